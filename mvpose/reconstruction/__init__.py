@@ -1,0 +1,7 @@
+"""From matched detections to people in 3D (paper, section 3.3): triangulation and pictorial structures."""
+
+from mvpose.reconstruction.likelihood import Noise
+from mvpose.reconstruction.pictorial import PictorialStructure
+from mvpose.reconstruction.triangulation import Triangulation
+
+__all__ = ["Noise", "PictorialStructure", "Triangulation"]
