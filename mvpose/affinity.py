@@ -81,14 +81,15 @@ def _ray_distance(view, origins, directions, weights, saturation):  # type: igno
         for b in range(a + 1, m):
             if view[a] == view[b]:
                 continue
-            wx, wy, wz = origins[a] - origins[b]
+            wx, wy = origins[a, 0] - origins[b, 0], origins[a, 1] - origins[b, 1]
+            wz = origins[a, 2] - origins[b, 2]
             total, mass, count = 0.0, 0.0, 0
             for j in range(joints):
                 weight = weights[a, j] * weights[b, j]
                 if weight <= 0.0:
                     continue
-                ux, uy, uz = directions[a, j]
-                vx, vy, vz = directions[b, j]
+                ux, uy, uz = directions[a, j, 0], directions[a, j, 1], directions[a, j, 2]
+                vx, vy, vz = directions[b, j, 0], directions[b, j, 1], directions[b, j, 2]
                 cosine = ux * vx + uy * vy + uz * vz
                 along_a = -(wx * ux + wy * uy + wz * uz)
                 along_b = wx * vx + wy * vy + wz * vz

@@ -73,41 +73,47 @@ def solve(
         return Relaxation(np.zeros((0, 0)), 0, (0.0, 0.0), 0.0, True)
     starts = block_starts(view)
     gain = np.where(view[:, None] == view[None, :], 0.0, affinity - alpha)
-    P, iterations, primal, dual = _admm(
-        np.ascontiguousarray(gain), starts, float(weight), float(rho), float(tolerance), most_iterations
-    )
+    P, iterations, primal, dual = _iterate(gain, starts, weight, rho, tolerance, most_iterations)
     objective = float(-(gain * P).sum() + weight * np.abs(np.linalg.eigvalsh(P)).sum())
     return Relaxation(P, iterations, (primal, dual), objective, primal < tolerance and dual < tolerance)
 
 
-@njit(cache=True)
-def _admm(gain, starts, weight, rho, tolerance, most_iterations):  # type: ignore[no-untyped-def]
+def _iterate(
+    gain: Floats, starts: NDArray[np.int64], weight: float, rho: float, tolerance: float, most_iterations: int
+) -> tuple[Floats, int, float, float]:
     m = len(gain)
     P = np.maximum(gain, 0.0)
     multipliers = np.zeros((len(starts), m))
     project_in_place(P, starts, multipliers)
-    Q = P.copy()
-    Y = weight * np.eye(m)
+    Q, Y = P.copy(), weight * np.eye(m)
     primal, dual, iteration = np.inf, np.inf, 0
     while iteration < most_iterations and (primal >= tolerance or dual >= tolerance):
         iteration += 1
-        before = Q
         values, vectors = np.linalg.eigh(P + Y / rho)
-        for k in range(m):
-            shrunk = max(abs(values[k]) - weight / rho, 0.0)
-            values[k] = shrunk if values[k] > 0 else -shrunk
-        Q = (vectors * values) @ vectors.T
-        P = Q - (Y - gain) / rho
-        P = 0.5 * (P + P.T)
-        project_in_place(P, starts, multipliers)
-        Y = Y + rho * (P - Q)
-        primal = np.sqrt(np.sum((P - Q) ** 2)) / m
-        dual = rho * np.sqrt(np.sum((Q - before) ** 2)) / m
+        shrunk = np.sign(values) * np.maximum(np.abs(values) - weight / rho, 0.0)
+        before, Q = Q, (vectors * shrunk) @ vectors.T
+        moved, gap = _project_and_ascend(Q, before, Y, gain, rho, P, starts, multipliers)
+        primal, dual = np.sqrt(gap) / m, rho * np.sqrt(moved) / m
         if iteration % _BALANCE_EVERY == 0:
-            if primal > _BALANCE * dual:
-                rho *= 2.0
-                multipliers *= 0.5
-            elif dual > _BALANCE * primal:
-                rho *= 0.5
-                multipliers *= 2.0
-    return P, iteration, primal, dual
+            factor = 2.0 if primal > _BALANCE * dual else 0.5 if dual > _BALANCE * primal else 1.0
+            rho *= factor
+            multipliers /= factor  # prices are per step: P's target is Q - (Y - gain) / rho
+    return P, iteration, float(primal), float(dual)
+
+
+@njit(cache=True)
+def _project_and_ascend(Q, before, Y, gain, rho, P, starts, multipliers):  # type: ignore[no-untyped-def]
+    """P onto C, Y up the dual, both in place; ``||Q - before||^2`` and ``||P - Q||^2``."""
+    m = len(Q)
+    for i in range(m):
+        for j in range(i, m):
+            target = 0.5 * (Q[i, j] + Q[j, i] - (Y[i, j] + Y[j, i] - gain[i, j] - gain[j, i]) / rho)
+            P[i, j] = P[j, i] = target
+    project_in_place(P, starts, multipliers)
+    moved, gap = 0.0, 0.0
+    for i in range(m):
+        for j in range(m):
+            moved += (Q[i, j] - before[i, j]) ** 2
+            gap += (P[i, j] - Q[i, j]) ** 2
+            Y[i, j] += rho * (P[i, j] - Q[i, j])
+    return moved, gap

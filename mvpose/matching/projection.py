@@ -14,8 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-10  # change of the multipliers
 MOST_SWEEPS = 10_000
+_SLACK = 1e-11  # of a row's sum; well above rounding for entries up to a thousand
 
 
 def project(matrix: ArrayLike, view: ArrayLike) -> NDArray[np.float64]:
@@ -90,7 +91,7 @@ def _solve_rows(Y, u, v):  # type: ignore[no-untyped-def]
                 if value > 0.0:
                     excess += value
                     above += 1
-            if excess <= 1e-15 * (1 + above):
+            if not excess > _SLACK:  # also ends on NaN
                 break
             price += excess / above
         change = max(change, abs(price - u[i]))

@@ -80,8 +80,11 @@ def add_ray(A, b, origin, direction, information):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def invert(A, out):  # type: ignore[no-untyped-def]
-    """Write the inverse of a symmetric (3, 3) into ``out``; False where it is singular to working precision."""
+def solve(A, b, inverse, point):  # type: ignore[no-untyped-def]
+    """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; False where A is singular in practice.
+
+    Written out: a call into LAPACK costs more than the work, and much more to compile.
+    """
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
     c01 = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]
     c02 = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
@@ -89,12 +92,12 @@ def invert(A, out):  # type: ignore[no-untyped-def]
     scale = (A[0, 0] + A[1, 1] + A[2, 2]) / 3.0
     if not determinant > 1e-12 * scale * scale * scale:
         return False
-    out[0, 0], out[0, 1], out[0, 2] = c00, c01, c02
-    out[1, 0] = c01
-    out[1, 1] = A[0, 0] * A[2, 2] - A[0, 2] * A[2, 0]
-    out[1, 2] = A[0, 1] * A[2, 0] - A[0, 0] * A[2, 1]
-    out[2, 0] = c02
-    out[2, 1] = out[1, 2]
-    out[2, 2] = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
-    out /= determinant
+    inverse[0, 0] = c00 / determinant
+    inverse[0, 1] = inverse[1, 0] = c01 / determinant
+    inverse[0, 2] = inverse[2, 0] = c02 / determinant
+    inverse[1, 1] = (A[0, 0] * A[2, 2] - A[0, 2] * A[2, 0]) / determinant
+    inverse[1, 2] = inverse[2, 1] = (A[0, 1] * A[2, 0] - A[0, 0] * A[2, 1]) / determinant
+    inverse[2, 2] = (A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]) / determinant
+    for r in range(3):
+        point[r] = inverse[r, 0] * b[0] + inverse[r, 1] * b[1] + inverse[r, 2] * b[2]
     return True

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, add_ray, invert, log_likelihood, view_terms
+from mvpose.reconstruction.likelihood import Noise, add_ray, log_likelihood, solve, view_terms
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -131,22 +131,25 @@ def _propose(origins, directions, weights, pixel, sigmas, floor):  # type: ignor
                     not together and (weights[first, j] <= 0.0 or weights[second, j] <= 0.0)
                 ):
                     continue
-                A[:] = 0.0
+                A[:, :] = 0.0
                 b[:] = 0.0
                 used = 0
                 for k in range(n):
                     if weights[k, j] > 0.0 and (together or k == first or k == second):
                         add_ray(A, b, origins[k], directions[k, j], weights[k, j])
                         used += 1
-                if used < 2 or not invert(A, inverse):
+                if used < (3 if together else 2) or not solve(A, b, inverse, point):
                     continue
-                point[:] = inverse @ b
                 ahead = True
                 for k in range(n):
                     if weights[k, j] > 0.0 and (together or k == first or k == second):
-                        ahead = ahead and np.dot(point - origins[k], directions[k, j]) > 0.0
+                        along = 0.0
+                        for r in range(3):
+                            along += (point[r] - origins[k, r]) * directions[k, j, r]
+                        ahead = ahead and along > 0.0
                 if ahead:
-                    states[j, count[j]] = point
+                    for r in range(3):
+                        states[j, count[j], r] = point[r]
                     unary[j, count[j]] = log_likelihood(
                         point, origins, directions[:, j], weights[:, j], pixel, sigmas[j], floor
                     )
@@ -165,13 +168,13 @@ def _refine(  # type: ignore[no-untyped-def]
     n, count = weights.shape
     scores = np.zeros(count)
     covariance = np.full((count, 3, 3), np.nan)
-    A, b, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    A, b = np.empty((3, 3)), np.empty(3)
     bone = np.empty(3)
-    for sweep in range(_SWEEPS):
+    for _ in range(_SWEEPS):
         for j in range(count):
             if np.isnan(joints[j, 0]):
                 continue
-            A[:] = 0.0
+            A[:, :] = 0.0
             for r in range(3):
                 A[r, r] = _LEASH
                 b[r] = _LEASH * joints[j, r]
@@ -200,8 +203,6 @@ def _refine(  # type: ignore[no-untyped-def]
                     for c in range(3):
                         A[r, c] += precision[child] * bone[r] * bone[c]
                     b[r] += precision[child] * bone[r] * (along + length[child])
-            invert(A, inverse)
-            joints[j] = inverse @ b
+            solve(A, b, covariance[j], joints[j])
             scores[j] = score / n
-            covariance[j] = inverse
     return scores, covariance

@@ -1,0 +1,19 @@
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# Kernels compile on first use, and machines are noisy: a deadline would time those, not the code.
+settings.register_profile("simharness", deadline=None, max_examples=50, derandomize=True)
+settings.load_profile("simharness")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real evaluation data; skips where it is absent."""
+    default = Path(__file__).parents[1] / ".." / "shared" / "data"
+    folder = Path(os.environ.get("SIMHARNESS_DATA", default)).resolve()
+    if not (folder / "shelf").is_dir():
+        pytest.skip(f"no evaluation data in {folder}; set SIMHARNESS_DATA to the folder that holds shelf/")
+    return folder

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+from test_projection import in_c
+
+from mvpose.matching import admm
+from mvpose.matching.projection import project
+
+
+def instance(seed, *, views=5, people=4, noise=0.2, miss=0.2):
+    """Affinities about 0.8 for the same person and 0.2 otherwise, with noise and missed people."""
+    rng = np.random.default_rng(seed)
+    view, person = np.array([(v, p) for v in range(views) for p in range(people) if rng.random() > miss]).T
+    affinity = np.where(person[:, None] == person, 0.8, 0.2) + noise * rng.standard_normal((len(view), len(view)))
+    affinity = np.clip(np.triu(affinity, 1) + np.triu(affinity, 1).T, 0, 1)
+    affinity[view[:, None] == view] = 0
+    return affinity, view, person
+
+
+def reference(affinity, view, *, alpha, weight, rho=1.0, iterations=20_000):
+    """Objective after a long run of Algorithm 1 as the paper prints it: random start, Y = 0, a fixed step."""
+    gain = np.where(view[:, None] == view, 0.0, affinity - alpha)
+    P, Y = np.random.default_rng(0).random(gain.shape), np.zeros(gain.shape)
+    P = 0.5 * (P + P.T)
+    for _ in range(iterations):
+        u, s, vt = np.linalg.svd(P + Y / rho)
+        Q = (u * np.maximum(s - weight / rho, 0)) @ vt
+        step = Q - (Y - gain) / rho
+        P = project(0.5 * (step + step.T), view)
+        Y = Y + rho * (P - Q)
+    assert np.abs(P - Q).max() < 1e-5  # the reference itself has converged
+    return -(gain * P).sum() + weight * np.linalg.svd(P, compute_uv=False).sum()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_constraints_hold_and_the_stop_is_honest(seed):
+    affinity, view, _ = instance(seed)
+    result = admm.solve(affinity, view)
+    assert in_c(result.P, view)
+    assert result.converged
+    assert max(result.residuals) < 5e-4
+    cut = admm.solve(affinity, view, most_iterations=3)
+    assert cut.iterations == 3
+    assert not cut.converged
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_objective_is_that_of_a_long_fixed_step_run(seed):
+    affinity, view, _ = instance(seed, views=4, people=3, noise=0.4)
+    expected = reference(affinity, view, alpha=0.5, weight=5.0)
+    result = admm.solve(affinity, view, alpha=0.5, weight=5.0, tolerance=1e-7, most_iterations=50_000)
+    assert result.converged
+    assert result.objective == pytest.approx(expected, abs=5e-4)  # of about 40; Q still differs from P by 1e-5
+
+
+def test_the_relaxation_bounds_every_grouping_from_below():
+    """A consistent P of any grouping lies in C, so its objective cannot be below the optimum."""
+    affinity, view, person = instance(3)
+    optimum = admm.solve(affinity, view, tolerance=1e-6, most_iterations=20_000).objective
+    truth = (person[:, None] == person).astype(float)
+    gain = np.where(view[:, None] == view, 0.0, affinity - 0.5)
+    assert optimum <= -(gain * truth).sum() + 50 * len(view) + 1e-3
+
+
+def test_clear_affinities_give_the_true_permutation():
+    affinity, view, person = instance(0, noise=0.05)
+    np.testing.assert_allclose(admm.solve(affinity, view).P, person[:, None] == person, atol=0.02)
+
+
+def test_cycle_consistency_overrules_a_pair():
+    """Detections 0, 1, 2 in three views: 0-2 alone looks wrong (0.3), but 0-1 and 1-2 vouch for it."""
+    affinity = np.array([[0, 0.9, 0.3], [0.9, 0, 0.9], [0.3, 0.9, 0]])
+    assert admm.solve(affinity, np.arange(3)).P[0, 2] > 0.9
+
+
+def test_one_detection_and_none():
+    assert admm.solve(np.zeros((0, 0)), np.zeros(0, int)).P.shape == (0, 0)
+    np.testing.assert_allclose(admm.solve(np.zeros((1, 1)), np.zeros(1, int)).P, 1)

@@ -1,0 +1,105 @@
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from people import STANDING, detect, ring
+
+from mvpose import COCO17, SHELF14, Detections
+from mvpose.rays import viewing_rays
+from mvpose.reconstruction import PictorialStructure, Triangulation
+from mvpose.reconstruction.bones import bone_lengths
+from mvpose.reconstruction.pictorial import max_product
+
+
+def total(states, unary, chosen, parents, length, deviation, count):
+    """The log-posterior of a choice, written out; joints without states take no part."""
+    value = 0.0
+    for joint, parent in enumerate(parents):
+        if count[joint] == 0:
+            continue
+        value += unary[joint, chosen[joint]]
+        if parent >= 0 and count[parent] > 0:
+            bone = np.linalg.norm(states[joint, chosen[joint]] - states[parent, chosen[parent]])
+            value -= 0.5 * ((bone - length[joint]) / deviation[joint]) ** 2
+    return value
+
+
+@given(st.integers(0, 100_000))
+def test_max_product_is_the_best_of_all_combinations(seed):
+    rng = np.random.default_rng(seed)
+    joints, most = 6, 4
+    parents = np.array([-1] + [rng.integers(0, k) for k in range(1, joints)])
+    order = rng.permutation(joints)  # parents may come after their children
+    parents = np.array([-1 if parents[k] < 0 else np.argmax(order == parents[k]) for k in order])
+    count = rng.integers(0, most + 1, joints)
+    states, unary = rng.standard_normal((joints, most, 3)), 3 * rng.standard_normal((joints, most))
+    length, deviation = rng.uniform(0.5, 2, joints), rng.choice([0.2, 0.5, np.inf], joints)
+    problem = (parents, length, deviation, count)
+    chosen = max_product(states, unary, count, parents=parents, length=length, deviation=deviation)
+    best = max(
+        total(states, unary, choice, *problem) for choice in itertools.product(*(range(max(c, 1)) for c in count))
+    )
+    assert total(states, unary, chosen, *problem) == pytest.approx(best, abs=1e-9)
+
+
+def wrong_elbow(rig):
+    """A person whose left elbow two views of four put in one same wrong place, half a metre off."""
+    pixels = rig.project(STANDING)
+    far = STANDING[7] + [0.4, 0.4, 0.1]  # across the line of sight of both
+    for view in (0, 1):
+        pixels[view, 7] = rig[view].project(far)
+    scores = np.full(pixels.shape[:2], 0.8)
+    scores[:2, 7] = 0.9  # and the wrong ones are surer of themselves
+    return viewing_rays(rig, Detections.from_keypoints(np.arange(len(rig)), pixels, scores))
+
+
+def test_the_prior_overrules_views_that_agree_on_an_impossible_limb():
+    rays = wrong_elbow(ring(4))
+    by_itself, _, _ = Triangulation()(rays, COCO17)
+    in_structure, _, _ = PictorialStructure()(rays, COCO17)
+    assert np.linalg.norm(by_itself[7] - STANDING[7]) > 0.3
+    assert np.linalg.norm(in_structure[7] - STANDING[7]) < 0.05
+
+
+def test_a_joint_without_evidence_is_missing_and_does_not_disturb_the_rest():
+    rig = ring(4)
+    scores = np.full((4, 17), 0.9)
+    scores[:, 11] = 0  # a hip in the middle of the tree
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
+    joints, scores, _ = PictorialStructure()(rays, COCO17)
+    assert np.isnan(joints[11]).all()
+    assert scores[11] == 0
+    others = np.delete(np.arange(17), 11)
+    assert np.linalg.norm(joints[others] - STANDING[others], axis=1).max() < 0.03
+
+
+def test_the_prior_pulls_an_average_adult_little():
+    rig = ring(5)
+    rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False)[0])
+    joints, _, _ = PictorialStructure()(rays, COCO17)
+    assert np.linalg.norm(joints - STANDING, axis=1).max() < 0.015
+
+
+def test_many_views_keep_the_likeliest_states():
+    rig = ring(14)  # 91 pairs
+    rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False, noise=2.0)[0])
+    few, _, _ = PictorialStructure(most_states=8)(rays, COCO17)
+    many, _, _ = PictorialStructure(most_states=500)(rays, COCO17)
+    np.testing.assert_allclose(few, many, atol=2e-3)
+
+
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
+def test_bone_lengths_are_symmetric_and_human(skeleton):
+    mean, deviation = bone_lengths(skeleton)
+    for joint, mirrored in enumerate(skeleton.mirror):
+        if skeleton.mirror[skeleton.parents[joint]] == skeleton.parents[mirrored]:
+            assert mean[joint] == mean[mirrored]
+    bones = np.flatnonzero(np.isfinite(deviation))
+    assert len(bones) == len(skeleton) - 1
+    assert (deviation[bones] < 0.35 * mean[bones]).all()
+    if skeleton is COCO17:  # the standing figure is 1.75 m tall: every bone within three deviations
+        real = [np.linalg.norm(STANDING[c] - STANDING[p]) for p, c in skeleton.edges]
+        wrong = np.abs(np.array(real) - [mean[c] for _, c in skeleton.edges])
+        assert (wrong < 3 * np.array([deviation[c] for _, c in skeleton.edges])).all()

@@ -1,0 +1,93 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from people import crowd, detect, ring
+from scipy.optimize import linear_sum_assignment
+
+from mvpose import Camera, Detections, Pipeline, Rig
+from mvpose.pipeline import PRESETS
+
+
+def errors(estimate, people):
+    """Largest joint error of each true person against its one-to-one estimate, metres."""
+    distance = np.linalg.norm(estimate.joints[:, None] - people[None], axis=3).max(axis=2)
+    mine, true = linear_sum_assignment(distance)
+    return distance[mine, true]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize(("views", "count"), [(2, 1), (3, 2), (5, 4), (8, 6)])
+def test_everybody_is_found_where_they_are(preset, views, count):
+    rig = Rig(list(ring(max(views, 5)))[:views])  # two cameras that face each other cannot triangulate
+    people = crowd(count)
+    detections, person = detect(rig, people)
+    estimate = Pipeline.preset(preset).estimate(rig, detections)
+    assert len(estimate) == count
+    assert errors(estimate, people).max() < (1e-3 if preset == "no-3dps" else 0.04)
+    labels = estimate.matching.labels
+    np.testing.assert_array_equal(labels[:, None] == labels, person[:, None] == person)
+
+
+def test_noise_of_three_pixels_costs_centimetres():
+    rig, people = ring(5), crowd(4)
+    detections, _ = detect(rig, people, noise=3.0)
+    assert errors(Pipeline().estimate(rig, detections), people).max() < 0.06
+
+
+def test_phantoms_become_nobody():
+    rig, people = ring(5), crowd(2)
+    detections, person = detect(rig, people)
+    phantom = np.full((1, 17, 2), 200.0) + 60 * np.random.default_rng(0).standard_normal((17, 2))
+    with_phantom = Detections.from_keypoints(
+        [*detections.view, 3], np.concatenate([detections.keypoints, phantom]), np.full((len(person) + 1, 17), 0.9)
+    )
+    estimate = Pipeline().estimate(rig, with_phantom)
+    assert len(estimate) == 2
+    assert estimate.matching.labels[-1] == -1
+
+
+def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
+    rig, people = ring(4), crowd(3)
+    detections, _ = detect(rig, people, noise=2.0)
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    shift = np.array([30.0, -12.0, 5.0])
+    moved = Rig([Camera(c.K, c.R @ turn.T, c.t - c.R @ turn.T @ shift, c.distortion, c.size) for c in rig])
+    order = np.random.default_rng(1).permutation(len(detections))
+    shuffled = Detections.from_keypoints(
+        detections.view[order], detections.keypoints[order], detections.scores[order]
+    )
+    here, there = Pipeline().estimate(rig, detections), Pipeline().estimate(moved, shuffled)
+    assert errors(there, here.joints @ turn.T + shift).max() < 1e-6
+    assert len(here) == len(there) == 3
+
+
+@pytest.mark.parametrize("view", [[], [0], [0, 0, 0]])
+def test_nothing_to_match_is_nobody(view):
+    keypoints = np.random.default_rng(0).uniform(0, 600, (len(view), 17, 2))
+    estimate = Pipeline().estimate(ring(3), Detections.from_keypoints(view, keypoints, np.ones((len(view), 17))))
+    assert estimate.joints.shape == (0, 17, 3)
+    assert (estimate.matching.labels == -1).all()
+
+
+def test_timings_add_up_and_the_estimate_is_whole():
+    rig = ring(5)
+    estimate = Pipeline().estimate(rig, detect(rig, crowd(2))[0])
+    stages = {"affinity", "matching", "reconstruction"}
+    assert set(estimate.timings) == stages | {"total"}
+    assert sum(estimate.timings[s] for s in stages) == pytest.approx(estimate.timings["total"])
+    assert estimate.scores.shape == (2, 17)
+    assert estimate.covariance.shape == (2, 17, 3, 3)
+    assert np.linalg.eigvalsh(estimate.covariance).min() > 0
+
+
+def test_an_unknown_preset_names_the_known_ones():
+    with pytest.raises(ValueError, match="full, no-3dps"):
+        Pipeline.preset("best")
+
+
+def test_the_method_stands_alone():
+    """mvpose runs on real cameras: importing it must bring in neither the simulator nor a renderer."""
+    code = "import sys, mvpose; print(*(m for m in ('simharness', 'mujoco', 'pyrender', 'cv2', 'polars') if m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
