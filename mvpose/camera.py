@@ -59,14 +59,16 @@ class Camera:
                 f"determinant {np.linalg.det(self.R):.3f}); expected rows of unit length at right angles"
             )
         if self.K[0, 0] <= 0 or self.K[1, 1] <= 0:
-            raise ValueError(f"camera {self.name!r}: focal lengths must be positive, got {self.K[0, 0]}, {self.K[1, 1]}")
+            raise ValueError(
+                f"camera {self.name!r}: focal lengths must be positive, got {self.K[0, 0]}, {self.K[1, 1]}"
+            )
         width, height = self.size
         if width <= 0 or height <= 0:
             raise ValueError(f"camera {self.name!r}: size must be (width, height) in pixels, got {self.size}")
         object.__setattr__(self, "size", (int(width), int(height)))
 
     @cached_property
-    def P(self) -> Floats:  # noqa: N802 (the field's name)
+    def P(self) -> Floats:
         """Projection matrix ``K [R | t]``, (3, 4), without distortion."""
         return self.K @ np.column_stack([self.R, self.t])
 
@@ -114,7 +116,8 @@ class Camera:
         """Which pixels (..., 2) fall on the image: within half a pixel of a pixel's centre."""
         pixels = np.asarray(pixels, float)
         with np.errstate(invalid="ignore"):
-            return ((pixels >= -0.5) & (pixels < np.array(self.size) - 0.5)).all(axis=-1)
+            low, high = pixels >= -0.5, pixels < np.array(self.size) - 0.5
+        return np.all(low & high, axis=-1)
 
     def _normalized(self, pixels: ArrayLike) -> Floats:
         pixels = np.asarray(pixels, float)
@@ -132,7 +135,10 @@ def _distort(xy: Floats, distortion: Floats) -> Floats:
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
     return np.stack(
-        [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
+        [
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        ],
         axis=-1,
     )
 
@@ -186,7 +192,7 @@ class Rig:
         return self.cameras[view]
 
     @cached_property
-    def P(self) -> Floats:  # noqa: N802 (the field's name)
+    def P(self) -> Floats:
         """Projection matrices, (V, 3, 4)."""
         return np.stack([camera.P for camera in self.cameras])
 
@@ -196,7 +202,7 @@ class Rig:
         return np.stack([camera.center for camera in self.cameras])
 
     @cached_property
-    def F(self) -> Floats:  # noqa: N802 (the field's name)
+    def F(self) -> Floats:
         """Fundamental matrices, (V, V, 3, 3): ``x_jᵀ F[i, j] x_i = 0``, so ``F[i, j] x_i`` is a line in view j.
 
         Of undistorted pixels; scaled to unit Frobenius norm; zero where i = j or the centres coincide.

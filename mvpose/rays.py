@@ -41,7 +41,11 @@ class Rays:
     def select(self, which: NDArray[np.bool_]) -> Rays:
         """Keep only some of the detections, (m,)."""
         return Rays(
-            self.view[which], self.origins[which], self.directions[which], self.weights[which], self.pixel[which]
+            self.view[which],
+            self.origins[which],
+            self.directions[which],
+            self.weights[which],
+            self.pixel[which],
         )
 
 

@@ -37,7 +37,9 @@ class Skeleton:
         count = len(self.joints)
         for key in ("parents", "mirror", "sigmas"):
             if len(getattr(self, key)) != count:
-                raise ValueError(f"skeleton {self.name!r}: {key} must have {count} entries, got {len(getattr(self, key))}")
+                raise ValueError(
+                    f"skeleton {self.name!r}: {key} must have {count} entries, got {len(getattr(self, key))}"
+                )
         if self.parents.count(-1) != 1 or not all(-1 <= parent < count for parent in self.parents):
             raise ValueError(f"skeleton {self.name!r}: parents must name one root (-1) and joints below {count}")
         reached = {self.parents.index(-1)}
@@ -89,7 +91,6 @@ SHELF14 = Skeleton(
 )
 
 _LIMBS_COCO17_TO_SHELF14 = (16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9)
-_BODY25_TO_COCO17 = (0, 16, 15, 18, 17, 5, 2, 6, 3, 7, 4, 12, 9, 13, 10, 14, 11)
 # fmt: on
 
 
@@ -119,11 +120,3 @@ def coco17_to_shelf14(joints: ArrayLike, *, head: HeadMapping = "voxelpose") -> 
         raise ValueError(f"head mapping must be 'voxelpose' or '2019', got {head!r}")
     limbs = joints[..., _LIMBS_COCO17_TO_SHELF14, :]
     return np.concatenate([limbs, bottom[..., None, :], top[..., None, :]], axis=-2)
-
-
-def body25_to_coco17(keypoints: ArrayLike) -> Floats:
-    """Pick the COCO-17 keypoints out of OpenPose's BODY_25: (..., 25, d) to (..., 17, d)."""
-    keypoints = np.asarray(keypoints, float)
-    if keypoints.ndim < 2 or keypoints.shape[-2] != 25:
-        raise ValueError(f"BODY_25 keypoints must be (..., 25, d), got {keypoints.shape}")
-    return keypoints[..., _BODY25_TO_COCO17, :]

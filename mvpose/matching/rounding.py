@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def round_to_people(
-    P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5
-) -> NDArray[np.int64]:
+def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5) -> NDArray[np.int64]:
     """Group detections whose P exceeds the threshold, at most one detection of a view in a group.
 
     Pairs are joined from the surest down; a pair that would put two detections of one view into a group is
@@ -24,7 +22,7 @@ def round_to_people(
     """
     m = len(view)
     group = np.arange(m)
-    first, second = np.nonzero(np.triu(P > threshold, k=1))
+    first, second = np.nonzero(np.triu(threshold < P, k=1))
     for k in np.argsort(-P[first, second], kind="stable"):
         mine, other = group[first[k]], group[second[k]]
         if mine != other:

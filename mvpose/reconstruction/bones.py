@@ -49,7 +49,9 @@ def bone_lengths(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.fl
     """
     mean, deviation = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
     for parent, child in skeleton.edges:
-        ends = frozenset(skeleton.joints[joint].removeprefix("left_").removeprefix("right_") for joint in (parent, child))
+        ends = frozenset(
+            skeleton.joints[joint].removeprefix("left_").removeprefix("right_") for joint in (parent, child)
+        )
         if ends in _BONES:
             mean[child], definition = _BONES[ends]
             deviation[child] = np.hypot(_POPULATION * mean[child], definition)

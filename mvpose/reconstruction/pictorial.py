@@ -39,7 +39,12 @@ class PictorialStructure:
         length, deviation = bone_lengths(skeleton)
         proposals = _keep_likely(propose(rays, self.noise.sigmas(skeleton), self.noise), self.most_states)
         chosen = max_product(
-            proposals.states, proposals.unary, proposals.count, parents=skeleton.parents, length=length, deviation=deviation
+            proposals.states,
+            proposals.unary,
+            proposals.count,
+            parents=skeleton.parents,
+            length=length,
+            deviation=deviation,
         )
         return refine(rays, skeleton, proposals, chosen, self.noise, length=length, deviation=deviation)
 

@@ -188,7 +188,11 @@ def _refine(  # type: ignore[no-untyped-def]
                     score += right * weights[k, j]
             for other in range(count):
                 child = j if parents[j] == other else other
-                if (parents[j] != other and parents[other] != j) or precision[child] == 0.0 or np.isnan(joints[other, 0]):
+                if (
+                    (parents[j] != other and parents[other] != j)
+                    or precision[child] == 0.0
+                    or np.isnan(joints[other, 0])
+                ):
                     continue
                 now = 0.0
                 for r in range(3):

@@ -83,7 +83,8 @@ class Rendering(_Section):
     """How the views are made."""
 
     renderer: Literal["auto", "raster", "gl"] = Field(
-        "raster", description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made"
+        "raster",
+        description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made",
     )
 
 

@@ -14,7 +14,13 @@ from mvpose.rays import Rays, viewing_rays
 def two_rays(origin, direction, other_origin, other_direction):
     directions = np.array([[direction], [other_direction]], float)
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
-    return Rays(np.array([0, 1]), np.array([origin, other_origin], float), directions, np.ones((2, 1)), np.full(2, 1e-3))
+    return Rays(
+        np.array([0, 1]),
+        np.array([origin, other_origin], float),
+        directions,
+        np.ones((2, 1)),
+        np.full(2, 1e-3),
+    )
 
 
 @given(st.integers(0, 100_000))
@@ -52,7 +58,10 @@ def test_epipolar_distance_is_the_mean_over_both_lines():
     rig, people = ring(3), crowd(2)
     detections, person = detect(rig, people, noise=5.0)
     distance = epipolar_distance(rig, detections)
-    a, b = np.argmax((detections.view == 0) & (person == 0)), np.argmax((detections.view == 1) & (person == 1))
+    a, b = (
+        np.argmax((detections.view == 0) & (person == 0)),
+        np.argmax((detections.view == 1) & (person == 1)),
+    )
     x, y = detections.keypoints[a], detections.keypoints[b]
     in_b = cv2.computeCorrespondEpilines(x[:, None], 1, rig.F[0, 1])[:, 0]  # normalised lines
     in_a = cv2.computeCorrespondEpilines(y[:, None], 2, rig.F[0, 1])[:, 0]
@@ -83,7 +92,12 @@ def test_ray_affinity_does_not_depend_on_resolution():
     for scale in (0.25, 1.0, 4.0):
         rig = ring(4)
         cameras = [
-            Camera(np.diag([scale, scale, 1]) @ c.K, c.R, c.t, size=(int(c.size[0] * scale), int(c.size[1] * scale)))
+            Camera(
+                np.diag([scale, scale, 1]) @ c.K,
+                c.R,
+                c.t,
+                size=(int(c.size[0] * scale), int(c.size[1] * scale)),
+            )
             for c in rig
         ]
         detections, _ = detect(Rig(cameras), people, noise=3.0 * scale)

@@ -35,10 +35,8 @@ def test_rays_undo_projection(distortion):
     offset = points - camera.center
     np.testing.assert_allclose(np.linalg.norm(np.cross(offset, rays), axis=1), 0, atol=1e-8)
     assert ((offset * rays).sum(axis=1) > 0).all()
-    np.testing.assert_allclose(
-        camera.undistort(camera.project(points)), Camera(camera.K, camera.R, camera.t, size=camera.size).project(points),
-        atol=1e-6,
-    )  # fmt: skip
+    pinhole = Camera(camera.K, camera.R, camera.t, size=camera.size)
+    np.testing.assert_allclose(camera.undistort(camera.project(points)), pinhole.project(points), atol=1e-6)
 
 
 def test_world_up_is_image_up_and_right_is_right():
@@ -64,7 +62,8 @@ def test_image_reaches_half_a_pixel_beyond_the_outer_centres():
 @given(st.integers(0, 10_000))
 def test_fundamental_matrices_vanish_on_true_points(seed):
     rng = np.random.default_rng(seed)
-    rig = Rig([look_at(rng.uniform([-5, -5, 0.5], [5, 5, 3]), rng.uniform(-0.5, 0.5, 3) + [0, 0, 1]) for _ in range(3)])
+    centers, targets = rng.uniform([-5, -5, 0.5], [5, 5, 3], (3, 3)), rng.uniform(-0.5, 0.5, (3, 3)) + [0, 0, 1]
+    rig = Rig([look_at(center, target) for center, target in zip(centers, targets, strict=True)])
     point = rng.uniform([-0.5, -0.5, 0.5], [0.5, 0.5, 1.5])
     pixels = np.column_stack([rig.project(point), np.ones(3)])
     seen = np.isfinite(pixels).all(axis=1)

@@ -41,7 +41,9 @@ def test_phantoms_become_nobody():
     detections, person = detect(rig, people)
     phantom = np.full((1, 17, 2), 200.0) + 60 * np.random.default_rng(0).standard_normal((17, 2))
     with_phantom = Detections.from_keypoints(
-        [*detections.view, 3], np.concatenate([detections.keypoints, phantom]), np.full((len(person) + 1, 17), 0.9)
+        [*detections.view, 3],
+        np.concatenate([detections.keypoints, phantom]),
+        np.full((len(person) + 1, 17), 0.9),
     )
     estimate = Pipeline().estimate(rig, with_phantom)
     assert len(estimate) == 2
@@ -55,9 +57,7 @@ def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
     shift = np.array([30.0, -12.0, 5.0])
     moved = Rig([Camera(c.K, c.R @ turn.T, c.t - c.R @ turn.T @ shift, c.distortion, c.size) for c in rig])
     order = np.random.default_rng(1).permutation(len(detections))
-    shuffled = Detections.from_keypoints(
-        detections.view[order], detections.keypoints[order], detections.scores[order]
-    )
+    shuffled = Detections.from_keypoints(detections.view[order], detections.keypoints[order], detections.scores[order])
     here, there = Pipeline().estimate(rig, detections), Pipeline().estimate(moved, shuffled)
     assert errors(there, here.joints @ turn.T + shift).max() < 1e-6
     assert len(here) == len(there) == 3
@@ -88,6 +88,7 @@ def test_an_unknown_preset_names_the_known_ones():
 
 
 def test_the_method_stands_alone():
-    """mvpose runs on real cameras: importing it must bring in neither the simulator nor a renderer."""
-    code = "import sys, mvpose; print(*(m for m in ('simharness', 'mujoco', 'pyrender', 'cv2', 'polars') if m in sys.modules))"
+    """Mvpose runs on real cameras: importing it must bring in neither the simulator nor a renderer."""
+    strangers = ("simharness", "mujoco", "pyrender", "cv2", "polars")
+    code = f"import sys, mvpose; print(*(m for m in {strangers} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []

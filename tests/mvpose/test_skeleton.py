@@ -3,7 +3,7 @@ import pytest
 from people import STANDING
 
 from mvpose import COCO17, SHELF14, Skeleton
-from mvpose.skeleton import body25_to_coco17, coco17_to_shelf14
+from mvpose.skeleton import coco17_to_shelf14
 
 
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
@@ -50,13 +50,3 @@ def test_head_mappings_by_hand():
     np.testing.assert_allclose(new[13], 0.75 * old[13] + 0.25 * np.array([0, 0, 1.775]))
     with pytest.raises(ValueError, match="voxelpose"):
         coco17_to_shelf14(joints, head="2020")
-
-
-def test_body25_by_name():
-    body25 = (
-        "nose neck right_shoulder right_elbow right_wrist left_shoulder left_elbow left_wrist mid_hip right_hip "
-        "right_knee right_ankle left_hip left_knee left_ankle right_eye left_eye right_ear left_ear"
-    ).split()
-    keypoints = np.arange(25.0)[:, None]
-    picked = body25_to_coco17(keypoints)[:, 0].astype(int)
-    assert [body25[k] for k in picked] == list(COCO17.joints)

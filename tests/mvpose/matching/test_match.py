@@ -12,7 +12,9 @@ def anything(draw):
     """Affinities of any values, views in any order."""
     rng = np.random.default_rng(draw(st.integers(0, 100_000)))
     view = rng.integers(0, draw(st.integers(1, 6)), draw(st.integers(0, 14)))
-    affinity = rng.choice([0.0, 0.3, 0.5, 0.7, 1.0], (len(view), len(view))) * rng.random((len(view), len(view))).round(1)
+    affinity = rng.choice([0.0, 0.3, 0.5, 0.7, 1.0], (len(view), len(view))) * rng.random((len(view), len(view))).round(
+        1
+    )
     affinity = np.triu(affinity, 1)
     affinity = affinity + affinity.T
     return affinity, view

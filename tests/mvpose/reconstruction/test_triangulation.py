@@ -58,7 +58,10 @@ def test_every_pair_of_views_proposes_and_so_do_all_together():
 def test_rays_that_meet_behind_the_cameras_propose_nothing():
     rig = Rig([look_at([4, y, 1], [0, y, 1]) for y in (-0.5, 0.5)])  # side by side; image right is world +y
     pixels = rig.project(STANDING)
-    pixels[:, 9] = [[100, 480], [1180, 480]]  # the left camera sees the wrist on its left, the right on its right
+    pixels[:, 9] = [
+        [100, 480],
+        [1180, 480],
+    ]  # the left camera sees the wrist on its left, the right on its right
     proposals = propose(rays_of(rig, pixels), Noise().sigmas(COCO17), Noise())
     assert proposals.count[9] == 0
     assert (np.delete(proposals.count, 9) == 1).all()

@@ -1,0 +1,25 @@
+"""How far apart true and estimated people are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def mean_distances(truth: Floats, estimate: Floats) -> Floats:
+    """Mean distance of the joints that both have, of every true person to every estimate.
+
+    Args:
+        truth: (P, J, 3), metres; NaN where undefined.
+        estimate: (n, J, 3), metres; NaN where missing.
+
+    Returns:
+        (P, n), metres; infinite where the two share no joint.
+    """
+    distance = np.linalg.norm(truth[:, None] - estimate[None], axis=-1)
+    shared = np.isfinite(distance)
+    count = shared.sum(axis=-1)
+    total = np.where(shared, distance, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)

@@ -1,0 +1,92 @@
+"""Every score of one frame in one place: what simulated runs and real data both produce and tabulate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose import COCO17, SHELF14
+from mvpose.checks import as_array
+from mvpose.skeleton import HeadMapping, coco17_to_shelf14
+from simharness.scoring.matching import PairCounts
+from simharness.scoring.pcp import percent, score_parts
+from simharness.scoring.pose import Pairing, pair
+
+
+@dataclass(frozen=True)
+class FrameScore:
+    """The scores of one frame.
+
+    Attributes:
+        parts: what became of every part of every true person, (P, 10), :class:`simharness.scoring.pcp.Part`.
+        pairing: the one-to-one pairs.
+        matching: detection pairs, or None where the true person of a detection is not known (real data).
+    """
+
+    parts: NDArray[np.int8]
+    pairing: Pairing
+    matching: PairCounts | None = None
+
+    def row(self) -> dict[str, Any]:
+        """The scores as one flat row of a table, free of NaN.
+
+        ``pcp`` is over the parts of this frame, ``mpjpe_mm`` the mean over its pairs (None without any).
+        ``parts`` holds ten values and ``errors_mm`` one (None for no pair) for each true person in turn.
+        """
+        errors = [None if np.isnan(error) else 1000.0 * float(error) for error in self.pairing.error]
+        known = [error for error in errors if error is not None]
+        matching = self.matching
+        return {
+            "people": self.pairing.people,
+            "estimates": self.pairing.estimates,
+            "found": self.pairing.found,
+            "missed": self.pairing.missed,
+            "ghosts": self.pairing.ghosts,
+            "pcp": percent(self.parts),
+            "mpjpe_mm": float(np.mean(known)) if known else None,
+            "pairs_correct": matching.correct if matching else None,
+            "pairs_wrong": matching.wrong if matching else None,
+            "pairs_lost": matching.lost if matching else None,
+            "errors_mm": errors,
+            "parts": self.parts.ravel().tolist(),
+        }
+
+
+def score_frame(
+    truth: ArrayLike,
+    estimate: ArrayLike,
+    *,
+    head: HeadMapping = "voxelpose",
+    matching: PairCounts | None = None,
+) -> FrameScore:
+    """Score the people of one frame.
+
+    Args:
+        truth: metres, (P, 17, 3) on COCO17 or (P, 14, 3) on SHELF14; NaN where undefined.
+        estimate: metres, (n, J, 3) on the truth's skeleton, or on COCO17 where the truth is on SHELF14; NaN
+            where missing.
+        head: how COCO-17 becomes the head of SHELF14. PCP is always judged on SHELF14; one-to-one pairs and
+            their errors on the truth's skeleton.
+        matching: :func:`simharness.scoring.matching.count_pairs` of the frame, where the true person of every
+            detection is known.
+
+    Raises:
+        ValueError: a wrong shape.
+    """
+    truth = as_array(truth, ("P", "J", 3), "truth")
+    estimate = as_array(estimate, ("n", "J", 3), "estimate")
+    parts = score_parts(_on_shelf14(truth, head, "truth"), _on_shelf14(estimate, head, "estimate"))
+    if truth.shape[1] == len(SHELF14):
+        estimate = _on_shelf14(estimate, head, "estimate")
+    return FrameScore(parts, pair(truth, estimate), matching)
+
+
+def _on_shelf14(joints: NDArray[np.float64], head: HeadMapping, name: str) -> NDArray[np.float64]:
+    if joints.shape[1] == len(COCO17):
+        return coco17_to_shelf14(joints, head=head)
+    if joints.shape[1] == len(SHELF14):
+        return joints
+    raise ValueError(f"{name} must have the 17 joints of COCO17 or the 14 of SHELF14, got {joints.shape[1]}")

@@ -1,0 +1,132 @@
+"""From frames to the summary that programs read: ``summary.json`` of a run and ``--json`` of ``evaluate``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from importlib.metadata import version
+from operator import add
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simharness.scoring.frame import FrameScore
+from simharness.scoring.pcp import GROUPS, percent
+
+STAGES = ("affinity", "matching", "reconstruction", "total")
+
+
+@dataclass(frozen=True)
+class VariantScores:
+    """What one variant of the method scored.
+
+    Attributes:
+        frames: the scored frames; every one with the same P people in the same order.
+        timings: ``Estimate.timings`` of every frame that was timed, seconds by stage.
+    """
+
+    frames: tuple[FrameScore, ...]
+    timings: tuple[Mapping[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frames", tuple(self.frames))
+        object.__setattr__(self, "timings", tuple(self.timings))
+        counts = sorted({len(frame.parts) for frame in self.frames})
+        if len(counts) > 1:
+            raise ValueError(f"all frames must count the same people, got frames of {counts[0]} and of {counts[-1]}")
+
+    def summary(self, *, actors: Sequence[int] | None = None) -> dict[str, Any]:
+        """The summary of this variant.
+
+        Args:
+            actors: the people whose PCP counts, by index; all when not given.
+
+        Returns:
+            ``pcp`` and ``pcp_parts`` (percent; means over the actors, so that everyone counts the same
+            however often seen), ``pcp_actors``, ``precision`` and ``recall`` of people, ``ghosts_per_frame``,
+            ``missed_per_frame``, ``mpjpe_mm`` over all one-to-one pairs, ``matching`` over all pairs of
+            detections, ``timings_ms`` by stage. None where a score does not apply; never NaN.
+        """
+        pairings = [frame.pairing for frame in self.frames]
+        found, people = sum(p.found for p in pairings), sum(p.people for p in pairings)
+        estimates, ghosts = sum(p.estimates for p in pairings), sum(p.ghosts for p in pairings)
+        errors = np.concatenate([np.zeros(0), *(p.error for p in pairings)]) * 1000.0
+        errors = errors[np.isfinite(errors)]
+        table = self.pcp_table(actors=actors)
+        return {
+            "pcp": _mean(row["all"] for row in table),
+            "pcp_parts": {group: _mean(row[group] for row in table) for group in GROUPS},
+            "pcp_actors": [row["all"] for row in table],
+            "precision": found / estimates if estimates else None,
+            "recall": found / people if people else None,
+            "ghosts_per_frame": ghosts / len(pairings) if pairings else None,
+            "missed_per_frame": (people - found) / len(pairings) if pairings else None,
+            "mpjpe_mm": {"mean": _statistic(np.mean, errors), "median": _statistic(np.median, errors)},
+            "matching": self._matching(),
+            "timings_ms": {stage: self._timing(stage) for stage in STAGES},
+        }
+
+    def pcp_table(self, *, actors: Sequence[int] | None = None) -> list[dict[str, float | None]]:
+        """PCP of every actor by group of parts and of ``"all"`` ten, percent; None where undefined."""
+        if not self.frames:
+            return []
+        parts = np.stack([frame.parts for frame in self.frames])
+        chosen = range(parts.shape[1]) if actors is None else actors
+        return [
+            {group: percent(parts[:, actor, list(index)]) for group, index in GROUPS.items()}
+            | {"all": percent(parts[:, actor])}
+            for actor in chosen
+        ]
+
+    def _matching(self) -> dict[str, float | None]:
+        counts = [frame.matching for frame in self.frames if frame.matching is not None]
+        total = reduce(add, counts) if counts else None
+        return {key: getattr(total, key, None) for key in ("precision", "recall", "f1")}
+
+    def _timing(self, stage: str) -> dict[str, float | None]:
+        times = np.array([1000.0 * timing[stage] for timing in self.timings if stage in timing])
+        return {
+            "median": _statistic(np.median, times),
+            "p99": _statistic(lambda values: np.percentile(values, 99), times),
+        }
+
+
+def summarize(
+    name: str,
+    variants: Mapping[str, VariantScores],
+    *,
+    frames: int,
+    seeds: int,
+    actors: Sequence[int] | None = None,
+    **more: Any,
+) -> dict[str, Any]:
+    """The summary of a whole run, in the one shape that ``run`` and ``evaluate`` share; JSON-ready.
+
+    Args:
+        name: of the scenario or data set.
+        variants: scores by variant.
+        frames: how many frames the method saw.
+        seeds: how many seeds, 0 for recorded data.
+        actors: the people whose PCP counts, by index; all when not given.
+        more: further keys that stand beside the shared ones.
+    """
+    return dict(
+        name=name,
+        frames=frames,
+        seeds=seeds,
+        code=version("simharness"),
+        variants={key: scores.summary(actors=actors) for key, scores in variants.items()},
+        **more,
+    )
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return math.fsum(known) / len(known) if known else None
+
+
+def _statistic(function: Callable[[NDArray[np.float64]], np.floating], values: NDArray[np.float64]) -> float | None:
+    return float(function(values)) if len(values) else None

@@ -1,0 +1,54 @@
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simharness.scoring.matching import PairCounts, count_pairs
+
+
+def test_a_perfect_matching():
+    counts = count_pairs([0, 0, 1, 1, 2], [0, 1, 0, 1, 0], [7, 3, 7, 3, 7])
+    assert counts == PairCounts(correct=4, wrong=0, lost=0)
+    assert (counts.precision, counts.recall, counts.f1) == (1.0, 1.0, 1.0)
+
+
+def test_one_view_of_three_matched_to_the_wrong_person():
+    # Person 0 in views 0, 1, 2; person 1 in view 2 only, matched in place of person 0's detection there.
+    counts = count_pairs([0, 1, 2, 2], [0, 0, -1, 0], [0, 0, 0, 1])
+    assert counts == PairCounts(correct=1, wrong=2, lost=2)
+    assert counts.precision == counts.recall == counts.f1 == pytest.approx(1 / 3)
+
+
+def test_phantoms_and_unmatched_detections_are_no_person():
+    assert count_pairs([0, 1], [-1, -1], [-1, -1]) == PairCounts(0, 0, 0)
+    assert count_pairs([0, 1], [0, 0], [-1, -1]) == PairCounts(0, 1, 0)
+    assert count_pairs([0, 1], [-1, -1], [4, 4]) == PairCounts(0, 0, 1)
+
+
+def test_detections_of_one_view_are_no_pair():
+    assert count_pairs([3, 3], [0, 0], [1, 1]) == PairCounts(0, 0, 0)
+
+
+def test_shares_that_do_not_apply_are_none():
+    assert count_pairs([], [], []).f1 is None
+    assert PairCounts(0, 0, 5).precision is None
+    assert PairCounts(0, 5, 0).recall is None
+    assert PairCounts(0, 0, 5).f1 == 0.0
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(-1, 2), st.integers(-1, 2)), max_size=12), st.randoms())
+def test_agrees_with_counting_by_hand_in_any_order(detections, random):
+    kinds = {"correct": 0, "wrong": 0, "lost": 0}
+    for (view, label, person), (other_view, other_label, other_person) in combinations(detections, 2):
+        said, true = label == other_label != -1, person == other_person != -1
+        if view != other_view and (said or true):
+            kinds["correct" if said and true else "wrong" if said else "lost"] += 1
+    random.shuffle(detections)
+    assert count_pairs(*np.array(detections, int).reshape(-1, 3).T) == PairCounts(**kinds)
+
+
+def test_lengths_must_agree():
+    with pytest.raises(ValueError, match="labels"):
+        count_pairs([0, 1], [0], [0, 0])

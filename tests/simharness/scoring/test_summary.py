@@ -1,0 +1,102 @@
+import json
+
+import numpy as np
+import pytest
+
+from simharness.scoring.frame import FrameScore
+from simharness.scoring.matching import PairCounts
+from simharness.scoring.pcp import GROUPS
+from simharness.scoring.pose import Pairing
+from simharness.scoring.summary import STAGES, VariantScores, summarize
+
+KEYS = {
+    "pcp",
+    "pcp_parts",
+    "pcp_actors",
+    "precision",
+    "recall",
+    "ghosts_per_frame",
+    "missed_per_frame",
+    "mpjpe_mm",
+    "matching",
+    "timings_ms",
+}
+
+
+def frame(parts, errors, *, estimates, matching=None):
+    """A frame whose people are all there; a NaN error is a missed person."""
+    errors = np.array(errors, float)
+    found = np.isfinite(errors)
+    pairing = Pairing(np.where(found, np.cumsum(found) - 1, -1), errors, np.ones(len(errors), bool), estimates)
+    return FrameScore(np.array(parts, np.int8).reshape(len(errors), 10), pairing, matching)
+
+
+RIGHT, WRONG, ABSENT = [1] * 10, [0] * 10, [-1] * 10
+HEAD_WRONG = [1] * 8 + [0, 1]
+
+
+def test_every_person_counts_the_same_however_often_seen():
+    frames = (
+        frame([RIGHT, ABSENT], [0.01, np.nan], estimates=1),
+        frame([RIGHT, ABSENT], [0.01, np.nan], estimates=1),
+        frame([RIGHT, WRONG], [0.01, 0.02], estimates=2),
+    )
+    summary = VariantScores(frames).summary()
+    assert summary["pcp_actors"] == [100.0, 0.0]
+    assert summary["pcp"] == 50.0
+    assert VariantScores(frames).summary(actors=[0])["pcp"] == 100.0
+    assert VariantScores(frames).summary(actors=[0])["pcp_actors"] == [100.0]
+
+
+def test_parts_are_named_by_group():
+    summary = VariantScores((frame([HEAD_WRONG], [0.1], estimates=1), frame([RIGHT], [0.1], estimates=1))).summary()
+    assert summary["pcp"] == 95.0
+    assert summary["pcp_parts"] == {group: 50.0 if group == "head" else 100.0 for group in GROUPS}
+
+
+def test_people_are_pooled_over_frames():
+    frames = (
+        frame([RIGHT, RIGHT], [0.010, 0.020], estimates=2, matching=PairCounts(8, 0, 0)),
+        frame([RIGHT, WRONG], [0.060, np.nan], estimates=3, matching=PairCounts(1, 1, 5)),
+    )
+    summary = VariantScores(frames).summary()
+    assert summary["precision"] == 3 / 5
+    assert summary["recall"] == 3 / 4
+    assert summary["ghosts_per_frame"] == 1.0
+    assert summary["missed_per_frame"] == 0.5
+    assert summary["mpjpe_mm"] == pytest.approx({"mean": 30.0, "median": 20.0})
+    assert summary["matching"] == pytest.approx({"precision": 0.9, "recall": 9 / 14, "f1": 18 / 24})
+
+
+def test_timings_are_in_milliseconds_by_stage():
+    timings = tuple({"affinity": 0.001 * k, "total": 0.002 * k} for k in range(101))
+    timed = VariantScores((), timings).summary()["timings_ms"]
+    assert tuple(timed) == STAGES
+    assert timed["affinity"] == pytest.approx({"median": 50.0, "p99": 99.0})
+    assert timed["total"] == pytest.approx({"median": 100.0, "p99": 198.0})
+    assert timed["matching"] == {"median": None, "p99": None}
+
+
+def test_what_does_not_apply_is_null_and_never_nan():
+    nobody = frame([], [], estimates=0)
+    for variant in (VariantScores(()), VariantScores((nobody,))):
+        summary = summarize("empty", {"full": variant}, frames=len(variant.frames), seeds=1)
+        scores = json.loads(json.dumps(summary, allow_nan=False))["variants"]["full"]
+        assert set(scores) == KEYS
+        for key in ("pcp", "precision", "recall"):
+            assert scores[key] is None
+        assert scores["mpjpe_mm"] == {"mean": None, "median": None}
+        assert scores["matching"] == {"precision": None, "recall": None, "f1": None}
+    assert VariantScores((nobody,)).summary()["ghosts_per_frame"] == 0.0
+
+
+def test_the_whole_has_the_shared_shape_and_room_beside_it():
+    summary = summarize("x", {"a": VariantScores(())}, frames=3, seeds=2, head="2019")
+    assert set(summary) == {"name", "frames", "seeds", "code", "variants", "head"}
+    assert (summary["name"], summary["frames"], summary["seeds"], summary["head"]) == ("x", 3, 2, "2019")
+    assert summary["code"]
+
+
+def test_frames_must_count_the_same_people():
+    with pytest.raises(ValueError, match="frames of 1 and of 2"):
+        VariantScores((frame([RIGHT], [0.1], estimates=1), frame([RIGHT, RIGHT], [0.1, 0.1], estimates=1)))
