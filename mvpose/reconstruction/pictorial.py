@@ -35,9 +35,14 @@ class PictorialStructure:
     most_states: int = 64
 
     def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Floats, Floats, Floats]:
-        """Joints (J, 3), scores (J,) and covariances (J, 3, 3) of one person; NaN and score 0 where missing."""
+        """Joints (J, 3), scores (J,) and covariances (J, 3, 3) of one person; NaN and score 0 where missing.
+
+        A joint that one view alone sees is placed on its ray by the prior, with the covariance that this deserves;
+        one that no view sees is missing.
+        """
         length, deviation = bone_lengths(skeleton)
         proposals = _keep_likely(propose(rays, self.noise.sigmas(skeleton), self.noise), self.most_states)
+        proposals = _add_single_views(proposals, rays, skeleton, self.noise, length=length, deviation=deviation)
         chosen = max_product(
             proposals.states,
             proposals.unary,
@@ -95,6 +100,46 @@ def _keep_likely(proposals: Proposals, most: int) -> Proposals:
         unary=np.take_along_axis(proposals.unary, best, axis=1),
         count=np.minimum(proposals.count, most),
     )
+
+
+def _add_single_views(
+    proposals: Proposals, rays: Rays, skeleton: Skeleton, noise: Noise, *, length: Floats, deviation: Floats
+) -> Proposals:
+    """Propose for joints that a single view sees: where its ray is a bone's length from a neighbour in the tree.
+
+    Such a joint has no pair of views, but its direction is known and the prior knows the depth, up to which of two
+    points it is. The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their
+    own neighbours in turn.
+    """
+    views = (rays.weights > 0).sum(axis=0)
+    waiting = set(np.flatnonzero((proposals.count == 0) & (views == 1)).tolist())
+    if not waiting:
+        return proposals
+    states = [list(proposals.states[j, : proposals.count[j]]) for j in range(len(skeleton))]
+    unary = [list(proposals.unary[j, : proposals.count[j]]) for j in range(len(skeleton))]
+    bones = [(a, b, length[b]) for a, b in skeleton.edges if np.isfinite(deviation[b])]
+    neighbours = {j: [(a + b - j, bone) for a, b, bone in bones if j in (a, b)] for j in waiting}
+    while ready := [j for j in waiting if any(states[other] for other, _ in neighbours[j])]:
+        for j in ready:
+            view = int(np.argmax(rays.weights[:, j]))
+            origin, direction = rays.origins[view], rays.directions[view, j]
+            for other, bone in neighbours[j]:
+                if states[other]:
+                    anchor = states[other][int(np.argmax(unary[other]))] - origin
+                    along = anchor @ direction
+                    reach = np.sqrt(max(bone**2 - (anchor @ anchor - along**2), 0.0))
+                    depths = [depth for depth in (along - reach, along + reach) if depth > 0]
+                    states[j] += [origin + depth * direction for depth in depths]
+                    unary[j] += [np.log(rays.weights[view, j] + noise.floor)] * len(depths)
+        waiting -= set(ready)
+    most = max(proposals.states.shape[1], *(len(each) for each in states))
+    padded = Proposals(
+        np.zeros((len(states), most, 3)), np.full((len(states), most), -np.inf), np.array([len(s) for s in states])
+    )
+    for j, count in enumerate(padded.count):
+        padded.states[j, :count] = np.reshape(states[j], (-1, 3))
+        padded.unary[j, :count] = unary[j]
+    return padded
 
 
 @njit(cache=True)

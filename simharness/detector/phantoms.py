@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import poisson
+from scipy.special import pdtr
 
 from mvpose import COCO17, Detections
 from mvpose.camera import Rig
@@ -43,8 +43,10 @@ def phantoms(rig: Rig, frames: int, *, rate: float, seed: int) -> list[Detection
     found: list[tuple[list[int], list[NDArray[np.float64]], list[NDArray[np.float64]]]] = [
         ([], [], []) for _ in range(frames)
     ]
+    most = pdtr(np.arange(rate + 10 * np.sqrt(rate) + 10), rate)  # P(at most k); beyond, 1 in double precision
     for view, camera in enumerate(rig):
-        count = poisson.ppf(stream(seed, "detector", "phantom count", view).random(frames), rate).astype(int)
+        # Inverting the Poisson distribution, so that a draw gives at least as many at a higher rate.
+        count = np.searchsorted(most, stream(seed, "detector", "phantom count", view).random(frames))
         for k in range(count.max(initial=0)):
             draws = stream(seed, "detector", "phantom", view, k)
             center, height = draws.random((frames, 2)), draws.uniform(0.25, 0.75, frames)

@@ -75,6 +75,24 @@ def test_a_joint_without_evidence_is_missing_and_does_not_disturb_the_rest():
     assert np.linalg.norm(joints[others] - STANDING[others], axis=1).max() < 0.03
 
 
+def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_the_ray():
+    rig = ring(4)
+    scores = np.full((4, 17), 0.9)
+    scores[1:, 9] = 0  # the left wrist, seen by camera 0 alone
+    scores[1:, 13], scores[1:, 15] = 0, 0  # a whole lower leg: knee and ankle hang on each other
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
+    joints, scores, covariance = PictorialStructure()(rays, COCO17)
+    for joint in (9, 13, 15):
+        sight = rays.directions[0, joint]
+        offset = joints[joint] - rig.centers[0]
+        assert np.linalg.norm(offset - (offset @ sight) * sight) < 0.02
+        assert np.linalg.norm(joints[joint] - joints[COCO17.parents[joint]]) == pytest.approx(
+            bone_lengths(COCO17)[0][joint], abs=0.05
+        )
+        assert 0 < scores[joint] < 0.3 * scores[0]
+        assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
+
+
 def test_the_prior_pulls_an_average_adult_little():
     rig = ring(5)
     rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False)[0])
