@@ -1,0 +1,1 @@
+"""People: bodies, their looks, and their MuJoCo models."""

@@ -1,0 +1,87 @@
+"""Human anatomy in numbers: degrees of freedom, their ranges, and how mass is spread over the segments.
+
+Zero is the anatomical neutral: standing, legs straight, feet forward, arms hanging, palms to the thighs. The
+anatomical word is the positive direction; bending and spine rotation are positive to the person's left, rotation of
+hip and shoulder inward (medial). A mirrored joint at the same value is in the mirrored pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+# (least, greatest) in degrees. Limbs: American Academy of Orthopaedic Surgeons, "Joint Motion: Method of Measuring
+# and Recording", 1965, and Boone & Azen, J. Bone Joint Surg. 61-A, 1979. Spine: White & Panjabi, "Clinical
+# Biomechanics of the Spine", 1990, their vertebral segments summed over lumbar, thoracic and cervical spine.
+# Clavicle elevation: Ludewig et al., J. Bone Joint Surg. 91-A, 2009, with the shrug of AAOS.
+_SPINE_DEGREES = {
+    "lumbar_flexion": (-25, 60),
+    "lumbar_bending": (-25, 25),
+    "lumbar_rotation": (-15, 15),
+    "thorax_flexion": (-20, 40),
+    "thorax_bending": (-25, 25),
+    "thorax_rotation": (-35, 35),
+    "neck_flexion": (-60, 50),
+    "neck_bending": (-45, 45),
+    "neck_rotation": (-80, 80),
+}
+_LIMB_DEGREES = {
+    "hip_flexion": (-30, 120),
+    "hip_abduction": (-30, 45),
+    "hip_rotation": (-45, 45),
+    "knee_flexion": (-5, 145),
+    "ankle_dorsiflexion": (-50, 25),
+    "ankle_inversion": (-20, 35),
+    "clavicle_elevation": (-10, 40),
+    "shoulder_flexion": (-60, 180),
+    "shoulder_abduction": (-30, 180),
+    "shoulder_rotation": (-90, 90),
+    "elbow_flexion": (-5, 150),
+    "forearm_pronation": (-80, 80),
+    "wrist_flexion": (-70, 80),
+}
+
+SIDES: tuple[str, str] = ("left", "right")
+
+RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        name: (float(np.radians(low)), float(np.radians(high)))
+        for name, (low, high) in (
+            *_SPINE_DEGREES.items(),
+            *((f"{side}_{joint}", degrees) for side in SIDES for joint, degrees in _LIMB_DEGREES.items()),
+        )
+    }
+)
+"""Least and greatest angle of every degree of freedom, radians."""
+
+DOFS: tuple[str, ...] = tuple(RANGES)
+"""The 35 degrees of freedom in the order of every array of angles."""
+
+# Male and female shares of body mass, de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters",
+# J. Biomechanics 29, 1996, table 4. Limb segments are of one side.
+_MASS_PERCENT = {
+    "head": (6.94, 6.68),
+    "upper_trunk": (15.96, 15.45),
+    "middle_trunk": (16.33, 14.65),
+    "lower_trunk": (11.17, 12.47),
+    "upper_arm": (2.71, 2.55),
+    "forearm": (1.62, 1.38),
+    "hand": (0.61, 0.56),
+    "thigh": (14.16, 14.78),
+    "shank": (4.33, 4.81),
+    "foot": (1.37, 1.29),
+}
+PAIRED_SEGMENTS: frozenset[str] = frozenset({"upper_arm", "forearm", "hand", "thigh", "shank", "foot"})
+
+
+def mass_fractions(gender: float) -> dict[str, float]:
+    """Share of body mass of every segment; limb segments are of one side and count twice towards the sum of 1.
+
+    Args:
+        gender: 0 male to 1 female; the shares of de Leva (1996) are interpolated.
+    """
+    shares = {name: (1 - gender) * male + gender * female for name, (male, female) in _MASS_PERCENT.items()}
+    total = sum(share * (2 if name in PAIRED_SEGMENTS else 1) for name, share in shares.items())
+    return {name: share / total for name, share in shares.items()}

