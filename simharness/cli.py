@@ -1,0 +1,212 @@
+"""The command line: ``simharness run`` and ``simharness evaluate``.
+
+Exit codes: 0 fine, 2 bad input (one message on stderr), 3 the run itself failed (with its traceback).
+Nothing heavy is imported before a command needs it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import json
+import os
+import shlex
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+BAD_INPUT = 2
+FAILED = 3
+
+
+class HeadMapping(enum.StrEnum):
+    """The published rules of :func:`mvpose.skeleton.coco17_to_shelf14`."""
+
+    VOXELPOSE = "voxelpose"
+    Y2019 = "2019"
+
+
+app = typer.Typer(
+    name="simharness",
+    help="Film simulated people with simulated cameras, and find where a multi-view pose method breaks.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+evaluating = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
+app.add_typer(evaluating, name="evaluate")
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from simharness.scenario.load import code_version
+
+        typer.echo(f"simharness {code_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Film simulated people with simulated cameras, and find where a multi-view pose method breaks."""
+
+
+@app.command()
+def run(
+    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
+    workers: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, help="Processes that share the frames. The results are the same."),
+    ] = 1,
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)
+    ] = Path("results/runs"),
+) -> None:
+    """Run a scenario: simulate, film, detect, estimate, score, report.
+
+    The results appear, when whole, in a folder NAME-HASH: report.html for people, the rest for programs.
+    """
+    with _border():
+        from simharness.experiment.progress import reporter
+        from simharness.experiment.run import run as run_scenario
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        command = shlex.join(["simharness", *sys.argv[1:]])
+        with reporter() as bars:
+            folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    console = Console()
+    console.print(_headline(summary))
+    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
+
+
+@evaluating.command()
+def shelf(
+    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write the summary there too.", dir_okay=False),
+    ] = None,
+    head: Annotated[
+        HeadMapping,
+        typer.Option(help="How the head of the 14 joints is made from COCO's: moves PCP by a point."),
+    ] = HeadMapping.VOXELPOSE,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="VARIANT", help="A preset of mvpose.Pipeline. Repeatable. [dim]\\[default: full][/]"
+        ),
+    ] = None,
+) -> None:
+    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.
+
+    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
+    """
+    with _border():
+        from mvpose import Pipeline
+        from simharness.datasets.evaluate import evaluate, print_evaluation
+        from simharness.datasets.shelf import read_shelf
+        from simharness.experiment.progress import reporter
+
+        pipelines = {name: Pipeline.preset(name) for name in method or ["full"]}
+        data = read_shelf(folder)
+        with (
+            _after_reading(),
+            reporter() as bars,
+            bars.stage("evaluate", len(data) * len(pipelines)) as advance,
+        ):
+            evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
+        if json_file is not None:
+            _write_json(evaluation.summary(), json_file)
+    print_evaluation(evaluation, Console())
+
+
+def _write_json(summary: dict[str, Any], path: Path) -> None:
+    """By rename: a file that is there is whole."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise ValueError(f"--json {path}: cannot be written: {error.strerror}") from None
+
+
+def _headline(summary: dict[str, Any]) -> Table:
+    """The headline numbers of a run, a row for each variant."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.experiment.headline import COLUMNS
+
+    title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
+    table.add_column("variant", no_wrap=True)
+    for column in COLUMNS:
+        heading = f"{column.title}\n{column.unit}" if column.unit else column.title.replace(" ", "\n")
+        table.add_column(heading, justify="right", no_wrap=True)
+    for name, scores in summary["variants"].items():
+        table.add_row(name, *(column.number(scores) for column in COLUMNS))
+    return table
+
+
+@contextlib.contextmanager
+def _border() -> Iterator[None]:
+    """Where errors become exit codes.
+
+    A ValueError that gets here is the input's fault, for whatever works on checked input raises a RunError
+    instead: :func:`simharness.experiment.run.run` and :func:`_after_reading` see to that.
+    """
+    console = Console(stderr=True)
+    try:
+        yield
+    except ValueError as error:
+        console.print(Text.assemble(("error: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(BAD_INPUT) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        console.print(Text.assemble(("the run failed: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(FAILED) from None
+
+
+@contextlib.contextmanager
+def _after_reading() -> Iterator[None]:
+    """From here on, an error is not the input's fault."""
+    from simharness.experiment.execution import RunError
+
+    try:
+        yield
+    except Exception as error:
+        raise RunError(f"{type(error).__name__}: {error}") from error
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,226 @@
+"""One scenario from its file to its result folder."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from mvpose import Detections, Estimate, Pipeline, Rig
+from simharness.detector.detect import detect
+from simharness.detector.truth import Truth
+from simharness.experiment.atomic import appearing
+from simharness.experiment.execution import RunError, map_frames
+from simharness.experiment.pictures import Footage, draw_pictures, outlines
+from simharness.experiment.progress import Advance, Reporter, Silence
+from simharness.experiment.store import Record, write_run
+from simharness.experiment.work import Estimating, Filming, renderer_of
+from simharness.rendering.film import Views
+from simharness.rendering.renderer import Unavailable
+from simharness.rigs.layouts import build_rig
+from simharness.scenario.load import fingerprint
+from simharness.scenario.models import Scenario
+from simharness.scene.build import Scene, build, check_rig
+from simharness.scene.sequence import Sequence as PeopleSequence
+from simharness.scene.simulation import simulate
+from simharness.scoring.frame import score_frame
+from simharness.scoring.matching import count_pairs
+from simharness.scoring.summary import VariantScores, summarize
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scenario that can be run: everything in it is built and checked.
+
+    Attributes:
+        scenario: what was asked for.
+        scene: the compiled room with its people, and how they move.
+        rig: the cameras.
+        pipelines: the variants of the method, by name.
+    """
+
+    scenario: Scenario
+    scene: Scene
+    rig: Rig
+    pipelines: Mapping[str, Pipeline]
+
+
+def prepare(scenario: Scenario) -> Trial:
+    """Build what a scenario describes.
+
+    Raises:
+        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant.
+    """
+    try:
+        pipelines = {name: Pipeline.preset(name) for name in scenario.method.variants}
+    except ValueError as error:
+        raise ValueError(f"method.variants: {error}") from None
+    try:
+        renderer_of(scenario.rendering.renderer)
+    except Unavailable as error:
+        raise ValueError(f"rendering.renderer: {error}") from None
+    try:
+        rig = build_rig(scenario.cameras)
+    except ValueError as error:
+        raise ValueError(f"cameras: {error}") from None
+    scene = build(scenario)
+    check_rig(scenario, scene, rig)
+    return Trial(scenario, scene, rig, pipelines)
+
+
+def run(
+    scenario: Scenario,
+    *,
+    out: Path,
+    workers: int = 1,
+    reporter: Reporter | None = None,
+    command: str | None = None,
+) -> Path:
+    """Run a scenario and write its results.
+
+    Args:
+        scenario: what to run.
+        out: where the result folder ``<name>-<fingerprint>`` goes. It appears when it is whole; results of an
+            earlier run of the same scenario are replaced then.
+        workers: processes that share the frames; the results do not depend on how many.
+        reporter: is told of the stages.
+        command: how the user asked for this, for the report.
+
+    Returns:
+        The result folder; :func:`simharness.experiment.store.read_run` reads it.
+
+    Raises:
+        ValueError: the scenario cannot be built.
+        RunError: anything that went wrong after that.
+    """
+    clock = _Clock(reporter or Silence())
+    with clock.stage("build", 1, foresee=True):
+        trial = prepare(scenario)
+        _make_folder(out)
+    with clock.stage("simulate", 1):
+        sequence = simulate(trial.scene)
+    views = _film(trial, sequence, workers, clock)
+    with clock.stage("detect", scenario.frames):
+        answers = detect(sequence, views, trial.rig, scenario.detector, seed=scenario.seed)
+        detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
+    estimates = _estimate(trial, detections, workers, clock)
+    with clock.stage("score", len(estimates)) as advance:
+        scores = {}
+        for variant, answered in estimates.items():
+            scores[variant] = score(detections, truth, answered)
+            advance(1)
+        summary = summarize(
+            scenario.name,
+            scores,
+            frames=scenario.frames,
+            seeds=1,
+            seed=scenario.seed,
+            fingerprint=fingerprint(scenario),
+            run={"command": command, "workers": workers, "stages_s": clock.seconds},  # which still grows
+        )
+    record = Record(
+        scenario=scenario,
+        rig=trial.rig,
+        time=sequence.time,
+        detections=detections,
+        truth=truth,
+        estimates=estimates,
+        scores=score_table(scores),
+        summary=summary,
+    )
+    footage = Footage(trial.scene, sequence, renderer_of(scenario.rendering.renderer))
+    with clock.stage("report", 3) as advance:
+        from simharness.experiment.report import render  # and with it matplotlib: late, for it loads slowly
+
+        pictures = draw_pictures(record, footage, progress=advance)
+        page = render(record, pictures=pictures, things=outlines(trial.scene))
+        advance(1)
+    folder = out / f"{scenario.name}-{fingerprint(scenario)}"
+    with clock.stage("write", 1), appearing(folder) as partial:
+        write_run(record, partial)
+        (partial / "report.html").write_text(page, encoding="utf-8")
+        (partial / "mosaic.png").write_bytes(pictures[0].png())
+    return folder
+
+
+def score(
+    detections: Sequence[Detections], truth: Sequence[Truth], estimates: Sequence[Estimate]
+) -> VariantScores:
+    """Score one variant, frame by frame."""
+    frames = [
+        score_frame(
+            true.joints,
+            estimate.joints,
+            matching=count_pairs(detected.view, estimate.matching.labels, true.person),
+        )
+        for detected, true, estimate in zip(detections, truth, estimates, strict=True)
+    ]
+    return VariantScores(tuple(frames), tuple(estimate.timings for estimate in estimates))
+
+
+def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:
+    """A row for each frame and variant: :meth:`simharness.scoring.frame.FrameScore.row`."""
+    rows = [
+        {"variant": variant, "frame": index, **frame.row()}
+        for variant, scored in scores.items()
+        for index, frame in enumerate(scored.frames)
+    ]
+    types: dict[str, Any] = {
+        "pcp": pl.Float64,
+        "mpjpe_mm": pl.Float64,
+        "errors_mm": pl.List(pl.Float64),
+        "parts": pl.List(pl.Int8),
+        **dict.fromkeys(("pairs_correct", "pairs_wrong", "pairs_lost"), pl.Int64),
+    }
+    return pl.DataFrame(rows, schema_overrides=types, infer_schema_length=None)
+
+
+def _make_folder(out: Path) -> None:
+    """Before the work, not after it: a disk that cannot be written to is better known at once."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {out}: cannot make this folder: {error.strerror}") from None
+
+
+def _film(trial: Trial, sequence: PeopleSequence, workers: int, clock: _Clock) -> Views:
+    frames = range(trial.scenario.frames)
+    with clock.stage("film", len(frames)) as advance:
+        filming = Filming(trial.scene, sequence, trial.rig, trial.scenario.rendering.renderer)
+        return Views.concatenate(map_frames(filming, frames, workers=workers, progress=advance))
+
+
+def _estimate(
+    trial: Trial, detections: tuple[Detections, ...], workers: int, clock: _Clock
+) -> dict[str, tuple[Estimate, ...]]:
+    with clock.stage("estimate", len(detections)) as advance:
+        estimating = Estimating(trial.rig, detections, trial.pipelines)
+        parts = map_frames(estimating, range(len(detections)), workers=workers, progress=advance)
+        return {name: tuple(each for part in parts for each in part[name]) for name in trial.pipelines}
+
+
+class _Clock:
+    """Tells the reporter of the stages, times them, and says which one it was that failed."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        self._reporter = reporter
+        self.seconds: dict[str, float] = {}
+
+    @contextlib.contextmanager
+    def stage(self, name: str, total: int, *, foresee: bool = False) -> Iterator[Advance]:
+        """One stage; ``foresee`` lets errors through as they are, for they may be the input's fault."""
+        start = time.perf_counter()
+        try:
+            with self._reporter.stage(name, total) as advance:
+                yield advance
+        except Exception as error:
+            if foresee:
+                raise
+            what = str(error) if isinstance(error, RunError) else f"{type(error).__name__}: {error}"
+            raise RunError(f"{name}: {what}") from error
+        self.seconds[name] = time.perf_counter() - start

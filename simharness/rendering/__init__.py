@@ -1,0 +1,1 @@
+"""Pictures of the scene and what they say about the truth: renderers, visibility, films, drawings."""

@@ -1,0 +1,78 @@
+"""What hides a joint: the pixel it projects to, and what is seen there.
+
+A joint centre lies inside its body, so the surface seen at its pixel is in front of it even where nothing hides
+it. What separates "the skin around the joint" from "something in front of it" is how far in front:
+
+- Up to the joint's radius plus ``_MARGIN`` it is the skin around the joint. The radius that comes with a body is
+  1.5 times the distance to the nearest skin: on the way out of a limb of radius r, at an angle to its axis, the
+  skin is r / sin(angle) away, and 1.5 covers angles down to 42 degrees. Steeper than that the joint lies behind
+  the length of its own limb. A hand in front of the hip, or the far hip seen from the side, are further in front.
+- ``_MARGIN`` is for the joints of the face, which lie on the skin with a radius near 0: what the pixel raster and
+  the regressor of the joint cost there is less than 2 cm; the far ear and eye are more than 5 cm behind the face.
+- Anyone or anything else hides a joint as soon as it is in front of it at all: it cannot be inside the body.
+- A surface behind the joint means that the joint projects just off its body's outline: nothing hides it.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose.camera import Camera
+from simharness.rendering.renderer import Image
+
+_MARGIN = 0.02  # metres
+
+
+class Visibility(IntEnum):
+    """How a camera sees a joint."""
+
+    VISIBLE = 0
+    SELF_OCCLUDED = 1
+    OCCLUDED_BY_PERSON = 2
+    OCCLUDED_BY_CLUTTER = 3
+    OUTSIDE = 4
+
+
+def label(image: Image, camera: Camera, *, joints: ArrayLike, radii: ArrayLike) -> NDArray[np.int8]:
+    """Label every joint of every person in one view.
+
+    Args:
+        image: what the camera sees; meshes 0 to P - 1 are the people, the others things and the room.
+        camera: the camera.
+        joints: joint centres in the world, (P, J, 3), metres.
+        radii: how far in front of each joint its own skin may be, (P, J), metres (``Body.joint_radii``).
+
+    Returns:
+        :class:`Visibility` of each joint, (P, J) int8. OUTSIDE is a joint off the image or behind the camera.
+
+    Raises:
+        ValueError: shapes that do not fit, or an image that is not of the camera's size.
+    """
+    joints, radii = np.asarray(joints, float), np.asarray(radii, float)
+    if joints.ndim != 3 or joints.shape[2] != 3 or radii.shape != joints.shape[:2]:
+        raise ValueError(f"joints must be (P, J, 3) and radii (P, J), got {joints.shape} and {radii.shape}")
+    if image.depth.shape != camera.size[::-1]:
+        raise ValueError(
+            f"the image must be of camera {camera.name!r}, {camera.size[0]} x {camera.size[1]} pixels, "
+            f"got {image.depth.shape[1]} x {image.depth.shape[0]}"
+        )
+    people = len(joints)
+    pixels = camera.project(joints)
+    inside = camera.inside(pixels)
+    column, row = np.moveaxis(np.floor(np.where(inside[..., None], pixels, 0) + 0.5).astype(int), -1, 0)
+    seen = image.ids[row, column]
+    depth = camera.depth(joints)
+    # Metres along the ray, not the axis: the radii are isotropic.
+    stretch = np.where(inside, np.linalg.norm(joints - camera.center, axis=-1), 1.0) / np.where(inside, depth, 1.0)
+    in_front = (depth - image.depth[row, column]) * stretch  # -inf where nothing is seen
+
+    own = seen == np.arange(people)[:, None]
+    person = (seen >= 0) & (seen < people)
+    return np.select(
+        [~inside, in_front <= np.where(own, radii + _MARGIN, 0.0), own, person],
+        [Visibility.OUTSIDE, Visibility.VISIBLE, Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON],
+        Visibility.OCCLUDED_BY_CLUTTER,
+    ).astype(np.int8)

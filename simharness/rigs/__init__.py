@@ -1,0 +1,1 @@
+"""Rigs of cameras: layouts to watch a room with."""

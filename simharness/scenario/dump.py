@@ -1,0 +1,39 @@
+"""A scenario back to TOML: every key written out, with what it means beside it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from pydantic import BaseModel
+
+from simharness.scenario.models import Scenario
+
+
+def dumps(scenario: Scenario) -> str:
+    """The whole scenario as TOML, defaults included; :func:`simharness.scenario.load.load` reads it back."""
+    return "\n".join(_lines(scenario)) + "\n"
+
+
+def _lines(section: BaseModel, name: str = "") -> list[str]:
+    lines = [f"[{name}]"] if name else []
+    nested: list[str] = []
+    for key, field in type(section).model_fields.items():
+        value = getattr(section, key)
+        if isinstance(value, BaseModel):
+            nested += ["", *_lines(value, f"{name}.{key}" if name else key)]
+        else:
+            assignment = f"{key} = {_written(value)}"
+            lines.append(f"{assignment:<32}# {field.description}" if field.description else assignment)
+    return lines + nested
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for the one control character that JSON lets stand.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_written, value)) + "]"
+    return repr(value)

@@ -1,0 +1,74 @@
+"""Plots: the page's colours, no ids twice, and nothing breaks on nothing."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from simharness.experiment import plots
+from simharness.rigs.layouts import build_rig
+from simharness.scenario.models import Cameras
+
+COLORS = ["#336699", "#996633", "#339966"]
+
+
+def draw_all(people: int = 3, frames: int = 6) -> list[str]:
+    rng = np.random.default_rng(0)
+    errors = rng.uniform(10, 40, (frames, people))
+    errors[1:3] = np.nan
+    shares = np.full((5, 5), 0.2)
+    return [
+        plots.error_over_time(np.arange(frames) / 10, errors, colors=COLORS),
+        plots.error_distribution({"full": errors.ravel(), "no-3dps": errors.ravel() * 2}),
+        plots.visibility_shares([f"cam{k}" for k in range(5)], shares, labels=list("abcde")),
+        plots.stage_times(
+            {"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}
+        ),
+        plots.floor_plan(
+            build_rig(Cameras()),
+            (8.0, 8.0),
+            things=[np.array([[0, 0], [1, 0], [1, 1.0]])],
+            paths=rng.normal(size=(frames, people, 2)),
+            estimates=rng.normal(size=(people, 2)),
+            colors=COLORS,
+        ),
+    ]
+
+
+@pytest.mark.parametrize("frames", [1, 6])
+@pytest.mark.parametrize("people", [1, 3])
+def test_every_plot_is_one_svg_element_in_the_colours_of_the_page(people, frames):
+    for svg in draw_all(people, frames):
+        assert ET.fromstring(svg.replace("xlink:", "")).tag.endswith("svg")
+        assert "currentColor" in svg
+        assert "var(--faint)" in svg
+        assert "#0102" not in svg, "a stand-in was left"
+        assert "#ffffff" not in svg, "a white background does not go with a dark page"
+        assert not re.match(r"<svg[^>]* width=", svg), "the page says how wide"
+
+
+def test_plots_on_one_page_share_no_ids():
+    ids = [name for svg in draw_all() for name in re.findall(r'\bid="([^"]+)"', svg)]
+    assert len(ids) == len(set(ids))
+
+
+def test_every_reference_has_its_target():
+    for svg in draw_all():
+        targets = set(re.findall(r'\bid="([^"]+)"', svg))
+        references = set(re.findall(r'url\(#([^)]+)\)|href="#([^"]+)"', svg))
+        assert {a or b for a, b in references} <= targets
+
+
+def test_plots_are_the_same_every_time():
+    assert draw_all() == draw_all()
+
+
+def test_nothing_to_plot_is_still_a_plot():
+    nobody = np.full((4, 2), np.nan)
+    assert "<svg" in plots.error_over_time(np.arange(4.0), nobody, colors=COLORS)
+    assert "<svg" in plots.error_distribution({"full": np.zeros(0)})
+    assert "<svg" in plots.stage_times({})
+    rig = build_rig(Cameras())
+    empty = {"things": [], "paths": np.zeros((4, 0, 2)), "estimates": np.zeros((0, 2)), "colors": []}
+    assert "<svg" in plots.floor_plan(rig, (8, 8), **empty)

@@ -1,0 +1,43 @@
+"""Both renderers behind one fixture."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from simharness.rendering.renderer import Unavailable, make_renderer
+
+sys.path.insert(0, str(Path(__file__).parent))  # shapes.py
+
+
+@cache
+def _made(name):
+    try:
+        return make_renderer(name)
+    except Unavailable as error:
+        return error
+
+
+def _renderer_or_skip(name):
+    made = _made(name)
+    if isinstance(made, Unavailable):
+        pytest.skip(str(made))
+    return made
+
+
+@pytest.fixture(params=["raster", "gl"])
+def renderer(request):
+    return _renderer_or_skip(request.param)
+
+
+@pytest.fixture
+def raster():
+    return _renderer_or_skip("raster")
+
+
+@pytest.fixture
+def gl():
+    return _renderer_or_skip("gl")

@@ -1,0 +1,108 @@
+"""Visibility of joints in scenes where the answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import ball, box, room, sheet
+from test_renderers import camera_at
+
+from simharness.rendering.visibility import Visibility, label
+
+VISIBLE, SELF, PERSON, CLUTTER, OUTSIDE = Visibility
+CAMERA = camera_at((3.5, 0.0, 1.0), (0.0, 0.0, 1.0), size=(320, 240), fov=60.0)
+
+
+def labels(raster, meshes, joints, radii, camera=CAMERA):
+    """``joints`` and ``radii`` of each person; the first meshes are the people."""
+    joints = np.array(joints, float)
+    return label(raster.render(camera, meshes), camera, joints=joints, radii=np.broadcast_to(radii, joints.shape[:2]))
+
+
+def test_a_joint_inside_its_own_limb_is_visible(raster):
+    limb = ball((0, 0, 1), 0.1)
+    assert labels(raster, [limb], [[(0, 0, 1)]], 0.15).tolist() == [[VISIBLE]]
+
+
+@pytest.mark.parametrize(("depth", "expected"), [(0.05, VISIBLE), (0.14, VISIBLE), (0.20, SELF), (0.5, SELF)])
+def test_a_joint_deep_in_its_own_body_is_hidden_by_it(raster, depth, expected):
+    trunk = ball((0, 0, 1), 0.4)
+    joint = (0.4 - depth, 0, 1)  # so far under the skin that faces the camera
+    assert labels(raster, [trunk], [[joint]], 0.15).tolist() == [[expected]]
+
+
+def test_the_allowance_is_along_the_ray_not_along_the_axis(raster):
+    camera = camera_at((2.0, 0.0, 1.0), (0.0, 0.0, 1.0), size=(320, 240), fov=100.0)
+    ray = camera.rays((300.0, 120.0))
+    away = camera.center + 2.0 * ray
+    wall = sheet([away + s * np.cross(ray, (0, 0, 1)) + (0, 0, t) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    cosine = ray @ camera.R[2]
+    assert cosine < 0.7
+    inside, beyond = away + 0.115 * ray, away + 0.13 * ray  # the limit is 0.1 + the margin of 2 cm
+    assert labels(raster, [wall], [[inside, beyond]], 0.1, camera).tolist() == [[VISIBLE, SELF]]
+
+
+def test_a_person_behind_a_wall_is_hidden_by_clutter(raster):
+    person, wall = ball((0, 0, 1), 0.2), box((2, 0, 1), (0.1, 1, 1))
+    assert labels(raster, [person, wall], [[(0, 0, 1)]], 0.3).tolist() == [[CLUTTER]]
+
+
+def test_a_thin_board_hides_what_is_behind_it_only(raster):
+    person = ball((0, 0, 1), 0.3, stretch=2.0)
+    board = box((1, 0, 1.4), (0.01, 1, 0.3))
+    low, high = (0.0, 0, 0.8), (0.0, 0, 1.49)
+    assert labels(raster, [person, board], [[low, high]], 0.35).tolist() == [[VISIBLE, CLUTTER]]
+
+
+def test_of_two_people_the_nearer_hides_the_farther(raster):
+    near, far = ball((1, 0, 1), 0.2), ball((-1, 0, 1), 0.2)
+    joints = [[(1, 0, 1)], [(-1, 0, 1)]]
+    assert labels(raster, [near, far], joints, 0.3).tolist() == [[VISIBLE], [PERSON]]
+    assert labels(raster, [far, near], joints[::-1], 0.3).tolist() == [[PERSON], [VISIBLE]]
+
+
+def test_people_that_touch_hide_each_other_without_any_allowance(raster):
+    """Another's arm 11 cm in front hides a joint, though the joint's own skin might be as far in front."""
+    arm, chest = ball((0.26, 0, 1), 0.05), ball((0, 0, 1), 0.25)
+    joint = (0.2, 0, 1)
+    assert labels(raster, [chest, arm], [[joint], [(0.26, 0, 1)]], 0.15).tolist() == [[PERSON], [VISIBLE]]
+
+
+def test_a_joint_just_off_the_outline_is_visible_before_whatever_is_behind(raster):
+    limb, other, walls = ball((0, 0, 1), 0.03), ball((-1, 0, 1), 0.5), room()
+    off = (0, 0.034, 1)  # beside its own ball, which the camera sees edge on
+    assert labels(raster, [limb, other, walls], [[off], [(-1, 0, 1)]], 0.05).tolist()[0] == [VISIBLE]
+    assert labels(raster, [limb, walls], [[off]], 0.05).tolist() == [[VISIBLE]]
+    assert labels(raster, [limb], [[off]], 0.05).tolist() == [[VISIBLE]]  # nothing at all behind it
+
+
+def test_walls_hide_who_is_behind_them(raster):
+    assert labels(raster, [ball((0, 9, 1), 0.3), room()], [[(-8, 0, 1)]], 0.3).tolist() == [[CLUTTER]]
+
+
+def test_the_border_of_the_image(raster):
+    """A pixel's area belongs to the image to its edge, half a pixel past its centre, and no further."""
+    width, height = CAMERA.size
+    pixels = np.array(
+        [(-0.49, 50), (-0.51, 50), (width - 0.51, 50), (width - 0.49, 50), (50, -0.51), (50, height - 0.51)]
+    )
+    places = CAMERA.center + 2 * CAMERA.rays(pixels)
+    found = labels(raster, [room()], [places], 0.1)[0]
+    assert found.tolist() == [VISIBLE, OUTSIDE, VISIBLE, OUTSIDE, OUTSIDE, VISIBLE]
+
+
+def test_behind_the_camera_is_outside(raster):
+    behind = CAMERA.center - 2 * CAMERA.R[2]
+    assert labels(raster, [ball(behind, 0.2)], [[behind, CAMERA.center]], 0.3).tolist() == [[OUTSIDE, OUTSIDE]]
+
+
+def test_nobody(raster):
+    assert labels(raster, [room()], np.zeros((0, 17, 3)), 0.1).shape == (0, 17)
+
+
+def test_shapes_are_checked(raster):
+    image = raster.render(CAMERA, [])
+    with pytest.raises(ValueError, match=r"joints must be \(P, J, 3\)"):
+        label(image, CAMERA, joints=np.zeros((17, 3)), radii=np.zeros(17))
+    with pytest.raises(ValueError, match="320 x 240 pixels, got 160 x 120"):
+        label(raster.render(camera_at((1, 1, 1), (0, 0, 0)), []), CAMERA, joints=np.zeros((1, 1, 3)), radii=[[0.1]])

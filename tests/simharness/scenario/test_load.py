@@ -1,0 +1,207 @@
+"""Scenario files: what is read, what is refused, and what the messages say."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simharness.scenario.dump import dumps
+from simharness.scenario.load import ScenarioError, fingerprint, load
+from simharness.scenario.models import Cameras, People, Scenario
+
+SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
+
+
+@pytest.fixture
+def scenario_file(tmp_path):
+    def write(text: str, name: str = "room.toml") -> Path:
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def refusal(path, **options) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load(path, **options)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_every_shipped_scenario_loads_and_is_named_as_its_file(path):
+    assert load(path).name == path.stem
+
+
+def test_scenarios_are_shipped():
+    assert "quickstart" in {path.stem for path in SHIPPED}
+
+
+class TestKeys:
+    def test_an_unknown_key_names_file_key_nearest_and_the_section(self, scenario_file):
+        path = scenario_file('name = "x"\n[people]\ncuont = 3')
+        message = refusal(path)
+        assert message.startswith(f"{path}: people.cuont is not a key; did you mean people.count?")
+        assert "[people] has activities, area, count, spacing" in message
+
+    def test_a_key_of_another_section_is_found_there(self, scenario_file):
+        assert "did you mean people.spacing?" in refusal(scenario_file('name = "x"\nspacing = 1.0'))
+
+    def test_a_key_like_no_other_gets_no_guess(self, scenario_file):
+        message = refusal(scenario_file('name = "x"\nzzzzzz = 1'))
+        assert "did you mean" not in message
+        assert "a scenario has cameras" in message
+
+    def test_every_mistake_of_a_file_is_named_at_once(self, scenario_file):
+        message = refusal(scenario_file('name = "x"\nrat = 5\n[people]\ncount = -1\n[cameras]\nfov = 190'))
+        assert len(message.splitlines()) == 3
+        for key in ("rate", "people.count", "cameras.fov"):
+            assert key in message
+
+    def test_a_missing_name_is_named(self, scenario_file):
+        assert "name is missing" in refusal(scenario_file("seed = 1"))
+
+
+class TestValues:
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ("[people]\ncount = -1", "people.count: expected greater than or equal to 0, got -1"),
+            ('[people]\ncount = "4"', 'people.count: expected a valid integer, got "4"'),
+            ("[people]\ncount = true", "people.count: expected a valid integer, got true"),
+            ("[people]\ncount = 4.5", "got 4.5"),
+            ("[cameras]\nfov = nan", "got NaN"),
+            ("[cameras]\nsize = [640, 480.5]", "cameras.size[1]"),
+            ('[people]\nactivities = ["walk", "dance"]', "people.activities[1]"),
+            ('[rendering]\nrenderer = "opengl"', "expected 'auto', 'raster' or 'gl', got \"opengl\""),
+            ("people = 4", "expected a section [people] with keys activities"),
+            ("duration = 2024-01-01", "duration"),
+        ],
+    )
+    def test_a_wrong_value_names_file_key_expected_and_got(self, scenario_file, text, said):
+        path = scenario_file('name = "x"\n' + text)
+        message = refusal(path)
+        assert message.startswith(f"{path}: ")
+        assert said in message
+        assert "expected" in message
+
+    def test_an_integer_is_a_number(self, scenario_file):
+        assert load(scenario_file('name = "x"\n[cameras]\nfov = 80')).cameras.fov == 80.0
+
+
+class TestFiles:
+    def test_a_syntax_error_names_file_and_line(self, scenario_file):
+        path = scenario_file('name = "x"\n\n[people\ncount = 3')
+        assert refusal(path).startswith(f"{path}, line 3, column ")
+
+    def test_an_error_at_the_end_names_the_last_line(self, scenario_file):
+        path = scenario_file('name = "x"\nseed =')
+        assert refusal(path).startswith(f"{path}, line 2, column ")
+
+    def test_a_missing_file_lists_what_is_beside_it(self, scenario_file):
+        path = scenario_file('name = "x"', "kitchen.toml")
+        message = refusal(path.with_name("kitchn.toml"))
+        assert "no such file" in message
+        assert f"did you mean {path}?" in message
+
+    def test_a_folder_is_not_a_scenario(self, tmp_path):
+        assert "is a folder" in refusal(tmp_path)
+
+    def test_a_binary_file_is_not_a_scenario(self, tmp_path):
+        path = tmp_path / "x.toml"
+        path.write_bytes(b"name = \xff\xfe")
+        assert "UTF-8" in refusal(path)
+
+
+class TestOverrides:
+    @pytest.fixture
+    def base(self, scenario_file):
+        return scenario_file('name = "x"\nseed = 3\n[people]\ncount = 2')
+
+    @pytest.mark.parametrize(
+        ("override", "section", "key", "value"),
+        [
+            ("people.count=6", "people", "count", 6),
+            ("people.area = 1.5", "people", "area", 1.5),
+            ('people.activities=["talk", "walk"]', "people", "activities", ("talk", "walk")),
+            ("cameras.size=[320, 240]", "cameras", "size", (320, 240)),
+            ("rendering.renderer=gl", "rendering", "renderer", "gl"),
+            ('rendering.renderer="gl"', "rendering", "renderer", "gl"),
+        ],
+    )
+    def test_the_right_hand_side_is_typed(self, base, override, section, key, value):
+        loaded = load(base, overrides=[override])
+        assert getattr(getattr(loaded, section), key) == value
+
+    def test_only_the_named_key_changes(self, base):
+        assert load(base, overrides=["people.count=6"]) == load(base).model_copy(
+            update={"people": People(count=6)}
+        )
+
+    def test_the_last_of_two_counts(self, base):
+        assert load(base, overrides=["people.count=6", "people.count=1"]).people.count == 1
+
+    @pytest.mark.parametrize("override", ["people.cuont=6", "people.count=six", "people.count=-1"])
+    def test_a_refused_override_is_the_place(self, base, override):
+        assert refusal(base, overrides=[override]).startswith(f"--set {override}: people.c")
+
+    def test_a_mistake_of_the_file_is_still_the_files(self, scenario_file):
+        path = scenario_file('name = "x"\n[people]\narea = -1')
+        assert refusal(path, overrides=["people.count=3"]).startswith(f"{path}: people.area")
+
+    @pytest.mark.parametrize(
+        "override", ["people.count", "=3", "people..count=3", "people.activities=[walk]", "seed="]
+    )
+    def test_what_is_not_key_and_value_is_refused(self, base, override):
+        assert refusal(base, overrides=[override]).startswith(f"--set {override}: ")
+
+    def test_a_value_is_not_a_section(self, base):
+        assert "people.count is a value" in refusal(base, overrides=["people.count.x=3"])
+
+    def test_seed_zero_is_a_seed(self, base):
+        assert load(base).seed == 3
+        assert load(base, seed=0).seed == 0
+
+    def test_a_bad_seed_is_told_of_by_its_option(self, base):
+        assert refusal(base, seed=-1).startswith("--seed: seed")
+
+
+class TestFingerprint:
+    def test_equal_scenarios_have_equal_fingerprints_however_written(self, scenario_file):
+        spelled_out = scenario_file('name = "x"\n[people]\ncount = 4\n[cameras]\nfov = 75', "a.toml")
+        assert fingerprint(load(spelled_out)) == fingerprint(load(scenario_file('name = "x"', "b.toml")))
+
+    @pytest.mark.parametrize(
+        "override", ["seed=1", "people.count=3", "cameras.fov=74.999", "name=y", 'method.variants=["full"]']
+    )
+    def test_any_value_changes_it(self, scenario_file, override):
+        path = scenario_file('name = "x"')
+        assert fingerprint(load(path)) != fingerprint(load(path, overrides=[override]))
+
+    def test_the_version_changes_it(self, monkeypatch):
+        scenario = Scenario(name="x")
+        before = fingerprint(scenario)
+        monkeypatch.setattr("simharness.scenario.load.code_version", lambda: "999")
+        assert fingerprint(scenario) != before
+
+
+SCENARIOS = st.builds(
+    Scenario,
+    name=st.from_regex(r"[a-z0-9][a-z0-9_-]*", fullmatch=True),
+    description=st.text(),
+    seed=st.integers(0, 2**63),
+    people=st.builds(People, count=st.integers(0, 100)),
+    cameras=st.builds(
+        Cameras,
+        fov=st.floats(1.0, 170.0, exclude_min=True, exclude_max=True),
+        start=st.floats(allow_nan=False, allow_infinity=False),
+    ),
+)
+
+
+@given(scenario=SCENARIOS)
+def test_what_is_written_is_read_back(tmp_path_factory, scenario):
+    path = tmp_path_factory.mktemp("scenario") / "x.toml"
+    path.write_text(dumps(scenario), encoding="utf-8", newline="\n")
+    assert load(path) == scenario

@@ -1,0 +1,126 @@
+"""The command line: what it says and how it exits."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from simharness.cli import app
+from simharness.experiment.execution import RunError
+
+QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
+TINY = [
+    *("--set", "people.count=2", "--set", "cameras.count=3", "--set", "duration=0.3"),
+    *("--set", "cameras.size=[160, 120]", "--set", "clutter.boxes=1", "--set", "clutter.shelves=0"),
+]
+
+
+@pytest.fixture
+def simharness(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str):
+        return CliRunner().invoke(app, list(arguments), catch_exceptions=False)
+
+    return call
+
+
+def assert_refused(result, *said: str):
+    """One message and no traceback."""
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")
+    assert "Traceback" not in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    for text in said:
+        assert text in result.stderr
+    assert result.stdout == ""
+
+
+def test_version(simharness):
+    result = simharness("--version")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("simharness 0.")
+
+
+@pytest.mark.parametrize("command", [[], ["run"], ["evaluate"], ["evaluate", "shelf"]])
+def test_help_is_there(simharness, command):
+    result = simharness(*command, "--help")
+    assert result.exit_code == 0
+    assert "Usage" in result.stdout
+
+
+class TestBadInput:
+    def test_unknown_key(self, simharness, tmp_path):
+        path = tmp_path / "room.toml"
+        path.write_text('name = "room"\n[people]\ncuont = 2\n')
+        assert_refused(simharness("run", str(path)), str(path), "people.cuont", "did you mean people.count?")
+
+    def test_brackets_in_messages_are_shown(self, simharness):
+        assert_refused(simharness("run", QUICKSTART, "--set", "people=3"), "a section [people] with keys")
+
+    def test_missing_file(self, simharness):
+        assert_refused(simharness("run", "nothing.toml"), "nothing.toml: no such file")
+
+    def test_one_camera(self, simharness):
+        assert_refused(
+            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=1"), "cameras: ", "at least 2 cameras", "got 1"
+        )
+
+    def test_no_camera(self, simharness):
+        assert_refused(
+            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=0"), "cameras: ", "at least 2 cameras", "got 0"
+        )
+
+    def test_camera_in_a_wall(self, simharness):
+        result = simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.0")
+        assert_refused(result, "cam0", "wall", "cameras.radius")
+
+    def test_people_that_do_not_fit(self, simharness):
+        result = simharness("run", QUICKSTART, *TINY, "--set", "people.count=12", "--set", "people.area=0.5")
+        assert_refused(result, "people.")
+
+    def test_unknown_variant(self, simharness):
+        result = simharness("run", QUICKSTART, *TINY, "--set", 'method.variants=["best"]')
+        assert_refused(result, "method.variants", "'best'", "full")
+
+    def test_out_that_cannot_be_a_folder(self, simharness, tmp_path):
+        (tmp_path / "file").touch()
+        assert_refused(simharness("run", QUICKSTART, *TINY, "--out", "file/deep"), "--out", "file")
+
+    def test_missing_data(self, simharness):
+        assert_refused(simharness("evaluate", "shelf", "nowhere"), "nowhere: no such folder")
+
+    def test_unknown_method(self, simharness):
+        assert_refused(simharness("evaluate", "shelf", "nowhere", "--method", "best"), "'best'", "full")
+
+    def test_nothing_is_left_behind(self, simharness, tmp_path):
+        simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.0")
+        assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.html")) == []
+
+
+@pytest.mark.parametrize("error", [ValueError("wrong turn"), KeyError("lost"), RunError("film: frame 3")])
+def test_an_error_of_ours_shows_its_traceback(simharness, monkeypatch, tmp_path, error):
+    def broken(*_args, **_options):
+        raise error
+
+    monkeypatch.setattr("simharness.experiment.run.detect", broken)
+    result = simharness("run", QUICKSTART, *TINY)
+    assert result.exit_code == 3
+    assert "Traceback" in result.stderr
+    assert "the run failed: detect: " in result.stderr
+    assert not list(tmp_path.rglob("summary.json"))
+
+
+@pytest.mark.slow
+def test_a_run_prints_the_numbers_and_where_the_report_is(simharness, tmp_path):
+    result = simharness("run", QUICKSTART, *TINY, "--seed", "3")
+    assert result.exit_code == 0, result.stderr
+    report = Path(result.stdout.strip().splitlines()[-1].removeprefix("report: "))
+    assert (tmp_path / report).read_text(encoding="utf-8").startswith("<!doctype html>")
+    summary = json.loads((tmp_path / report).with_name("summary.json").read_text())
+    assert summary["seed"] == 3
+    assert summary["frames"] == 3
+    for variant in ("full", "no-3dps"):
+        assert variant in summary["variants"]
+        assert variant in result.stdout
