@@ -75,18 +75,16 @@ def run(
     scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
     overrides: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."
-        ),
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
     workers: Annotated[
         int,
         typer.Option(metavar="N", min=1, help="Processes that share the frames. The results are the same."),
     ] = 1,
-    out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)
-    ] = Path("results/runs"),
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)] = Path(
+        "results/runs"
+    ),
 ) -> None:
     """Run a scenario: simulate, film, detect, estimate, score, report.
 
@@ -94,10 +92,11 @@ def run(
     """
     with _border():
         from simharness.experiment.progress import reporter
-        from simharness.experiment.run import run as run_scenario
         from simharness.scenario.load import load
 
-        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        loaded = load(scenario, overrides=overrides or (), seed=seed)  # before the slow imports, to answer at once
+        from simharness.experiment.run import run as run_scenario
+
         command = shlex.join(["simharness", *sys.argv[1:]])
         with reporter() as bars:
             folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
@@ -120,9 +119,7 @@ def shelf(
     ] = HeadMapping.VOXELPOSE,
     method: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="VARIANT", help="A preset of mvpose.Pipeline. Repeatable. [dim]\\[default: full][/]"
-        ),
+        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline. Repeatable. [dim]\\[default: full][/]"),
     ] = None,
 ) -> None:
     """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.

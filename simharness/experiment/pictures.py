@@ -62,8 +62,8 @@ class Picture:
     def uri(self) -> str:
         """The picture as a data URI for a page: JPEG, no wider than a page needs."""
         shrink = min(1.0, _WIDEST / self.rgb.shape[1])
-        rgb = cv2.resize(self.rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-        jpeg = _encoded(rgb, ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        small = cv2.resize(self.rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+        jpeg = _encoded(small.astype(np.uint8, copy=False), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
         return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode()
 
 

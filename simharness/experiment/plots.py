@@ -63,9 +63,7 @@ _STYLE: dict[Any, Any] = {
 def _figure(name: str, *, size: tuple[float, float] = _SIZE) -> Iterator[tuple[Axes, list[str]]]:
     """Axes to draw on; the SVG is in the list afterwards."""
     written: list[str] = []
-    with mpl.rc_context(
-        {**_STYLE, "svg.hashsalt": name}
-    ):  # the salt keeps the ids of two plots of a page apart
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):  # the salt keeps the ids of two plots of a page apart
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.add_subplot()
         axes.set_axisbelow(True)
@@ -96,9 +94,7 @@ def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) ->
     with _figure("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
-            axes.plot(
-                time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3
-            )
+            axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
             lost = np.isnan(errors[:, person])
             row = -top * (0.05 + 0.045 * person)
             axes.plot(time[lost], np.full(lost.sum(), row), "s", ms=3, color=colors[person], clip_on=False)
@@ -150,9 +146,7 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
         stages = list(dict.fromkeys(stage for each in times.values() for stage in each if stage != "total"))
         for stage, spare in zip(stages, VARIANT_COLORS * len(stages), strict=False):
             width = np.array([each.get(stage, 0.0) for each in times.values()])
-            axes.barh(
-                rows, width, left=left, height=0.6, color=STAGE_COLORS.get(stage, spare), label=stage, lw=0
-            )
+            axes.barh(rows, width, left=left, height=0.6, color=STAGE_COLORS.get(stage, spare), label=stage, lw=0)
             left += width
         for row, (end, each) in enumerate(zip(left.tolist(), times.values(), strict=True)):
             told = f"{each.get('total', end):.1f} ms"
@@ -223,10 +217,7 @@ def _camera(axes: Axes, center: Floats, forward: Floats, *, tangent: float, name
         return
     bearing = math.atan2(forward[1], forward[0])
     side = math.atan(tangent)
-    ends = [
-        center + 1.2 * np.array([math.cos(bearing + turn), math.sin(bearing + turn)])
-        for turn in (side, -side)
-    ]
+    ends = [center + 1.2 * np.array([math.cos(bearing + turn), math.sin(bearing + turn)]) for turn in (side, -side)]
     axes.add_patch(Polygon(np.array([center, *ends]), fc=_FAINT, ec="none", alpha=0.18, zorder=1))
     axes.plot(*center, "o", color=_INK, ms=3.5, zorder=4)
     aside = center + 0.3 * np.array([-forward[1], forward[0]]) / length

@@ -52,17 +52,13 @@ def render(record: Record, *, pictures: Sequence[Picture] = (), things: Sequence
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    source = (
-        resources.files("simharness.experiment").joinpath("templates/report.html").read_text(encoding="utf-8")
-    )
+    source = resources.files("simharness.experiment").joinpath("templates/report.html").read_text(encoding="utf-8")
     return environment.from_string(source).render(
         scenario=record.scenario,
         summary=summary,
         main=main,
         facts=_facts(record),
-        cards=[
-            {"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS
-        ],
+        cards=[{"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS],
         columns=COLUMNS,
         parts=_parts_table(summary["variants"]),
         people=_people_table(record, main),
@@ -165,9 +161,7 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
     joints = np.stack([true.joints for true in record.truth])
     people = joints.shape[1]
     colors = [_line_color(person) for person in range(people)]
-    found = np.concatenate(
-        [estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]]
-    )
+    found = np.concatenate([estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]])
     drawn = {
         "plan": plots.floor_plan(
             record.rig,
@@ -193,7 +187,5 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
         drawn["distribution"] = plots.error_distribution(
             {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
         )
-        drawn["errors"] = plots.error_over_time(
-            record.time, person_errors(record.scores, main), colors=colors
-        )
+        drawn["errors"] = plots.error_over_time(record.time, person_errors(record.scores, main), colors=colors)
     return {name: Markup(svg) for name, svg in drawn.items()}

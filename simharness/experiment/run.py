@@ -15,6 +15,7 @@ from mvpose import Detections, Estimate, Pipeline, Rig
 from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
 from simharness.experiment.atomic import appearing
+from simharness.experiment.compilation import Compilation
 from simharness.experiment.execution import RunError, map_frames
 from simharness.experiment.pictures import Footage, draw_pictures, outlines
 from simharness.experiment.progress import Advance, Reporter, Silence
@@ -102,13 +103,15 @@ def run(
     with clock.stage("build", 1, foresee=True):
         trial = prepare(scenario)
         _make_folder(out)
+    compilation = Compilation(trial.pipelines)
+    compilation.start()
     with clock.stage("simulate", 1):
         sequence = simulate(trial.scene)
     views = _film(trial, sequence, workers, clock)
     with clock.stage("detect", scenario.frames):
         answers = detect(sequence, views, trial.rig, scenario.detector, seed=scenario.seed)
         detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
-    estimates = _estimate(trial, detections, workers, clock)
+    estimates = _estimate(trial, detections, compilation, workers, clock)
     with clock.stage("score", len(estimates)) as advance:
         scores = {}
         for variant, answered in estimates.items():
@@ -148,9 +151,7 @@ def run(
     return folder
 
 
-def score(
-    detections: Sequence[Detections], truth: Sequence[Truth], estimates: Sequence[Estimate]
-) -> VariantScores:
+def score(detections: Sequence[Detections], truth: Sequence[Truth], estimates: Sequence[Estimate]) -> VariantScores:
     """Score one variant, frame by frame."""
     frames = [
         score_frame(
@@ -196,8 +197,10 @@ def _film(trial: Trial, sequence: PeopleSequence, workers: int, clock: _Clock) -
 
 
 def _estimate(
-    trial: Trial, detections: tuple[Detections, ...], workers: int, clock: _Clock
+    trial: Trial, detections: tuple[Detections, ...], compilation: Compilation, workers: int, clock: _Clock
 ) -> dict[str, tuple[Estimate, ...]]:
+    with clock.stage("compile", 1):
+        compilation.wait()
     with clock.stage("estimate", len(detections)) as advance:
         estimating = Estimating(trial.rig, detections, trial.pipelines)
         parts = map_frames(estimating, range(len(detections)), workers=workers, progress=advance)

@@ -86,9 +86,7 @@ class Record:
     def __post_init__(self) -> None:
         counts = {len(self.time), len(self.detections), len(self.truth), *map(len, self.estimates.values())}
         if len(counts) != 1:
-            raise ValueError(
-                f"time, detections, truth and estimates must have one entry a frame, got {sorted(counts)}"
-            )
+            raise ValueError(f"time, detections, truth and estimates must have one entry a frame, got {sorted(counts)}")
 
 
 def write_run(record: Record, folder: Path) -> None:
@@ -234,9 +232,7 @@ _OF_MATCHING = ("labels", "iterations", "residuals", "objective", "converged")
 _OF_ESTIMATES = ("frame", "joints", "scores", "covariance", *_OF_MATCHING)
 
 
-def _estimates(
-    arrays: Arrays, detected: NDArray[np.int64], timings: pl.DataFrame
-) -> dict[str, tuple[Estimate, ...]]:
+def _estimates(arrays: Arrays, detected: NDArray[np.int64], timings: pl.DataFrame) -> dict[str, tuple[Estimate, ...]]:
     estimates = {}
     for variant in map(str, arrays["variants"]):
         fields = {key: arrays.get(f"{variant}/{key}") for key in _OF_ESTIMATES}

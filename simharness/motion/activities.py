@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.motion.gait import Gait
 from simharness.motion.gestures import gesture
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
@@ -19,8 +18,8 @@ def perform(
     track: Track,
     time: NDArray[np.float64],
     *,
-    gait: Gait | None,
     rng: np.random.Generator,
+    pace: float = 1.0,
 ) -> Motion:
     """Let one person do one activity.
 
@@ -29,11 +28,14 @@ def perform(
         kinematics: the body.
         track: where.
         time: seconds, (T,).
-        gait: how the body walks; needed on a loop only.
         rng: draws the manner.
+        pace: quick short steps are above 1; see ``make_gait``.
+
+    Raises:
+        ValueError: an activity that does not go with the track.
     """
+    if (activity == "walk") != isinstance(track, Loop):
+        raise ValueError(f"{activity!r} does not go with a {type(track).__name__}: walk on a Loop, all else on a Spot")
     if isinstance(track, Loop):
-        if gait is None:
-            raise ValueError(f"to {activity} on a loop needs a gait: make_gait(kinematics)")
-        return walk(kinematics, track, gait, time, rng)
-    return gesture(activity, kinematics, track, time, rng)
+        return walk(kinematics, track, time, rng=rng, pace=pace)
+    return gesture(activity, kinematics, track, time, rng=rng)

@@ -23,7 +23,7 @@ _HANGING = {"shoulder_abduction": 9.0, "shoulder_rotation": 8.0, "elbow_flexion"
 _HANGING |= {"wrist_flexion": 5.0, "shoulder_flexion": 2.0}
 
 
-def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, rng: np.random.Generator) -> Motion:
+def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator) -> Motion:
     """Stand on the spot and do one of ``GESTURES``, over and over, with natural pauses.
 
     Args:
@@ -71,9 +71,7 @@ def _planted(kinematics: Kinematics, spot: Spot, side: str, frames: int) -> Foot
     c, s = np.cos(spot.bearing), np.sin(spot.bearing)
     ground = spot.place + np.array([c * ankle[0] - s * ankle[1], s * ankle[0] + c * ankle[1]])
     place = np.append(ground, ankle[2] + kinematics.standing_height)
-    return Foot(
-        ankle=np.tile(place, (frames, 1)), bearing=np.full(frames, spot.bearing + out), pitch=np.zeros(frames)
-    )
+    return Foot(ankle=np.tile(place, (frames, 1)), bearing=np.full(frames, spot.bearing + out), pitch=np.zeros(frames))
 
 
 def wander(time: Floats, rng: np.random.Generator, rate: float) -> Floats:
@@ -129,14 +127,14 @@ def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """The hand goes up beside the head, palm forward, and waves from the elbow."""
     side, _ = _side(rng)
-    on = strokes(time, rng, hold=2.4, rest=0.8)
+    on = strokes(time, rng, hold=2.4, rest=0.5)
     beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
     arm = _arm(
         side,
         shoulder_abduction=rng.uniform(55, 80),
         shoulder_flexion=rng.uniform(15, 35),
         shoulder_rotation=-75.0 + 6.0 * beat,
-        elbow_flexion=rng.uniform(85, 105) + rng.uniform(14, 22) * beat,
+        elbow_flexion=rng.uniform(85, 105) + rng.uniform(18, 26) * beat,
         forearm_pronation=-5.0,
         wrist_flexion=-6.0 + 10.0 * beat,
         clavicle_elevation=10.0,
@@ -147,7 +145,7 @@ def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """A straight arm points at something that the eyes follow too."""
     side, sign = _side(rng)
-    on = strokes(time, rng, hold=2.2, rest=1.0)
+    on = strokes(time, rng, hold=2.0, rest=0.6)
     away = rng.uniform(-10, 45) + 10.0 * wander(time, rng, 0.3)  # to the arm's side
     _blend(
         curves,
@@ -171,7 +169,7 @@ def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """Both hands in front of the belly, beating along with what is said; the head nods."""
     for side in SIDES:
-        on = strokes(time, rng, hold=3.0, rest=0.7)
+        on = strokes(time, rng, hold=3.0, rest=0.5)
         _blend(
             curves,
             on,
@@ -191,7 +189,7 @@ def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 def _reach(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """One arm reaches for something high or low in front; trunk and weight go along."""
     side, sign = _side(rng)
-    on = strokes(time, rng, hold=1.1, rest=0.8, raised=1.0)
+    on = strokes(time, rng, hold=0.9, rest=0.4, raised=1.0)
     low = rng.uniform()  # 0 a high shelf, 1 a low table
     _blend(
         curves,

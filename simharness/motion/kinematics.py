@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import mujoco
@@ -20,13 +19,6 @@ Floats = NDArray[np.float64]
 _LEG = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion", "ankle_inversion")
 _FEET = {"left": "LeftFoot", "right": "RightFoot"}
 _SOLE = 0.03  # metres: skin this near the floor in the neutral stance belongs to the sole
-
-
-@dataclass(frozen=True)
-class Sole:
-    """The underside of a foot: skin points relative to the ankle while the foot lies flat, (n, 3), metres."""
-
-    points: Floats
 
 
 class Kinematics:
@@ -63,21 +55,27 @@ class Kinematics:
         return self.body.joints(self.transforms(motion))
 
     @cached_property
-    def soles(self) -> dict[str, Sole]:
-        """The soles by side."""
+    def soles(self) -> dict[str, Floats]:
+        """By side, the skin under the foot relative to the ankle while the foot lies flat, (n, 3) metres."""
         neutral = self.body.skin(bone_transforms(self.body, *self._neutral)).astype(float)
         floor = neutral[:, 2].min()
         result = {}
         for side in SIDES:
             foot = self._neutral[0][self.body.bones.index(_FEET[side])]
             own = (np.sign(neutral[:, 1]) == np.sign(foot[1])) & (neutral[:, 2] < floor + _SOLE)
-            result[side] = Sole(points=neutral[own] - foot)
+            result[side] = neutral[own] - foot
         return result
 
     @cached_property
     def standing_height(self) -> float:
         """Height of the pelvis over the floor in the neutral stance, metres."""
         return -float(self.body.skin(bone_transforms(self.body, *self._neutral))[:, 2].min())
+
+    @property
+    def leg_length(self) -> float:
+        """From hip to ankle, metres."""
+        leg = self.legs["left"]
+        return float(np.linalg.norm(leg.end - leg.anchors[0]))
 
     def _pose(self, root: Floats, angles: Floats) -> tuple[Floats, Floats]:
         self._address.write(self._data.qpos, root, angles)

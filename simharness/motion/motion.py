@@ -39,8 +39,8 @@ class Motion:
         off = np.abs(np.linalg.norm(root[:, 3:], axis=1) - 1.0)
         if (off > _UNIT_TOLERANCE).any():
             raise ValueError(
-                f"motion root quaternions (w x y z) must have unit length, got {1 + off.max():.6f} off by {off.max():.2g} "
-                f"in frame {int(off.argmax())}"
+                f"motion root quaternions (w x y z) must have unit length, the one of frame {int(off.argmax())} is "
+                f"off by {off.max():.2g}"
             )
         object.__setattr__(self, "root", root)
         object.__setattr__(self, "angles", angles)

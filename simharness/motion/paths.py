@@ -15,12 +15,12 @@ Floats = NDArray[np.float64]
 
 SWAY = 0.05  # metres: how far a pelvis strays from its track, by swaying, shifting weight and reaching
 _TIGHTEST = 0.8  # metres: least radius of a turn, where there is room
-_FASTEST_TURN = 1.4  # radians a second: in a narrow space people walk more slowly
+_FASTEST_TURN = 1.3  # radians a second: in a narrow space people walk more slowly
 _NARROWEST = 0.45  # metres: half side of the least square to walk round in
 _KNOTS = 48
-_IN_FILE = (0.3, 0.15)  # chance of trying to walk behind someone rather than one's own way, and more for each plan
-_TRIES = 400  # draws for each person before the plan starts over
-_PLANS = 8  # plans before giving up
+_IN_FILE = (0.3, 0.2)  # chance of trying to walk behind someone rather than one's own way, and more for each plan
+_TRIES = 300  # draws for each person before the plan starts over
+_PLANS = 6  # plans before giving up
 _CHECKS = 30.0  # Hz: spacing is checked at this rate, whatever the rate of the frames
 
 
@@ -79,20 +79,15 @@ Track = Spot | Loop
 
 
 def make_loop(points: Floats, *, speed: float, start: float) -> Loop:
-    """The smooth closed way through ``points`` (n, 2) in their order, by arc length; ``start`` in 0..1 of it.
+    """The smooth closed way through ``points`` (n, 2), metres, close together and in their order.
 
-    The first point is repeated at the end by this function, not by the caller.
+    The first point is repeated at the end by this function, not by the caller; ``start`` is a share of the length.
     """
     closed = np.concatenate([points, points[:1]])
-    chords = np.linalg.norm(np.diff(closed, axis=0), axis=1)
-    by_chord = CubicSpline(np.concatenate([[0.0], np.cumsum(chords)]), closed, bc_type="periodic")
-    fine = np.linspace(0.0, by_chord.x[-1], 8 * len(points) + 1)
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(by_chord(fine), axis=0), axis=1))])
-    knots = np.interp(np.linspace(0.0, arc[-1], len(points) + 1), arc, fine)
-    places = by_chord(knots)
-    places[-1] = places[0]
-    curve = CubicSpline(np.linspace(0.0, arc[-1], len(points) + 1), places, bc_type="periodic")
-    return Loop(curve=curve, speed=speed, start=start * arc[-1])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    knots = np.linspace(0.0, arc[-1], _KNOTS + 1)
+    places = np.stack([np.interp(knots, arc, closed[:, k]) for k in range(2)], axis=-1)
+    return Loop(curve=CubicSpline(knots, places, bc_type="periodic"), speed=speed, start=start * arc[-1])
 
 
 def draw_spot(rng: np.random.Generator, *, half: float) -> Spot:
@@ -112,7 +107,7 @@ def draw_loop(rng: np.random.Generator, *, half: float, speed: float) -> Loop | 
     wobble = rng.uniform(0.0, 0.12) * (1.0 - tightest * wide / slim**2)
     tilt, wobble_phase, start = rng.uniform(0.0, 2 * np.pi, 3)
     sense = rng.choice([-1.0, 1.0])
-    around = sense * np.linspace(0.0, 2 * np.pi, _KNOTS, endpoint=False)
+    around = sense * np.linspace(0.0, 2 * np.pi, 8 * _KNOTS, endpoint=False)
     radial = 1.0 + wobble * np.cos(3 * around + wobble_phase)
     ellipse = np.stack([wide * radial * np.cos(around), slim * radial * np.sin(around)], axis=-1)
     turn = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
@@ -167,9 +162,9 @@ def plan_tracks(
         else:
             return tuple(tracks)
     raise ValueError(
-        f"people.count = {len(speeds)} people do not fit: only {furthest} found a place in people.area = {area:g} m (half "
-        f"the side of their square) with people.spacing = {spacing:g} m between any two for {duration:g} s; lower "
-        "people.count or people.spacing, or enlarge people.area"
+        f"people.count = {len(speeds)} people do not fit: only {furthest} found a place in people.area = {area:g} m "
+        f"(half the side of their square) with people.spacing = {spacing:g} m between any two for {duration:g} s; "
+        "lower people.count or people.spacing, or enlarge people.area"
     )
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.motion.gait import Gait
 from simharness.humans.anatomy import SIDES
+from simharness.motion.gait import Gait, make_gait
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
 from simharness.motion.paths import Loop
@@ -25,26 +25,26 @@ _ARM_SWING = 19.0
 _ELBOW_SWING = 13.0
 
 
-def walk(kinematics: Kinematics, loop: Loop, gait: Gait, time: Floats, rng: np.random.Generator) -> Motion:
-    """Walk round the loop at its speed with the body's gait.
+def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
+    """Walk round the loop at its speed.
 
     Feet are planted: a footprint lies where the pelvis passes over it, and the foot rolls over it without slipping
     from heel strike to toe off, so that neither a bend nor the sway of the pelvis drags a foot.
 
     Args:
         kinematics: the body.
-        loop: the way; its speed sets the cadence, so ``gait.speed`` gives the intended one.
-        gait: the body's gait.
+        loop: the way and the speed.
         time: seconds, (T,).
+        pace: as in ``make_gait``.
         rng: draws the phase and the manner: how far the arms swing, how the trunk leans.
     """
+    gait = make_gait(kinematics, speed=loop.speed, pace=pace)
     offset, swing, manner, droop = rng.uniform(size=4)
     arms = (0.7 + 0.6 * swing) * gait.vigour
     lean_degrees = 1.0 + 4.0 * manner
-    frequency = loop.speed / gait.stride
-    phase = offset + frequency * time  # of the left foot; the right is half a stride later
+    phase = offset + gait.frequency * time  # of the left foot; the right is half a stride later
 
-    heading = np.unwrap(loop.heading(time)) if len(time) else loop.heading(time)
+    heading = loop.heading(time)
     bank = np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.25, 0.25)  # into the bend
     cycle = 2 * np.pi * phase
     turned = -_PELVIS_TURN * gait.vigour * np.cos(cycle)  # the side that steps goes forward
@@ -56,7 +56,7 @@ def walk(kinematics: Kinematics, loop: Loop, gait: Gait, time: Floats, rng: np.r
     bob = -gait.bob * np.cos(2 * cycle)  # lowest when a heel strikes
     pelvis = Pelvis(ground=ground, bob=bob, bearing=heading + turned, lean=lean, list=listed)
     own = {"left": phase, "right": phase - 0.5}
-    feet = {side: _steps(kinematics, loop, gait, side, own[side], frequency, time) for side in SIDES}
+    feet = {side: _steps(kinematics, loop, gait, side, own[side], time) for side in SIDES}
     counter = 2.0 * np.degrees(turned)  # the thorax turns as far the other way as the pelvis
     forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # an arm swings with the leg of the other side
     look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
@@ -81,14 +81,12 @@ def walk(kinematics: Kinematics, loop: Loop, gait: Gait, time: Floats, rng: np.r
     return stand_on(kinematics, pelvis, feet, angles, guess=guess, straightest=_STRAIGHTEST)
 
 
-def _steps(
-    kinematics: Kinematics, loop: Loop, gait: Gait, side: str, phase: Floats, frequency: float, time: Floats
-) -> Foot:
+def _steps(kinematics: Kinematics, loop: Loop, gait: Gait, side: str, phase: Floats, time: Floats) -> Foot:
     """One foot's way from print to print; ``phase`` counts its strides."""
     width = _STEP_WIDTH * kinematics.legs[side].end[1]  # to the left
     toe_out = _TOE_OUT * np.sign(width)
     stride = np.floor(phase)
-    struck = time - (phase - stride) / frequency
+    struck = time - (phase - stride) / gait.frequency
 
     def prints(when: Floats) -> tuple[Floats, Floats]:
         """Ankle (T, 2) over the print, as if flat, and bearing of a foot that lands at ``when``."""
@@ -98,7 +96,7 @@ def _steps(
         return loop.position(passed) + width * left, heading + toe_out
 
     here, bearing = prints(struck)
-    there, bearing_there = prints(struck + 1.0 / frequency)
+    there, bearing_there = prints(struck + 1.0 / gait.frequency)
     pitch, lift, progress = gait.foot(phase)
     swung = np.angle(np.exp(1j * (bearing_there - bearing)))
     bearing = bearing + progress * swung

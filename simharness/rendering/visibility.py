@@ -6,9 +6,10 @@ it. What separates "the skin around the joint" from "something in front of it" i
 - Up to the joint's radius plus ``_MARGIN`` it is the skin around the joint. The radius that comes with a body is
   1.5 times the distance to the nearest skin: on the way out of a limb of radius r, at an angle to its axis, the
   skin is r / sin(angle) away, and 1.5 covers angles down to 42 degrees. Steeper than that the joint lies behind
-  the length of its own limb. A hand in front of the hip, or the far hip seen from the side, are further in front.
-- ``_MARGIN`` is for the joints of the face, which lie on the skin with a radius near 0: what the pixel raster and
-  the regressor of the joint cost there is less than 2 cm; the far ear and eye are more than 5 cm behind the face.
+  the length of its own limb; the far hip or shoulder seen from the side is further behind still.
+- ``_MARGIN`` = 4 cm is for joints on or near the skin: the face, where the radius is near 0, and flat wrists,
+  which are thicker one way than the other. Seen from all sides, the near eyes and ears lie at most 2 cm under the
+  skin that is seen, the far ones at least 5 cm.
 - Anyone or anything else hides a joint as soon as it is in front of it at all: it cannot be inside the body.
 - A surface behind the joint means that the joint projects just off its body's outline: nothing hides it.
 """
@@ -23,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.camera import Camera
 from simharness.rendering.renderer import Image
 
-_MARGIN = 0.02  # metres
+_MARGIN = 0.04  # metres
 
 
 class Visibility(IntEnum):

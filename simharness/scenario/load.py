@@ -57,9 +57,7 @@ def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = 
 
 def fingerprint(scenario: Scenario) -> str:
     """Ten hexadecimal digits that change with any value of the scenario and with the version of the code."""
-    resolved = json.dumps(
-        {"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True
-    )
+    resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
     return hashlib.blake2b(resolved.encode(), digest_size=5).hexdigest()
 
 
@@ -76,9 +74,7 @@ def _read(path: Path) -> dict[str, Any]:
     except IsADirectoryError:
         raise ScenarioError(f"{path}: is a folder, not a scenario file; {_beside(path / '_')}") from None
     except UnicodeDecodeError as error:
-        raise ScenarioError(
-            f"{path}: not a text file in UTF-8 ({error.reason} at byte {error.start})"
-        ) from None
+        raise ScenarioError(f"{path}: not a text file in UTF-8 ({error.reason} at byte {error.start})") from None
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
     try:

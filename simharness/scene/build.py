@@ -14,7 +14,6 @@ from simharness.humans.looks import draw_looks, dress, face_colors
 from simharness.humans.model import person_spec
 from simharness.humans.shape import draw_shape
 from simharness.motion.activities import perform
-from simharness.motion.gait import make_gait
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
 from simharness.motion.paths import plan_tracks
@@ -26,7 +25,8 @@ from simharness.scene.placement import BODY_HALF_WIDTH, FreeSpace, place_clutter
 from simharness.scene.room import make_room
 
 _WALL_MARGIN = 0.1  # metres between a camera and a wall
-_VIGOUR, _PACE = (0.82, 0.98), (1.05, 1.25)  # in a room people stroll: shorter, quicker steps
+_FROUDE = (0.28, 0.39)  # speed over sqrt(g x leg): people stroll in a room; 0.42 is comfortable outdoors
+_PACE = (1.05, 1.25)  # and their steps are short and quick
 
 
 @dataclass(frozen=True)
@@ -65,26 +65,29 @@ def build(scenario: Scenario) -> Scene:
     count = people.count
     activities = [people.activities[i % len(people.activities)] for i in range(count)]
     looks = draw_looks(seed, count)
-    bodies = tuple(dress(make_body(draw_shape(stream(seed, "people", i, "shape"))), look) for i, look in enumerate(looks))
+    bodies = tuple(
+        dress(make_body(draw_shape(stream(seed, "people", i, "shape"))), look) for i, look in enumerate(looks)
+    )
     kinematics = [Kinematics(body) for body in bodies]
-    gaits = []
-    for i, activity in enumerate(activities):
-        rng = stream(seed, "people", i, "gait")
-        vigour, pace = rng.uniform(*_VIGOUR), rng.uniform(*_PACE)
-        gaits.append(make_gait(kinematics[i], vigour=vigour, pace=pace) if activity == "walk" else None)
+    manner = [stream(seed, "people", i, "gait") for i in range(count)]
+    drawn = [(rng.uniform(*_FROUDE), rng.uniform(*_PACE)) for rng in manner]
+    speeds = [froude * np.sqrt(9.81 * mover.leg_length) for (froude, _), mover in zip(drawn, kinematics, strict=True)]
     tracks = plan_tracks(
         seed,
-        [gait.speed if gait else None for gait in gaits],
+        [speed if activity == "walk" else None for speed, activity in zip(speeds, activities, strict=True)],
         area=people.area,
         spacing=people.spacing,
-        duration=float(time[-1]),
+        duration=scenario.duration,
     )
     motions = tuple(
-        perform(activities[i], kinematics[i], tracks[i], time, gait=gaits[i], rng=stream(seed, "people", i, "motion"))
-        for i in range(count)
+        perform(activity, mover, track, time, pace=pace, rng=stream(seed, "people", i, "motion"))
+        for i, (activity, mover, track, (_, pace)) in enumerate(zip(activities, kinematics, tracks, drawn, strict=True))
     )
     pelvises = np.concatenate([np.zeros((0, 3)), *(motion.root[:, :3] for motion in motions)])
-    joints = [body.joints(mover.transforms(m)).reshape(-1, 3) for body, mover, m in zip(bodies, kinematics, motions, strict=True)]
+    joints = [
+        body.joints(mover.transforms(m)).reshape(-1, 3)
+        for body, mover, m in zip(bodies, kinematics, motions, strict=True)
+    ]
     space = FreeSpace(
         room=scenario.room.size,
         area=people.area,
@@ -120,8 +123,8 @@ def _check_area(scenario: Scenario) -> None:
     largest = min(scenario.room.size[:2]) / 2 - BODY_HALF_WIDTH
     if scenario.people.count and scenario.people.area > largest:
         raise ValueError(
-            f"people.area = {scenario.people.area:g} m reaches into the walls of room.size = {list(scenario.room.size)}: "
-            f"take people.area at most {largest:.2f}, or a larger room"
+            f"people.area = {scenario.people.area:g} m reaches into the walls of room.size = "
+            f"{list(scenario.room.size)}: take people.area at most {largest:.2f}, or a larger room"
         )
 
 

@@ -6,6 +6,7 @@ A thing is drawn standing on the origin; ``placement.py`` finds it a place.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,14 +20,28 @@ _BOX_HEIGHT = (0.40, 1.10)
 _STACKED = 0.35  # chance of a smaller box on top of a low one
 _STACK_HEIGHT = (0.25, 0.45)
 _BOX_COLORS = np.array(
-    [[0.76, 0.60, 0.42], [0.70, 0.52, 0.35], [0.36, 0.50, 0.55], [0.80, 0.66, 0.38], [0.66, 0.42, 0.34], [0.50, 0.56, 0.46]]
+    [
+        [0.76, 0.60, 0.42],
+        [0.70, 0.52, 0.35],
+        [0.36, 0.50, 0.55],
+        [0.80, 0.66, 0.38],
+        [0.66, 0.42, 0.34],
+        [0.50, 0.56, 0.46],
+    ]
 )
 _TAPE = 0.06  # metres
 _SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
 _BOARD = 0.025
 _WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
 _BOOK_COLORS = np.array(
-    [[0.55, 0.22, 0.20], [0.20, 0.32, 0.46], [0.25, 0.42, 0.32], [0.78, 0.62, 0.30], [0.82, 0.79, 0.72], [0.36, 0.26, 0.40]]
+    [
+        [0.55, 0.22, 0.20],
+        [0.20, 0.32, 0.46],
+        [0.25, 0.42, 0.32],
+        [0.78, 0.62, 0.30],
+        [0.82, 0.79, 0.72],
+        [0.36, 0.26, 0.40],
+    ]
 )
 
 
@@ -74,7 +89,7 @@ def _taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[lis
     c, s = np.cos(yaw), np.sin(yaw)
     edges = np.array([-size[1] / 2, -_TAPE / 2, _TAPE / 2, size[1] / 2])
     boxes, painted = [], []
-    for k, (low, high) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (low, high) in enumerate(pairwise(edges)):
         across = float(low + high) / 2
         center = (float(-s * across), float(c * across), float(base + size[2] / 2))
         boxes.append(Box(center, (float(size[0] / 2), float(high - low) / 2, float(size[2] / 2)), yaw))
@@ -98,7 +113,7 @@ def draw_shelf(rng: np.random.Generator) -> Thing:
     levels = np.linspace(0.08, height - _BOARD / 2, boards)
     for z in levels:
         parts.append((Box((0.0, 0.0, float(z)), (depth / 2, inner / 2, _BOARD / 2)), 0.94 * wood))
-    for z, above in zip(levels[:-1], levels[1:], strict=True):
+    for z, above in pairwise(levels):
         parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
     boxes, colors = zip(*parts, strict=True)
     return Thing(boxes, np.repeat(np.array(colors)[:, None], 6, axis=1))

@@ -18,6 +18,7 @@ BODY_HALF_WIDTH = 0.42  # metres: what a trunk with its arms needs to pass by
 _LIMB = 0.15  # metres around every joint: an outstretched arm does not go through a shelf
 _LENS = 0.5  # metres kept free around each camera
 _GAP = 0.08  # metres between things, and to the walls
+_BESIDE = (0.6, 1.4)  # metres from a person to a box beside
 _TRIES = 2000
 
 
@@ -88,23 +89,29 @@ def _place(
             return thing.at(place, yaw, name=f"{kind}{k}")
     plural = "shelves" if kind == "shelf" else "boxes"
     raise ValueError(
-        f"clutter.{plural}: {kind} {k} finds no place in {_TRIES} tries beside {len(placed)} other things, the people's "
-        f"paths and the cameras in room.size = {list(space.room)}; lower clutter.{plural} or people.count, or enlarge room.size"
+        f"clutter.{plural}: {kind} {k} finds no place in {_TRIES} tries beside {len(placed)} other things, the "
+        f"people's paths and the cameras in room.size = {list(space.room)}; lower clutter.{plural} or people.count, "
+        "or enlarge room.size"
     )
 
 
 def _about(rng: np.random.Generator, thing: Thing, space: FreeSpace) -> tuple[Floats, float]:
-    """Anywhere from among the people to just outside their area, at any angle: between them and the cameras."""
-    reach = np.minimum(space.area + 0.7, np.array(space.room[:2]) / 2)
-    place = _ring(rng, rng.uniform(0.4, 1.0) * reach)
-    return place, float(rng.uniform(0.0, 2 * np.pi))
+    """Close to where someone stands or walks, on any side, at any angle: it hides legs from the cameras beyond."""
+    share, distance = rng.uniform(), rng.uniform(*_BESIDE)
+    bearing, yaw = rng.uniform(0.0, 2 * np.pi, 2)
+    if len(space.pelvises):
+        someone = space.pelvises[int(share * len(space.pelvises)), :2]
+        place = someone + distance * np.array([np.cos(bearing), np.sin(bearing)])
+    else:
+        place = _ring(rng, share * np.minimum(space.area, np.array(space.room[:2]) / 2))
+    return place, float(yaw)
 
 
 def _beside(rng: np.random.Generator, thing: Thing, space: FreeSpace) -> tuple[Floats, float]:
-    """At the edge of the people's area or behind it up to the wall, its back outwards."""
+    """From within the people's area out to the wall, rather near than far, its back outwards."""
     half = np.array(space.room[:2]) / 2
-    edge = np.minimum(0.85 * space.area, half)
-    place = _ring(rng, rng.uniform(edge, np.maximum(half - 0.25, edge)))
+    edge = np.minimum(0.6 * space.area, half)
+    place = _ring(rng, edge + rng.uniform() ** 2 * np.maximum(half - 0.25 - edge, 0.0))
     outward = place / half
     side = int(np.abs(outward).argmax())
     yaw = (np.pi if outward[0] > 0 else 0.0) if side == 0 else (-np.pi / 2 if outward[1] > 0 else np.pi / 2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from simharness.humans.body import body_model
 from simharness.humans.model import bone_transforms
 from simharness.motion.kinematics import Addresses
 from simharness.scene.build import Scene
@@ -18,7 +19,7 @@ def simulate(scene: Scene) -> Sequence:
         The joints and bone transforms of everyone in every frame; arrays of P = 0 for an empty room.
     """
     frames, people = len(scene.time), len(scene.bodies)
-    bones = len(scene.bodies[0].bones) if people else 0
+    bones = len(body_model().bones)
     places = np.empty((people, frames, bones, 3))
     turns = np.empty((people, frames, bones, 3, 3))
     addresses = [Addresses(scene.model, body, prefix=f"person{i}/") for i, body in enumerate(scene.bodies)]

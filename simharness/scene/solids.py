@@ -113,4 +113,9 @@ def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
 def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh:
     """Quadrilaterals (k, 4), counter-clockwise from outside, each with a colour (k, 3), as triangles."""
     faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return Mesh(vertices=vertices, faces=faces, colors=np.repeat(np.clip(colors, 0, 1), 2, axis=0), smooth=False)
+    return Mesh(
+        vertices=vertices.astype(np.float32),
+        faces=faces.astype(np.int32),
+        colors=np.repeat(np.clip(colors, 0, 1), 2, axis=0).astype(np.float32),
+        smooth=False,
+    )

@@ -54,9 +54,7 @@ def test_no_frames_no_results():
 
 
 def test_frames_need_not_begin_at_zero():
-    assert list(itertools.chain(*map_frames(square, range(300, 310)))) == [
-        frame**2 for frame in range(300, 310)
-    ]
+    assert list(itertools.chain(*map_frames(square, range(300, 310)))) == [frame**2 for frame in range(300, 310)]
 
 
 def test_progress_counts_every_frame_once():

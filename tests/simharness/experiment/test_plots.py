@@ -22,9 +22,7 @@ def draw_all(people: int = 3, frames: int = 6) -> list[str]:
         plots.error_over_time(np.arange(frames) / 10, errors, colors=COLORS),
         plots.error_distribution({"full": errors.ravel(), "no-3dps": errors.ravel() * 2}),
         plots.visibility_shares([f"cam{k}" for k in range(5)], shares, labels=list("abcde")),
-        plots.stage_times(
-            {"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}
-        ),
+        plots.stage_times({"full": {"affinity": 1.0, "matching": 2.0, "total": 3.1}, "other": {"affinity": 4.0}}),
         plots.floor_plan(
             build_rig(Cameras()),
             (8.0, 8.0),

@@ -165,7 +165,7 @@ class TestPrepare:
             raise Unavailable("no EGL here")
 
         monkeypatch.setattr(running, "renderer_of", nothing)
-        with pytest.raises(ValueError, match="rendering.renderer: no EGL here"):
+        with pytest.raises(ValueError, match=r"rendering\.renderer: no EGL here"):
             prepare(tiny(rendering=Rendering(renderer="gl")))
 
 

@@ -55,9 +55,7 @@ def make_record(*, people: int, empty: bool = False, seed: int = 0) -> Record:
 def _camera(rng: np.random.Generator, name: str) -> Camera:
     rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     rotation *= np.sign(np.linalg.det(rotation))
-    return Camera(
-        np.diag([500.0, 501.0, 1.0]), rotation, rng.normal(size=3), rng.normal(size=5), (640, 480), name
-    )
+    return Camera(np.diag([500.0, 501.0, 1.0]), rotation, rng.normal(size=3), rng.normal(size=5), (640, 480), name)
 
 
 def _estimate(rng: np.random.Generator, found: int) -> Estimate:
@@ -72,9 +70,7 @@ def _estimate(rng: np.random.Generator, found: int) -> Estimate:
         converged=bool(rng.integers(2)),
     )
     covariance = rng.normal(size=(people, 17, 3, 3))
-    return Estimate(
-        joints, rng.random((people, 17)), matching, covariance, {"matching": 0.25, "total": rng.random()}
-    )
+    return Estimate(joints, rng.random((people, 17)), matching, covariance, {"matching": 0.25, "total": rng.random()})
 
 
 def assert_same(a, b, fields):

@@ -10,7 +10,7 @@ TIME = np.linspace(0.0, 6.0, 301)
 
 
 def circle(radius: float, *, clockwise: bool = False, speed: float = 1.0) -> Loop:
-    around = np.linspace(0, 2 * np.pi, 48, endpoint=False) * (-1 if clockwise else 1)
+    around = np.linspace(0, 2 * np.pi, 400, endpoint=False) * (-1 if clockwise else 1)
     return make_loop(radius * np.stack([np.cos(around), np.sin(around)], axis=-1), speed=speed, start=0.0)
 
 
@@ -18,7 +18,9 @@ def test_circle_has_its_length_speed_and_curvature():
     loop = circle(1.5, speed=0.9)
     assert loop.length == pytest.approx(2 * np.pi * 1.5, rel=1e-4)
     np.testing.assert_allclose(loop.curvature(TIME), 1 / 1.5, rtol=1e-2)
-    np.testing.assert_allclose(np.linalg.norm(np.gradient(loop.position(TIME), TIME, axis=0)[1:-1], axis=1), 0.9, rtol=2e-3)
+    np.testing.assert_allclose(
+        np.linalg.norm(np.gradient(loop.position(TIME), TIME, axis=0)[1:-1], axis=1), 0.9, rtol=2e-3
+    )
     np.testing.assert_allclose(circle(1.5, clockwise=True).curvature(TIME), -1 / 1.5, rtol=1e-2)
 
 

@@ -135,9 +135,7 @@ class TestOverrides:
         assert getattr(getattr(loaded, section), key) == value
 
     def test_only_the_named_key_changes(self, base):
-        assert load(base, overrides=["people.count=6"]) == load(base).model_copy(
-            update={"people": People(count=6)}
-        )
+        assert load(base, overrides=["people.count=6"]) == load(base).model_copy(update={"people": People(count=6)})
 
     def test_the_last_of_two_counts(self, base):
         assert load(base, overrides=["people.count=6", "people.count=1"]).people.count == 1
@@ -150,9 +148,7 @@ class TestOverrides:
         path = scenario_file('name = "x"\n[people]\narea = -1')
         assert refusal(path, overrides=["people.count=3"]).startswith(f"{path}: people.area")
 
-    @pytest.mark.parametrize(
-        "override", ["people.count", "=3", "people..count=3", "people.activities=[walk]", "seed="]
-    )
+    @pytest.mark.parametrize("override", ["people.count", "=3", "people..count=3", "people.activities=[walk]", "seed="])
     def test_what_is_not_key_and_value_is_refused(self, base, override):
         assert refusal(base, overrides=[override]).startswith(f"--set {override}: ")
 

@@ -1,0 +1,44 @@
+"""Compile the method's kernels in a second process while this one builds and films.
+
+The first run after an installation spends a quarter of its time on it. What is compiled lands in numba's cache on
+disk, where the processes that estimate find it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterable
+
+import numpy as np
+
+from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+
+
+class Compilation:
+    """A process that compiles; a failure costs nothing but the head start."""
+
+    def __init__(self, variants: Iterable[str]) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        self._process = spawn.Process(target=compile_kernels, args=(tuple(variants),), daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._process.start()
+
+    def wait(self) -> None:
+        """Return when all is compiled."""
+        self._process.join()
+
+
+def compile_kernels(variants: Iterable[str]) -> None:
+    """Compile whatever these presets of :class:`mvpose.Pipeline` use, or load it from the cache.
+
+    Two cameras side by side see one stick of a person: the least that goes through every stage.
+    """
+    K = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
+    rig = Rig([Camera(K, np.eye(3), np.array([x, 0.0, 3.0]), size=(640, 480)) for x in (-0.5, 0.5)])
+    body = np.column_stack([np.zeros(len(COCO17)), np.linspace(-0.8, 0.8, len(COCO17)), np.zeros(len(COCO17))])
+    detections = Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
+    for variant in variants:
+        if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
+            raise RuntimeError(f"{variant}: the one person before two perfect cameras was not found")

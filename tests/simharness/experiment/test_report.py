@@ -1,0 +1,82 @@
+"""The page's own arithmetic, and that what people write into a scenario cannot break it."""
+
+import numpy as np
+import pytest
+
+from mvpose import Detections, Estimate, Matching
+from simharness.detector.truth import Truth
+from simharness.experiment.report import joint_errors, person_errors, render
+from simharness.experiment.run import score, score_table
+from simharness.experiment.store import Record
+from simharness.rigs.layouts import build_rig
+from simharness.scenario.models import Cameras, People, Scenario
+from simharness.scoring.summary import summarize
+
+FRAMES = 4
+
+
+def make_record(*, people: int = 3, lost: bool = True, **scenario) -> Record:
+    """Estimates in another order than the people, person p off by (p + 1) cm; in frame 2 person 0 is lost."""
+    rng = np.random.default_rng(0)
+    rig = build_rig(Cameras(count=2))
+    truth, estimates, detections = [], [], []
+    for frame in range(FRAMES):
+        joints = rng.uniform(-0.2, 0.2, (people, 17, 3)) + [1.0, 0, 1.0] * np.arange(people)[:, None, None]
+        found = [p for p in reversed(range(people)) if not (lost and frame == 2 and p == 0)]
+        offset = np.zeros((people, 1, 3))
+        offset[:, 0, 1] = 0.01 * (np.arange(people) + 1)
+        pixels = rig.project(joints)
+        detections.append(Detections.empty())
+        truth.append(
+            Truth(
+                joints=joints,
+                pixels=pixels,
+                visibility=np.zeros(pixels.shape[:3], np.int8),
+                boxes=np.zeros((2, people, 4)),
+                person=np.zeros(0, np.int64),
+                error=np.zeros((0, 17), np.int8),
+            )
+        )
+        answer = (joints + offset)[found].reshape(-1, 17, 3)
+        estimates.append(Estimate(answer, np.ones(answer.shape[:2]), Matching(np.zeros(0, np.int64))))
+    scores = {"full": score(detections, truth, estimates)}
+    settings = Scenario(name="made", people=People(count=people), **scenario)
+    return Record(
+        scenario=settings,
+        rig=rig,
+        time=np.arange(FRAMES) / 10,
+        detections=tuple(detections),
+        truth=tuple(truth),
+        estimates={"full": tuple(estimates)},
+        scores=score_table(scores),
+        summary=summarize("made", scores, frames=FRAMES, seeds=1, seed=0, fingerprint="0" * 10),
+    )
+
+
+def test_errors_are_those_of_the_right_person():
+    expected = np.tile([10.0, 20.0, 30.0], (FRAMES, 1))
+    expected[2, 0] = np.nan
+    record = make_record()
+    np.testing.assert_allclose(person_errors(record.scores, "full"), expected, atol=1e-9)
+    np.testing.assert_allclose(joint_errors(record, "full"), np.repeat(expected[..., None], 17, -1), atol=1e-9)
+
+
+@pytest.mark.parametrize("people", [0, 1])
+def test_a_page_of_few_people(people):
+    page = render(make_record(people=people, lost=False))
+    assert page.startswith("<!doctype html>")
+    assert page.count("<svg") == (5 if people else 2)
+    assert "nan" not in page.lower().replace("nanum", "")
+
+
+def test_the_numbers_of_the_page_are_those_of_the_summary():
+    page = render(make_record())
+    assert "91.7" in page  # recall: 11 of 12
+    assert "0.250" in page  # missed a frame
+    assert "75.0" in page  # person 0 was found in 3 of 4 frames
+
+
+def test_what_people_write_is_text():
+    page = render(make_record(description="<script>alert(1)</script> & more"))
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page

@@ -1,0 +1,34 @@
+import numpy as np
+import pytest
+
+from simharness.scene.sequence import Sequence
+
+
+def arrays(frames: int, people: int) -> dict[str, np.ndarray]:
+    return {
+        "joints": np.zeros((frames, people, 17, 3)),
+        "ids": np.arange(people),
+        "time": np.arange(frames) / 10,
+        "bones": np.zeros((frames, people, 35, 3, 4)),
+    }
+
+
+@pytest.mark.parametrize("people", [0, 1, 5])
+def test_any_number_of_people(people):
+    sequence = Sequence(**arrays(3, people))
+    assert sequence.joints.shape == (3, people, 17, 3)
+    assert len(sequence) == 3
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("joints", np.zeros((3, 2, 16, 3)), r"sequence joints must be \(3, 2, 17, 3\), got \(3, 2, 16, 3\)"),
+        ("bones", np.zeros((3, 1, 35, 3, 4)), r"sequence bones must be \(3, 2, B, 3, 4\)|must be"),
+        ("ids", np.arange(3), "must be"),
+        ("joints", np.full((3, 2, 17, 3), np.nan), "never missing"),
+    ],
+)
+def test_bad_sequences_are_refused(key, value, message):
+    with pytest.raises(ValueError, match=message):
+        Sequence(**(arrays(3, 2) | {key: value}))
