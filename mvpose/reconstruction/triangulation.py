@@ -80,7 +80,7 @@ def refine(
     """Climb from the chosen states to the nearby maximum of likelihood times bone-length prior.
 
     Expectation maximisation: which keypoints are right given the joints, then the joints given those, each a 3 x 3
-    solve with the bones to its neighbours linearised.
+    solve with the bones to its neighbours linearised. No step lowers the posterior.
 
     Args:
         rays: one person's, (n, J).
@@ -158,6 +158,7 @@ def _propose(origins, directions, weights, pixel, sigmas, floor):  # type: ignor
 
 
 _SWEEPS = 8
+_HALVINGS = 4
 _LEASH = 1.0  # 1/m^2: information that ties a joint to where it is; it matters only where no view agrees
 
 
@@ -168,8 +169,7 @@ def _refine(  # type: ignore[no-untyped-def]
     n, count = weights.shape
     scores = np.zeros(count)
     covariance = np.full((count, 3, 3), np.nan)
-    A, b = np.empty((3, 3)), np.empty(3)
-    bone = np.empty(3)
+    A, b, target, trial, bone = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for _ in range(_SWEEPS):
         for j in range(count):
             if np.isnan(joints[j, 0]):
@@ -187,26 +187,60 @@ def _refine(  # type: ignore[no-untyped-def]
                     add_ray(A, b, origins[k], directions[k, j], right / variance)
                     score += right * weights[k, j]
             for other in range(count):
-                child = j if parents[j] == other else other
-                if (
-                    (parents[j] != other and parents[other] != j)
-                    or precision[child] == 0.0
-                    or np.isnan(joints[other, 0])
-                ):
+                child = _bone_between(j, other, parents)
+                if child < 0 or precision[child] == 0.0 or np.isnan(joints[other, 0]):
                     continue
-                now = 0.0
+                now, along = max(_distance(joints[j], joints[other]), 1e-9), 0.0
                 for r in range(3):
-                    bone[r] = joints[j, r] - joints[other, r]
-                    now += bone[r] * bone[r]
-                now = max(np.sqrt(now), 1e-9)
-                along = 0.0
-                for r in range(3):
-                    bone[r] /= now
+                    bone[r] = (joints[j, r] - joints[other, r]) / now
                     along += bone[r] * joints[other, r]
                 for r in range(3):
                     for c in range(3):
                         A[r, c] += precision[child] * bone[r] * bone[c]
                     b[r] += precision[child] * bone[r] * (along + length[child])
-            solve(A, b, covariance[j], joints[j])
+            if not solve(A, b, covariance[j], target):
+                continue
             scores[j] = score / n
+            # The bones are linearised, so a long step can overshoot; a step is taken only if it climbs.
+            here = _local_posterior(
+                joints[j], j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
+            )
+            step = 1.0
+            for _ in range(_HALVINGS):
+                for r in range(3):
+                    trial[r] = joints[j, r] + step * (target[r] - joints[j, r])
+                there = _local_posterior(
+                    trial, j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
+                )
+                if there >= here:
+                    for r in range(3):
+                        joints[j, r] = trial[r]
+                    break
+                step *= 0.5
     return scores, covariance
+
+
+@njit(cache=True)
+def _local_posterior(  # type: ignore[no-untyped-def]
+    point, j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
+):
+    """The terms of the log-posterior that change when joint j moves to ``point``."""
+    value = log_likelihood(point, origins, directions[:, j], weights[:, j], pixel, sigmas[j], floor)
+    for other in range(len(parents)):
+        child = _bone_between(j, other, parents)
+        if child >= 0 and precision[child] > 0.0 and not np.isnan(joints[other, 0]):
+            value -= 0.5 * precision[child] * (_distance(point, joints[other]) - length[child]) ** 2
+    return value
+
+
+@njit(cache=True)
+def _bone_between(j, other, parents):  # type: ignore[no-untyped-def]
+    """The child of the two where one is the other's parent, which names the bone; -1 where there is none."""
+    if parents[j] == other:
+        return j
+    return other if parents[other] == j else -1
+
+
+@njit(cache=True)
+def _distance(a, b):  # type: ignore[no-untyped-def]
+    return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)

@@ -173,6 +173,7 @@ def text_mask(text: str, size: float) -> NDArray[np.float32]:
     font = _font(max(6, round(size)))
     *_, bottom = font.getbbox("Åg" + text)
     glyphs, (x, y) = font.getmask2(text, mode="L")  # type: ignore[union-attr]
+    x = max(x, 0)  # some letters lean out to the left of where they stand
     mask = np.zeros((int(np.ceil(bottom)), max(int(np.ceil(font.getlength(text))) + 1, glyphs.size[0] + x)), np.float32)
     if glyphs.size[0] and glyphs.size[1]:
         drawn = np.array(glyphs, np.float32).reshape(glyphs.size[::-1])[: mask.shape[0] - y]

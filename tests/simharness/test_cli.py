@@ -73,8 +73,8 @@ class TestBadInput:
         )
 
     def test_camera_in_a_wall(self, simharness):
-        result = simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.0")
-        assert_refused(result, "cam0", "wall", "cameras.radius")
+        result = simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
+        assert_refused(result, "camera 'cam", "wall", "cameras.radius")
 
     def test_people_that_do_not_fit(self, simharness):
         result = simharness("run", QUICKSTART, *TINY, "--set", "people.count=12", "--set", "people.area=0.5")
@@ -95,7 +95,7 @@ class TestBadInput:
         assert_refused(simharness("evaluate", "shelf", "nowhere", "--method", "best"), "'best'", "full")
 
     def test_nothing_is_left_behind(self, simharness, tmp_path):
-        simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.0")
+        simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
         assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.html")) == []
 
 

@@ -6,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from people import STANDING, detect, ring
 
-from mvpose import COCO17, SHELF14, Detections
+from mvpose import COCO17, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
-from mvpose.reconstruction import PictorialStructure, Triangulation
+from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bones import bone_lengths
 from mvpose.reconstruction.pictorial import max_product
+from mvpose.reconstruction.triangulation import Proposals, refine
 
 
 def total(states, unary, chosen, parents, length, deviation, count):
@@ -91,6 +92,38 @@ def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_th
         )
         assert 0 < scores[joint] < 0.3 * scores[0]
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
+
+
+def log_posterior(joints, rays):
+    """Likelihood times prior of a whole pose, written out from the docstrings."""
+    noise, (length, deviation) = Noise(), bone_lengths(COCO17)
+    offset = joints[None] - rays.origins[:, None]
+    along = (offset * rays.directions).sum(axis=2)
+    e2 = (offset**2).sum(axis=2) - along**2
+    variance = noise.sigmas(COCO17) ** 2 + (rays.pixel[:, None] * along) ** 2
+    right = rays.weights * np.exp(-0.5 * e2 / variance) * (along > 0)
+    unary = np.where(rays.weights > 0, np.log(noise.floor + right), 0.0).sum()
+    bones = np.array([np.linalg.norm(joints[c] - joints[p]) for p, c in COCO17.edges])
+    children = [c for _, c in COCO17.edges]
+    return unary - 0.5 * (((bones - length[children]) / deviation[children]) ** 2).sum()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_refinement_climbs_and_never_runs_away(seed):
+    """Two views nearly in line, many joints of one view only, noise: where a linearised step can overshoot."""
+    rng = np.random.default_rng(seed)
+    rig = Rig(list(ring(7))[:3])
+    pixels = rig.project(STANDING) + rng.normal(0, 15, (3, 17, 2))
+    scores = np.where(rng.random((3, 17)) < 0.55, 0.9, 0.0)
+    scores[rng.integers(0, 3, 17), np.arange(17)] = 0.9
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(3), pixels, scores))
+    length, deviation = bone_lengths(COCO17)
+    start = STANDING + rng.normal(0, 0.2, (17, 3))
+    proposals = Proposals(start[:, None].copy(), np.zeros((17, 1)), np.ones(17, int))
+    joints, _, _ = refine(rays, COCO17, proposals, np.zeros(17, int), Noise(), length=length, deviation=deviation)
+    assert log_posterior(joints, rays) > log_posterior(start, rays)
+    whole, _, _ = PictorialStructure()(rays, COCO17)
+    assert np.linalg.norm(whole - STANDING, axis=1).max() < 1.5
 
 
 def test_the_prior_pulls_an_average_adult_little():
