@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,19 +16,25 @@ from mvpose import COCO17, Camera, Detections, Pipeline, Rig
 
 
 class Compilation:
-    """A process that compiles; a failure costs nothing but the head start."""
+    """A process that compiles; a failure costs nothing but the head start. A program needs it once."""
+
+    _compiled: ClassVar[set[str]] = set()
 
     def __init__(self, variants: Iterable[str]) -> None:
+        self._variants = set(variants) - self._compiled
         spawn = multiprocessing.get_context("spawn")
-        self._process = spawn.Process(target=compile_kernels, args=(tuple(variants),), daemon=True)
+        self._process = spawn.Process(target=compile_kernels, args=(self._variants,), daemon=True)
 
     def start(self) -> None:
         """Begin."""
-        self._process.start()
+        if self._variants:
+            self._process.start()
 
     def wait(self) -> None:
         """Return when all is compiled."""
-        self._process.join()
+        if self._variants:
+            self._process.join()
+            self._compiled.update(self._variants)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:
