@@ -85,25 +85,11 @@ class Camera:
         """Project world points (..., 3) to pixels (..., 2), distortion included; NaN where not in front."""
         local = np.asarray(points, float) @ self.R.T + self.t
         z = np.where(local[..., 2] > 0, local[..., 2], np.nan)
-        xy = _distort(local[..., :2] / z[..., None], self.distortion)
-        return np.stack(
-            [
-                self.K[0, 0] * xy[..., 0] + self.K[0, 1] * xy[..., 1] + self.K[0, 2],
-                self.K[1, 1] * xy[..., 1] + self.K[1, 2],
-            ],
-            axis=-1,
-        )
+        return self._to_pixels(_distort(local[..., :2] / z[..., None], self.distortion))
 
     def undistort(self, pixels: ArrayLike) -> Floats:
         """Pixels (..., 2) of the real lens to the pixels (..., 2) of a lens without distortion."""
-        xy = self._normalized(pixels)
-        return np.stack(
-            [
-                self.K[0, 0] * xy[..., 0] + self.K[0, 1] * xy[..., 1] + self.K[0, 2],
-                self.K[1, 1] * xy[..., 1] + self.K[1, 2],
-            ],
-            axis=-1,
-        )
+        return self._to_pixels(self._normalized(pixels))
 
     def rays(self, pixels: ArrayLike) -> Floats:
         """Unit viewing directions in the world (..., 3) of pixels (..., 2); NaN stays NaN."""
@@ -118,6 +104,10 @@ class Camera:
         with np.errstate(invalid="ignore"):
             low, high = pixels >= -0.5, pixels < np.array(self.size) - 0.5
         return np.all(low & high, axis=-1)
+
+    def _to_pixels(self, xy: Floats) -> Floats:
+        x, y = xy[..., 0], xy[..., 1]
+        return np.stack([self.K[0, 0] * x + self.K[0, 1] * y + self.K[0, 2], self.K[1, 1] * y + self.K[1, 2]], axis=-1)
 
     def _normalized(self, pixels: ArrayLike) -> Floats:
         pixels = np.asarray(pixels, float)

@@ -169,7 +169,7 @@ def _refine(  # type: ignore[no-untyped-def]
     n, count = weights.shape
     scores = np.zeros(count)
     covariance = np.full((count, 3, 3), np.nan)
-    A, b, target, trial, bone = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    A, b, target, trial = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for _ in range(_SWEEPS):
         for j in range(count):
             if np.isnan(joints[j, 0]):
@@ -186,18 +186,7 @@ def _refine(  # type: ignore[no-untyped-def]
                     )
                     add_ray(A, b, origins[k], directions[k, j], right / variance)
                     score += right * weights[k, j]
-            for other in range(count):
-                child = _bone_between(j, other, parents)
-                if child < 0 or precision[child] == 0.0 or np.isnan(joints[other, 0]):
-                    continue
-                now, along = max(_distance(joints[j], joints[other]), 1e-9), 0.0
-                for r in range(3):
-                    bone[r] = (joints[j, r] - joints[other, r]) / now
-                    along += bone[r] * joints[other, r]
-                for r in range(3):
-                    for c in range(3):
-                        A[r, c] += precision[child] * bone[r] * bone[c]
-                    b[r] += precision[child] * bone[r] * (along + length[child])
+            _add_bones(A, b, j, joints, parents, length, precision)
             if not solve(A, b, covariance[j], target):
                 continue
             scores[j] = score / n
@@ -218,6 +207,24 @@ def _refine(  # type: ignore[no-untyped-def]
                     break
                 step *= 0.5
     return scores, covariance
+
+
+@njit(cache=True)
+def _add_bones(A, b, j, joints, parents, length, precision):  # type: ignore[no-untyped-def]
+    """Add the bones that end in joint j to its normal equations, linearised in the direction they have now."""
+    bone = np.empty(3)
+    for other in range(len(parents)):
+        child = _bone_between(j, other, parents)
+        if child < 0 or precision[child] == 0.0 or np.isnan(joints[other, 0]):
+            continue
+        now, along = max(_distance(joints[j], joints[other]), 1e-9), 0.0
+        for r in range(3):
+            bone[r] = (joints[j, r] - joints[other, r]) / now
+            along += bone[r] * joints[other, r]
+        for r in range(3):
+            for c in range(3):
+                A[r, c] += precision[child] * bone[r] * bone[c]
+            b[r] += precision[child] * bone[r] * (along + length[child])
 
 
 @njit(cache=True)

@@ -65,6 +65,6 @@ _warm: set[str] = set()  # variants that this process has run
 @functools.cache
 def renderer_of(name: RendererName) -> Renderer:
     """The one renderer of this process: two GL contexts cannot share a scene, and shaders load once."""
-    from simharness.rendering.renderer import make_renderer
+    from simharness.rendering.choice import make_renderer
 
     return make_renderer(name)

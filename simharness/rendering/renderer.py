@@ -63,32 +63,6 @@ class Renderer(Protocol):
         ...
 
 
-def make_renderer(name: RendererName = "raster") -> Renderer:
-    """Make a renderer by its name.
-
-    Args:
-        name: ``"raster"`` (numba, anywhere), ``"gl"`` (pyrender on EGL), or ``"auto"``: gl where it works.
-
-    Raises:
-        Unavailable: ``"gl"`` was asked for and no context can be made.
-        ValueError: an unknown name.
-    """
-    from simharness.rendering.raster import RasterRenderer
-
-    if name == "raster":
-        return RasterRenderer()
-    if name not in ("gl", "auto"):
-        raise ValueError(f"renderer must be 'raster', 'gl' or 'auto', got {name!r}")
-    from simharness.rendering.gl import GlRenderer
-
-    try:
-        return GlRenderer()
-    except Unavailable:
-        if name == "gl":
-            raise
-        return RasterRenderer()
-
-
 def check_scene(camera: Camera, meshes: Sequence[Mesh], *, most: int) -> None:
     """Refuse what the renderers cannot draw rightly: a lens with distortion, more than ``most`` meshes."""
     if camera.distortion.any():

@@ -12,7 +12,7 @@ from mvpose.camera import Rig
 from simharness.humans.body import Body, make_body
 from simharness.humans.looks import draw_looks, dress, face_colors
 from simharness.humans.model import person_spec
-from simharness.humans.shape import draw_shape
+from simharness.humans.population import draw_shape
 from simharness.motion.activities import perform
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion

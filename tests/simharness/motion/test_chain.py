@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from simharness.humans.body import make_body
 from simharness.humans.model import person_spec
-from simharness.humans.shape import draw_shape
+from simharness.humans.population import draw_shape
 from simharness.motion.chain import Chain
 from simharness.motion.kinematics import Kinematics
 from simharness.random import stream

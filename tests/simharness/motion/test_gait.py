@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simharness.humans.body import make_body
-from simharness.humans.shape import draw_shape
+from simharness.humans.population import draw_shape
 from simharness.motion.gait import FOOT_OFF, make_gait, normative
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.rolling import roll

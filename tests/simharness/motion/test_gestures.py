@@ -4,7 +4,7 @@ import pytest
 from mvpose.skeleton import COCO17
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
-from simharness.humans.shape import draw_shape
+from simharness.humans.population import draw_shape
 from simharness.motion.activities import perform
 from simharness.motion.gestures import GESTURES, gesture, strokes, wander
 from simharness.motion.kinematics import Kinematics

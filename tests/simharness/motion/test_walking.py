@@ -7,7 +7,7 @@ import pytest
 
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
-from simharness.humans.shape import draw_shape
+from simharness.humans.population import draw_shape
 from simharness.motion.gait import make_gait
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from simharness.rendering.renderer import Unavailable, make_renderer
+from simharness.rendering.choice import make_renderer
+from simharness.rendering.renderer import Unavailable
 
 sys.path.insert(0, str(Path(__file__).parent))  # shapes.py
 

@@ -48,7 +48,7 @@ def stage(people=PEOPLE):
 
 @pytest.fixture(scope="module")
 def footage():
-    from simharness.rendering.renderer import make_renderer
+    from simharness.rendering.choice import make_renderer
 
     scene, sequence = stage()
     return scene, sequence, film(scene, sequence, RIG, make_renderer("raster"))

@@ -9,7 +9,8 @@ import pytest
 from shapes import _mesh, ball, box, crowd, disc, room, sheet
 
 from mvpose.camera import Camera
-from simharness.rendering.renderer import NEAR, make_renderer
+from simharness.rendering.choice import make_renderer
+from simharness.rendering.renderer import NEAR
 from simharness.rigs.layouts import build_rig, intrinsics, look_at
 from simharness.scenario.models import Cameras
 

@@ -110,7 +110,7 @@ def test_a_body_seen_from_around_it(raster, bearing, seen, hidden):
     """Who stands with the arms a little off the body shows its near side, and the limbs front and back."""
     from mvpose.skeleton import COCO17
     from simharness.humans.body import make_body
-    from simharness.humans.shape import draw_shape
+    from simharness.humans.population import draw_shape
     from simharness.random import stream
 
     body = make_body(draw_shape(stream(1, "test")))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from simharness.humans.body import body_model, make_body
-from simharness.humans.shape import STATURE, Shape, draw_shape, with_stature
+from simharness.humans.population import STATURE, draw_shape, with_stature
+from simharness.humans.shape import Shape
 from simharness.random import stream
 
 
