@@ -1,0 +1,19 @@
+import subprocess
+import sys
+
+import pytest
+
+import simharness
+
+
+def test_every_public_name_can_be_imported():
+    for name in simharness.__all__:
+        assert getattr(simharness, name).__name__ == name
+    with pytest.raises(AttributeError, match="it has KeypointError, Scenario"):
+        _ = simharness.Nothing
+
+
+def test_importing_the_package_and_its_command_line_is_light():
+    heavy = ("numba", "mujoco", "polars", "matplotlib", "scipy", "cv2", "OpenGL")
+    code = f"import sys, simharness, simharness.cli; print(*(m for m in {heavy} if m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
