@@ -26,6 +26,7 @@ Reconstruction = Callable[[Rays, Skeleton], tuple[Floats, Floats, Floats]]
 
 PRESETS: dict[str, str] = {
     "full": "every cue there is (geometry; appearance where descriptors are given), ADMM matching, 3DPS",
+    "fast": "geometry, matching by clustering, robust triangulation",
     "no-3dps": "as full, with robust triangulation in place of the pictorial structure",
 }
 
@@ -54,6 +55,8 @@ class Pipeline:
         if name not in PRESETS:
             raise ValueError(f"no preset {name!r} of the pipeline; there are {', '.join(PRESETS)}")
         full = cls()
+        if name == "fast":
+            return replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation())
         return replace(full, reconstruction=Triangulation()) if name == "no-3dps" else full
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.checks import as_array
 from mvpose.estimate import Matching
 from mvpose.matching import admm
-from mvpose.matching.rounding import round_to_people
+from mvpose.matching.clustering import cluster
+from mvpose.matching.pairwise import assign
+from mvpose.matching.rounding import number_people, round_to_people
 
 __all__ = ["Matcher", "match", "objective"]
 
-Method = Literal["admm"]
+Method = Literal["admm", "clustering", "hungarian"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,9 @@ def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alph
     Args:
         affinity: (m, m), symmetric, 0 to 1.
         view: camera of each detection, (m,), in any order.
-        method: ``"admm"`` is Algorithm 1 of the paper.
+        method: ``"admm"`` is Algorithm 1 of the paper; ``"clustering"`` works on the integer problem that it relaxes
+            and is much faster; ``"hungarian"`` matches each pair of views alone and breaks what is inconsistent at
+            its weakest links: the baseline.
         alpha: a match must have more affinity than this to be worth making.
 
     Returns:
@@ -52,21 +56,27 @@ def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alph
     affinity = as_array(affinity, (len(view), len(view)), "affinity")
     if not ((affinity >= 0) & (affinity <= 1)).all() or not np.allclose(affinity, affinity.T, atol=1e-9):
         raise ValueError("affinity must be symmetric with values in 0..1")
+    if method == "clustering":
+        return _matching(number_people(cluster(affinity, view, alpha=alpha)), affinity, alpha)
+    if method == "hungarian":
+        return _matching(round_to_people(assign(affinity, view, alpha=alpha), view, threshold=alpha), affinity, alpha)
     if method != "admm":
-        raise ValueError(f"method must be 'admm', got {method!r}")
+        raise ValueError(f"method must be 'admm', 'clustering' or 'hungarian', got {method!r}")
     order = np.argsort(view, kind="stable")
     back = np.argsort(order, kind="stable")
     relaxed = admm.solve(affinity[np.ix_(order, order)], view[order], alpha=alpha)
     P = relaxed.P[np.ix_(back, back)]
-    labels = round_to_people(P, view)
-    return Matching(
-        labels=labels,
+    return replace(
+        _matching(round_to_people(P, view), affinity, alpha),
         P=P,
         iterations=relaxed.iterations,
         residuals=relaxed.residuals,
-        objective=objective(labels, affinity, alpha=alpha),
         converged=relaxed.converged,
     )
+
+
+def _matching(labels: NDArray[np.int64], affinity: NDArray[np.float64], alpha: float) -> Matching:
+    return Matching(labels=labels, objective=objective(labels, affinity, alpha=alpha))
 
 
 def objective(labels: NDArray[np.int64], affinity: NDArray[np.float64], *, alpha: float = 0.5) -> float:

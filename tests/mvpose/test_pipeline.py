@@ -25,7 +25,7 @@ def test_everybody_is_found_where_they_are(preset, views, count):
     detections, person = detect(rig, people)
     estimate = Pipeline.preset(preset).estimate(rig, detections)
     assert len(estimate) == count
-    assert errors(estimate, people).max() < (1e-3 if preset == "no-3dps" else 0.04)
+    assert errors(estimate, people).max() < (0.04 if preset == "full" else 1e-3)
     labels = estimate.matching.labels
     np.testing.assert_array_equal(labels[:, None] == labels, person[:, None] == person)
 
@@ -83,7 +83,7 @@ def test_timings_add_up_and_the_estimate_is_whole():
 
 
 def test_an_unknown_preset_names_the_known_ones():
-    with pytest.raises(ValueError, match="full, no-3dps"):
+    with pytest.raises(ValueError, match="full, fast, no-3dps"):
         Pipeline.preset("best")
 
 

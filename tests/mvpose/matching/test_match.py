@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 from mvpose.matching import Matcher, match, objective
 from mvpose.matching.rounding import round_to_people
 
+METHODS = ("admm", "clustering", "hungarian")
+
 
 @st.composite
 def anything(draw):
@@ -26,10 +28,11 @@ def consistent(labels, view):
     return all(len(views) >= 2 and len(set(views.tolist())) == len(views) for views in people)
 
 
-@given(anything())
-def test_every_result_is_cycle_consistent(case):
+@pytest.mark.parametrize("method", METHODS)
+@given(case=anything())
+def test_every_result_is_cycle_consistent(method, case):
     affinity, view = case
-    result = match(affinity, view)
+    result = match(affinity, view, method=method)
     assert consistent(result.labels, view)
     assert result.objective == pytest.approx(objective(result.labels, affinity))
 
@@ -47,34 +50,37 @@ def test_rounding_breaks_the_weakest_link_of_a_chain():
     assert round_to_people(P, view).tolist() == [0, 0, -1]
 
 
-def test_matching_does_not_depend_on_the_order_of_detections():
+@pytest.mark.parametrize("method", METHODS)
+def test_matching_does_not_depend_on_the_order_of_detections(method):
     rng = np.random.default_rng(5)
     view, person = np.divmod(np.arange(20), 4)
     affinity = np.where(person[:, None] == person, 0.8, 0.2) + 0.02 * rng.standard_normal((20, 20))
     affinity = np.triu(affinity, 1) + np.triu(affinity, 1).T
     affinity[view[:, None] == view] = 0
     order = rng.permutation(20)
-    there = match(affinity, view).labels
-    shuffled = match(affinity[np.ix_(order, order)], view[order]).labels
+    there = match(affinity, view, method=method).labels
+    shuffled = match(affinity[np.ix_(order, order)], view[order], method=method).labels
     np.testing.assert_array_equal(there[order][:, None] == there[order], shuffled[:, None] == shuffled)
     np.testing.assert_array_equal(there[:, None] == there, person[:, None] == person)
 
 
-def test_phantoms_are_pruned_and_one_person_is_found():
+@pytest.mark.parametrize("method", METHODS)
+def test_phantoms_are_pruned_and_one_person_is_found(method):
     view = np.array([0, 1, 2, 0, 1])
     affinity = np.zeros((5, 5))
     affinity[:3, :3] = 0.9 * (1 - np.eye(3))
     affinity[3, 1] = affinity[1, 3] = 0.4  # a phantom that agrees a little with one view
-    assert match(affinity, view).labels.tolist() == [0, 0, 0, -1, -1]
+    assert match(affinity, view, method=method).labels.tolist() == [0, 0, 0, -1, -1]
 
 
-def test_two_views_are_matched_as_the_hungarian_algorithm_would():
+@pytest.mark.parametrize("method", METHODS)
+def test_two_views_are_matched_as_the_hungarian_algorithm_would(method):
     """Greedy takes the 0.9; the best sum takes 0.8 + 0.8 (less alpha each)."""
     view = np.array([0, 0, 1, 1])
     affinity = np.zeros((4, 4))
     affinity[:2, 2:] = [[0.9, 0.8], [0.8, 0.1]]
     affinity[2:, :2] = affinity[:2, 2:].T
-    assert match(affinity, view).labels.tolist() == [0, 1, 1, 0]
+    assert match(affinity, view, method=method).labels.tolist() == [0, 1, 1, 0]
 
 
 def test_a_match_must_earn_more_than_alpha():

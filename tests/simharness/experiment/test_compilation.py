@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from mvpose import Camera, Detections, Pipeline, Rig, affinity
-from mvpose.matching import admm
+from mvpose.matching import admm, clustering
 from mvpose.pipeline import PRESETS
 from mvpose.reconstruction import likelihood, pictorial, triangulation
 from simharness.experiment.compilation import Compilation, compile_kernels
@@ -13,7 +13,7 @@ def signatures():
     """What every kernel of the method that Python calls has been compiled or loaded for, by its name."""
     kernels = {
         f"{module.__name__}.{name}": kernel
-        for module in (affinity, admm, likelihood, triangulation, pictorial)
+        for module in (affinity, admm, clustering, likelihood, triangulation, pictorial)
         for name, kernel in vars(module).items()
         if isinstance(kernel, numba.core.dispatcher.Dispatcher)
     }
@@ -24,7 +24,7 @@ def test_a_real_frame_finds_everything_compiled():
     compile_kernels(PRESETS)
     before = signatures()
     assert {name.rpartition(".")[2] for name in before} >= {
-        "_ray_distance", "_project_and_ascend", "project_in_place", "_propose", "_refine", "_max_product"
+        "_ray_distance", "_project_and_ascend", "project_in_place", "_propose", "_refine", "_max_product", "_contract"
     }  # fmt: skip
     rng = np.random.default_rng(0)
     K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
