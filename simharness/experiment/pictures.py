@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from mvpose import Camera, Detections
 from simharness.experiment.store import Record
-from simharness.rendering.film import meshes_at
+from simharness.rendering.film import antialiased, meshes_at
 from simharness.rendering.mosaic import Mark, legend, mosaic
-from simharness.rendering.overlay import Overlay
+from simharness.rendering.overlay import COCO17_BODY, Overlay
 from simharness.rendering.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.rendering.renderer import Renderer
 from simharness.scene.build import Scene
@@ -128,7 +128,7 @@ def draw_frame(record: Record, footage: Footage, frame: int, *, variant: str) ->
     tiles = []
     for view in views:
         camera = record.rig[view]
-        overlay = Overlay(footage.renderer.render(camera, meshes).rgb)
+        overlay = Overlay(antialiased(footage.renderer, camera, meshes))
         for joints, person in zip(estimate.joints, owner, strict=True):
             _draw_estimate(overlay, camera, joints, person_color(int(person)))
         for pixels in truth.pixels[view]:
@@ -142,7 +142,7 @@ def draw_frame(record: Record, footage: Footage, frame: int, *, variant: str) ->
 
 
 def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64], color: Color) -> None:
-    overlay.skeleton(camera.project(joints), color=color, width=7, dots=0, opacity=0.55)
+    overlay.skeleton(camera.project(joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
 
 
 def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, said: int, true: int) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mvpose.skeleton import COCO17
 from simharness.experiment import plots
+from simharness.experiment.animation import Animation
 from simharness.experiment.headline import COLUMNS, NOTHING
 from simharness.experiment.pictures import Picture
 from simharness.experiment.store import Record
@@ -36,13 +37,20 @@ _VISIBILITY_LABELS = {
 }
 
 
-def render(record: Record, *, pictures: Sequence[Picture] = (), things: Sequence[Floats] = ()) -> str:
+def render(
+    record: Record,
+    *,
+    pictures: Sequence[Picture] = (),
+    things: Sequence[Floats] = (),
+    animation: Animation | None = None,
+) -> str:
     """Make the page of a run.
 
     Args:
         record: the run.
         pictures: shown below the headline numbers.
         things: outlines of the clutter seen from above, each (n, 2) metres.
+        animation: the film of the run.
 
     Returns:
         A self-contained HTML document.
@@ -63,6 +71,7 @@ def render(record: Record, *, pictures: Sequence[Picture] = (), things: Sequence
         parts=_parts_table(summary["variants"]),
         people=_people_table(record, main),
         pictures=pictures,
+        animation=animation,
         plots=_plots(record, main, things),
         stages=summary.get("run", {}).get("stages_s", {}),
         command=_command(record),

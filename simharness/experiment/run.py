@@ -14,6 +14,7 @@ import polars as pl
 from mvpose import Detections, Estimate, Pipeline, Rig
 from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
+from simharness.experiment.animation import animate, animated_frames
 from simharness.experiment.atomic import appearing
 from simharness.experiment.compilation import Compilation
 from simharness.experiment.execution import RunError, map_frames
@@ -141,13 +142,16 @@ def run(
         from simharness.experiment.report import render  # and with it matplotlib: late, for it loads slowly
 
         pictures = draw_pictures(record, footage, progress=advance)
-        page = render(record, pictures=pictures, things=outlines(trial.scene))
+        animation = animate(views.previews, record) if views.previews else None
+        page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation)
         advance(1)
     folder = out / f"{scenario.name}-{fingerprint(scenario)}"
     with clock.stage("write", 1), appearing(folder) as partial:
         write_run(record, partial)
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "mosaic.png").write_bytes(pictures[0].png())
+        if animation:
+            (partial / "film.webp").write_bytes(animation.webp)
     return folder
 
 
@@ -190,9 +194,10 @@ def _make_folder(out: Path) -> None:
 
 
 def _film(trial: Trial, sequence: PeopleSequence, workers: int, clock: _Clock) -> Views:
-    frames = range(trial.scenario.frames)
+    frames, rendering = range(trial.scenario.frames), trial.scenario.rendering
     with clock.stage("film", len(frames)) as advance:
-        filming = Filming(trial.scene, sequence, trial.rig, trial.scenario.rendering.renderer)
+        previews = frozenset(animated_frames(len(frames)) if rendering.color else ())
+        filming = Filming(trial.scene, sequence, trial.rig, rendering.renderer, rendering.color, previews)
         return Views.concatenate(map_frames(filming, frames, workers=workers, progress=advance))
 
 

@@ -25,6 +25,8 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
     a row for each frame and variant: :mod:`simharness.scoring.summary`.
 `timings.parquet`
     ``variant``, ``frame``, ``stage``, ``seconds``: apart, for all files above are the same bytes in two runs.
+`film.webp`, `mosaic.png`, `report.html`
+    for people: what the cameras recorded, a typical frame with everything drawn in, and the page of both.
 `summary.json`
     the headline numbers (DESIGN, "Machine-readable output"), the time of each stage of the run, the command.
 """

@@ -27,12 +27,22 @@ class Filming:
     sequence: Sequence
     rig: Rig
     renderer: RendererName
+    color: bool
+    previews: frozenset[int]
 
     def __call__(self, frames: range) -> Views:
         """The views of these frames."""
         from simharness.rendering.film import film
 
-        return film(self.scene, self.sequence, self.rig, renderer_of(self.renderer), frames=frames)
+        return film(
+            self.scene,
+            self.sequence,
+            self.rig,
+            renderer_of(self.renderer),
+            frames=frames,
+            color=self.color,
+            previews=self.previews,
+        )
 
 
 @dataclass(frozen=True)

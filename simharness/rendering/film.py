@@ -5,8 +5,9 @@ Frames are independent of each other, so processes can share them and :meth:`Vie
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 import cv2
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from simharness.scene.sequence import Sequence
 
 
+PREVIEW = 320  # pixels: width of the reduced pictures
+
+
 @dataclass(frozen=True)
 class Views:
     """The truth in the pictures of V cameras over T frames.
@@ -34,12 +38,14 @@ class Views:
         boxes: x, y, width, height in pixels of the part of each person's silhouette that falls on the image,
             whatever stands in front, (T, V, P, 4); zeros where none does.
         area_visible: pixels in which each person is seen, (T, V, P).
+        previews: reduced colour pictures of some frames, by frame, each (V, h, w, 3) uint8.
     """
 
     pixels: NDArray[np.float64]
     visibility: NDArray[np.int8]
     boxes: NDArray[np.float64]
     area_visible: NDArray[np.int64]
+    previews: Mapping[int, NDArray[np.uint8]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         pixels = as_array(self.pixels, ("T", "V", "P", "J", 2), "pixels")
@@ -70,6 +76,7 @@ class Views:
             visibility=np.concatenate([part.visibility for part in parts]),
             boxes=np.concatenate([part.boxes for part in parts]),
             area_visible=np.concatenate([part.area_visible for part in parts]),
+            previews={frame: pictures for part in parts for frame, pictures in part.previews.items()},
         )
 
 
@@ -101,15 +108,26 @@ def antialiased(renderer: Renderer, camera: Camera, meshes: Many[Mesh], *, finer
     return cv2.resize(large, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
-def film(scene: Scene, sequence: Sequence, rig: Rig, renderer: Renderer, *, frames: Many[int] | None = None) -> Views:
+def film(
+    scene: Scene,
+    sequence: Sequence,
+    rig: Rig,
+    renderer: Renderer,
+    *,
+    frames: Many[int] | None = None,
+    color: bool = False,
+    previews: Collection[int] = (),
+) -> Views:
     """Film ``frames`` (all by default) of a sequence with every camera of a rig.
 
     Args:
         scene: people, their colours and the things around them.
         sequence: where everyone is in every frame.
         rig: the V cameras.
-        renderer: makes depth and ids.
+        renderer: makes colour, depth and ids.
         frames: indices into the sequence.
+        color: shade the pictures; labels and boxes need depth and ids only.
+        previews: frames of which to keep the colour pictures, reduced to a width of ``PREVIEW`` pixels.
     """
     frames = range(len(sequence.joints)) if frames is None else frames
     people, joints = sequence.joints.shape[1:3]
@@ -117,17 +135,29 @@ def film(scene: Scene, sequence: Sequence, rig: Rig, renderer: Renderer, *, fram
     shape = (len(frames), len(rig), people)
     pixels, visibility = np.full((*shape, joints, 2), np.nan), np.zeros((*shape, joints), np.int8)
     boxes, area = np.zeros((*shape, 4)), np.zeros(shape, np.int64)
+    kept: dict[int, NDArray[np.uint8]] = {}
     for f, frame in enumerate(frames):
         meshes = meshes_at(scene, sequence, frame)
         where = sequence.joints[frame]
+        reduced = []
         for v, camera in enumerate(rig):
-            picture = renderer.render(camera, meshes, color=False)
+            picture = renderer.render(camera, meshes, color=color)
+            if frame in previews:
+                reduced.append(_reduced(picture.rgb))
             pixels[f, v] = camera.project(where)
             visibility[f, v] = label(picture, camera, joints=where, radii=radii)
             area[f, v] = np.bincount(picture.ids.ravel() + 1, minlength=people + 1)[1 : people + 1]
             for p in range(people):
                 boxes[f, v, p] = silhouette_box(camera, meshes[p].vertices)
-    return Views(pixels=pixels, visibility=visibility, boxes=boxes, area_visible=area)
+        if reduced:
+            kept[frame] = np.stack(reduced)
+    return Views(pixels=pixels, visibility=visibility, boxes=boxes, area_visible=area, previews=kept)
+
+
+def _reduced(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width = rgb.shape[:2]
+    size = (PREVIEW, max(1, round(PREVIEW * height / width)))
+    return cv2.resize(rgb, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def silhouette_box(camera: Camera, vertices: NDArray) -> NDArray[np.float64]:

@@ -86,6 +86,7 @@ class Rendering(_Section):
         "raster",
         description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made",
     )
+    color: bool = Field(True, description="shade every picture; without it there are depth and ids, and no film")
 
 
 class Scenario(_Section):

@@ -148,6 +148,20 @@ def test_views_are_checked(footage):
     with pytest.raises(ValueError, match=r"boxes must be \(4, 3, 2, 4\)"):
         replace(views, boxes=views.boxes[..., :3])
     with pytest.raises(ValueError, match="must share views, people and joints"):
-        Views.concatenate([views, replace(views, **{k: getattr(views, k)[:, :2] for k in vars(views)})])
+        Views.concatenate([views, replace(views, **{k: a[:, :2] for k, a in vars(views).items() if k != "previews"})])
     with pytest.raises(ValueError, match="got none"):
         Views.concatenate([])
+
+
+def test_previews_are_the_pictures_reduced_and_only_those_asked_for(raster):
+    scene, sequence = stage()
+    views = Views.concatenate(
+        [film(scene, sequence, RIG, raster, frames=[t], color=True, previews={1, 3}) for t in range(FRAMES)]
+    )
+    assert sorted(views.previews) == [1, 3]
+    assert views.previews[3].shape == (len(RIG), 240, 320, 3)
+    for v, camera in enumerate(RIG):
+        full = image(scene, sequence, camera, 3, raster).rgb
+        np.testing.assert_allclose(views.previews[3][v].mean(axis=(0, 1)), full.mean(axis=(0, 1)), atol=1.0)
+    assert views.previews[3].std() > 10
+    assert film(scene, sequence, RIG, raster).previews == {}
