@@ -18,7 +18,7 @@ from simharness.scenario.models import Cameras, Clutter, Detector, Method, Peopl
 from simharness.scoring.summary import VariantScores
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
-FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "report.html"}
+FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.webp", "report.html"}
 
 
 def tiny(**sections) -> Scenario:
@@ -184,3 +184,9 @@ class TestScoring:
 
     def test_a_table_of_no_frames_has_no_rows(self):
         assert running.score_table({"full": VariantScores(())}).height == 0
+
+
+def test_without_colour_there_is_no_film_and_the_same_detections(tmp_path, done):
+    folder = run(tiny(rendering=Rendering(color=False)), out=tmp_path)
+    assert {path.name for path in folder.iterdir()} == FILES - {"film.webp"}
+    assert (folder / "detections.npz").read_bytes() == (done / "detections.npz").read_bytes()
