@@ -90,6 +90,8 @@ def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_th
         assert np.linalg.norm(joints[joint] - joints[COCO17.parents[joint]]) == pytest.approx(
             bone_lengths(COCO17)[0][joint], abs=0.05
         )
+        anchor = joints[COCO17.parents[joint]] - rig.centers[0]
+        assert offset @ sight < anchor @ sight + 0.01  # of the two points a bone away, the nearer
         assert 0 < scores[joint] < 0.3 * scores[0]
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
 
