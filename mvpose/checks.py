@@ -9,20 +9,25 @@ from numpy.typing import ArrayLike, NDArray
 def as_array(
     value: ArrayLike, shape: tuple[int | str, ...], name: str, dtype: type[np.generic] = np.float64
 ) -> NDArray:
-    """Return ``value`` as a read-only array of ``dtype`` and ``shape``.
+    """Return ``value`` as a read-only array of ``dtype`` and ``shape``, C-contiguous.
 
     Args:
-        value: anything NumPy reads.
+        value: anything NumPy reads as numbers; ``None`` among floats is NaN.
         shape: sizes; a string stands for any size and names it in the message ("m").
         name: what the message calls the array.
-        dtype: the wanted scalar type.
+        dtype: the wanted scalar type. Integers must be given as whole numbers: 1.5 is refused, not cut off, and so
+            is a mask.
 
     Raises:
         ValueError: "keypoints must be (m, 17, 2), got (4, 17)".
     """
     try:
-        array = np.array(value, dtype=dtype)  # a copy: the caller's later writes must not reach a frozen object
-    except (TypeError, ValueError) as error:
+        given = np.asarray(value)
+        if given.dtype.kind == "O":
+            given = given.astype(np.float64)
+        # Always a copy: the caller's later writes must not reach a frozen object.
+        array = given.astype(dtype, order="C") if given.dtype == dtype else _converted(given, np.dtype(dtype))
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must be numbers of shape {_written(shape)}: {error}") from None
     fits = array.ndim == len(shape) and all(
         isinstance(wanted, str) or got == wanted for wanted, got in zip(shape, array.shape, strict=True)
@@ -30,6 +35,34 @@ def as_array(
     if not fits:
         raise ValueError(f"{name} must be {_written(shape)}, got {_written(array.shape)}")
     array.flags.writeable = False
+    return array
+
+
+def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:
+    """Return ``value`` as floats of shape (..., size), not copied where it is that already.
+
+    Raises:
+        ValueError: "points must be (..., 3), got (4, 2)".
+    """
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name} must be numbers of shape (..., {size}): {error}") from None
+    if not array.ndim or array.shape[-1] != size:
+        raise ValueError(f"{name} must be (..., {size}), got {_written(array.shape)}")
+    return array
+
+
+def _converted(given: NDArray, dtype: np.dtype) -> NDArray:
+    kind, whole = given.dtype.kind, dtype.kind in "iu"
+    if kind not in "biuf":
+        raise ValueError(f"got values of type {given.dtype}")
+    if kind == "b" and whole:
+        raise ValueError("got booleans where whole numbers are expected (of a mask, take np.flatnonzero)")
+    with np.errstate(invalid="ignore", over="ignore"):
+        array = given.astype(dtype, order="C")
+    if whole and (array != given).any():
+        raise ValueError(f"got {given[array != given].flat[0]}, expected whole numbers that fit {dtype}")
     return array
 
 

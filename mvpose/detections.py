@@ -9,14 +9,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
-from mvpose.skeleton import COCO17, Skeleton
+from mvpose.heatmaps import Heatmaps
+from mvpose.skeleton import COCO17, SHELF14, Skeleton
+
+Floats = NDArray[np.float64]
+
+_FARTHEST = 1e9  # pixels: no image is so large, and squares of these are far from overflow
+_LEAST_SCORE = 1e-6  # no detector is so exact, and products of these are far from underflow
 
 
 @dataclass(frozen=True)
 class Detections:
     """The 2D poses that a detector found in all views of one frame, as flat arrays of m detections.
 
-    A keypoint that was not detected has score 0 and NaN coordinates; both are set where either is given.
+    A keypoint that was not detected has score 0 and NaN coordinates; both are set where either is given, where a
+    coordinate is infinite or farther than 1e9 pixels away, and where the score is NaN or below 1e-6. A detection may
+    have no keypoint at all: it is evidence of nothing.
 
     Attributes:
         view: index of the camera of each detection, (m,).
@@ -25,36 +33,39 @@ class Detections:
         boxes: x, y, width, height in pixels, (m, 4).
         box_scores: confidence of each box, 0 to 1, (m,).
         skeleton: the J joints.
-        descriptors: appearance, (m, D), or None.
+        descriptors: appearance, (m, D), or None. A row that is not finite throughout becomes NaN: no descriptor.
+        likelihoods: the heat maps that the keypoints were read from, or None.
 
     Raises:
-        ValueError: a wrong shape, a negative view, or scores outside 0..1.
+        ValueError: a wrong shape or skeleton, a view that is no index, scores outside 0..1, a box that is none.
     """
 
     view: NDArray[np.int64]
-    keypoints: NDArray[np.float64]
-    scores: NDArray[np.float64]
-    boxes: NDArray[np.float64]
-    box_scores: NDArray[np.float64]
+    keypoints: Floats
+    scores: Floats
+    boxes: Floats
+    box_scores: Floats
     skeleton: Skeleton = COCO17
-    descriptors: NDArray[np.float64] | None = None
+    descriptors: Floats | None = None
+    likelihoods: Heatmaps | None = None
 
     def __post_init__(self) -> None:
         view = as_array(self.view, ("m",), "view", np.int64)
-        count, joints = len(view), len(self.skeleton)
-        keypoints = as_array(self.keypoints, (count, joints, 2), "keypoints").copy()
-        scores = as_array(self.scores, (count, joints), "scores").copy()
+        count = len(view)
+        keypoints, scores = _keypoints(self.keypoints, self.scores, count, self.skeleton)
         boxes = as_array(self.boxes, (count, 4), "boxes")
         box_scores = as_array(self.box_scores, (count,), "box_scores")
-        if (view < 0).any():
+        if count and view.min() < 0:
             raise ValueError(f"view must be camera indices from 0, got {view.min()}")
-        missing = ~(np.isfinite(keypoints).all(axis=2) & (scores > 0))  # a NaN score is missing too
-        keypoints[missing] = np.nan
-        scores[missing] = 0.0
-        for name, values in (("scores", scores), ("box_scores", box_scores)):
-            if not ((values >= 0) & (values <= 1)).all():
-                raise ValueError(f"{name} must lie in 0..1, got {np.nanmin(values):.3g} to {np.nanmax(values):.3g}")
-        keypoints.flags.writeable = scores.flags.writeable = False
+        if not (np.isfinite(boxes).all() and (boxes[:, 2:] >= 0).all()):
+            bad = int(np.flatnonzero(~(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] >= 0).all(axis=1)))[0])
+            raise ValueError(
+                f"boxes must be finite x, y, width, height with sizes of at least 0, got {boxes[bad].tolist()} for "
+                f"detection {bad}; corners x0, y0, x1, y1 are x0, y0, x1 - x0, y1 - y0"
+            )
+        if not ((box_scores >= 0) & (box_scores <= 1)).all():
+            bad = int(np.flatnonzero(~((box_scores >= 0) & (box_scores <= 1)))[0])
+            raise ValueError(f"box_scores must lie in 0..1, got {box_scores[bad]:.6g} for detection {bad}")
         for key, value in (
             ("view", view),
             ("keypoints", keypoints),
@@ -64,7 +75,12 @@ class Detections:
         ):
             object.__setattr__(self, key, value)
         if self.descriptors is not None:
-            object.__setattr__(self, "descriptors", as_array(self.descriptors, (count, "D"), "descriptors"))
+            descriptors = as_array(self.descriptors, (count, "D"), "descriptors").copy()
+            descriptors[~np.isfinite(descriptors).all(axis=1)] = np.nan
+            descriptors.flags.writeable = False
+            object.__setattr__(self, "descriptors", descriptors)
+        if self.likelihoods is not None:
+            _check_likelihoods(self.likelihoods, scores.shape)
 
     def __len__(self) -> int:
         return len(self.view)
@@ -84,13 +100,90 @@ class Detections:
         cls, view: ArrayLike, keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17
     ) -> Self:
         """Detections without boxes of their own: the box spans the keypoints, its score is their mean score."""
-        view = np.asarray(view, np.int64)
-        keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
-        boxes, box_scores = np.zeros((len(view), 4)), np.zeros(len(view))
-        for k in range(len(view)):
-            found = (scores[k] > 0) & np.isfinite(keypoints[k]).all(axis=1)
-            if found.any():
-                low, high = keypoints[k][found].min(axis=0), keypoints[k][found].max(axis=0)
-                boxes[k] = *low, *(high - low)
-                box_scores[k] = scores[k][found].mean()
-        return cls(view, keypoints, scores, boxes, box_scores, skeleton)
+        view = as_array(view, ("m",), "view", np.int64)
+        keypoints, scores = _keypoints(keypoints, scores, len(view), skeleton)
+        return cls(view, keypoints, scores, _spanning_boxes(keypoints), _mean_scores(scores), skeleton)
+
+    @classmethod
+    def from_heatmaps(
+        cls, view: ArrayLike, heatmaps: Heatmaps, *, boxes: ArrayLike | None = None, skeleton: Skeleton = COCO17
+    ) -> Self:
+        """Detections from heat maps, which they carry along: the strongest mode of each is the keypoint.
+
+        Args:
+            view: camera of each detection, (m,).
+            heatmaps: a map for each of m detections and J joints. The height of its strongest mode, 1 at most, is the
+                score; an empty map is a missing joint.
+            boxes: x, y, width, height in pixels, (m, 4); spans the keypoints where not given.
+            skeleton: the J joints.
+
+        Raises:
+            ValueError: as of the class.
+        """
+        if not isinstance(heatmaps, Heatmaps):
+            raise ValueError(f"heatmaps must be mvpose.heatmaps.Heatmaps, got {type(heatmaps).__name__}")
+        view = as_array(view, ("m",), "view", np.int64)
+        _check_likelihoods(heatmaps, (len(view), len(_checked(skeleton))))
+        pixels, heights = heatmaps.modes(1)
+        keypoints, scores = pixels[:, :, 0], np.minimum(heights[:, :, 0], 1.0)
+        spans = _spanning_boxes(keypoints) if boxes is None else as_array(boxes, (len(view), 4), "boxes")
+        return cls(view, keypoints, scores, spans, _mean_scores(scores), skeleton, likelihoods=heatmaps)
+
+
+def _keypoints(keypoints: ArrayLike, scores: ArrayLike, count: int, skeleton: Skeleton) -> tuple[Floats, Floats]:
+    """Checked keypoints and scores, missing ones marked in both."""
+    joints = len(_checked(skeleton))
+    keypoints = as_array(keypoints, ("m", "J", 2), "keypoints")
+    if keypoints.shape != (count, joints, 2):
+        raise ValueError(
+            f"keypoints must be {(count, joints, 2)}, got {keypoints.shape}"
+            + (f": {_skeleton_hint(skeleton, keypoints.shape[1])}" if keypoints.shape[1] != joints else "")
+        )
+    scores = as_array(scores, (count, joints), "scores")
+    outside = (scores < 0) | (scores > 1)  # a NaN score is a missing joint
+    if outside.any():
+        detection, joint = (int(index[0]) for index in np.nonzero(outside))
+        raise ValueError(
+            f"scores must lie in 0..1, got {scores[detection, joint]:.6g} for joint {skeleton.joints[joint]!r} of "
+            f"detection {detection}; clip the heights of heat maps, take the sigmoid of logits, and say missing by 0"
+        )
+    detected = (scores >= _LEAST_SCORE) & (np.abs(keypoints) < _FARTHEST).all(axis=2)
+    keypoints, scores = np.where(detected[:, :, None], keypoints, np.nan), np.where(detected, scores, 0.0)
+    keypoints.flags.writeable = scores.flags.writeable = False
+    return keypoints, scores
+
+
+def _checked(skeleton: Skeleton) -> Skeleton:
+    if not isinstance(skeleton, Skeleton):
+        raise ValueError(f"skeleton must be a Skeleton such as COCO17, got {type(skeleton).__name__}")
+    return skeleton
+
+
+def _skeleton_hint(skeleton: Skeleton, got: int) -> str:
+    others = [other.name for other in (COCO17, SHELF14) if len(other) == got]
+    fits = f"skeleton {others[0]!r} has {got}" if others else "pass the skeleton that the keypoints are of"
+    return f"skeleton {skeleton.name!r} has {len(skeleton)} joints ({', '.join(skeleton.joints)}); {fits}"
+
+
+def _spanning_boxes(keypoints: Floats) -> Floats:
+    """Boxes about the keypoints that were found, (m, 4); zeros where none was."""
+    low = np.where(np.isnan(keypoints), np.inf, keypoints).min(axis=1)
+    high = np.where(np.isnan(keypoints), -np.inf, keypoints).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        boxes = np.concatenate([low, high - low], axis=1)
+    return np.where(np.isfinite(low[:, :1]), boxes, 0.0)
+
+
+def _mean_scores(scores: Floats) -> Floats:
+    """Mean score of the keypoints that were found, (m,); 0 where none was."""
+    return scores.sum(axis=1) / np.maximum((scores > 0).sum(axis=1), 1)
+
+
+def _check_likelihoods(likelihoods: Heatmaps, shape: tuple[int, ...]) -> None:
+    if not isinstance(likelihoods, Heatmaps):
+        raise ValueError(f"likelihoods must be mvpose.heatmaps.Heatmaps, got {type(likelihoods).__name__}")
+    if likelihoods.values.shape[:2] != shape:
+        raise ValueError(
+            f"heat maps must be {shape} of maps, a row for each detection and a map for each joint of the skeleton, "
+            f"got {likelihoods.values.shape[:2]}"
+        )

@@ -5,30 +5,37 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import Self
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
-from mvpose.affinity import GeometricAffinity
+from mvpose.affinity import Affinity, AppearanceAffinity, FusedAffinity, GeometricAffinity
 from mvpose.camera import Rig
 from mvpose.detections import Detections
-from mvpose.estimate import Estimate
+from mvpose.duplicates import Duplicates
+from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Matcher
 from mvpose.rays import Rays, viewing_rays
-from mvpose.reconstruction import PictorialStructure, Triangulation
+from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
-Reconstruction = Callable[[Rays, Skeleton], tuple[Floats, Floats, Floats]]
 
 PRESETS: dict[str, str] = {
     "full": "every cue there is (geometry; appearance where descriptors are given), ADMM matching, 3DPS",
-    "fast": "geometry, matching by clustering, robust triangulation",
+    "appearance": "as full, with appearance as the only affinity: detections must carry descriptors",
+    "geometry": "as full, with geometry as the only affinity",
     "no-3dps": "as full, with robust triangulation in place of the pictorial structure",
+    "no-matching": "3DPS straight from all detections",
+    "fast": "as full, with matching by clustering and robust triangulation",
 }
+
+
+class Estimator(Protocol):
+    """Anything that finds the people of a frame."""
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Find the people of one frame; see :meth:`Pipeline.estimate`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -37,27 +44,35 @@ class Pipeline:
 
     Attributes:
         affinity: how likely two detections are one person.
-        matching: who is who, over all views at once.
-        reconstruction: one person's rays to joints.
+        matching: affinities (m, m) and views (m,) to people, over all views at once.
+        reconstruction: everybody's rays, labels (m,) and the skeleton to joints.
+        duplicates: which detections to keep, (m,); the others repeat a surer one of their view.
     """
 
-    affinity: GeometricAffinity = GeometricAffinity()
-    matching: Matcher = Matcher()
-    reconstruction: Reconstruction = PictorialStructure()
+    affinity: Affinity = FusedAffinity()
+    matching: Callable[[NDArray[np.float64], NDArray[np.int64]], Matching] = Matcher()
+    reconstruction: Callable[[Rays, NDArray[np.int64], Skeleton], Poses] = PictorialStructure()
+    duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
 
-    @classmethod
-    def preset(cls, name: str) -> Self:
-        """One of the named variants, :data:`PRESETS`.
+    @staticmethod
+    def preset(name: str) -> Estimator:
+        """One of the named variants, :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
 
         Raises:
             ValueError: a name that is none of them.
         """
-        if name not in PRESETS:
+        full = Pipeline()
+        variants: dict[str, Estimator] = {
+            "full": full,
+            "appearance": replace(full, affinity=AppearanceAffinity()),
+            "geometry": replace(full, affinity=GeometricAffinity()),
+            "no-3dps": replace(full, reconstruction=Triangulation()),
+            "no-matching": UnmatchedPipeline(),
+            "fast": replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation()),
+        }
+        if name not in variants:
             raise ValueError(f"no preset {name!r} of the pipeline; there are {', '.join(PRESETS)}")
-        full = cls()
-        if name == "fast":
-            return replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation())
-        return replace(full, reconstruction=Triangulation()) if name == "no-3dps" else full
+        return variants[name]
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Find the people of one frame.
@@ -70,29 +85,50 @@ class Pipeline:
             The people that at least two views agree on, possibly none.
 
         Raises:
-            ValueError: detections that name a camera that the rig does not have.
+            ValueError: detections that name a camera that the rig does not have, or that lack descriptors where
+                appearance is the only affinity.
         """
-        with _threads().limit(limits=1):  # the matrices are small: threads would only fight over them
-            clock = [time.perf_counter()]
-            rays = viewing_rays(rig, detections)
-            affinity = self.affinity(rays)
-            clock.append(time.perf_counter())
-            matching = self.matching(affinity, detections.view)
-            clock.append(time.perf_counter())
-            count = len(detections.skeleton)
-            joints, scores = np.zeros((matching.people, count, 3)), np.zeros((matching.people, count))
-            covariance = np.zeros((matching.people, count, 3, 3))
-            for person in range(matching.people):
-                mine = matching.labels == person
-                joints[person], scores[person], covariance[person] = self.reconstruction(
-                    rays.select(mine), detections.skeleton
-                )
-            clock.append(time.perf_counter())
-        stages = dict(zip(("affinity", "matching", "reconstruction"), np.diff(clock).tolist(), strict=True))
-        timings = {**stages, "total": clock[-1] - clock[0]}
-        return Estimate(joints, scores, matching, covariance, timings)
+        start = time.perf_counter()
+        rays = viewing_rays(rig, detections)
+        affinity = self.affinity(rig, detections, rays)
+        repeated = ~self.duplicates(detections)
+        if repeated.any():
+            affinity[repeated] = affinity[:, repeated] = 0.0
+        compared = time.perf_counter()
+        matching = self.matching(affinity, detections.view)
+        matched = time.perf_counter()
+        poses = self.reconstruction(rays, matching.labels, detections.skeleton)
+        return _estimate(poses, matching, start, compared, matched)
 
 
-@cache
-def _threads() -> ThreadpoolController:
-    return ThreadpoolController()
+@dataclass(frozen=True)
+class UnmatchedPipeline:
+    """The paper's "No matching": pictorial structures say by themselves who is who.
+
+    Attributes:
+        reconstruction: everybody's rays and the skeleton to joints and labels.
+        duplicates: as of :class:`Pipeline`.
+    """
+
+    reconstruction: Callable[[Rays, Skeleton], tuple[Poses, NDArray[np.int64]]] = UnmatchedPictorialStructure()
+    duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Find the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""
+        start = time.perf_counter()
+        rays = viewing_rays(rig, detections)
+        rays.weights[~self.duplicates(detections)] = 0.0  # who sees nothing belongs to nobody
+        ready = time.perf_counter()
+        poses, labels = self.reconstruction(rays, detections.skeleton)
+        return _estimate(poses, Matching(labels), start, ready, ready)
+
+
+def _estimate(poses: Poses, matching: Matching, start: float, compared: float, matched: float) -> Estimate:
+    end = time.perf_counter()
+    timings = {
+        "affinity": compared - start,
+        "matching": matched - compared,
+        "reconstruction": end - matched,
+        "total": end - start,
+    }
+    return Estimate(poses.joints, poses.scores, matching, poses.covariance, timings)

@@ -6,18 +6,43 @@ a ray, are in metres whatever the resolution, focal length or lens, so one set o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from mvpose.detections import Detections
+from mvpose.heatmaps import Heatmaps
+from mvpose.lens import undistort
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+_MODES = 3  # of a heat map that are looked at: a joint, its mirror image, and a neighbour's
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Where the heat maps of m detections are high, as rays, and the maps themselves, to be sampled from the world.
+
+    Attributes:
+        directions: unit vectors to the modes of each map, strongest first, (m, J, K, 3); zeros where there are fewer.
+        weights: heights of the modes, at most 1, (m, J, K); 0 where there are fewer.
+        values: the maps, (m, J, h, w).
+        grid: origin and stride of each detection's maps, x and y, pixels, (m, 4).
+        cameras: that saw each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22).
+    """
+
+    directions: Floats
+    weights: Floats
+    values: NDArray[np.float32]
+    grid: Floats
+    cameras: Floats
+
+
+@dataclass(frozen=True, slots=True)
 class Rays:
     """The viewing rays of m detections of J joints.
 
@@ -27,6 +52,7 @@ class Rays:
         directions: unit vectors, (m, J, 3); zeros where the keypoint is missing.
         weights: scores of the keypoints, (m, J); 0 where missing.
         pixel: angle that one pixel spans at the image centre, (m,), radians.
+        modes: what the detections' heat maps say, or None.
     """
 
     view: NDArray[np.int64]
@@ -34,37 +60,79 @@ class Rays:
     directions: Floats
     weights: Floats
     pixel: Floats
+    modes: Modes | None = None
 
     def __len__(self) -> int:
         return len(self.view)
 
     def select(self, which: NDArray[np.bool_]) -> Rays:
         """Keep only some of the detections, (m,)."""
+        modes = self.modes and Modes(*(getattr(self.modes, field.name)[which] for field in fields(self.modes)))
         return Rays(
             self.view[which],
             self.origins[which],
             self.directions[which],
             self.weights[which],
             self.pixel[which],
+            modes,
         )
 
 
 def viewing_rays(rig: Rig, detections: Detections) -> Rays:
     """Turn keypoints into viewing rays, lens distortion undone.
 
+    A keypoint that no direction is imaged at (far outside the picture of a distorting lens) is missing.
+
     Raises:
         ValueError: a detection names a view that the rig does not have.
     """
-    if len(detections) and detections.view.max() >= len(rig):
+    if len(detections) and (last := int(detections.view.max())) >= len(rig):
         raise ValueError(
-            f"a detection names view {detections.view.max()}, but the rig has {len(rig)} cameras (0 to {len(rig) - 1})"
+            f"a detection names view {last}, but the rig has {len(rig)} cameras (0 to {len(rig) - 1}); "
+            "pass the rig that the detections were made with, its cameras in that order"
         )
-    directions = np.zeros((*detections.keypoints.shape[:2], 3))
-    origins, pixel = np.zeros((len(detections), 3)), np.zeros(len(detections))
-    for index, camera in enumerate(rig):
-        mine = detections.view == index
-        if mine.any():
-            directions[mine] = np.nan_to_num(camera.rays(detections.keypoints[mine]))
-            origins[mine] = camera.center
-            pixel[mine] = 1.0 / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
-    return Rays(detections.view, origins, directions, detections.scores, pixel)
+    origins, directions, weights, pixel = _viewing_rays(
+        rig.packed, detections.view, detections.keypoints, detections.scores
+    )
+    modes = None if detections.likelihoods is None else _modes(rig, detections.view, detections.likelihoods)
+    return Rays(detections.view, origins, directions, weights, pixel, modes)
+
+
+def _modes(rig: Rig, view: NDArray[np.int64], maps: Heatmaps) -> Modes:
+    pixels, heights = maps.modes(_MODES)
+    m, joints = heights.shape[:2]
+    flat = pixels.reshape(m, joints * _MODES, 2), np.minimum(heights, 1.0).reshape(m, joints * _MODES)
+    _, directions, weights, _ = _viewing_rays(rig.packed, view, *flat)
+    return Modes(
+        directions.reshape(m, joints, _MODES, 3),
+        weights.reshape(m, joints, _MODES),
+        maps.values,
+        np.hstack([maps.origin, maps.stride]),
+        rig.packed[view],
+    )
+
+
+@njit(cache=True)
+def _viewing_rays(cameras, view, keypoints, scores):  # type: ignore[no-untyped-def]
+    m, joints = scores.shape
+    origins, directions = np.empty((m, 3)), np.zeros((m, joints, 3))
+    weights, pixel = np.zeros((m, joints)), np.empty(m)
+    for d in range(m):
+        camera = cameras[view[d]]  # see Rig.packed
+        fx, skew, cx, fy, cy = camera[0], camera[1], camera[2], camera[3], camera[4]
+        for r in range(3):
+            origins[d, r] = camera[14 + r]
+        pixel[d] = 1.0 / np.sqrt(fx * fy)
+        for j in range(joints):
+            if not scores[d, j] > 0.0:
+                continue
+            v = (keypoints[d, j, 1] - cy) / fy
+            u = (keypoints[d, j, 0] - cx - skew * v) / fx
+            x, y = undistort(u, v, camera[17:22])
+            if not abs(x) + abs(y) < 1e6:  # also false of NaN: across the line of sight, not on the image plane
+                continue
+            scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
+            for r in range(3):  # R transposed, times (x, y, 1)
+                directions[d, j, r] = (camera[5 + r] * x + camera[8 + r] * y + camera[11 + r]) * scale
+            weights[d, j] = scores[d, j]
+    return origins, directions, weights, pixel

@@ -6,10 +6,13 @@ World axes are z up wherever a mapping needs to know (the published head mapping
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from mvpose.checks import as_points
 
 Floats = NDArray[np.float64]
 HeadMapping = Literal["voxelpose", "2019"]
@@ -34,19 +37,29 @@ class Skeleton:
     sigmas: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        count = len(self.joints)
+        for key in ("joints", "parents", "mirror", "sigmas"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))
+        count, skeleton = len(self.joints), f"skeleton {self.name!r}"
+        if not count or len(set(self.joints)) != count:
+            raise ValueError(f"{skeleton}: joints must be different names, one or more, got {self.joints}")
         for key in ("parents", "mirror", "sigmas"):
             if len(getattr(self, key)) != count:
-                raise ValueError(
-                    f"skeleton {self.name!r}: {key} must have {count} entries, got {len(getattr(self, key))}"
-                )
+                raise ValueError(f"{skeleton}: {key} must have {count} entries, got {len(getattr(self, key))}")
         if self.parents.count(-1) != 1 or not all(-1 <= parent < count for parent in self.parents):
-            raise ValueError(f"skeleton {self.name!r}: parents must name one root (-1) and joints below {count}")
+            raise ValueError(f"{skeleton}: parents must name one root (-1) and joints below {count}")
         reached = {self.parents.index(-1)}
         for _ in range(count):
             reached |= {joint for joint, parent in enumerate(self.parents) if parent in reached}
         if len(reached) != count:
-            raise ValueError(f"skeleton {self.name!r}: parents do not form one tree")
+            raise ValueError(f"{skeleton}: parents do not form one tree")
+        for joint, other in enumerate(self.mirror):
+            if not 0 <= other < count or self.mirror[other] != joint:
+                raise ValueError(
+                    f"{skeleton}: mirror must name pairs, each the other's, and itself on the midline; "
+                    f"{self.joints[joint]!r} ({joint}) has {other}"
+                )
+        if not all(0 < sigma < np.inf for sigma in self.sigmas):
+            raise ValueError(f"{skeleton}: sigmas must be positive, got {self.sigmas}")
 
     def __len__(self) -> int:
         return len(self.joints)
@@ -55,6 +68,13 @@ class Skeleton:
     def edges(self) -> tuple[tuple[int, int], ...]:
         """The bones of the tree as (parent, child), J - 1 of them."""
         return tuple((parent, child) for child, parent in enumerate(self.parents) if parent >= 0)
+
+    @cached_property
+    def variances(self) -> Floats:
+        """What OKS divides squared distances by, ``(2 sigma)²``, (J,), as fractions of the person's area."""
+        variances = (2.0 * np.array(self.sigmas)) ** 2
+        variances.flags.writeable = False
+        return variances
 
     def index(self, joint: str) -> int:
         """Index of a joint by its name; a ValueError lists the names."""
@@ -104,9 +124,9 @@ def coco17_to_shelf14(joints: ArrayLike, *, head: HeadMapping = "voxelpose") -> 
     Raises:
         ValueError: a wrong shape or an unknown rule.
     """
-    joints = np.asarray(joints, float)
+    joints = as_points(joints, 3, "joints")
     if joints.shape[-2:] != (17, 3):
-        raise ValueError(f"joints must be (..., 17, 3), got {joints.shape}")
+        raise ValueError(f"joints must be (..., 17, 3), those of COCO17, got {joints.shape}")
     nose, ears = joints[..., 0, :], joints[..., 3:5, :].mean(axis=-2)
     shoulders = joints[..., 5:7, :].mean(axis=-2)
     bottom = shoulders + 0.5 * (nose - shoulders)

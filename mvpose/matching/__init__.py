@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
@@ -13,11 +14,13 @@ from mvpose.estimate import Matching
 from mvpose.matching import admm
 from mvpose.matching.clustering import cluster
 from mvpose.matching.pairwise import assign
-from mvpose.matching.rounding import number_people, round_to_people
+from mvpose.matching.rounding import number_people, read_only, round_to_people
 
 __all__ = ["Matcher", "match", "objective"]
 
 Method = Literal["admm", "clustering", "hungarian"]
+
+_ASYMMETRY = 1e-6  # what rounding may leave, in single precision too
 
 
 @dataclass(frozen=True)
@@ -27,9 +30,36 @@ class Matcher:
     method: Method = "admm"
     alpha: float = 0.5
 
-    def __call__(self, affinity: NDArray[np.float64], view: NDArray[np.int64]) -> Matching:
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ValueError(f"method must be 'admm', 'clustering' or 'hungarian', got {self.method!r}")
+        if not 0.0 <= self.alpha <= 1.0:
+            raise ValueError(f"alpha must lie in 0..1, as affinities do, got {self.alpha}")
+
+    def __call__(self, affinity: ArrayLike, view: ArrayLike) -> Matching:
         """Match; see :func:`match`."""
-        return match(affinity, view, method=self.method, alpha=self.alpha)
+        affinity, view = _checked(affinity, view)
+        if self.method == "clustering":
+            return self._matching(number_people(cluster(affinity, view, alpha=self.alpha)), affinity)
+        if self.method == "hungarian":
+            matched = assign(affinity, view, alpha=self.alpha)
+            return self._matching(round_to_people(matched, view, threshold=self.alpha), affinity)
+        order = np.argsort(view, kind="stable")
+        back = np.argsort(order, kind="stable")
+        parts = cluster(affinity, view, alpha=self.alpha)
+        relaxed = admm.solve(affinity[order[:, None], order], view[order], parts=parts[order], alpha=self.alpha)
+        P = relaxed.P[back[:, None], back]
+        return self._matching(
+            round_to_people(P, view),
+            affinity,
+            P=P,
+            iterations=relaxed.iterations,
+            residuals=relaxed.residuals,
+            converged=relaxed.converged,
+        )
+
+    def _matching(self, labels: NDArray[np.int64], affinity: NDArray[np.float64], **solver: Any) -> Matching:
+        return Matching(labels=labels, objective=objective(labels, affinity, alpha=self.alpha), **solver)
 
 
 def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alpha: float = 0.5) -> Matching:
@@ -50,39 +80,56 @@ def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alph
         The people; ``objective`` is :func:`objective` of the labels, so that methods can be compared.
 
     Raises:
-        ValueError: a shape or method that does not fit, or an affinity that is not symmetric or outside 0..1.
+        ValueError: a shape, method or alpha that does not fit, or an affinity that is not symmetric or outside 0..1.
     """
-    view = as_array(view, ("m",), "view", np.int64)
-    affinity = as_array(affinity, (len(view), len(view)), "affinity")
-    if not ((affinity >= 0) & (affinity <= 1)).all() or not np.allclose(affinity, affinity.T, atol=1e-9):
-        raise ValueError("affinity must be symmetric with values in 0..1")
-    if method == "clustering":
-        return _matching(number_people(cluster(affinity, view, alpha=alpha)), affinity, alpha)
-    if method == "hungarian":
-        return _matching(round_to_people(assign(affinity, view, alpha=alpha), view, threshold=alpha), affinity, alpha)
-    if method != "admm":
-        raise ValueError(f"method must be 'admm', 'clustering' or 'hungarian', got {method!r}")
-    order = np.argsort(view, kind="stable")
-    back = np.argsort(order, kind="stable")
-    relaxed = admm.solve(affinity[np.ix_(order, order)], view[order], alpha=alpha)
-    P = relaxed.P[np.ix_(back, back)]
-    return replace(
-        _matching(round_to_people(P, view), affinity, alpha),
-        P=P,
-        iterations=relaxed.iterations,
-        residuals=relaxed.residuals,
-        converged=relaxed.converged,
-    )
+    return Matcher(method=method, alpha=alpha)(affinity, view)
 
 
-def _matching(labels: NDArray[np.int64], affinity: NDArray[np.float64], alpha: float) -> Matching:
-    return Matching(labels=labels, objective=objective(labels, affinity, alpha=alpha))
-
-
-def objective(labels: NDArray[np.int64], affinity: NDArray[np.float64], *, alpha: float = 0.5) -> float:
+def objective(labels: ArrayLike, affinity: ArrayLike, *, alpha: float = 0.5) -> float:
     """``<alpha E - A, P>`` of a grouping, summed over unordered pairs: what every method minimises.
 
     The nuclear norm of a consistent P is m whatever the grouping, so the paper's second term is left out.
     """
-    together = (labels[:, None] == labels[None, :]) & (labels[:, None] >= 0)
-    return float(np.triu(together * (alpha - affinity), k=1).sum())
+    return _objective(read_only(labels, np.int64), read_only(affinity, np.float64), float(alpha))
+
+
+def _checked(affinity: ArrayLike, view: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Both as read-only arrays, the affinity exactly symmetric."""
+    if not (isinstance(view, np.ndarray) and view.ndim == 1 and view.dtype == np.int64):
+        view = as_array(view, ("m",), "view", np.int64)
+    shape = (len(view), len(view))
+    if not (isinstance(affinity, np.ndarray) and affinity.shape == shape and affinity.dtype == np.float64):
+        affinity = as_array(affinity, shape, "affinity")
+    affinity = read_only(affinity, np.float64)
+    asymmetry = _asymmetry(affinity)
+    if not asymmetry <= _ASYMMETRY:
+        raise ValueError("affinity must be symmetric with values in 0..1")
+    if asymmetry > 0.0:
+        affinity = read_only(0.5 * (affinity + affinity.T), np.float64)
+    return affinity, read_only(view, np.int64)
+
+
+@njit(cache=True)
+def _asymmetry(affinity):  # type: ignore[no-untyped-def]
+    """Greatest difference from the transpose; infinite where a value is outside 0..1 or not a number."""
+    m, side, worst = len(affinity), 32, 0.0
+    for top in range(0, m, side):  # square tiles: both the matrix and its transpose stay in the cache
+        for left in range(top, m, side):
+            for i in range(top, min(top + side, m)):
+                for j in range(max(left, i), min(left + side, m)):
+                    one, other = affinity[i, j], affinity[j, i]
+                    if not (one >= 0.0 and one <= 1.0 and other >= 0.0 and other <= 1.0):
+                        return np.inf
+                    worst = max(worst, abs(one - other))
+    return worst
+
+
+@njit(cache=True)
+def _objective(labels, affinity, alpha):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(len(labels)):
+        if labels[i] >= 0:
+            for j in range(i + 1, len(labels)):
+                if labels[j] == labels[i]:
+                    total += alpha - affinity[i, j]
+    return total

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
+
+from mvpose.matching.assignment import best_assignment
 
 
 def assign(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.float64]:
@@ -20,13 +21,10 @@ def assign(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: flo
         together need not be cycle-consistent.
     """
     result = np.zeros_like(affinity)
-    views = np.unique(view)
-    for a, first in enumerate(views):
-        for second in views[a + 1 :]:
-            rows, columns = np.flatnonzero(view == first), np.flatnonzero(view == second)
-            gain = np.maximum(affinity[np.ix_(rows, columns)] - alpha, 0.0)
-            i, j = linear_sum_assignment(gain, maximize=True)
-            matched = gain[i, j] > 0
-            i, j = rows[i[matched]], columns[j[matched]]
+    rows_of = [np.flatnonzero(view == one) for one in np.unique(view)]
+    for a, rows in enumerate(rows_of):
+        for columns in rows_of[a + 1 :]:
+            matched = best_assignment(affinity[rows[:, None], columns] - alpha)
+            i, j = rows[matched >= 0], columns[matched[matched >= 0]]
             result[i, j] = result[j, i] = affinity[i, j]
     return result

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
 
 
 def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5) -> NDArray[np.int64]:
@@ -20,25 +21,73 @@ def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshol
     Returns:
         Person of each detection, numbered by their first detection, -1 where a detection matches no other, (m,).
     """
-    m = len(view)
-    group = np.arange(m)
     first, second = np.nonzero(np.triu(threshold < P, k=1))
-    for k in np.argsort(-P[first, second], kind="stable"):
-        mine, other = group[first[k]], group[second[k]]
-        if mine != other:
-            views = np.concatenate([view[group == mine], view[group == other]])
-            if len(np.unique(views)) == len(views):
-                group[group == max(mine, other)] = min(mine, other)
-    return number_people(group)
+    surest = np.argsort(-P[first, second], kind="stable")
+    return number_people(_join_pairs(first[surest], second[surest], read_only(view, np.int64)))
 
 
 def number_people(group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Renumber arbitrary group names (m,) as 0, 1, ... by first member; groups of one become -1."""
-    labels = np.full(len(group), -1, dtype=np.int64)
-    people = 0
-    for name in dict.fromkeys(group.tolist()):
-        members = group == name
-        if members.sum() > 1:
-            labels[members] = people
+    """Renumber group names 0 to m - 1, (m,), as 0, 1, ... by first member; groups of one become -1."""
+    return _number_people(read_only(group, np.int64))
+
+
+def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
+    """The same numbers as a read-only C-contiguous array: numba compiles a kernel anew for any other kind."""
+    result = np.ascontiguousarray(array, dtype)
+    if result.flags.writeable:
+        result = result.view()
+        result.flags.writeable = False
+    return result
+
+
+@njit(cache=True)
+def rank_views(view):  # type: ignore[no-untyped-def]
+    """Number the views 0, 1, ... by their first detection: the number of each detection's view, and how many."""
+    m = len(view)
+    rank, seen, views = np.empty(m, np.int64), np.empty(m, np.int64), 0
+    for i in range(m):
+        r = 0
+        while r < views and seen[r] != view[i]:
+            r += 1
+        if r == views:
+            seen[r] = view[i]
+            views += 1
+        rank[i] = r
+    return rank, views
+
+
+@njit(cache=True)
+def _join_pairs(first, second, view):  # type: ignore[no-untyped-def]
+    m = len(view)
+    rank, views = rank_views(view)
+    group = np.arange(m)
+    seen = np.zeros((m, views), np.bool_)
+    for i in range(m):
+        seen[i, rank[i]] = True
+    for k in range(len(first)):
+        keep, gone = group[first[k]], group[second[k]]
+        fits = keep != gone
+        for r in range(views):
+            fits = fits and not (seen[keep, r] and seen[gone, r])
+        if fits:
+            for r in range(views):
+                seen[keep, r] = seen[keep, r] or seen[gone, r]
+            for i in range(m):
+                if group[i] == gone:
+                    group[i] = keep
+    return group
+
+
+@njit(cache=True)
+def _number_people(group):  # type: ignore[no-untyped-def]
+    m = len(group)
+    size, number, people = np.zeros(m, np.int64), np.full(m, -1, np.int64), 0
+    for i in range(m):
+        size[group[i]] += 1
+    labels = np.empty(m, np.int64)
+    for i in range(m):
+        if size[group[i]] > 1 and number[group[i]] < 0:
+            number[group[i]] = people
             people += 1
+        labels[i] = number[group[i]]
     return labels

@@ -1,7 +1,9 @@
-"""From matched detections to people in 3D (paper, section 3.3): triangulation and pictorial structures."""
+"""From detections to people in 3D (paper, section 3.3): triangulation and pictorial structures."""
 
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.pictorial import PictorialStructure
+from mvpose.reconstruction.poses import Poses
 from mvpose.reconstruction.triangulation import Triangulation
+from mvpose.reconstruction.unmatched import UnmatchedPictorialStructure
 
-__all__ = ["Noise", "PictorialStructure", "Triangulation"]
+__all__ = ["Noise", "PictorialStructure", "Poses", "Triangulation", "UnmatchedPictorialStructure"]

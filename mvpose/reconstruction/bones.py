@@ -14,13 +14,21 @@ neither, nor on any simulated population:
 
 from __future__ import annotations
 
+from functools import cache
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.skeleton import Skeleton
 
+Floats = NDArray[np.float64]
+
 STATURE = 1.70  # metres
-_POPULATION = 0.07  # deviation of a bone between adults as a share of its length: stature 5.5 % and proportion 4 %
+STATURE_DEVIATION = 0.055
+"""Deviation of the stature of adults, as a share of it: all bones of a person together."""
+PROPORTION_DEVIATION = 0.04
+"""Deviation of a bone among adults of one stature, as a share of its length."""
 
 # Mean length in metres and the deviation, in metres, of what detectors call the joint from the joint centre.
 # fmt: off
@@ -40,19 +48,41 @@ _BONES: dict[frozenset[str], tuple[float, float]] = {
 # fmt: on
 
 
-def bone_lengths(skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean and standard deviation of the bone from every joint to its parent.
+class Bones(NamedTuple):
+    """The bone from every joint to its parent.
 
-    Returns:
-        Means (J,) and deviations (J,), metres. A bone without a published length, and the root, has an infinite
-        deviation: it constrains nothing.
+    Attributes:
+        length: mean over adults, (J,), metres; 0 where nothing is published, and at the root.
+        definition: deviation, in metres, of what detectors call the joints from the joint centres, (J,); infinite
+            where nothing is published, and at the root.
     """
-    mean, deviation = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
+
+    length: Floats
+    definition: Floats
+
+    def deviation(self, *, stature: float = STATURE_DEVIATION) -> Floats:
+        """Deviation of the length, (J,), metres, where stature itself deviates by this share; infinite: no prior."""
+        return np.hypot(np.hypot(stature, PROPORTION_DEVIATION) * self.length, self.definition)
+
+
+@cache
+def bones(skeleton: Skeleton) -> Bones:
+    """The published bones of a skeleton."""
+    length, definition = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
     for parent, child in skeleton.edges:
         ends = frozenset(
             skeleton.joints[joint].removeprefix("left_").removeprefix("right_") for joint in (parent, child)
         )
         if ends in _BONES:
-            mean[child], definition = _BONES[ends]
-            deviation[child] = np.hypot(_POPULATION * mean[child], definition)
-    return mean, deviation
+            length[child], definition[child] = _BONES[ends]
+    return Bones(length, definition)
+
+
+def bone_lengths(skeleton: Skeleton) -> tuple[Floats, Floats]:
+    """Mean and standard deviation of the bone from every joint to its parent, over adults.
+
+    Returns:
+        Means (J,) and deviations (J,), metres. A bone without a published length, and the root, has an infinite
+        deviation: it constrains nothing.
+    """
+    return bones(skeleton).length, bones(skeleton).deviation()

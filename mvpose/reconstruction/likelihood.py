@@ -3,7 +3,11 @@
 Each view that detected a joint says ``p(I_v | X) = floor + score * exp(-e^2 / (2 sigma^2))``, where e is the
 distance in metres from X to the viewing ray. The floor models a keypoint that is simply wrong; without it one bad
 view would veto the truth. sigma is the scatter of a detector across the body, in metres and so the same for every
-rig, with the angle of a pixel added: far away, pixels are what limits it.
+rig, with the angle of a pixel added: far away, pixels are what limits it. Where a view offers several keypoints for
+one joint (the modes of a heat map), the best of them counts (a max-mixture: Olson & Agarwal, IJRR 2013).
+
+The kernels work on one joint of one person in n views with K modes each: origins (n, 3), directions (n, K, 3),
+weights (n, K), 0 where a view has no such mode, and the angle of a pixel (n,).
 """
 
 from __future__ import annotations
@@ -17,6 +21,8 @@ from numpy.typing import NDArray
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
+
+_FASTMATH = {"contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
 @dataclass(frozen=True)
@@ -42,31 +48,90 @@ class Noise:
         return np.hypot(self.area * np.asarray(skeleton.sigmas), self.definition)
 
 
-@njit(cache=True)
-def view_terms(point, origin, direction, weight, pixel, sigma, floor):  # type: ignore[no-untyped-def]
-    """One view's ``(responsibility, variance, likelihood)`` at a point.
-
-    The responsibility is the posterior that this keypoint is right given that the joint is at the point; a point
-    behind the camera gets the floor alone.
-    """
-    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    along = x * direction[0] + y * direction[1] + z * direction[2]
-    variance = sigma * sigma + (pixel * along) ** 2
-    if along <= 0.0:
-        return 0.0, variance, floor
-    e2 = max(x * x + y * y + z * z - along * along, 0.0)
-    right = weight * np.exp(-0.5 * e2 / variance)
-    return right / (right + floor), variance, right + floor
-
-
-@njit(cache=True)
+@njit(cache=True, fastmath=_FASTMATH)
 def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):  # type: ignore[no-untyped-def]
-    """Sum over the views that detected the joint: origins and directions (n, 3), weights and pixel (n,)."""
-    total = 0.0
-    for k in range(len(weights)):
-        if weights[k] > 0.0:
-            total += np.log(view_terms(point, origins[k], directions[k], weights[k], pixel[k], sigma, floor)[2])
-    return total
+    """Sum over the views that detected the joint; a view that has the point behind it gives the floor."""
+    total, product = 0.0, 1.0
+    for v in range(weights.shape[0]):
+        x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
+        best, seen = 0.0, False
+        for k in range(weights.shape[1]):
+            if weights[v, k] > 0.0:
+                seen = True
+                along = x * directions[v, k, 0] + y * directions[v, k, 1] + z * directions[v, k, 2]
+                if along > 0.0:
+                    breadth = pixel[v] * along
+                    precision = weights[v, k] ** 2 / (sigma * sigma + breadth * breadth)
+                    e2 = x * x + y * y + z * z - along * along
+                    best = max(best, weights[v, k] * np.exp(-0.5 * e2 * precision))
+        if seen:
+            product *= floor + best  # one logarithm for many views
+            if product < 1e-200:
+                total += np.log(product)
+                product = 1.0
+    return total + np.log(product)
+
+
+@njit(cache=True, fastmath=_FASTMATH)
+def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):  # type: ignore[no-untyped-def]
+    """Add what the views say of a joint near the point to its normal equations A (3, 3) and b (3,).
+
+    Every keypoint weighs by its responsibility (the posterior that it is right, given the joint at the point) over
+    its variance. ``temper`` widens the variances of the responsibilities alone: above 1, far keypoints still pull.
+
+    Returns:
+        Support, the sum of score times responsibility; the sum of responsibilities; and the misfit, the sum of
+        responsibility times squared error over variance.
+    """
+    a00, a01, a02, a11, a12, a22, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    support, rights, misfit, cold = 0.0, 0.0, 0.0, -0.5 / temper
+    for v in range(weights.shape[0]):
+        ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
+        x, y, z = point[0] - ox, point[1] - oy, point[2] - oz
+        best, mode, precision, error = 0.0, -1, 1.0, 0.0
+        for k in range(weights.shape[1]):
+            if weights[v, k] > 0.0:
+                along = x * directions[v, k, 0] + y * directions[v, k, 1] + z * directions[v, k, 2]
+                if along > 0.0:
+                    breadth = pixel[v] * along
+                    sharpness = weights[v, k] ** 2 / (sigma * sigma + breadth * breadth)
+                    e2 = max(x * x + y * y + z * z - along * along, 0.0)
+                    value = weights[v, k] * np.exp(cold * e2 * sharpness)
+                    if value > best:
+                        best, mode, precision, error = value, k, sharpness, e2
+        if mode < 0:
+            continue
+        right = best / (best + floor)
+        weight = right * precision
+        support += weights[v, mode] * right
+        rights += right
+        misfit += weight * error
+        dx, dy, dz = directions[v, mode, 0], directions[v, mode, 1], directions[v, mode, 2]
+        # weight (I - d dᵀ), and its product with the origin
+        wx, wy, wz = weight * dx, weight * dy, weight * dz
+        a00 += weight - wx * dx
+        a11 += weight - wy * dy
+        a22 += weight - wz * dz
+        a01 -= wx * dy
+        a02 -= wx * dz
+        a12 -= wy * dz
+        ahead = dx * ox + dy * oy + dz * oz
+        b0 += weight * ox - wx * ahead
+        b1 += weight * oy - wy * ahead
+        b2 += weight * oz - wz * ahead
+    A[0, 0] += a00
+    A[1, 1] += a11
+    A[2, 2] += a22
+    A[0, 1] += a01
+    A[1, 0] += a01
+    A[0, 2] += a02
+    A[2, 0] += a02
+    A[1, 2] += a12
+    A[2, 1] += a12
+    b[0] += b0
+    b[1] += b1
+    b[2] += b2
+    return support, rights, misfit
 
 
 @njit(cache=True)

@@ -14,44 +14,72 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.bones import bone_lengths
-from mvpose.reconstruction.likelihood import Noise
-from mvpose.reconstruction.triangulation import Proposals, propose, refine
+from mvpose.reconstruction.bones import STATURE_DEVIATION, bones
+from mvpose.reconstruction.likelihood import Noise, accumulate
+from mvpose.reconstruction.poses import Poses, gather
+from mvpose.reconstruction.proposals import propose_all, propose_single_views
+from mvpose.reconstruction.refinement import climb, judge, leaves_first, tree
+from mvpose.reconstruction.sampling import rescore
+from mvpose.reconstruction.scatter import person_scale
+from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
+
+_NO_MAPS = np.zeros((0, 0, 0, 0), np.float32), np.zeros((0, 4)), np.zeros((0, 22))
+_NO_MAPS[0].flags.writeable = False  # as maps are: numba compiles once for each kind of array
 
 
 @dataclass(frozen=True)
 class PictorialStructure:
     """Reconstruction by 3DPS: proposals, max-product, then a local refinement of the winner.
 
+    The likelihood is that of the detections' heat maps where they carry any, else a Gaussian about each keypoint.
+
+    A joint that one view alone sees is placed on its ray by the prior, with the covariance that this deserves; one
+    that no view sees is missing.
+
     Attributes:
         noise: the error model of keypoints.
-        most_states: proposals kept for a joint, the most likely ones; many views have very many pairs.
+        personal: scale the bone-length prior to the person, whose stature his well-seen bones tell.
+        most_pairs: pairs of views that propose for a joint, those that agree and meet at wide angles; 12 views and
+            more have too many.
+        most_states: proposals kept for a joint, the likeliest ones.
     """
 
     noise: Noise = Noise()
-    most_states: int = 64
+    personal: bool = True
+    most_pairs: int = 64
+    most_states: int = 32
 
-    def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Floats, Floats, Floats]:
-        """Joints (J, 3), scores (J,) and covariances (J, 3, 3) of one person; NaN and score 0 where missing.
+    def __post_init__(self) -> None:
+        for name in ("most_pairs", "most_states"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} of the pictorial structure must be at least 1, got {getattr(self, name)}")
 
-        A joint that one view alone sees is placed on its ray by the prior, with the covariance that this deserves;
-        one that no view sees is missing.
-        """
-        length, deviation = bone_lengths(skeleton)
-        proposals = _keep_likely(propose(rays, self.noise.sigmas(skeleton), self.noise), self.most_states)
-        proposals = _add_single_views(proposals, rays, skeleton, self.noise, length=length, deviation=deviation)
-        chosen = max_product(
-            proposals.states,
-            proposals.unary,
-            proposals.count,
-            parents=skeleton.parents,
-            length=length,
-            deviation=deviation,
+    def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
+        """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
+        length, definition = bones(skeleton)
+        modes = rays.modes
+        maps = _NO_MAPS if modes is None else (modes.values, modes.grid, modes.cameras)
+        return Poses(
+            *_structures(
+                labels,
+                rays.origins,
+                rays.directions[:, :, None] if modes is None else modes.directions,
+                rays.weights[:, :, None] if modes is None else modes.weights,
+                rays.pixel,
+                maps,
+                self.noise.sigmas(skeleton),
+                np.array([self.noise.pixels, self.noise.floor, STATURE_DEVIATION]),
+                *tree(skeleton),
+                length,
+                definition,
+                self.personal,
+                self.most_pairs,
+                self.most_states,
+            )
         )
-        return refine(rays, skeleton, proposals, chosen, self.noise, length=length, deviation=deviation)
 
 
 def max_product(
@@ -78,75 +106,69 @@ def max_product(
         Index of the chosen state of every joint, (J,); 0 for a joint without states.
     """
     parents = np.asarray(parents, np.int64)
-    return _max_product(states, unary, count, parents, _leaves_first(parents), length, 1.0 / deviation**2)
+    return _max_product(states, unary, count, parents, leaves_first(parents), length, 1.0 / deviation**2)
 
 
-def _leaves_first(parents: NDArray[np.int64]) -> NDArray[np.int64]:
-    depth = np.zeros(len(parents), np.int64)
-    for joint in range(len(parents)):
-        ancestor = parents[joint]
-        while ancestor >= 0:
-            depth[joint] += 1
-            ancestor = parents[ancestor]
-    return np.argsort(-depth, kind="stable")
+@njit(cache=True)
+def _structures(  # type: ignore[no-untyped-def]
+    labels, origins, directions, weights, pixel, maps, sigmas, noise,
+    parents, order, neighbours, bones, length, definition, personal, most_pairs, most_states,
+):  # fmt: skip
+    people, count = 0, len(sigmas)
+    for label in labels:
+        people = max(people, label + 1)
+    floor = noise[1]
+    joints, scores = np.full((people, count, 3), np.nan), np.zeros((people, count))
+    covariance = np.full((people, count, 3, 3), np.nan)
+    for person in range(people):
+        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, noise[0] * pixel)
+        states, unary, valid = propose_all(mine, towards, weight, angle, sigmas, floor, most_pairs, most_states)
+        if len(maps[0]):
+            rescore(states, unary, valid, labels, person, weight, maps, floor)
+        own_length, precision = personal_prior(
+            states, unary, valid, weight, sigmas, floor, parents, length, definition, noise[2], personal
+        )
+        own = np.sqrt(_scatter(states, valid, mine, towards, weight, angle, sigmas, floor)) * sigmas
+        propose_single_views(
+            states, unary, valid, mine, towards, weight, floor, neighbours, bones, own_length, precision
+        )
+        chosen = _max_product(states, unary, valid, parents, order, own_length, precision)
+        for j in range(count):
+            if valid[j] > 0:
+                for r in range(3):
+                    joints[person, j, r] = states[j, chosen[j], r]
+        climb(
+            joints[person], mine, towards, weight, angle, own, floor,
+            parents, order, neighbours, bones, own_length, precision,
+        )  # fmt: skip
+        judge(
+            scores[person], covariance[person], joints[person], mine, towards, weight, angle, own, floor,
+            parents, order, neighbours, bones, own_length, precision,
+        )  # fmt: skip
+    return joints, scores, covariance
 
 
-def _keep_likely(proposals: Proposals, most: int) -> Proposals:
-    if proposals.unary.shape[1] <= most:
-        return proposals
-    best = np.argsort(-proposals.unary, axis=1, kind="stable")[:, :most]
-    return Proposals(
-        states=np.take_along_axis(proposals.states, best[:, :, None], axis=1),
-        unary=np.take_along_axis(proposals.unary, best, axis=1),
-        count=np.minimum(proposals.count, most),
-    )
-
-
-def _add_single_views(
-    proposals: Proposals, rays: Rays, skeleton: Skeleton, noise: Noise, *, length: Floats, deviation: Floats
-) -> Proposals:
-    """Propose for joints that a single view sees: where its ray is a bone's length from a neighbour in the tree.
-
-    Such a joint has no pair of views, but its direction is known and the prior knows the depth, up to which of two
-    points it is. The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their
-    own neighbours in turn.
-    """
-    views = (rays.weights > 0).sum(axis=0)
-    waiting = set(np.flatnonzero((proposals.count == 0) & (views == 1)).tolist())
-    if not waiting:
-        return proposals
-    states = [list(proposals.states[j, : proposals.count[j]]) for j in range(len(skeleton))]
-    unary = [list(proposals.unary[j, : proposals.count[j]]) for j in range(len(skeleton))]
-    bones = [(a, b, length[b]) for a, b in skeleton.edges if np.isfinite(deviation[b])]
-    neighbours = {j: [(a + b - j, bone) for a, b, bone in bones if j in (a, b)] for j in waiting}
-    while ready := [j for j in waiting if any(states[other] for other, _ in neighbours[j])]:
-        for j in ready:
-            view = int(np.argmax(rays.weights[:, j]))
-            origin, direction = rays.origins[view], rays.directions[view, j]
-            for other, bone in neighbours[j]:
-                if states[other]:
-                    anchor = states[other][int(np.argmax(unary[other]))] - origin
-                    along = anchor @ direction
-                    reach = np.sqrt(max(bone**2 - (anchor @ anchor - along**2), 0.0))
-                    depths = [depth for depth in (along - reach, along + reach) if depth > 0]
-                    states[j] += [origin + depth * direction for depth in depths]
-                    unary[j] += [np.log(rays.weights[view, j] + noise.floor)] * len(depths)
-        waiting -= set(ready)
-    most = max(proposals.states.shape[1], *(len(each) for each in states))
-    padded = Proposals(
-        np.zeros((len(states), most, 3)), np.full((len(states), most), -np.inf), np.array([len(s) for s in states])
-    )
-    for j, count in enumerate(padded.count):
-        padded.states[j, :count] = np.reshape(states[j], (-1, 3))
-        padded.unary[j, :count] = unary[j]
-    return padded
+@njit(cache=True)
+def _scatter(states, count, origins, directions, weights, pixel, sigmas, floor):  # type: ignore[no-untyped-def]
+    """The scale of a person's errors, from the likeliest proposal of every joint."""
+    joints, A, b = len(count), np.zeros((3, 3)), np.zeros(3)
+    misfit, rights = np.zeros(joints), np.zeros(joints)
+    for j in range(joints):
+        if count[j] > 0:
+            _, rights[j], misfit[j] = accumulate(
+                states[j, 0], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b
+            )
+    return person_scale(misfit, rights)
 
 
 @njit(cache=True)
 def _max_product(states, unary, count, parents, order, length, precision):  # type: ignore[no-untyped-def]
     joints = len(parents)
-    belief = unary.copy()
-    choice = np.zeros((joints, states.shape[1]), np.int64)  # best state of a joint for each state of its parent
+    belief = np.empty(unary.shape)
+    choice = np.zeros(unary.shape, np.int64)  # best state of a joint for each state of its parent
+    for joint in range(joints):
+        for s in range(count[joint]):
+            belief[joint, s] = unary[joint, s]
     for child in order:
         parent = parents[child]
         if parent < 0 or count[child] == 0:
@@ -156,10 +178,10 @@ def _max_product(states, unary, count, parents, order, length, precision):  # ty
             for c in range(count[child]):
                 value = belief[child, c]
                 if precision[child] > 0.0:
-                    d2 = 0.0
-                    for r in range(3):
-                        d2 += (states[child, c, r] - states[parent, p, r]) ** 2
-                    value -= 0.5 * precision[child] * (np.sqrt(d2) - length[child]) ** 2
+                    x = states[child, c, 0] - states[parent, p, 0]
+                    y = states[child, c, 1] - states[parent, p, 1]
+                    z = states[child, c, 2] - states[parent, p, 2]
+                    value -= 0.5 * precision[child] * (np.sqrt(x * x + y * y + z * z) - length[child]) ** 2
                 if value > best:
                     best, argument = value, c
             belief[parent, p] += best
@@ -169,6 +191,8 @@ def _max_product(states, unary, count, parents, order, length, precision):  # ty
         parent = parents[joint]
         if parent >= 0 and count[parent] > 0:
             chosen[joint] = choice[joint, chosen[parent]]
-        elif count[joint] > 0:
-            chosen[joint] = np.argmax(belief[joint, : count[joint]])
+        else:
+            for s in range(1, count[joint]):
+                if belief[joint, s] > belief[joint, chosen[joint]]:
+                    chosen[joint] = s
     return chosen

@@ -1,253 +1,279 @@
-"""From matched rays to points: proposals from every pair of views, and robust triangulation over all of them.
+"""From matched rays to points, every joint by itself: the paper's reconstruction without a pictorial structure.
 
-A triangulated point minimises the weighted squared distance to its viewing rays; the weights are the scores and the
-inverse variances of :mod:`mvpose.reconstruction.likelihood`, so this is score-weighted triangulation in metres.
+A triangulated point minimises the weighted squared distance to its viewing rays: linear triangulation (the DLT) in
+metres. One wrong view spoils it, so the default goes on: residuals are down-weighted by the error model of
+:mod:`mvpose.reconstruction.likelihood`, from a wide one to the real one (graduated non-convexity: Yang et al., IEEE
+RA-L 2020), and where no majority of the views agrees every pair of views gets its say.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, add_ray, log_likelihood, solve, view_terms
+from mvpose.reconstruction.likelihood import Noise, accumulate, add_ray, log_likelihood, solve
+from mvpose.reconstruction.poses import Poses, gather
+from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Proposals:
-    """Candidate positions of every joint of one person.
-
-    Attributes:
-        states: (J, S, 3), metres; the first ``count[j]`` are valid.
-        unary: log-likelihood of each, (J, S); -inf beyond the count.
-        count: (J,).
-    """
-
-    states: Floats
-    unary: Floats
-    count: NDArray[np.int64]
-
-
-def propose(rays: Rays, sigmas: Floats, noise: Noise) -> Proposals:
-    """Triangulate every joint from every pair of views, and from all views at once (paper, section 3.3).
-
-    As long as a joint is right in two views, its position is among the proposals; the all-view point adds accuracy
-    where more are right. Pairs whose rays are parallel or meet behind a camera propose nothing.
-
-    Args:
-        rays: one person's, at most one detection a view, (n, J).
-        sigmas: deviation of each joint, (J,), metres.
-        noise: the rest of the error model.
-    """
-    states, unary, count = _propose(rays.origins, rays.directions, rays.weights, rays.pixel, sigmas, noise.floor)
-    return Proposals(states, unary, count)
+Method = Literal["robust", "dlt", "best-pair"]
+_METHODS: tuple[Method, ...] = ("robust", "dlt", "best-pair")
 
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Reconstruction without a pictorial structure: every joint by itself (the paper's "No 3DPS").
+    """Reconstruction without a pictorial structure (the paper's "No 3DPS").
 
-    The most likely proposal, refined over all views that agree with it; views that do not are found and left out,
-    not averaged in. Joints seen by fewer than two views are missing, not invented.
+    Joints seen by fewer than two views are missing, not invented.
+
+    Attributes:
+        method: ``"robust"`` finds the views that are wrong and leaves them out; ``"dlt"`` averages all views, weighted
+            by score; ``"best-pair"`` takes the pair of views with the least reprojection error over all views, as
+            the code released with the paper does.
+        noise: the error model of keypoints.
+
+    Raises:
+        ValueError: a method that is none of these.
     """
 
+    method: Method = "robust"
     noise: Noise = Noise()
 
-    def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Floats, Floats, Floats]:
-        """Joints (J, 3), scores (J,) and covariances (J, 3, 3) of one person; NaN and score 0 where missing."""
-        proposals = propose(rays, self.noise.sigmas(skeleton), self.noise)
-        best = np.argmax(proposals.unary, axis=1)
-        free = np.full(len(skeleton), np.inf)
-        return refine(rays, skeleton, proposals, best, self.noise, length=np.zeros(len(skeleton)), deviation=free)
+    def __post_init__(self) -> None:
+        if self.method not in _METHODS:
+            raise ValueError(f"method of triangulation must be one of {', '.join(_METHODS)}, got {self.method!r}")
+
+    def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
+        """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
+        return Poses(
+            *_triangulate(
+                labels,
+                rays.origins,
+                rays.directions[:, :, None],
+                rays.weights[:, :, None],
+                rays.pixel,
+                self.noise.sigmas(skeleton),
+                np.array([self.noise.pixels, self.noise.floor]),
+                _METHODS.index(self.method),
+            )
+        )
 
 
-def refine(
-    rays: Rays,
-    skeleton: Skeleton,
-    proposals: Proposals,
-    chosen: NDArray[np.int64],
-    noise: Noise,
-    *,
-    length: Floats,
-    deviation: Floats,
-) -> tuple[Floats, Floats, Floats]:
-    """Climb from the chosen states to the nearby maximum of likelihood times bone-length prior.
+@njit(cache=True)
+def _triangulate(labels, origins, directions, weights, pixel, sigmas, noise, method):  # type: ignore[no-untyped-def]
+    people, joints, floor = 0, len(sigmas), noise[1]
+    for label in labels:
+        people = max(people, label + 1)
+    points, scores = np.full((people, joints, 3), np.nan), np.zeros((people, joints))
+    covariance = np.full((people, joints, 3, 3), np.nan)
+    misfit, rights = np.zeros(joints), np.zeros(joints)
+    scratch = np.empty((8, 3))
+    for person in range(people):
+        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, noise[0] * pixel)
+        point = points[person]
+        for j in range(joints):
+            misfit[j] = rights[j] = 0.0
+            view = mine, towards[j], weight[j], angle, sigmas[j], floor
+            support = 0.0
+            if method == 0:
+                support, rights[j], misfit[j] = consensus(point[j], view, scratch)
+            elif _all_views(point[j], view, scratch) if method == 1 else _best_pair(point[j], view):
+                support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, 0)
+            if support > 0.0:
+                scores[person, j] = support / len(angle)
+            for r in range(3):
+                if support == 0.0:
+                    point[j, r] = np.nan
+                else:
+                    for c in range(3):
+                        covariance[person, j, r, c] = scratch[r, c]
+        if method == 0:  # what is wrong by this person's measure, not the model's
+            own = np.sqrt(person_scale(misfit, rights))
+            for j in range(joints):
+                if not np.isnan(point[j, 0]):
+                    view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
+                    support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, _MOST_STEPS)
+                    scores[person, j] = support / len(angle)
+                    for r in range(3):
+                        for c in range(3):
+                            covariance[person, j, r, c] = scratch[r, c]
+        scale = joint_scales(misfit, rights)
+        for j in range(joints):
+            for r in range(3):
+                for c in range(3):
+                    covariance[person, j, r, c] *= scale[j]
+    return points, scores, covariance
 
-    Expectation maximisation: which keypoints are right given the joints, then the joints given those, each a 3 x 3
-    solve with the bones to its neighbours linearised. No step lowers the posterior.
+
+LEASH = 1.0
+"""Information, 1/m^2, that ties a joint to where it is: it matters only where no view agrees."""
+
+
+@njit(cache=True)
+def tie(point, A, b):  # type: ignore[no-untyped-def]
+    """Begin normal equations with no more than that the joint is about here."""
+    for r in range(3):
+        for c in range(3):
+            A[r, c] = 0.0
+        A[r, r] = LEASH
+        b[r] = LEASH * point[r]
+
+
+_MOST_STEPS = 12
+_COOLING = 4.0  # of the temper, a step
+_STILL = 2.5e-5  # m^2: a step of less than 5 mm is far below the scatter of any detector, and the step is still taken
+_MAJORITY = 0.5  # of the score
+_NEARLY_ALL = 0.8
+_BEYOND_CHANCE = 3.5  # views
+
+
+@njit(cache=True)
+def consensus(point, view, scratch):  # type: ignore[no-untyped-def]
+    """Write the most likely point of one joint, and say who vouches for it, as :func:`settle` does.
+
+    Nobody does, and the support is 0, where fewer than two views see it.
+
+    Where nearly all views agree, or four and more that are the majority (rays that pass one point by chance are
+    rarely more than three), cooling has led to the point. Otherwise all pairs of views are tried and the likeliest
+    point is refined.
 
     Args:
-        rays: one person's, (n, J).
-        skeleton: its tree.
-        proposals: the states.
-        chosen: index of the state of every joint, (J,).
-        noise: the error model.
-        length: mean length of the bone to the parent, (J,), metres.
-        deviation: its deviation, (J,), metres; infinite for no constraint.
+        point: where to write, (3,).
+        view: origins, directions, weights and angles of a pixel as in :mod:`mvpose.reconstruction.likelihood`, the
+            deviation of the joint and the floor.
+        scratch: (8, 3).
+    """
+    origins, directions, weights, pixel, sigma, floor = view
+    if not _all_views(point, view, scratch):
+        return 0.0, 0.0, 0.0
+    total, worst = 0.0, 0.0
+    for v in range(len(weights)):
+        if weights[v, 0] > 0.0:
+            total += weights[v, 0]
+            x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
+            along = x * directions[v, 0, 0] + y * directions[v, 0, 1] + z * directions[v, 0, 2]
+            worst = max(worst, x * x + y * y + z * z - along * along)
+    temper = min(max(worst / (4.0 * sigma * sigma), 1.0), 1e4)  # the worst view at two deviations
+    vouched = settle(point, view, scratch, temper, _MOST_STEPS)
+    if vouched[0] > (_MAJORITY if vouched[1] > _BEYOND_CHANCE else _NEARLY_ALL) * total:
+        return vouched
+    best = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
+    trial = np.empty(3)
+    for first in range(len(weights)):
+        for second in range(first + 1, len(weights)):
+            if pair_point(origins, directions, weights, first, 0, second, 0, trial):
+                value = log_likelihood(trial, origins, directions, weights, pixel, sigma, floor)
+                if value > best:
+                    best = value
+                    for r in range(3):
+                        point[r] = trial[r]
+    return settle(point, view, scratch, 1.0, _MOST_STEPS)
+
+
+@njit(cache=True)
+def settle(point, view, scratch, temper, steps):  # type: ignore[no-untyped-def]
+    """Move a point to the nearby maximum of its likelihood by expectation maximisation.
+
+    Hot, with a temper above 1, the error model starts wider, so that the maximum need not be near.
 
     Returns:
-        Joints (J, 3), scores (J,): mean over the person's views of score times responsibility, and covariances
-        (J, 3, 3), the inverse information of rays and bones.
+        Support, responsibilities and misfit as :func:`mvpose.reconstruction.likelihood.accumulate`, at the last step;
+        the first three rows of the scratch are the covariance there.
     """
-    joints = np.take_along_axis(proposals.states, chosen[:, None, None], axis=1)[:, 0]
-    joints[proposals.count == 0] = np.nan
-    parents = np.asarray(skeleton.parents, np.int64)
-    precision = 1.0 / deviation**2
-    scores, covariance = _refine(
-        joints,
-        rays.origins,
-        rays.directions,
-        rays.weights,
-        rays.pixel,
-        noise.sigmas(skeleton),
-        noise.floor,
-        parents,
-        length,
-        precision,
-    )
-    return joints, scores, covariance
-
-
-@njit(cache=True)
-def _propose(origins, directions, weights, pixel, sigmas, floor):  # type: ignore[no-untyped-def]
-    n, joints = weights.shape
-    most = n * (n - 1) // 2 + 1
-    states = np.zeros((joints, most, 3))
-    unary = np.full((joints, most), -np.inf)
-    count = np.zeros(joints, np.int64)
-    A, b, inverse, point = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)
-    for j in range(joints):
-        for first in range(n):
-            for second in range(first, n):
-                # (0, 0) stands for all views at once; the other pairs of one view with itself are no pairs.
-                together = first == 0 and second == 0
-                if (first == second and not together) or (
-                    not together and (weights[first, j] <= 0.0 or weights[second, j] <= 0.0)
-                ):
-                    continue
-                A[:, :] = 0.0
-                b[:] = 0.0
-                used = 0
-                for k in range(n):
-                    if weights[k, j] > 0.0 and (together or k == first or k == second):
-                        add_ray(A, b, origins[k], directions[k, j], weights[k, j])
-                        used += 1
-                if used < (3 if together else 2) or not solve(A, b, inverse, point):
-                    continue
-                ahead = True
-                for k in range(n):
-                    if weights[k, j] > 0.0 and (together or k == first or k == second):
-                        along = 0.0
-                        for r in range(3):
-                            along += (point[r] - origins[k, r]) * directions[k, j, r]
-                        ahead = ahead and along > 0.0
-                if ahead:
-                    for r in range(3):
-                        states[j, count[j], r] = point[r]
-                    unary[j, count[j]] = log_likelihood(
-                        point, origins, directions[:, j], weights[:, j], pixel, sigmas[j], floor
-                    )
-                    count[j] += 1
-    return states, unary, count
-
-
-_SWEEPS = 8
-_HALVINGS = 4
-_LEASH = 1.0  # 1/m^2: information that ties a joint to where it is; it matters only where no view agrees
-
-
-@njit(cache=True)
-def _refine(  # type: ignore[no-untyped-def]
-    joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
-):
-    n, count = weights.shape
-    scores = np.zeros(count)
-    covariance = np.full((count, 3, 3), np.nan)
-    A, b, target, trial = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-    for _ in range(_SWEEPS):
-        for j in range(count):
-            if np.isnan(joints[j, 0]):
-                continue
-            A[:, :] = 0.0
-            for r in range(3):
-                A[r, r] = _LEASH
-                b[r] = _LEASH * joints[j, r]
-            score = 0.0
-            for k in range(n):
-                if weights[k, j] > 0.0:
-                    right, variance, _ = view_terms(
-                        joints[j], origins[k], directions[k, j], weights[k, j], pixel[k], sigmas[j], floor
-                    )
-                    add_ray(A, b, origins[k], directions[k, j], right / variance)
-                    score += right * weights[k, j]
-            _add_bones(A, b, j, joints, parents, length, precision)
-            if not solve(A, b, covariance[j], target):
-                continue
-            scores[j] = score / n
-            # The bones are linearised, so a long step can overshoot; a step is taken only if it climbs.
-            here = _local_posterior(
-                joints[j], j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
-            )
-            step = 1.0
-            for _ in range(_HALVINGS):
-                for r in range(3):
-                    trial[r] = joints[j, r] + step * (target[r] - joints[j, r])
-                there = _local_posterior(
-                    trial, j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
-                )
-                if there >= here:
-                    for r in range(3):
-                        joints[j, r] = trial[r]
-                    break
-                step *= 0.5
-    return scores, covariance
-
-
-@njit(cache=True)
-def _add_bones(A, b, j, joints, parents, length, precision):  # type: ignore[no-untyped-def]
-    """Add the bones that end in joint j to its normal equations, linearised in the direction they have now."""
-    bone = np.empty(3)
-    for other in range(len(parents)):
-        child = _bone_between(j, other, parents)
-        if child < 0 or precision[child] == 0.0 or np.isnan(joints[other, 0]):
-            continue
-        now, along = max(_distance(joints[j], joints[other]), 1e-9), 0.0
+    origins, directions, weights, pixel, sigma, floor = view
+    inverse, A, b, target = scratch[:3], scratch[3:6], scratch[6], scratch[7]
+    for step in range(max(steps, 1)):
+        tie(point, A, b)
+        vouched = accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b)
+        solve(A, b, inverse, target)
+        if step == steps:  # only to look
+            break
+        moved = 0.0
         for r in range(3):
-            bone[r] = (joints[j, r] - joints[other, r]) / now
-            along += bone[r] * joints[other, r]
-        for r in range(3):
-            for c in range(3):
-                A[r, c] += precision[child] * bone[r] * bone[c]
-            b[r] += precision[child] * bone[r] * (along + length[child])
+            moved += (target[r] - point[r]) ** 2
+            point[r] = target[r]
+        if temper == 1.0 and moved < _STILL:
+            break
+        temper = max(temper / _COOLING, 1.0)
+    return vouched
 
 
 @njit(cache=True)
-def _local_posterior(  # type: ignore[no-untyped-def]
-    point, j, joints, origins, directions, weights, pixel, sigmas, floor, parents, length, precision
-):
-    """The terms of the log-posterior that change when joint j moves to ``point``."""
-    value = log_likelihood(point, origins, directions[:, j], weights[:, j], pixel, sigmas[j], floor)
-    for other in range(len(parents)):
-        child = _bone_between(j, other, parents)
-        if child >= 0 and precision[child] > 0.0 and not np.isnan(joints[other, 0]):
-            value -= 0.5 * precision[child] * (_distance(point, joints[other]) - length[child]) ** 2
-    return value
+def _all_views(point, view, scratch):  # type: ignore[no-untyped-def]
+    """Write the point nearest to all rays, weighted by score; False where fewer than two views see the joint."""
+    origins, directions, weights = view[:3]
+    inverse, A, b = scratch[:3], scratch[3:6], scratch[6]
+    for r in range(3):
+        b[r] = 0.0
+        for c in range(3):
+            A[r, c] = 0.0
+    views = 0
+    for v in range(len(weights)):
+        if weights[v, 0] > 0.0:
+            views += 1
+            # Squared: in the DLT the rows are weighted by score, and a row is a residual.
+            add_ray(A, b, origins[v], directions[v, 0], weights[v, 0] ** 2)
+    return views > 1 and solve(A, b, inverse, point)
 
 
 @njit(cache=True)
-def _bone_between(j, other, parents):  # type: ignore[no-untyped-def]
-    """The child of the two where one is the other's parent, which names the bone; -1 where there is none."""
-    if parents[j] == other:
-        return j
-    return other if parents[other] == j else -1
+def _best_pair(point, view):  # type: ignore[no-untyped-def]
+    """Write the point of the pair of views with the least mean reprojection error over all views; False if none."""
+    origins, directions, weights, pixel = view[:4]
+    best, trial = np.inf, np.empty(3)
+    for first in range(len(weights)):
+        for second in range(first + 1, len(weights)):
+            if pair_point(origins, directions, weights, first, 0, second, 0, trial):
+                error, mass = 0.0, 0.0
+                for v in range(len(weights)):
+                    if weights[v, 0] > 0.0:
+                        x, y, z = trial[0] - origins[v, 0], trial[1] - origins[v, 1], trial[2] - origins[v, 2]
+                        along = x * directions[v, 0, 0] + y * directions[v, 0, 1] + z * directions[v, 0, 2]
+                        across = np.sqrt(max(x * x + y * y + z * z - along * along, 0.0))
+                        error += weights[v, 0] * np.arctan2(across, along) / pixel[v]
+                        mass += weights[v, 0]
+                if error / mass < best:
+                    best = error / mass
+                    for r in range(3):
+                        point[r] = trial[r]
+    return best < np.inf
+
+
+_LEAST_SINE2 = 1e-10  # of the angle between two rays, squared; below, they are parallel
 
 
 @njit(cache=True)
-def _distance(a, b):  # type: ignore[no-untyped-def]
-    return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+def pair_point(origins, directions, weights, first, mode, second, other, point):  # type: ignore[no-untyped-def]
+    """Write the point nearest to two rays, weighted by score; the agreement of the pair, 0 where they have no point.
+
+    Rays that are parallel, or that come nearest to each other behind a camera, have none.
+
+    Returns:
+        Product of the scores and of the squared sine between the rays: how well the pair pins the joint down.
+    """
+    p, q = weights[first, mode], weights[second, other]
+    if p <= 0.0 or q <= 0.0:
+        return 0.0
+    wx = origins[second, 0] - origins[first, 0]
+    wy = origins[second, 1] - origins[first, 1]
+    wz = origins[second, 2] - origins[first, 2]
+    ux, uy, uz = directions[first, mode, 0], directions[first, mode, 1], directions[first, mode, 2]
+    vx, vy, vz = directions[second, other, 0], directions[second, other, 1], directions[second, other, 2]
+    cosine = ux * vx + uy * vy + uz * vz
+    sine2 = 1.0 - cosine * cosine
+    along_u, along_v = wx * ux + wy * uy + wz * uz, wx * vx + wy * vy + wz * vz
+    s, t = along_u - along_v * cosine, along_u * cosine - along_v  # both times sine2
+    if not (sine2 > _LEAST_SINE2 and s > 0.0 and t > 0.0):
+        return 0.0
+    s, t = s / sine2, t / sine2
+    p, q = p * p, q * q
+    point[0] = (p * (origins[first, 0] + s * ux) + q * (origins[second, 0] + t * vx)) / (p + q)
+    point[1] = (p * (origins[first, 1] + s * uy) + q * (origins[second, 1] + t * vy)) / (p + q)
+    point[2] = (p * (origins[first, 2] + s * uz) + q * (origins[second, 2] + t * vz)) / (p + q)
+    return np.sqrt(p * q) * sine2

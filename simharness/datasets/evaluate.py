@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from rich.box import Box
@@ -14,10 +13,11 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose.pipeline import Estimator
 from mvpose.skeleton import HeadMapping
-from simharness.datasets.shelf import Shelf, read_shelf
+from simharness.datasets.shelf import Shelf
 from simharness.scoring.frame import score_frame
+from simharness.scoring.matching import count_violations
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.summary import STAGES, VariantScores, summarize
 
@@ -26,18 +26,12 @@ ACTORS = (0, 1, 2)
 
 PUBLISHED: dict[str, tuple[float, ...]] = {
     "full": (98.8, 94.1, 97.8, 96.9),
+    "appearance": (98.6, 60.5, 94.3, 84.5),
     "geometry": (97.2, 79.5, 96.5, 91.1),
     "no-3dps": (97.9, 89.5, 97.8, 95.1),
+    "no-matching": (98.1, 91.1, 92.8, 94.0),
 }
 """PCP of actors 1 to 3 on Shelf and their average, as Dong et al., CVPR 2019, tables 1 and 2, print them."""
-
-
-class Estimator(Protocol):
-    """Anything that the harness can score: :class:`mvpose.Pipeline`, or another method."""
-
-    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """The people of one frame, on COCO17."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -50,6 +44,7 @@ class Evaluation:
         frames: how many frames the method saw.
         annotated: how many of them have truth, and so a score.
         variants: scores by variant.
+        violations: by variant, how many detections share a person with another one of their own view.
     """
 
     name: str
@@ -57,13 +52,14 @@ class Evaluation:
     frames: int
     annotated: int
     variants: Mapping[str, VariantScores]
+    violations: Mapping[str, int]
 
     def summary(self) -> dict[str, Any]:
         """The JSON-ready summary, in the shape of a run's ``summary.json``.
 
-        Beside the shared keys: ``head`` and ``frames_annotated``.
+        Beside the shared keys: ``head``, ``frames_annotated``, and ``same_view_violations`` of every variant.
         """
-        return summarize(
+        summary = summarize(
             self.name,
             self.variants,
             frames=self.frames,
@@ -72,28 +68,9 @@ class Evaluation:
             head=self.head,
             frames_annotated=self.annotated,
         )
-
-
-def evaluate_shelf(
-    folder: str | Path,
-    *,
-    variants: Sequence[str] = ("full",),
-    head: HeadMapping = "voxelpose",
-    progress: Callable[[int, int], None] | None = None,
-) -> Evaluation:
-    """Run variants of :class:`mvpose.Pipeline` on frames 300 to 599 of Shelf and score them.
-
-    Args:
-        folder: the published files, see :mod:`simharness.datasets.shelf`.
-        variants: names of pipeline presets.
-        head: the head mapping, ``"voxelpose"`` or ``"2019"``.
-        progress: called after every frame with how many are done, and of how many.
-
-    Raises:
-        ValueError: files that are missing or broken, an unknown preset or head mapping.
-    """
-    pipelines = {name: Pipeline.preset(name) for name in variants}
-    return evaluate(read_shelf(folder), pipelines, head=head, progress=progress)
+        for name, scores in summary["variants"].items():
+            scores["same_view_violations"] = self.violations[name]
+        return summary
 
 
 def evaluate(
@@ -121,18 +98,21 @@ def evaluate(
         raise ValueError("no frame to evaluate")
     annotated = np.any(np.isfinite(shelf.truth), axis=(1, 2, 3))
     variants: dict[str, VariantScores] = {}
+    violations: dict[str, int] = {}
     for name, estimator in estimators.items():
         estimator.estimate(shelf.rig, shelf.detections[0])
-        scores, timings = [], []
+        scores, timings, violations[name] = [], [], 0
         for frame, detections in enumerate(shelf.detections):
             estimate = estimator.estimate(shelf.rig, detections)
             timings.append(estimate.timings)
+            if len(estimate.matching.labels):  # a method that groups no detections has none to mix up
+                violations[name] += count_violations(detections.view, estimate.matching.labels)
             if annotated[frame]:
                 scores.append(score_frame(shelf.truth[frame], estimate.joints, head=head))
             if progress is not None:
                 progress(len(variants) * len(shelf) + frame + 1, len(estimators) * len(shelf))
         variants[name] = VariantScores(tuple(scores), tuple(timings))
-    return Evaluation("shelf", head, len(shelf), int(annotated.sum()), variants)
+    return Evaluation("shelf", head, len(shelf), int(annotated.sum()), variants, violations)
 
 
 def print_evaluation(evaluation: Evaluation, console: Console) -> None:
@@ -148,12 +128,14 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         "PCP: part correct within 0.5 of its length; average of actors 1 to 3; blind to ghosts. "
         "Paper: Dong et al. 2019, with its own detections and the 2019 head.\n"
         "One-to-one: pairs under 500 mm. Shelf does not annotate everyone in every frame: "
-        "an estimate of someone without annotation counts as a ghost.",
+        "an estimate of someone without annotation counts as a ghost. "
+        "Same view: detections that share a person with another of their own view.",
         style="dim",
     )
     blocks: list[RenderableType] = [
         headline,
         *tables,
+        *([_comparison(evaluation)] if len(tables) > 1 else []),
         _people_table(summaries),
         _time_table(summaries),
         notes,
@@ -181,9 +163,23 @@ def _pcp_table(name: str, scores: VariantScores) -> Table:
     return table
 
 
+def _comparison(evaluation: Evaluation) -> Table:
+    """Everybody's PCP in one table, a variant a row, with the paper's row under those that it has."""
+    table = _table("PCP of the variants", "variant")
+    for actor in ACTORS:
+        table.add_column(f"actor {actor + 1}", justify="right")
+    table.add_column("average", justify="right", style="bold")
+    for name, scores in evaluation.summary()["variants"].items():
+        table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
+        if name in PUBLISHED:
+            table.add_row("  paper", *(_number(value, 1) for value in PUBLISHED[name]), style="cyan not bold")
+    return table
+
+
 def _people_table(summaries: Mapping[str, Any]) -> Table:
-    table = _table("People, one-to-one; MPJPE in mm", "variant")
-    for column in ("precision %", "recall %", "ghosts / frame", "missed / frame", "MPJPE mean", "median"):
+    table = _table("People, one-to-one: %, people a frame, and MPJPE in mm", "variant")
+    columns = ("precision", "recall", "ghosts", "missed", "mean", "median", "same view")
+    for column in columns:
         table.add_column(column, justify="right")
     for name, scores in summaries.items():
         table.add_row(
@@ -194,6 +190,7 @@ def _people_table(summaries: Mapping[str, Any]) -> Table:
             _number(scores["missed_per_frame"], 2),
             _number(scores["mpjpe_mm"]["mean"], 1),
             _number(scores["mpjpe_mm"]["median"], 1),
+            str(scores["same_view_violations"]),
         )
     return table
 

@@ -58,14 +58,16 @@ def detect(
         ghost = ghosts[t]
         m = len(ghost.view)
         view = np.concatenate([view, ghost.view])
-        flat = {
-            "keypoints": np.concatenate([keypoints[t][found[t]], ghost.keypoints]),
-            "scores": np.concatenate([scores[t][found[t]], ghost.scores]),
-            "boxes": np.concatenate([boxes[t][found[t]], ghost.boxes]),
-            "box_scores": np.concatenate([box_scores[t][found[t]], ghost.box_scores]),
-        }
-        order = np.lexsort((-flat["box_scores"], view))
-        detections = Detections(view=view[order], **{key: value[order] for key, value in flat.items()}, skeleton=COCO17)
+        sureness = np.concatenate([box_scores[t][found[t]], ghost.box_scores])
+        order = np.lexsort((-sureness, view))
+        detections = Detections(
+            view[order],
+            np.concatenate([keypoints[t][found[t]], ghost.keypoints])[order],
+            np.concatenate([scores[t][found[t]], ghost.scores])[order],
+            np.concatenate([boxes[t][found[t]], ghost.boxes])[order],
+            sureness[order],
+            COCO17,
+        )
         truth = Truth(
             joints=sequence.joints[t],
             pixels=views.pixels[t],

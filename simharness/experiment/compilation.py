@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -45,7 +46,9 @@ def compile_kernels(variants: Iterable[str]) -> None:
     K = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
     rig = Rig([Camera(K, np.eye(3), np.array([x, 0.0, 3.0]), size=(640, 480)) for x in (-0.5, 0.5)])
     body = np.column_stack([np.zeros(len(COCO17)), np.linspace(-0.8, 0.8, len(COCO17)), np.zeros(len(COCO17))])
-    detections = Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
+    bare = Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
+    described = replace(bare, descriptors=np.ones((2, 8)))
     for variant in variants:
-        if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
-            raise RuntimeError(f"{variant}: the one person before two perfect cameras was not found")
+        for detections in (described,) if variant == "appearance" else (bare, described):
+            if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
+                raise RuntimeError(f"{variant}: the one person before two perfect cameras was not found")

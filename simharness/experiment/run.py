@@ -12,6 +12,7 @@ from typing import Any
 import polars as pl
 
 from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose.pipeline import Estimator
 from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
 from simharness.experiment.animation import animate, animated_frames
@@ -49,7 +50,7 @@ class Trial:
     scenario: Scenario
     scene: Scene
     rig: Rig
-    pipelines: Mapping[str, Pipeline]
+    pipelines: Mapping[str, Estimator]
 
 
 def prepare(scenario: Scenario) -> Trial:

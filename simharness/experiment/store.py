@@ -189,9 +189,16 @@ def _detection_arrays(detections: Sequence[Detections]) -> Arrays:
 
 def _detections(arrays: Arrays) -> tuple[Detections, ...]:
     skeleton = _SKELETONS[str(arrays["skeleton"])]
-    keys = [key for key in (*_OF_DETECTIONS, "descriptors") if key in arrays]
     return tuple(
-        Detections(**{key: arrays[key][part] for key in keys}, skeleton=skeleton)
+        Detections(
+            arrays["view"][part],
+            arrays["keypoints"][part],
+            arrays["scores"][part],
+            arrays["boxes"][part],
+            arrays["box_scores"][part],
+            skeleton,
+            arrays["descriptors"][part] if "descriptors" in arrays else None,
+        )
         for part in _parts(arrays["frame"], int(arrays["frames"]))
     )
 

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mvpose import Detections, Estimate, Pipeline, Rig
+from mvpose import Detections, Estimate, Rig
+from mvpose.pipeline import Estimator
 
 if TYPE_CHECKING:
     from simharness.rendering.film import Views
@@ -51,7 +52,7 @@ class Estimating:
 
     rig: Rig
     detections: tuple[Detections, ...]
-    pipelines: Mapping[str, Pipeline]
+    pipelines: Mapping[str, Estimator]
 
     def __call__(self, frames: range) -> dict[str, list[Estimate]]:
         """What each variant says of these frames."""

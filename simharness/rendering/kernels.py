@@ -1,6 +1,6 @@
 """The compiled loops of the rasteriser: private, on plain arrays, single-threaded."""
 
-# ruff: noqa: PLR0912, PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
+# ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
 
 from __future__ import annotations
 

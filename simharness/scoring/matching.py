@@ -74,3 +74,19 @@ def _same(group: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np
 
 def _share(part: int, whole: int) -> float | None:
     return part / whole if whole else None
+
+
+def count_violations(view: ArrayLike, labels: ArrayLike) -> int:
+    """Count the detections that share a person with another one of their own view: what a matching must never have.
+
+    Args:
+        view: camera of each detection, (m,).
+        labels: ``Matching.labels``, (m,); -1 for unmatched.
+
+    Raises:
+        ValueError: lengths that differ.
+    """
+    view = as_array(view, ("m",), "view", np.int64)
+    labels = as_array(labels, (len(view),), "labels", np.int64)
+    pairs = np.column_stack([view, labels])[labels >= 0]
+    return len(pairs) - len(np.unique(pairs, axis=0))

@@ -26,9 +26,40 @@ def test_edges_join_all_joints(skeleton):
     assert len(reached) == len(skeleton)
 
 
-def test_a_skeleton_that_is_no_tree_is_refused():
-    with pytest.raises(ValueError, match="one tree"):
-        Skeleton("loop", ("a", "b", "c"), (-1, 2, 1), (0, 1, 2), (0.1, 0.1, 0.1))
+BAD = {
+    "a loop": ({"parents": (-1, 2, 1)}, "do not form one tree"),
+    "two roots": ({"parents": (-1, -1, 0)}, r"must name one root \(-1\)"),
+    "a joint that is not there": ({"parents": (-1, 0, 3)}, "joints below 3"),
+    "a parent short": ({"parents": (-1, 0)}, "parents must have 3 entries, got 2"),
+    "one name twice": ({"joints": ("a", "b", "b")}, "joints must be different names"),
+    "no joints": ({"joints": ()}, "joints must be different names, one or more"),
+    "a mirror of one side": ({"mirror": (0, 2, 2)}, r"mirror must name pairs, .*; 'b' \(1\) has 2"),
+    "a mirror beyond": ({"mirror": (0, 1, 5)}, r"'c' \(2\) has 5"),
+    "a sigma of zero": ({"sigmas": (0.1, 0.0, 0.1)}, "sigmas must be positive"),
+    "a sigma unknown": ({"sigmas": (0.1, float("nan"), 0.1)}, "sigmas must be positive"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_skeleton_that_is_none_is_refused(name):
+    changes, message = BAD[name]
+    good = {"joints": ("a", "b", "c"), "parents": (-1, 0, 1), "mirror": (0, 2, 1), "sigmas": (0.1, 0.1, 0.1)}
+    assert len(Skeleton("limb", **good)) == 3
+    with pytest.raises(ValueError, match=message) as error:
+        Skeleton("limb", **{**good, **changes})
+    assert "skeleton 'limb'" in str(error.value)
+
+
+def test_lists_make_a_skeleton_too():
+    lists = {key: list(getattr(SHELF14, key)) for key in ("joints", "parents", "mirror", "sigmas")}
+    assert Skeleton("shelf14", **lists) == SHELF14
+    assert hash(Skeleton("shelf14", **lists)) == hash(SHELF14)
+
+
+def test_oks_variances_are_those_of_coco():
+    """A keypoint off by 2 sigma sqrt(area) has a similarity of exp(-1/2) (the definition, cocodataset.org)."""
+    assert COCO17.variances[COCO17.index("left_hip")] == pytest.approx((2 * 0.107) ** 2)
+    assert not COCO17.variances.flags.writeable
 
 
 def test_limbs_map_by_name():
@@ -50,3 +81,6 @@ def test_head_mappings_by_hand():
     np.testing.assert_allclose(new[13], 0.75 * old[13] + 0.25 * np.array([0, 0, 1.775]))
     with pytest.raises(ValueError, match="voxelpose"):
         coco17_to_shelf14(joints, head="2020")
+    for shape in [(14, 3), (17, 2), (17,), ()]:
+        with pytest.raises(ValueError, match=r"joints must be \(\.\.\., (17, )?3\)"):
+            coco17_to_shelf14(np.zeros(shape))

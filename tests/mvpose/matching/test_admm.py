@@ -1,19 +1,12 @@
 import numpy as np
 import pytest
+from instances import filmed, instance, sort_by_view
+from scipy.optimize import linear_sum_assignment
 from test_projection import in_c
 
-from mvpose.matching import admm
+from mvpose.matching import admm, objective
+from mvpose.matching.clustering import cluster
 from mvpose.matching.projection import project
-
-
-def instance(seed, *, views=5, people=4, noise=0.2, miss=0.2):
-    """Affinities about 0.8 for the same person and 0.2 otherwise, with noise and missed people."""
-    rng = np.random.default_rng(seed)
-    view, person = np.array([(v, p) for v in range(views) for p in range(people) if rng.random() > miss]).T
-    affinity = np.where(person[:, None] == person, 0.8, 0.2) + noise * rng.standard_normal((len(view), len(view)))
-    affinity = np.clip(np.triu(affinity, 1) + np.triu(affinity, 1).T, 0, 1)
-    affinity[view[:, None] == view] = 0
-    return affinity, view, person
 
 
 def reference(affinity, view, *, alpha, weight, rho=1.0, iterations=20_000):
@@ -29,6 +22,18 @@ def reference(affinity, view, *, alpha, weight, rho=1.0, iterations=20_000):
         Y = Y + rho * (P - Q)
     assert np.abs(P - Q).max() < 1e-5  # the reference itself has converged
     return -(gain * P).sum() + weight * np.linalg.svd(P, compute_uv=False).sum()
+
+
+def lower_bound(result, view):
+    """The Lagrange dual at Y: no P of C has a lower objective. Minimised over C block by block, by assignment."""
+    Y = result.Y * min(1.0, result.weight / np.linalg.norm(result.Y, 2))
+    saved = np.where(view[:, None] == view, 0.0, np.maximum(result.gain - Y, 0.0))
+    total = np.trace(Y)
+    for one in np.unique(view):
+        for other in np.unique(view[view > one]):
+            block = saved[np.ix_(view == one, view == other)]
+            total -= 2 * block[linear_sum_assignment(block, maximize=True)].sum()
+    return total
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -51,6 +56,42 @@ def test_objective_is_that_of_a_long_fixed_step_run(seed):
     result = admm.solve(affinity, view, alpha=0.5, weight=5.0, tolerance=1e-7, most_iterations=50_000)
     assert result.converged
     assert result.objective == pytest.approx(expected, abs=5e-4)  # of about 40; Q still differs from P by 1e-5
+
+
+@pytest.mark.parametrize(("views", "people", "noise"), [(5, 4, 12.0), (10, 10, 4.0), (10, 10, 12.0)])
+def test_the_dual_variable_proves_the_optimum(views, people, noise):
+    """A part of the spectrum missed, a projection not exact or a stop too early would leave a gap."""
+    affinity, view = sort_by_view(*filmed(0, views=views, people=people, noise=noise)[:2])
+    single = 2e-5  # the least tolerance at which the spectrum is computed in single precision
+    result = admm.solve(affinity, view, parts=cluster(affinity, view), tolerance=single, most_iterations=5000)
+    assert result.converged
+    low = lower_bound(result, view)
+    worth = result.weight * len(view) - low  # in units of gain: the nuclear norm of every grouping is m
+    assert -1e-6 * worth < result.objective - low < 0.005 * worth
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_start_ends_at_the_same_optimum(seed):
+    affinity, view = sort_by_view(*filmed(seed, views=5, people=4)[:2])
+    wrong = np.concatenate([np.arange(count) for count in np.bincount(view)])  # the k-th of every view are one person
+    cold, *warm = (
+        admm.solve(affinity, view, parts=parts, tolerance=1e-6, most_iterations=20_000)
+        for parts in (None, wrong, cluster(affinity, view))
+    )
+    assert cold.converged
+    for result in warm:
+        assert result.converged
+        assert result.objective == pytest.approx(cold.objective, abs=2e-3)  # of which about 15 is gain
+
+
+def test_a_start_at_the_optimum_is_recognised_at_once():
+    """No gain within a person is negative and none between people positive: nothing can be better."""
+    affinity, view, person = instance(0, noise=0.05)
+    result = admm.solve(affinity, view, parts=person)
+    assert result.iterations == 1
+    assert result.converged
+    np.testing.assert_allclose(result.P, person[:, None] == person, atol=1e-6)
+    assert result.objective == pytest.approx(2 * objective(person, affinity) + result.weight * len(view))
 
 
 def test_the_relaxation_bounds_every_grouping_from_below():

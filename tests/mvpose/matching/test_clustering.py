@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
-from test_admm import instance
+from instances import f1, filmed, instance, sort_by_view
+from scipy.optimize import linear_sum_assignment
+from test_admm import lower_bound
 
-from mvpose.matching import match, objective
+from mvpose.matching import admm, match, objective
+from mvpose.matching.clustering import cluster
 
 
 def partitions(view):
@@ -22,41 +25,104 @@ def optimum(affinity, view):
     return min(objective(np.array(labels), affinity) for labels in partitions(view))
 
 
-def test_small_instances_are_solved_nearly_always_exactly():
-    exact = {"clustering": 0, "admm": 0}
-    for seed in range(60):
-        affinity, view, _ = instance(seed, views=3, people=3, noise=0.4)
+@pytest.mark.parametrize(
+    ("make", "views", "people"), [(instance, 3, 3), (instance, 5, 2), (filmed, 3, 2), (filmed, 2, 4), (filmed, 4, 2)]
+)
+def test_small_instances_are_solved_nearly_always_exactly(make, views, people):
+    """Up to ten detections, by enumeration: what either method misses, and how often."""
+    noise = {instance: 0.4, filmed: 12.0}[make]
+    exact, total, best_total, count = {"clustering": 0, "admm": 0}, {"clustering": 0.0, "admm": 0.0}, 0.0, 0
+    for seed in range(40):
+        affinity, view, _ = make(seed, views=views, people=people, noise=noise)
+        if len(view) > 10:
+            continue
         best = optimum(affinity, view)
+        count, best_total = count + 1, best_total + best
         for method in exact:
             found = match(affinity, view, method=method).objective
             assert found >= best - 1e-9
             exact[method] += found < best + 1e-9
-    assert exact["clustering"] >= 57
-    assert exact["admm"] >= 48
+            total[method] += found
+    assert count >= 25
+    assert exact["clustering"] >= 0.85 * count
+    assert exact["admm"] >= 0.7 * count
+    assert total["clustering"] < 0.98 * best_total  # objectives are negative
+    assert total["admm"] < 0.96 * best_total
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed):
+    affinity, view, _ = filmed(seed, views=10, people=6)
+    part = cluster(affinity, view)
+    gain = np.where(view[:, None] == view, 0.0, affinity - 0.5)
+    members = (part[:, None] == np.unique(part)).astype(float)
+    beside = gain @ members  # of each detection, in each part, the members of its own view left out
+    for one in np.unique(view):
+        mine = view == one
+        best = np.maximum(beside[mine], 0.0)
+        rows, columns = linear_sum_assignment(best, maximize=True)
+        assert best[rows, columns].sum() <= (beside * members)[mine].sum() + 1e-6
+    between = members.T @ beside
+    clash = members.T @ (view[:, None] == view) @ members > 0
+    assert between[~clash].max(initial=0.0) <= 1e-6
+
+
+@pytest.mark.parametrize(
+    ("views", "people", "seeds", "margin"),
+    [(5, 4, 40, 0.2), (8, 6, 10, 0.05), (10, 10, 4, 0.05), pytest.param(15, 20, 2, 0.05, marks=pytest.mark.slow)],
+)
+def test_clustering_and_admm_agree_on_hard_instances(views, people, seeds, margin):
+    """Keypoints off by 12 px, 30 % misses, a phantom a view: objectives differ by at most 5 %, on average by 2 %.
+
+    (With twenty detections one wrong link is 5 %, so there it is up to 20 %.) Clustering is not the worse on average,
+    and both group better than pairs of views.
+    """
+    ratios, scores = [], {"clustering": [], "admm": [], "hungarian": []}
+    for seed in range(seeds):
+        affinity, view, person = filmed(seed, views=views, people=people)
+        found = {method: match(affinity, view, method=method) for method in scores}
+        ratios.append(found["clustering"].objective / found["admm"].objective)
+        for method, values in scores.items():
+            values.append(f1(found[method].labels, person, view))
+    assert 1 - margin < min(ratios)
+    assert max(ratios) < 1 + margin
+    assert 0.99 < np.mean(ratios) < 1.02  # objectives are negative: above 1, clustering found more
+    assert min(np.mean(scores["clustering"]), np.mean(scores["admm"])) > np.mean(scores["hungarian"]) + 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("views", "people", "seeds"), [(5, 4, 8), (10, 10, 2)])
+def test_both_come_near_what_the_dual_proves_possible(views, people, seeds):
+    """No grouping beats the relaxation; either method gets 90 % of it on any instance, and 96 % on average."""
+    reached = {"clustering": [], "admm": []}
+    for seed in range(seeds):
+        affinity, view = sort_by_view(*filmed(seed, views=views, people=people)[:2])
+        parts = cluster(affinity, view)
+        relaxed = admm.solve(affinity, view, parts=parts, tolerance=1e-5, most_iterations=5000)
+        possible = (lower_bound(relaxed, view) - relaxed.weight * len(view)) / 2  # per unordered pair
+        for method, values in reached.items():
+            values.append(match(affinity, view, method=method).objective / possible)
+    for values in reached.values():
+        assert max(values) <= 1.0 + 1e-6
+        assert min(values) > 0.9
+        assert np.mean(values) > 0.96
 
 
 @pytest.mark.parametrize(("views", "people"), [(5, 4), (10, 6)])
-def test_clustering_and_admm_agree_on_hard_instances(views, people):
-    """On these both err: each within 15 % of the other's objective, and clustering the better on average."""
+def test_on_noise_clustering_holds_its_own(views, people):
+    """Random affinities, at which ADMM's rounding errs: clustering loses at most 15 %, on average 1 %."""
     ratios = []
     for seed in range(16):
         affinity, view, _ = instance(seed, views=views, people=people, noise=0.4, miss=0.3)
         ratios.append(
             match(affinity, view, method="clustering").objective / match(affinity, view, method="admm").objective
         )
-    assert min(ratios) > 0.85  # objectives are negative: above 1, clustering found more
+    assert min(ratios) > 0.85
     assert np.mean(ratios) > 0.99
 
 
 def test_cycle_consistency_beats_pairs_of_views():
     """Noise that single pairs cannot see through, all views together can."""
-
-    def f1(labels, person, view):
-        across = view[:, None] != view
-        said = (labels[:, None] == labels) & (labels[:, None] >= 0) & across
-        true = (person[:, None] == person) & across
-        return 2 * (said & true).sum() / (said.sum() + true.sum())
-
     scores = {method: [] for method in ("admm", "clustering", "hungarian")}
     for seed in range(6):
         affinity, view, person = instance(seed, views=6, people=5, noise=0.35)

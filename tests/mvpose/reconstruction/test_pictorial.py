@@ -9,9 +9,15 @@ from people import STANDING, detect, ring
 from mvpose import COCO17, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
-from mvpose.reconstruction.bones import bone_lengths
+from mvpose.reconstruction.bones import PROPORTION_DEVIATION, bone_lengths
 from mvpose.reconstruction.pictorial import max_product
-from mvpose.reconstruction.triangulation import Proposals, refine
+from mvpose.reconstruction.proposals import propose_all
+from mvpose.reconstruction.refinement import _marginalize, refine, tree
+
+
+def reconstruct(rays, method=None):
+    """Joints, scores and covariances of the one person that all rays are of."""
+    return (each[0] for each in (method or PictorialStructure())(rays, np.zeros(len(rays), int), COCO17))
 
 
 def total(states, unary, chosen, parents, length, deviation, count):
@@ -58,8 +64,8 @@ def wrong_elbow(rig):
 
 def test_the_prior_overrules_views_that_agree_on_an_impossible_limb():
     rays = wrong_elbow(ring(4))
-    by_itself, _, _ = Triangulation()(rays, COCO17)
-    in_structure, _, _ = PictorialStructure()(rays, COCO17)
+    by_itself, _, _ = reconstruct(rays, Triangulation())
+    in_structure, _, _ = reconstruct(rays)
     assert np.linalg.norm(by_itself[7] - STANDING[7]) > 0.3
     assert np.linalg.norm(in_structure[7] - STANDING[7]) < 0.05
 
@@ -69,7 +75,7 @@ def test_a_joint_without_evidence_is_missing_and_does_not_disturb_the_rest():
     scores = np.full((4, 17), 0.9)
     scores[:, 11] = 0  # a hip in the middle of the tree
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
-    joints, scores, _ = PictorialStructure()(rays, COCO17)
+    joints, scores, _ = reconstruct(rays)
     assert np.isnan(joints[11]).all()
     assert scores[11] == 0
     others = np.delete(np.arange(17), 11)
@@ -82,7 +88,7 @@ def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_th
     scores[1:, 9] = 0  # the left wrist, seen by camera 0 alone
     scores[1:, 13], scores[1:, 15] = 0, 0  # a whole lower leg: knee and ankle hang on each other
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
-    joints, scores, covariance = PictorialStructure()(rays, COCO17)
+    joints, scores, covariance = reconstruct(rays)
     for joint in (9, 13, 15):
         sight = rays.directions[0, joint]
         offset = joints[joint] - rig.centers[0]
@@ -102,7 +108,8 @@ def log_posterior(joints, rays):
     offset = joints[None] - rays.origins[:, None]
     along = (offset * rays.directions).sum(axis=2)
     e2 = (offset**2).sum(axis=2) - along**2
-    variance = noise.sigmas(COCO17) ** 2 + (rays.pixel[:, None] * along) ** 2
+    with np.errstate(divide="ignore"):
+        variance = (noise.sigmas(COCO17) ** 2 + (rays.pixel[:, None] * along) ** 2) / rays.weights**2
     right = rays.weights * np.exp(-0.5 * e2 / variance) * (along > 0)
     unary = np.where(rays.weights > 0, np.log(noise.floor + right), 0.0).sum()
     bones = np.array([np.linalg.norm(joints[c] - joints[p]) for p, c in COCO17.edges])
@@ -121,25 +128,24 @@ def test_refinement_climbs_and_never_runs_away(seed):
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(3), pixels, scores))
     length, deviation = bone_lengths(COCO17)
     start = STANDING + rng.normal(0, 0.2, (17, 3))
-    proposals = Proposals(start[:, None].copy(), np.zeros((17, 1)), np.ones(17, int))
-    joints, _, _ = refine(rays, COCO17, proposals, np.zeros(17, int), Noise(), length=length, deviation=deviation)
+    joints, _, _ = refine(start, rays, COCO17, noise=Noise(), length=length, deviation=deviation)
     assert log_posterior(joints, rays) > log_posterior(start, rays)
-    whole, _, _ = PictorialStructure()(rays, COCO17)
+    whole, _, _ = reconstruct(rays)
     assert np.linalg.norm(whole - STANDING, axis=1).max() < 1.5
 
 
 def test_the_prior_pulls_an_average_adult_little():
     rig = ring(5)
     rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False)[0])
-    joints, _, _ = PictorialStructure()(rays, COCO17)
+    joints, _, _ = reconstruct(rays)
     assert np.linalg.norm(joints - STANDING, axis=1).max() < 0.015
 
 
 def test_many_views_keep_the_likeliest_states():
     rig = ring(14)  # 91 pairs
     rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False, noise=2.0)[0])
-    few, _, _ = PictorialStructure(most_states=8)(rays, COCO17)
-    many, _, _ = PictorialStructure(most_states=500)(rays, COCO17)
+    few, _, _ = reconstruct(rays, PictorialStructure(most_states=8))
+    many, _, _ = reconstruct(rays, PictorialStructure(most_states=500))
     np.testing.assert_allclose(few, many, atol=2e-3)
 
 
@@ -156,3 +162,87 @@ def test_bone_lengths_are_symmetric_and_human(skeleton):
         real = [np.linalg.norm(STANDING[c] - STANDING[p]) for p, c in skeleton.edges]
         wrong = np.abs(np.array(real) - [mean[c] for _, c in skeleton.edges])
         assert (wrong < 3 * np.array([deviation[c] for _, c in skeleton.edges])).all()
+
+
+def test_every_pair_of_views_proposes_and_near_ones_are_one():
+    rig = ring(5)
+    pixels = rig.project(STANDING)
+    pixels[4, 9] += [300, 0]  # one view is wrong about the wrist
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(5), pixels, np.full((5, 17), 0.9)))
+    arrays = rays.directions.transpose(1, 0, 2)[:, :, None].copy(), rays.weights.T[:, :, None].copy()
+    states, unary, count = propose_all(rays.origins, *arrays, rays.pixel, Noise().sigmas(COCO17), 0.01, 64, 32)
+    assert (np.delete(count, 9) == 1).all()  # ten pairs and all views, all at one place
+    assert 2 <= count[9] <= 1 + 4  # the place of the four, and where each of them meets the fifth
+    np.testing.assert_allclose(states[:, 0], STANDING, atol=1e-4)
+    np.testing.assert_allclose(np.delete(unary[:, 0], 9), 5 * np.log(0.9 + 0.01), atol=1e-4)
+    assert (np.diff(unary[9, : count[9]]) <= 0).all()
+
+
+@given(st.integers(0, 100_000))
+def test_marginals_are_those_of_the_whole_gaussian(seed):
+    """Belief propagation on the tree against the inverse of the whole 3J x 3J information matrix."""
+    rng = np.random.default_rng(seed)
+    skeletal = tree(COCO17)
+    joints = rng.standard_normal((17, 3))
+    joints[rng.random(17) < 0.15] = np.nan
+    roots = rng.standard_normal((17, 3, 3))
+    information = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(3)
+    precision = rng.choice([0.0, 1.0, 30.0], 17)
+    whole = np.zeros((17, 3, 17, 3))
+    for j in range(17):
+        whole[j, :, j] = information[j]
+    for parent, child in COCO17.edges:
+        bone = joints[child] - joints[parent]
+        if np.isfinite(bone).all():
+            outer = precision[child] * np.outer(bone, bone) / (bone @ bone)
+            whole[child, :, child] += outer
+            whole[parent, :, parent] += outer
+            whole[child, :, parent] -= outer
+            whole[parent, :, child] -= outer
+    expected = np.linalg.inv(whole.reshape(51, 51)).reshape(17, 3, 17, 3)
+    covariance = np.full((17, 3, 3), np.nan)
+    _marginalize(joints, information.copy(), covariance, skeletal.parents, skeletal.order, precision)
+    for j in np.flatnonzero(np.isfinite(joints[:, 0])):
+        np.testing.assert_allclose(covariance[j], expected[j, :, j], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("stature", [0.65, 1.0, 1.2])
+def test_the_prior_takes_the_size_of_the_person(stature):
+    """A child of 1.1 m: the adult prior stretches what few noisy views say of it, the personal one does not."""
+    rig, body = Rig(list(ring(7))[:3]), stature * STANDING
+    errors = {True: [], False: []}
+    for seed in range(12):
+        rays = viewing_rays(rig, detect(rig, body[None], shuffle=False, noise=6.0, seed=seed)[0])
+        for personal, mine in errors.items():
+            joints, _, _ = reconstruct(rays, PictorialStructure(personal=personal))
+            mine.append(np.linalg.norm(joints - body, axis=1).mean())
+    if stature == 1.0:
+        assert np.mean(errors[True]) < 1.1 * np.mean(errors[False])
+    else:
+        assert np.mean(errors[True]) < 0.95 * np.mean(errors[False])
+
+
+@pytest.mark.parametrize("method", [Triangulation(), PictorialStructure()])
+@pytest.mark.parametrize("share", [0.3, 0.7, 1.2])
+def test_the_true_joint_is_in_the_90_percent_ellipsoid(method, share):
+    """Keypoints that scatter less or more than the error model says, some hidden, some grossly wrong.
+
+    85 to 95 % is what calibration means here; of the chi-square of three degrees of freedom, 6.25 is the 90 %
+    quantile.
+    """
+    rng, inside = np.random.default_rng(int(10 * share)), []
+    for _ in range(60):
+        rig = ring(int(rng.integers(4, 8)))
+        body = STANDING * rng.normal(1.0, PROPORTION_DEVIATION)
+        depth = np.linalg.norm(body - rig.centers[:, None], axis=2)
+        scatter = share * Noise().sigmas(COCO17) * 800 / depth
+        pixels = rig.project(body) + rng.standard_normal((len(rig), 17, 2)) * scatter[..., None]
+        pixels[rng.random(pixels.shape[:2]) < 0.03] += 90  # the model's floor is for these
+        scores = np.where(rng.random(pixels.shape[:2]) < 0.15, 0.0, 0.9)
+        rays = viewing_rays(rig, Detections.from_keypoints(np.arange(len(rig)), pixels, scores))
+        joints, _, covariance = reconstruct(rays, method)
+        for j in np.flatnonzero((scores > 0).sum(axis=0) > 1):
+            off = joints[j] - body[j]
+            inside.append(off @ np.linalg.solve(covariance[j], off) < 6.25)
+    assert len(inside) > 900
+    assert 0.85 < np.mean(inside) < 0.95

@@ -1,0 +1,144 @@
+"""Affinity from the distance between viewing rays in metres: the default geometric cue.
+
+It is the same evidence as the paper's epipolar distance (:mod:`mvpose.affinity.epipolar`), but its scale does not
+change with resolution, focal length or the distance of the people, so one threshold serves every rig.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, lay_out
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+from mvpose.rays import Rays
+
+_PARALLEL = 1e-9  # squared sine: rays this near to parallel differ by 0.3 mm at 10 m
+
+
+@dataclass(frozen=True)
+class GeometricAffinity:
+    """Affinity from the mean distance between the viewing rays of two poses' joints.
+
+    Attributes:
+        midpoint: distance in metres at which a match is as likely as not (affinity 1/2). Keypoints scatter by
+            about 0.06 m across the ray (OKS sigmas of the limbs on an adult), so rays of one joint pass each
+            other at 0.07 m on average; two people who do not touch differ by 0.3 m and more unless they share
+            an epipolar plane.
+        slope: metres over which the affinity falls from 1/2 to 1/(1 + e).
+        threshold: the paper's ``th``: the affinity is 0 beyond this distance, metres.
+        saturation: a joint counts at most this far apart, metres, so that one wrong limb cannot part two
+            otherwise equal poses.
+        least_joints: poses that share fewer detected joints than this are not compared; their affinity is 0.
+        nearest: where a viewing ray starts, metres from the optical centre; a body that is nearer does not fit
+            in the picture. Without it, all rays of two cameras side by side would pass each other closely in
+            front of the lenses, whoever they show.
+    """
+
+    midpoint: float = 0.15
+    slope: float = 0.04
+    threshold: float = 0.25
+    saturation: float = 0.5
+    least_joints: int = 3
+    nearest: float = 0.5
+
+    def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
+        """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
+        return _compare_rays(
+            rays.view, rays.origins, rays.directions, rays.weights, self.nearest, self.saturation,
+            self.midpoint, self.slope, self.threshold, max(self.least_joints, 1), False,
+        )[0]  # fmt: skip
+
+
+def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0) -> tuple[Floats, NDArray[np.int64]]:
+    """Mean distance between the viewing rays of corresponding joints, weighted by both scores.
+
+    Rays start ``nearest`` ahead of the camera: where the lines meet behind that, the distance is taken from there.
+    The distance of parallel rays is the distance of their lines. Missing joints are left out.
+
+    Args:
+        rays: m poses; those of one view share its optical centre.
+        saturation: greatest distance that one joint can add, metres.
+        nearest: where a ray starts, metres from the optical centre.
+
+    Returns:
+        Distances, (m, m), metres, infinite for two poses of one view or without a common joint; and the number
+        of joints that both poses have, (m, m), 0 for two poses of one view.
+    """
+    distance, shared = _compare_rays(
+        rays.view, rays.origins, rays.directions, rays.weights, nearest, saturation, 0.0, 1.0, 0.0, 1, True
+    )
+    return distance, shared
+
+
+@njit(cache=True, fastmath=FASTMATH, error_model="numpy")
+def _compare_rays(  # type: ignore[no-untyped-def]
+    view, origins, directions, weights, nearest, saturation, midpoint, slope, threshold, least, distances
+):
+    """Affinities; or, with ``distances``, the mean distances and the numbers of common joints."""
+    order, start = by_view(view)
+    pose = lay_out(directions, weights, order, 4)
+    m, _, padded = pose.shape
+    result = np.full((m, m), np.inf) if distances else np.zeros((m, m))
+    shared = np.zeros((m, m) if distances else (0, 0), np.int64)
+    normal, first, second = np.empty((3, padded)), np.empty(padded), np.empty((m, padded))
+    excess = np.empty(m)
+    for p in range(len(start) - 2):
+        for q in range(p + 1, len(start) - 1):
+            # Between two views the baseline w is one: what depends on it and one ray is computed once.
+            o, r = order[start[p]], order[start[q]]
+            wx, wy, wz = origins[o, 0] - origins[r, 0], origins[o, 1] - origins[r, 1], origins[o, 2] - origins[r, 2]
+            baseline2 = wx * wx + wy * wy + wz * wz
+            for b in range(start[q], start[q + 1]):
+                for j in range(padded):
+                    second[b, j] = wx * pose[b, 0, j] + wy * pose[b, 1, j] + wz * pose[b, 2, j]
+            for a in range(start[p], start[p + 1]):
+                ux, uy, uz, weight_a = pose[a, 0], pose[a, 1], pose[a, 2], pose[a, 3]
+                nx, ny, nz = normal[0], normal[1], normal[2]
+                for j in range(padded):
+                    nx[j] = wy * uz[j] - wz * uy[j]
+                    ny[j] = wz * ux[j] - wx * uz[j]
+                    nz[j] = wx * uy[j] - wy * ux[j]
+                    first[j] = -(wx * ux[j] + wy * uy[j] + wz * uz[j])
+                for b in range(start[q], start[q + 1]):
+                    vx, vy, vz, weight_b, along_b = pose[b, 0], pose[b, 1], pose[b, 2], pose[b, 3], second[b]
+                    total = 0.0
+                    for j in range(padded):  # no branch, so that it runs on whole registers of joints
+                        cosine = ux[j] * vx[j] + uy[j] * vy[j] + uz[j] * vz[j]
+                        volume = nx[j] * vx[j] + ny[j] * vy[j] + nz[j] * vz[j]  # w . (u x v)
+                        sine2 = 1.0 - cosine * cosine
+                        # Along the rays from their starts, minimise |w' + s u - t v|^2 over s, t >= 0: inside if
+                        # the lines meet ahead of both starts, else with s = 0 or t = 0.
+                        shift = nearest * (1.0 - cosine)
+                        s, t = first[j] - shift, along_b[j] - shift
+                        ahead = min(s + t * cosine, t + s * cosine)
+                        lines = volume * volume / max(sine2, _PARALLEL)
+                        edge = max(s, t, 0.0)
+                        starts = baseline2 - 2.0 * nearest * (s + t + shift)
+                        square = lines if (ahead >= 0.0) & (sine2 > _PARALLEL) else max(starts - edge * edge, 0.0)
+                        total += weight_a[j] * weight_b[j] * (min(math.sqrt(square), saturation) - threshold)
+                    excess[b] = total
+                for b in range(start[q], start[q + 1]):
+                    if excess[b] > 0.0 and not distances:  # on average beyond the threshold
+                        continue
+                    weight_b = pose[b, 3]
+                    mass, count = 0.0, 0
+                    for j in range(padded):
+                        weight = weight_a[j] * weight_b[j]
+                        mass += weight
+                        count += weight > 0.0
+                    if count < least:
+                        continue
+                    i, k = order[a], order[b]
+                    distance = threshold + excess[b] / mass
+                    if distances:
+                        result[i, k] = result[k, i] = distance
+                        shared[i, k] = shared[k, i] = count
+                    else:
+                        result[i, k] = result[k, i] = falling(distance, midpoint, slope)
+    return result, shared

@@ -1,0 +1,73 @@
+"""How long Python takes to import mvpose, and the first call to compile."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import tempfile
+import time
+from dataclasses import dataclass
+
+from mvpose.bench.processes import report
+from mvpose.bench.report import against, caption, figure, table
+from mvpose.bench.scenes import HARD, frames
+from mvpose.pipeline import Pipeline
+
+PRESETS = ("fast", "full")
+IMPORTS = ("import numpy", "import numba", "import mvpose", "from mvpose import Pipeline")
+IMPORT_TARGET, COMPILE_TARGET = 0.5, 20.0  # seconds
+
+
+@dataclass(frozen=True)
+class Start:
+    """Seconds of one way to start, and what it should keep, or None."""
+
+    what: str
+    seconds: float
+    target: float | None = None
+
+
+def measure(*, quick: bool = False) -> list[Start]:
+    """Time imports, and first calls without and with compiled kernels on the disk, each in a fresh process."""
+    starts = []
+    for statement in IMPORTS:
+        code = f"import time; start = time.perf_counter(); {statement}; print(time.perf_counter() - start)"
+        report(code)  # brings files into memory
+        seconds = statistics.median(report(code) for _ in range(1 if quick else 7))
+        starts.append(Start(statement, seconds, IMPORT_TARGET if "mvpose" in statement else None))
+    with tempfile.TemporaryDirectory() as cache:
+        for when, target in (("first call after install", COMPILE_TARGET), ("first call later", None)):
+            code = f"from mvpose.bench.start import in_process; in_process({PRESETS!r})"
+            begin = time.perf_counter()
+            seconds_of = report(code, environment={"NUMBA_CACHE_DIR": cache})
+            whole = time.perf_counter() - begin
+            starts += [Start(f"{when}: {preset}", seconds_of[preset]) for preset in PRESETS]
+            starts.append(Start(f"{when}: the whole process", whole, target))
+    return starts
+
+
+def in_process(presets: tuple[str, ...]) -> None:
+    """Print the seconds of each preset's first frames, in turn; for a process of its own.
+
+    The frames are hard ones, and several, so that no kernel is left to be compiled later.
+    """
+    scenes = frames(5, 4, 5, conditions=HARD)
+    seconds = {}
+    for preset in presets:
+        begin = time.perf_counter()
+        pipeline = Pipeline.preset(preset)
+        for scene in scenes:
+            pipeline.estimate(scene.rig, scene.detections)
+        seconds[preset] = time.perf_counter() - begin
+    print(json.dumps(seconds))
+
+
+def table_of(starts: list[Start]) -> str:
+    """The text."""
+    rows = [["seconds, in a fresh process", "", "", "target"]]
+    for start in starts:
+        rows.append([start.what, figure(start.seconds), *against(start.seconds, start.target)])
+    return table(rows, "<>^>", rules=(0, len(IMPORTS))) + caption(
+        "First calls: five hard 5×4 frames by fast, then by full, which compiles only what fast has not. The whole "
+        "process counts Python's start and the imports."
+    )

@@ -1,0 +1,163 @@
+"""Repeated detections: a detector often reports one person twice in a view, with two nearly equal poses.
+
+Matching takes at most one detection of a view into a person, so the second set would become a ghost beside its person.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvpose.detections import Detections
+
+_BOX_SHARE = 0.53  # of its box that a person fills (Ronchi & Perona, ICCV 2017)
+_FAR = 5.0  # times the median distance from the median keypoint; on a standing person the feet have 2.3
+
+
+@dataclass(frozen=True)
+class Duplicates:
+    """Pose non-maximum suppression in each view: of poses that say the same, the surest stays.
+
+    How alike two poses are is their object keypoint similarity (OKS), the mean over the joints that both have of
+    ``exp(-d² / (2 s² (2 sigma)²))``, with d the distance in pixels and s² 0.53 of the area of the box around the
+    detected keypoints, averaged over the two (Xiao, Wu & Wei, "Simple baselines", ECCV 2018, who suppress above 0.9).
+    A keypoint far from the others is left out of the box: a single wrong joint must not make everybody alike.
+
+    Suppression is greedy: the detection with the greatest box score stays (of equals the one with the greatest mean
+    score, then the first) and takes those that are like it away; then the next of what is left.
+
+    Attributes:
+        threshold: OKS above which two poses of one view are one person.
+        least_joints: poses that share fewer detected joints are not compared.
+
+    Raises:
+        ValueError: a threshold outside 0..1, or no joint to compare.
+    """
+
+    threshold: float = 0.9
+    least_joints: int = 3
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.threshold <= 1:
+            raise ValueError(f"threshold must be an object keypoint similarity, 0 to 1, got {self.threshold}")
+        if self.least_joints < 1:
+            raise ValueError(f"least_joints must be at least 1, got {self.least_joints}")
+
+    def __call__(self, detections: Detections) -> NDArray[np.bool_]:
+        """Which detections to keep, (m,)."""
+        return _suppress(
+            detections.view,
+            detections.keypoints,
+            detections.scores,
+            detections.box_scores,
+            detections.skeleton.variances,
+            self.threshold,
+            self.least_joints,
+        )
+
+
+@njit(cache=True)
+def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):  # type: ignore[no-untyped-def]
+    m = len(view)
+    keep, rival = np.ones(m, np.bool_), np.zeros(m, np.bool_)
+    area = np.full(m, -1.0)  # computed when asked for: hardly any pair needs it
+    box = np.empty(m)  # stray keypoints and all, so never smaller: OKS by it never lower
+    for d in range(m):
+        box[d] = _box_area(keypoints, scores, d, 0.0, 0.0, np.inf)
+    first, second = np.empty(m * m // 2, np.int64), np.empty(m * m // 2, np.int64)
+    count = 0
+    for a in range(m):
+        for b in range(a + 1, m):
+            if view[a] == view[b] and _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
+                rival[a] = rival[b] = True
+                first[count], second[count] = a, b
+                count += 1
+    while count:
+        best = m
+        for d in range(m):
+            if rival[d] and (best == m or _surer(d, best, scores, box_scores)):
+                best = d
+        if best == m:
+            break
+        rival[best] = False
+        for k in range(count):
+            if first[k] == best or second[k] == best:
+                other = first[k] + second[k] - best
+                if rival[other]:
+                    rival[other] = keep[other] = False
+    return keep
+
+
+@njit(cache=True)
+def _surer(one, other, scores, box_scores):  # type: ignore[no-untyped-def]
+    if box_scores[one] != box_scores[other]:
+        return box_scores[one] > box_scores[other]
+    difference = 0.0
+    for j in range(scores.shape[1]):
+        difference += scores[one, j] - scores[other, j]
+    return difference > 0.0
+
+
+@njit(cache=True)
+def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):  # type: ignore[no-untyped-def]
+    """Whether the OKS of two poses is above the threshold; two joints mostly suffice to say no."""
+    joints = len(variances)
+    size = box[a] + box[b]
+    for stray in (True, False):
+        if not stray:
+            for d in (a, b):
+                if area[d] < 0.0:
+                    area[d] = _area(keypoints, scores, d)
+            size = area[a] + area[b]
+        shared, lost = 0, 0.0
+        for j in range(joints):
+            if not (scores[a, j] > 0.0 and scores[b, j] > 0.0):
+                continue
+            shared += 1
+            dx, dy = keypoints[a, j, 0] - keypoints[b, j, 0], keypoints[a, j, 1] - keypoints[b, j, 1]
+            d2, scale = dx * dx + dy * dy, _BOX_SHARE * size * variances[j]  # 2 s², s² of the mean area
+            if d2 >= 40.0 * scale:  # also of an area of 0
+                lost += 1.0 if d2 > 0.0 else 0.0
+            else:
+                lost += 1.0 - np.exp(-d2 / scale)
+            if lost >= (1.0 - threshold) * joints:
+                return False
+        if shared < least or lost >= (1.0 - threshold) * shared:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _area(keypoints, scores, d):  # type: ignore[no-untyped-def]
+    """Area of the box around the keypoints of a detection, without those that lie far from the others."""
+    values = np.empty(scores.shape[1])
+    x, y, median = 0.0, 0.0, 0.0
+    for axis in range(3):  # x, y, and the greater of the distances in x and y
+        count = 0
+        for j in range(len(values)):
+            if scores[d, j] > 0.0:
+                u, v = keypoints[d, j, 0], keypoints[d, j, 1]
+                value, at = (u if axis == 0 else v if axis == 1 else max(abs(u - x), abs(v - y))), count
+                while at > 0 and values[at - 1] > value:  # sorted as they come
+                    values[at] = values[at - 1]
+                    at -= 1
+                values[at] = value
+                count += 1
+        median = values[(count - 1) // 2] if count else 0.0  # the lower of two
+        x, y = (median if axis == 0 else x), (median if axis == 1 else y)
+    return _box_area(keypoints, scores, d, x, y, _FAR * median)
+
+
+@njit(cache=True)
+def _box_area(keypoints, scores, d, x, y, reach):  # type: ignore[no-untyped-def]
+    """Area of the box around the keypoints of a detection that lie up to ``reach`` from a point in x and in y."""
+    left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
+    for j in range(scores.shape[1]):
+        u, v = keypoints[d, j, 0], keypoints[d, j, 1]
+        if scores[d, j] > 0.0 and abs(u - x) <= reach and abs(v - y) <= reach:
+            left, right = (u if u < left else left), (u if u > right else right)
+            top, bottom = (v if v < top else top), (v if v > bottom else bottom)
+    return (right - left) * (bottom - top) if right >= left else 0.0

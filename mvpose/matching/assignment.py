@@ -1,0 +1,77 @@
+"""The assignment problem, as a kernel that other kernels can call.
+
+SciPy has it too, but not for numba, and a call of SciPy's costs more than all the local moves of a frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def best_assignment(value):  # type: ignore[no-untyped-def]
+    """Give rows different columns so that the values add up to the most; pairs of no positive value stay apart.
+
+    Shortest augmenting paths with prices (Jonker and Volgenant 1987; Crouse 2016): the cost of a pair is its negative
+    value, and one more column of cost 0 a row is where a row goes that is better off alone. Rows whose favourite is
+    free take it at once, so only contested ones need a path.
+
+    Args:
+        value: (rows, columns), finite.
+
+    Returns:
+        The column of each row, -1 for none, (rows,).
+    """
+    rows, real = value.shape
+    columns = real + rows
+    row_price, column_price = np.zeros(rows), np.zeros(columns)
+    column_of, row_of = np.full(rows, -1, np.int64), np.full(columns, -1, np.int64)
+    for i in range(rows):
+        most, favourite = 0.0, real + i
+        for j in range(real):
+            if value[i, j] > most:
+                most, favourite = value[i, j], j
+        row_price[i] = -most
+        if row_of[favourite] < 0:
+            row_of[favourite], column_of[i] = i, favourite
+    distance, before = np.empty(columns), np.empty(columns, np.int64)
+    settled = np.empty(columns, np.bool_)
+    for start in range(rows):
+        if column_of[start] >= 0:
+            continue
+        for j in range(columns):
+            distance[j], settled[j] = np.inf, False
+        i, reach, end = start, 0.0, -1
+        while end < 0:  # Dijkstra from the free row to the nearest free column, over costs less prices
+            nearest, base = -1, reach - row_price[i]
+            for j in range(columns):
+                if settled[j]:
+                    continue
+                cost = -value[i, j] if j < real and value[i, j] > 0.0 else 0.0
+                length = base + cost - column_price[j]
+                if length < distance[j]:
+                    distance[j], before[j] = length, i
+                if nearest < 0 or distance[j] < distance[nearest]:
+                    nearest = j
+            reach = distance[nearest]
+            if row_of[nearest] < 0:
+                end = nearest
+            else:
+                settled[nearest] = True
+                i = row_of[nearest]
+        row_price[start] += reach
+        for j in range(columns):
+            if settled[j]:
+                row_price[row_of[j]] += reach - distance[j]
+                column_price[j] -= reach - distance[j]
+        while True:  # every row on the path moves on to the column that it was reached from
+            i = before[end]
+            row_of[end] = i
+            column_of[i], end = end, column_of[i]
+            if i == start:
+                break
+    for i in range(rows):
+        if column_of[i] >= real or value[i, column_of[i]] <= 0.0:
+            column_of[i] = -1
+    return column_of

@@ -1,0 +1,303 @@
+"""3D pictorial structures straight from all detections, without matching (the paper's "No matching", section 4.2).
+
+The way of the methods before the paper (Belagiannis et al., PAMI 2016; Joo et al., PAMI 2017): which keypoints of
+different views belong together is not decided beforehand but by the pictorial structure, for everybody at once.
+
+1. The states of a joint are where any two views' rays meet (:mod:`mvpose.reconstruction.hypotheses`). The unary of a
+   state is the sum over the views of ``log(1 + score * exp(-e^2 / (2 sigma^2)) / floor)``, of the best keypoint that
+   vouches for it: its log-likelihood less that of a joint that is not there.
+2. Max-product over the tree, with the log-Gaussian prior on bone lengths, finds the best pose; it may lack joints.
+3. The keypoints that vouch for a pose, one in a view for a joint, are explained and serve no other pose. Back to 2
+   with what is left, until no pose has enough joints.
+
+Besides its price this has a weakness that no tuning mends: which keypoints of a view are one body's comes in only
+when the pose stands, so it takes the limb of whoever is near where the bones fit. That is why the paper matches first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvpose.rays import Rays
+from mvpose.reconstruction.bones import bone_lengths
+from mvpose.reconstruction.hypotheses import hypothesize
+from mvpose.reconstruction.likelihood import Noise
+from mvpose.reconstruction.poses import Poses
+from mvpose.reconstruction.refinement import refine
+from mvpose.skeleton import Skeleton
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_SHARED = 3  # joints of a detection that a person must explain to have it
+
+
+@dataclass(frozen=True)
+class UnmatchedPictorialStructure:
+    """Everybody's joints from all detections at once, without matching.
+
+    Attributes:
+        noise: the error model of keypoints.
+        agreement: two rays propose a state if they pass each other within this many standard deviations.
+        reach: greatest misfit of a bone, in standard deviations of its length and of the states at its ends.
+        least_joints: joints of a person on which two views or more agree. More than the five of a face: they lie
+            within a hand's breadth, so where the rays of two faces meet by chance all five do.
+        apart: two people's joints are further apart than this on average, metres: a chest is 0.25 m deep
+            (ANSUR II). What lies nearer is one person seen twice, left-right inverted or not.
+        most_states: states that a keypoint can propose, the likeliest ones.
+    """
+
+    noise: Noise = Noise()
+    agreement: float = 3.0
+    reach: float = 4.0
+    least_joints: int = 6
+    apart: float = 0.15
+    most_states: int = 8
+
+    def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Poses, Integers]:
+        """Find everybody.
+
+        Args:
+            rays: all detections of all views, m of them.
+            skeleton: their J joints.
+
+        Returns:
+            The poses, without the joints on which no two views agree; and the person of each detection, (m,): the one
+            who explains most of its joints, three at least, -1 for none. A person has two detections or more, at most
+            one of a view.
+        """
+        order = np.argsort(rays.view, kind="stable")
+        by_view = Rays(
+            rays.view[order], rays.origins[order], rays.directions[order], rays.weights[order], rays.pixel[order]
+        )
+        found = self._find(by_view, skeleton)
+        labels = np.empty(len(rays), np.int64)
+        labels[order] = _label(found, by_view.view)
+        # Numbered by their first detection; a pose that is left with a single one is nobody.
+        people = [pose for pose in dict.fromkeys(labels.tolist()) if pose >= 0 and (labels == pose).sum() > 1]
+        number = np.full(len(found.poses) + 1, -1)  # the last one stays: that of -1
+        number[people] = np.arange(len(people))
+        return Poses(*_polish(by_view, skeleton, found, people, self.noise)), number[labels]
+
+    def _find(self, rays: Rays, skeleton: Skeleton) -> _Found:
+        space = hypothesize(
+            rays, skeleton, noise=self.noise, agreement=self.agreement, reach=self.reach, most=self.most_states
+        )
+        parents = np.array(skeleton.parents, np.int64)
+        outwards = [skeleton.parents.index(-1)]
+        for joint in outwards:
+            outwards += np.flatnonzero(parents == joint).tolist()
+        order = np.array(outwards)
+        found = _Found([], [], np.full(rays.weights.shape, -1), np.zeros(rays.weights.shape))
+        unary = np.ones(len(space.points))
+        _weigh(unary, rays.view, found.owner, space)
+        while True:
+            core, bound = _best_pose(order, parents, unary, space)
+            if bound < _SHARED:
+                return found
+            pose = _attach(core, order, parents, unary, rays.view, found.owner, space)
+            if (pose >= 0).sum() < self.least_joints:
+                unary[core[core >= 0]] = 0.0
+                continue
+            joints = np.where(pose[:, None] >= 0, space.points[pose], np.nan)
+            found.person.append(_same_person(joints, found, skeleton, self.apart))
+            _explain(pose, len(found.poses), rays.view, found.owner, found.evidence, space)
+            found.poses.append(joints)
+            _weigh(unary, rays.view, found.owner, space)
+
+
+class _Found(NamedTuple):
+    """Poses in the order in which they were found."""
+
+    poses: list[Floats]  # (J, 3), NaN where absent
+    person: list[int]  # the first pose that was the same person, (often) itself
+    owner: Integers  # the pose that explains each keypoint, -1 for none, (m, J)
+    evidence: Floats  # for what it says, (m, J)
+
+
+def _same_person(joints: Floats, found: _Found, skeleton: Skeleton, apart: float) -> int:
+    """The pose of which this one is a repetition, as it is or with left and right exchanged; else its own index."""
+    for index, other in enumerate(found.poses):
+        for same in (other, other[list(skeleton.mirror)]):
+            distance = np.linalg.norm(joints - same, axis=1)
+            if np.isfinite(distance).any() and np.nanmean(distance) < apart:
+                return found.person[index]
+    return len(found.poses)
+
+
+def _label(found: _Found, view: Integers) -> Integers:
+    """Detections to people by the joints that they explain, the clearest first, (m,)."""
+    votes, evidence = np.zeros((2, len(view), len(found.poses)))
+    detection, joint = np.nonzero(found.owner >= 0)
+    person = np.array(found.person, np.int64)[found.owner[detection, joint]]
+    np.add.at(votes, (detection, person), 1)
+    np.add.at(evidence, (detection, person), found.evidence[detection, joint])
+    labels, taken = np.full(len(view), -1), set()
+    detection, person = np.nonzero(votes >= _SHARED)
+    for k in np.lexsort([-evidence[detection, person], -votes[detection, person]]):
+        place = (view[detection[k]], person[k])
+        if labels[detection[k]] < 0 and place not in taken:
+            labels[detection[k]] = person[k]
+            taken.add(place)
+    return labels
+
+
+def _polish(
+    rays: Rays, skeleton: Skeleton, found: _Found, people: list[int], noise: Noise
+) -> tuple[Floats, Floats, Floats]:
+    """Refine poses over the keypoints that they explain, as if those of a view were one detection."""
+    shape = (len(people), len(skeleton))
+    joints, scores, covariance = np.zeros((*shape, 3)), np.zeros(shape), np.zeros((*shape, 3, 3))
+    length, deviation = bone_lengths(skeleton)
+    for k, pose in enumerate(people):
+        detection, joint = np.nonzero(found.owner == pose)
+        views, first, row = np.unique(rays.view[detection], return_index=True, return_inverse=True)
+        directions, weights = np.zeros((len(views), shape[1], 3)), np.zeros((len(views), shape[1]))
+        directions[row, joint] = rays.directions[detection, joint]
+        weights[row, joint] = rays.weights[detection, joint]
+        mine = detection[first]
+        joints[k], scores[k], covariance[k] = refine(
+            found.poses[pose],
+            Rays(views, rays.origins[mine], directions, weights, rays.pixel[mine]),
+            skeleton,
+            noise=noise,
+            length=length,
+            deviation=deviation,
+        )
+    return joints, scores, covariance
+
+
+@njit(cache=True)
+def _weigh(unary, view, owner, space):  # type: ignore[no-untyped-def]
+    """Renew unaries from the keypoints that are not explained yet: 0, for good, where fewer than two views vouch."""
+    for joint in range(len(space.start) - 1):
+        for state in range(space.start[joint], space.start[joint + 1]):
+            if unary[state] == 0.0:
+                continue
+            total, best, views, last = 0.0, 0.0, 0, -1
+            for k in range(space.voucher_start[state], space.voucher_start[state + 1]):
+                if owner[space.voucher[k], joint] >= 0:
+                    continue
+                if view[space.voucher[k]] != last:
+                    last = view[space.voucher[k]]
+                    total += best
+                    best = 0.0
+                    views += 1
+                best = max(best, space.evidence[k])
+            unary[state] = total + best if views > 1 else 0.0
+
+
+@njit(cache=True)
+def _best_pose(order, parents, unary, space):  # type: ignore[no-untyped-def]
+    """The connected part of the tree, and states of its joints, with the greatest sum of unaries less costs of bones.
+
+    Returns:
+        State of every joint, (J,), -1 where the pose lacks it; and how many joints a pose can have, at most.
+    """
+    joints, most = len(parents), 0
+    for joint in range(joints):
+        most = max(most, space.start[joint + 1] - space.start[joint])
+    value, size = unary.copy(), np.ones(len(unary), np.int64)  # of the best pose that has the state on top
+    choice = np.full((joints, most), -1)  # best state of a joint for each state of its parent
+    message, larger = np.zeros(most), np.zeros(most, np.int64)
+    chosen, root, top, best, bound = np.full(joints, -1), 0, -1, 0.0, 0
+    for joint in order[::-1]:
+        parent = parents[joint]
+        message[:] = 0.0
+        larger[:] = 0
+        for state in range(space.start[joint], space.start[joint + 1]):
+            if unary[state] == 0.0:
+                continue
+            bound = max(bound, size[state])
+            if value[state] > best:
+                best, root, top = value[state], joint, state
+            for k in range(space.link_start[state], space.link_start[state + 1]):
+                there = space.link[k] - space.start[parent]
+                larger[there] = max(larger[there], size[state])
+                if value[state] - space.cost[k] > message[there]:
+                    message[there] = value[state] - space.cost[k]
+                    choice[joint, there] = state
+        if parent >= 0:
+            for there in range(space.start[parent + 1] - space.start[parent]):
+                value[space.start[parent] + there] += message[there]
+                size[space.start[parent] + there] += larger[there]
+    if top >= 0:
+        chosen[root] = top
+        for joint in order:
+            if parents[joint] >= 0 and chosen[parents[joint]] >= 0:
+                chosen[joint] = choice[joint, chosen[parents[joint]] - space.start[parents[joint]]]
+    return chosen, bound
+
+
+@njit(cache=True)
+def _attach(core, order, parents, unary, view, owner, space):  # type: ignore[no-untyped-def]
+    """The pose with joints that an absent one cuts it off from: those on which two of its own detections agree.
+
+    Its own is, in each view, the detection that vouches for most of its joints, if for three or more.
+    """
+    pose = core.copy()
+    votes = np.zeros(len(view))
+    for joint in range(len(parents)):
+        if pose[joint] >= 0:
+            for k in range(space.voucher_start[pose[joint]], space.voucher_start[pose[joint] + 1]):
+                if owner[space.voucher[k], joint] < 0:
+                    votes[space.voucher[k]] += 1.0 + 1e-6 * space.evidence[k]  # the evidence decides between equals
+    own = votes >= _SHARED
+    for d in range(len(view)):
+        for other in range(len(view)):
+            if view[other] == view[d] and votes[other] > votes[d]:
+                own[d] = False
+    for joint in order:
+        if pose[joint] >= 0:
+            continue
+        best = 0.0
+        for state in range(space.start[joint], space.start[joint + 1]):
+            if unary[state] == 0.0:
+                continue
+            total, views = 0.0, 0
+            for k in range(space.voucher_start[state], space.voucher_start[state + 1]):
+                if own[space.voucher[k]] and owner[space.voucher[k], joint] < 0:
+                    total += space.evidence[k]
+                    views += 1
+            if views < 2 or total <= best:
+                continue
+            fits = True  # to the neighbours that there are
+            for other in range(len(parents)):
+                if pose[other] >= 0 and parents[joint] == other:
+                    fits = fits and _linked(state, pose[other], space)
+                elif pose[other] >= 0 and parents[other] == joint:
+                    fits = fits and _linked(pose[other], state, space)
+            if fits:
+                best = total
+                pose[joint] = state
+    return pose
+
+
+@njit(cache=True)
+def _linked(child, parent, space):  # type: ignore[no-untyped-def]
+    found = False
+    for k in range(space.link_start[child], space.link_start[child + 1]):
+        found = found or space.link[k] == parent
+    return found
+
+
+@njit(cache=True)
+def _explain(pose, index, view, owner, strength, space):  # type: ignore[no-untyped-def]
+    """Give the keypoints that vouch for a pose to it: of each joint, in every view, the best that is free."""
+    for joint in range(len(pose)):
+        if pose[joint] < 0:
+            continue
+        best, last = -1, space.voucher_start[pose[joint] + 1]
+        for k in range(space.voucher_start[pose[joint]], last):
+            if owner[space.voucher[k], joint] < 0 and (best < 0 or space.evidence[k] > space.evidence[best]):
+                best = k
+            if best >= 0 and (k + 1 == last or view[space.voucher[k + 1]] != view[space.voucher[k]]):
+                owner[space.voucher[best], joint] = index
+                strength[space.voucher[best], joint] = space.evidence[best]
+                best = -1
+    # A keypoint is taken only after all of its view were compared, so no pose takes two of a view for a joint.

@@ -1,0 +1,174 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gathering import labels, noisy, pairwise_f1, people_in_a_room, rig_around
+from hypothesis import given
+from hypothesis import strategies as st
+from people import STANDING, detect, ring
+
+from mvpose import Detections
+from mvpose.affinity import AppearanceAffinity, EpipolarAffinity, FusedAffinity, GeometricAffinity
+from mvpose.rays import viewing_rays
+
+
+def at_cosines(cosines, dimensions=64, seed=0):
+    """A unit vector, and others at the given cosines to it, in a random direction of space."""
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.standard_normal((dimensions, dimensions)))[0]
+    return np.array([basis[0], *(c * basis[0] + np.sqrt(1 - c * c) * basis[k + 1] for k, c in enumerate(cosines))])
+
+
+def looks(person, *, dimensions=256, cosine=0.8, seed=0):
+    """Descriptors, (m, D): those of one person at a mean ``cosine`` to each other, strangers nearly at right angles."""
+    rng = np.random.default_rng(seed)
+    own = rng.standard_normal((person.max() + 1, dimensions))[person]
+    spread = rng.standard_normal((len(person), dimensions))
+    return np.sqrt(cosine) * own + np.sqrt(1 - cosine) * spread
+
+
+def everywhere(descriptors):
+    """Detections with these descriptors, each in a view of its own; and their affinity by appearance."""
+    m = len(descriptors)
+    rig = ring(max(m, 2))
+    detections, _ = detect(rig, STANDING[None], shuffle=False)
+    detections = replace(detections, descriptors=descriptors)
+    return detections, AppearanceAffinity()(rig, detections, viewing_rays(rig, detections))
+
+
+def test_appearance_is_a_sigmoid_of_the_distance_of_unit_vectors():
+    cosines = [1.0, 0.9, 0.7, 0.5, 0.0, -1.0]
+    _, affinity = everywhere(at_cosines(cosines))
+    distance = np.sqrt(2 - 2 * np.array(cosines))
+    np.testing.assert_allclose(affinity[0, 1:], 1 / (1 + np.exp((distance - 1.0) / 0.1)), atol=1e-4)
+    assert affinity[0, 4] == pytest.approx(0.5, abs=1e-5)  # a cosine of 1/2 is a distance of 1
+    assert affinity[0, 2:4].min() > 0.9  # one person
+    assert affinity[0, 5] < 0.02  # strangers
+
+
+@pytest.mark.parametrize("factor", [1e-30, 1e-3, 1e6, 1e100])
+def test_the_length_of_a_descriptor_means_nothing(factor):
+    descriptors = at_cosines([0.9, 0.6, 0.3])
+    scaled = descriptors * np.array([1.0, factor, 1.0, 1 / factor])[:, None]
+    np.testing.assert_allclose(everywhere(scaled)[1], everywhere(descriptors)[1], atol=1e-5)
+
+
+def test_appearance_alone_needs_descriptors():
+    rig = ring(3)
+    detections, _ = detect(rig, STANDING[None])
+    with pytest.raises(ValueError, match=r"needs descriptors \(m, D\), but the 3 detections carry none: give"):
+        AppearanceAffinity()(rig, detections, viewing_rays(rig, detections))
+    nobody = Detections.empty()
+    assert AppearanceAffinity()(rig, nobody, viewing_rays(rig, nobody)).shape == (0, 0)
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.nan, np.inf])
+@pytest.mark.parametrize("geometry", [GeometricAffinity(), EpipolarAffinity()])
+def test_a_detection_without_a_descriptor_is_judged_by_geometry_alone(nothing, geometry):
+    rig = rig_around(4)
+    detections, person = noisy(rig, people_in_a_room(3))
+    descriptors = looks(person)
+    descriptors[[2, 5]] = nothing
+    if not np.isfinite(nothing):
+        descriptors[2] = 1.0
+        descriptors[2, 7] = nothing  # one bad number spoils the row
+    detections = replace(detections, descriptors=descriptors)
+    rays = viewing_rays(rig, detections)
+    without = np.zeros(len(detections), bool)
+    without[[2, 5]] = True
+    pairs = without[:, None] | without
+    by_geometry = geometry(rig, detections, rays)
+    appearance = AppearanceAffinity()(rig, detections, rays)
+    fused = FusedAffinity(geometry=geometry)(rig, detections, rays)
+    assert (appearance[pairs] == 0).all()
+    np.testing.assert_array_equal(fused[pairs], by_geometry[pairs])
+    np.testing.assert_allclose(fused[~pairs], np.sqrt(by_geometry * appearance)[~pairs], atol=1e-12)
+    assert (appearance[~pairs] > 0).any()
+    assert (fused[pairs] > 0.5).any()
+
+
+def test_geometry_has_a_veto_and_appearance_a_say():
+    """Everybody looks alike: nothing beyond the threshold is matched. Nobody does: near pairs lose affinity."""
+    rig = rig_around(4)
+    detections, person = noisy(rig, people_in_a_room(4))
+    rays = viewing_rays(rig, detections)
+    geometry = GeometricAffinity()(rig, detections, rays)
+    alike = replace(detections, descriptors=np.ones((len(person), 8)))
+    strangers = replace(detections, descriptors=np.eye(len(person)))
+    same = FusedAffinity()(rig, alike, rays)
+    other = FusedAffinity()(rig, strangers, rays)
+    assert (same[geometry == 0] == 0).all()
+    assert (geometry == 0).mean() > 0.3
+    assert (same[geometry > 0] > geometry[geometry > 0] - 1e-4).all()  # sqrt raises what lies below 1
+    assert other.max() < 0.2
+    np.testing.assert_array_equal(FusedAffinity()(rig, detections, rays), geometry)
+
+
+@given(st.integers(0, 100_000))
+def test_anything_gives_an_affinity(seed):
+    rng = np.random.default_rng(seed)
+    rig = rig_around(4, seed=seed)
+    m, dimensions = rng.integers(0, 9), rng.integers(0, 5)
+    view = rng.integers(0, 4, m)
+    descriptors = rng.choice([0.0, 1e-200, 1.0, 1e200], (m, 1)) * rng.standard_normal((m, dimensions))
+    descriptors[rng.random(m) < 0.3] = rng.choice([np.nan, -np.inf])
+    detections = replace(
+        Detections.from_keypoints(view, rng.uniform(400, 700, (m, 17, 2)), np.ones((m, 17))), descriptors=descriptors
+    )
+    rays = viewing_rays(rig, detections)
+    for affinity in (AppearanceAffinity(), FusedAffinity(), FusedAffinity(geometry=EpipolarAffinity())):
+        matrix = affinity(rig, detections, rays)
+        assert matrix.shape == (m, m)
+        assert ((matrix >= 0) & (matrix <= 1)).all()
+        np.testing.assert_array_equal(matrix, matrix.T)
+        assert (matrix[view[:, None] == view] == 0).all()
+
+
+def two_in_one_spot(rig):
+    """Two people who hug: as far as rays can tell, one place and one pose."""
+    return np.array([STANDING, STANDING + [0.05, 0.0, 0.0]])
+
+
+def two_in_one_plane(rig):
+    """Two people in a plane with both of the first two cameras: each is on the other's epipolar lines."""
+    one, other = rig.centers[:2]
+    toward = -(one + other)[:2] / np.linalg.norm((one + other)[:2])
+    # Small things at the cameras' height, so that all their joints are in (nearly) that one plane.
+    thing = (STANDING - STANDING.mean(axis=0)) * 0.1 + [0, 0, one[2]]
+    return np.array([thing + [*(0.4 * toward), 0], thing - [*(0.4 * toward), 0]])
+
+
+@pytest.mark.parametrize(("views", "gather"), [(4, two_in_one_spot), (2, two_in_one_plane)])
+def test_appearance_tells_apart_whom_geometry_cannot(views, gather):
+    rig = rig_around(views, seed=1) if gather is two_in_one_spot else type(ring(5))(list(ring(5))[:2])
+    people = gather(rig)
+    f1 = {"geometry": [], "fused": [], "appearance": []}
+    for seed in range(6):
+        detections, person = noisy(rig, people, seed=seed)
+        detections = replace(detections, descriptors=looks(person, seed=seed))
+        for name, affinity in (
+            ("geometry", GeometricAffinity()),
+            ("fused", FusedAffinity()),
+            ("appearance", AppearanceAffinity()),
+        ):
+            f1[name].append(pairwise_f1(labels(rig, detections, affinity), person, detections.view))
+    assert min(f1["fused"]) == min(f1["appearance"]) == 1
+    assert np.mean(f1["geometry"]) < 0.9
+
+
+def test_geometry_tells_apart_who_wear_the_same():
+    rig = rig_around(4)
+    detections, person = noisy(rig, people_in_a_room(4, gap=1.0))
+    detections = replace(detections, descriptors=looks(np.zeros_like(person)))
+    assert pairwise_f1(labels(rig, detections, FusedAffinity()), person, detections.view) == 1
+    assert pairwise_f1(labels(rig, detections, AppearanceAffinity()), person, detections.view) < 0.9
+
+
+def test_some_descriptors_are_better_than_none():
+    """Each third detection has none: pairs by geometry and pairs by both are on one scale and match together."""
+    rig = rig_around(5, seed=2)
+    detections, person = noisy(rig, people_in_a_room(6), seed=2)
+    descriptors = looks(person)
+    descriptors[::3] = np.nan
+    detections = replace(detections, descriptors=descriptors)
+    assert pairwise_f1(labels(rig, detections, FusedAffinity()), person, detections.view) == 1
