@@ -52,7 +52,8 @@ class Camera:
     def __post_init__(self) -> None:
         camera = f"camera {self.name!r}"
         for key, shape in (("K", (3, 3)), ("R", (3, 3)), ("t", (3,)), ("distortion", (5,))):
-            array = as_array(getattr(self, key), shape, f"{camera}: {key}")
+            terms = " (k1 k2 p1 p2 k3, 0 where a model has none)" if key == "distortion" else ""
+            array = as_array(getattr(self, key), shape, f"{camera}: {key}{terms}")
             if not np.isfinite(array).all():
                 raise ValueError(f"{camera}: {key} has values that are not finite: {array.tolist()}")
             object.__setattr__(self, key, array)

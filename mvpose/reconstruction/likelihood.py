@@ -135,16 +135,6 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
 
 
 @njit(cache=True)
-def add_ray(A, b, origin, direction, information):  # type: ignore[no-untyped-def]
-    """Add ``information * (I - d dᵀ)`` to A (3, 3) and its product with the origin to b (3,)."""
-    for r in range(3):
-        for c in range(3):
-            entry = information * ((1.0 if r == c else 0.0) - direction[r] * direction[c])
-            A[r, c] += entry
-            b[r] += entry * origin[c]
-
-
-@njit(cache=True)
 def solve(A, b, inverse, point):  # type: ignore[no-untyped-def]
     """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; False where A is singular in practice.
 

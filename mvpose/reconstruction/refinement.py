@@ -18,7 +18,7 @@ from mvpose.rays import Rays
 from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, solve
 from mvpose.reconstruction.poses import gather
 from mvpose.reconstruction.scatter import joint_scales
-from mvpose.reconstruction.triangulation import LEASH, tie
+from mvpose.reconstruction.triangulation import LEASH, NOBODY, tie
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -204,7 +204,10 @@ def judge(  # type: ignore[no-untyped-def]
     scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones,
     length, precision,
 ):  # fmt: skip
-    """Write scores (J,) and covariances (J, 3, 3) of a pose at its maximum; a joint that is NaN is left alone."""
+    """Write scores (J,) and covariances (J, 3, 3) of a pose at its maximum.
+
+    A joint that is NaN is left alone, and one that no view vouches for becomes NaN.
+    """
     n, count = len(pixel), len(joints)
     misfit, rights = np.zeros(count), np.zeros(count)
     information, b = np.zeros((count, 3, 3)), np.empty(3)
@@ -213,7 +216,11 @@ def judge(  # type: ignore[no-untyped-def]
             support, rights[j], misfit[j] = accumulate(
                 joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, information[j], b
             )
-            scores[j] = support / n
+            if support / n > NOBODY:
+                scores[j] = support / n
+            else:  # no view vouches for it: invented by the prior
+                for r in range(3):
+                    joints[j, r] = np.nan
     scale = joint_scales(misfit, rights)
     for j in range(count):
         for r in range(3):

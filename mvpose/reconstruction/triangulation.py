@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, accumulate, add_ray, log_likelihood, solve
+from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, solve
 from mvpose.reconstruction.poses import Poses, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
@@ -59,15 +59,16 @@ class Triangulation:
                 rays.weights[:, :, None],
                 rays.pixel,
                 self.noise.sigmas(skeleton),
-                np.array([self.noise.pixels, self.noise.floor]),
+                self.noise.pixels,
+                self.noise.floor,
                 _METHODS.index(self.method),
             )
         )
 
 
 @njit(cache=True)
-def _triangulate(labels, origins, directions, weights, pixel, sigmas, noise, method):  # type: ignore[no-untyped-def]
-    people, joints, floor = 0, len(sigmas), noise[1]
+def _triangulate(labels, origins, directions, weights, pixel, sigmas, pixels, floor, method):  # type: ignore[no-untyped-def]
+    people, joints = 0, len(sigmas)
     for label in labels:
         people = max(people, label + 1)
     points, scores = np.full((people, joints, 3), np.nan), np.zeros((people, joints))
@@ -75,7 +76,7 @@ def _triangulate(labels, origins, directions, weights, pixel, sigmas, noise, met
     misfit, rights = np.zeros(joints), np.zeros(joints)
     scratch = np.empty((8, 3))
     for person in range(people):
-        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, noise[0] * pixel)
+        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixels * pixel)
         point = points[person]
         for j in range(joints):
             misfit[j] = rights[j] = 0.0
@@ -85,24 +86,14 @@ def _triangulate(labels, origins, directions, weights, pixel, sigmas, noise, met
                 support, rights[j], misfit[j] = consensus(point[j], view, scratch)
             elif _all_views(point[j], view, scratch) if method == 1 else _best_pair(point[j], view):
                 support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, 0)
-            if support > 0.0:
-                scores[person, j] = support / len(angle)
-            for r in range(3):
-                if support == 0.0:
-                    point[j, r] = np.nan
-                else:
-                    for c in range(3):
-                        covariance[person, j, r, c] = scratch[r, c]
+            _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
         if method == 0:  # what is wrong by this person's measure, not the model's
             own = np.sqrt(person_scale(misfit, rights))
             for j in range(joints):
-                if not np.isnan(point[j, 0]):
+                if scores[person, j] > 0.0:
                     view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
                     support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, _MOST_STEPS)
-                    scores[person, j] = support / len(angle)
-                    for r in range(3):
-                        for c in range(3):
-                            covariance[person, j, r, c] = scratch[r, c]
+                    _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
         scale = joint_scales(misfit, rights)
         for j in range(joints):
             for r in range(3):
@@ -110,6 +101,20 @@ def _triangulate(labels, origins, directions, weights, pixel, sigmas, noise, met
                     covariance[person, j, r, c] *= scale[j]
     return points, scores, covariance
 
+
+@njit(cache=True)
+def _note(point, score, scratch, j, scores, covariance):  # type: ignore[no-untyped-def]
+    """Enter a joint of one person; where no view vouches for it, there is none."""
+    scores[j] = score if score > NOBODY else 0.0
+    for r in range(3):
+        if score <= NOBODY:
+            point[r] = np.nan
+        for c in range(3):
+            covariance[j, r, c] = scratch[r, c] if score > NOBODY else np.nan
+
+
+NOBODY = 1e-9
+"""Score up to which no view vouches for a joint."""
 
 LEASH = 1.0
 """Information, 1/m^2, that ties a joint to where it is: it matters only where no view agrees."""
@@ -208,18 +213,34 @@ def settle(point, view, scratch, temper, steps):  # type: ignore[no-untyped-def]
 def _all_views(point, view, scratch):  # type: ignore[no-untyped-def]
     """Write the point nearest to all rays, weighted by score; False where fewer than two views see the joint."""
     origins, directions, weights = view[:3]
-    inverse, A, b = scratch[:3], scratch[3:6], scratch[6]
-    for r in range(3):
-        b[r] = 0.0
-        for c in range(3):
-            A[r, c] = 0.0
+    a00, a01, a02, a11, a12, a22, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     views = 0
     for v in range(len(weights)):
         if weights[v, 0] > 0.0:
             views += 1
-            # Squared: in the DLT the rows are weighted by score, and a row is a residual.
-            add_ray(A, b, origins[v], directions[v, 0], weights[v, 0] ** 2)
-    return views > 1 and solve(A, b, inverse, point)
+            weight = weights[v, 0] ** 2  # in the DLT the rows are weighted by score, and a row is a residual
+            dx, dy, dz = directions[v, 0, 0], directions[v, 0, 1], directions[v, 0, 2]
+            ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
+            wx, wy, wz = weight * dx, weight * dy, weight * dz
+            a00 += weight - wx * dx
+            a11 += weight - wy * dy
+            a22 += weight - wz * dz
+            a01 -= wx * dy
+            a02 -= wx * dz
+            a12 -= wy * dz
+            ahead = dx * ox + dy * oy + dz * oz
+            b0 += weight * ox - wx * ahead
+            b1 += weight * oy - wy * ahead
+            b2 += weight * oz - wz * ahead
+    if views < 2:
+        return False
+    inverse, A, b = scratch[:3], scratch[3:6], scratch[6]
+    A[0, 0], A[1, 1], A[2, 2] = a00, a11, a22
+    A[0, 1] = A[1, 0] = a01
+    A[0, 2] = A[2, 0] = a02
+    A[1, 2] = A[2, 1] = a12
+    b[0], b[1], b[2] = b0, b1, b2
+    return solve(A, b, inverse, point)
 
 
 @njit(cache=True)

@@ -39,6 +39,55 @@ def test_rays_undo_projection(distortion):
     np.testing.assert_allclose(camera.undistort(camera.project(points)), pinhole.project(points), atol=1e-6)
 
 
+def straight_to_the_centre(camera, xy, *, slack=0.0):
+    """Whether the lens keeps its orientation all the way from its centre to normalised points (n, 2)."""
+    k1, k2, p1, p2, k3 = camera.distortion
+    x, y = (np.linspace(0, 1, 500)[:, None] * axis for axis in np.moveaxis(xy, -1, 0))
+    r2 = x * x + y * y
+    radial, slope = 1 + r2 * (k1 + r2 * (k2 + r2 * k3)), 2 * k1 + r2 * (4 * k2 + 6 * r2 * k3)
+    xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+    yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+    xy = x * y * slope + 2 * p1 * x + 2 * p2 * y
+    return ((xx * yy - xy * xy > -slack) & (xx + yy > 0)).all(axis=0)
+
+
+@given(st.integers(0, 10_000))
+def test_a_lens_is_undone_as_far_as_it_does_not_fold_and_nowhere_else(seed):
+    """Also lenses far stronger than a fit to an image would give, and points far outside any image."""
+    rng = np.random.default_rng(seed)
+    terms = rng.normal(size=5) * [0.3, 0.2, 0.003, 0.003, 0.1] * (rng.random(5) < 0.8)
+    camera = Camera(np.eye(3), np.eye(3), np.zeros(3), terms, (2, 2))
+    bearing, radius = rng.uniform(0, 2 * np.pi, 100), rng.uniform(0, 1.2, 100)
+    xy = np.column_stack([radius * np.cos(bearing), radius * np.sin(bearing)])
+    xy = xy[straight_to_the_centre(camera, xy)]
+    there = camera.project(np.column_stack([xy, np.ones(len(xy))]))
+    np.testing.assert_allclose(camera.undistort(there), xy, atol=1e-7)
+    found = camera.undistort(rng.uniform(-1.5, 1.5, (100, 2)))
+    found = found[np.isfinite(found).all(axis=1)]
+    assert straight_to_the_centre(camera, found, slack=0.01).all()
+
+
+@pytest.mark.parametrize("distortion", LENSES)
+def test_pixels_beyond_the_lens_are_no_rays_and_cost_the_others_nothing(distortion):
+    camera = look_at([3, -2, 2.5], [0, 0, 1], distortion=distortion)
+    points = points_before(camera, 50, 3)
+    pixels = camera.project(points)
+    wild = [[np.nan, 5], [np.inf, 5], [5, -np.inf], [1e300, 1e300], [-1e308, 3], [1e12, 0]]
+    mixed = camera.rays(np.concatenate([wild, pixels]))
+    assert np.isnan(mixed[: len(wild)]).all()
+    np.testing.assert_array_equal(mixed[len(wild) :], camera.rays(pixels))
+    assert np.isnan(camera.undistort(wild)).all()
+    far = camera.rays([1e6, 0.0])
+    assert np.isfinite(far).all() == (not np.any(distortion))  # a pinhole images every direction before it
+
+
+def test_points_at_infinity_have_no_pixel():
+    camera = look_at([3, -2, 2.5], [0, 0, 1], distortion=LENSES[1])
+    points = [[np.inf, 0, 0], [np.nan, 0, 0], [1e308, -1e308, 1e308], [-1.7e308, 1.7e308, -1.7e308]]
+    assert not np.isfinite(camera.project(points)).any()
+    assert camera.depth(points).shape == (4,)
+
+
 def test_world_up_is_image_up_and_right_is_right():
     camera = look_at([4, 0, 1], [0, 0, 1])  # looks along -x, so world +y is on its right
     middle, above, beside = camera.project([[0, 0, 1], [0, 0, 1.5], [0, 0.5, 1]])
@@ -84,27 +133,101 @@ def test_fundamental_matrices_are_not_trivial():
 
 
 def test_rig_arrays_follow_the_cameras():
-    rig = ring(3)
+    rig = ring(3, distortion=LENSES[1])
     point = np.array([0.3, -0.2, 1.1, 1.0])
     for view, camera in enumerate(rig):
         homogeneous = rig.P[view] @ point
-        np.testing.assert_allclose(homogeneous[:2] / homogeneous[2], camera.project(point[:3]))
+        np.testing.assert_allclose(camera.undistort(camera.project(point[:3])), homogeneous[:2] / homogeneous[2])
         np.testing.assert_allclose(camera.R @ rig.centers[view] + camera.t, 0, atol=1e-12)
+        fx, skew, cx, fy, cy, *rest = rig.packed[view]
+        np.testing.assert_array_equal([[fx, skew, cx], [0, fy, cy], [0, 0, 1]], camera.K)
+        np.testing.assert_array_equal(rest, [*camera.R.ravel(), *rig.centers[view], *camera.distortion])
+    assert rig.packed.shape == (3, 22)
+    assert rig.packed.flags.c_contiguous
 
 
-def test_bad_calibrations_are_refused():
-    good = look_at([4, 0, 1], [0, 0, 1])
-    with pytest.raises(ValueError, match="at least 2 cameras"):
-        Rig([good])
-    with pytest.raises(ValueError, match="one point"):
-        Rig([good, good])
-    with pytest.raises(ValueError, match="millimetres"):
-        Rig([good, look_at([-4000, 0, 1000], [0, 0, 1000])])
-    with pytest.raises(ValueError, match=r"K must be \(3, 3\), got \(3, 4\)"):
-        Camera(np.eye(3, 4), good.R, good.t, size=(10, 10))
-    with pytest.raises(ValueError, match="not a rotation"):
-        Camera(good.K, 2 * good.R, good.t, size=(10, 10))
-    with pytest.raises(ValueError, match="not finite"):
-        Camera(good.K, good.R, [np.nan, 0, 0], size=(10, 10))
-    with pytest.raises(ValueError, match="size"):
-        Camera(good.K, good.R, good.t)
+GOOD = look_at([4, 0, 1], [0, 0, 1])
+SKEWED = [[800, 3, 1e7], [0, 780, -1e7], [0, 0, 1]]  # odd, but a camera
+
+# What is wrong, and what the message says of it.
+BAD_CAMERAS = {
+    "K of another shape": ({"K": np.eye(3, 4)}, r"K must be \(3, 3\), got \(3, 4\)"),
+    "K in words": ({"K": [["a"] * 3] * 3}, r"K must be numbers of shape \(3, 3\): got values of type"),
+    "K not finite": ({"K": [[np.nan, 0, 5], [0, 9, 5], [0, 0, 1]]}, "K has values that are not finite"),
+    "K transposed": ({"K": GOOD.K.T}, r"K is transposed, .*: pass K\.T"),
+    "K scaled": ({"K": 2 * GOOD.K}, r"K\[2, 2\] must be 1, .*: divide K by 2"),
+    "K singular": ({"K": np.diag([800.0, 800, 0])}, "the last row of K must be 0 0 1"),
+    "K projective": ({"K": GOOD.K + [[0, 0, 0], [0, 0, 0], [0.1, 0, 0]]}, "the last row of K must be 0 0 1"),
+    "K with a lower skew": ({"K": GOOD.K + [[0, 0, 0], [2, 0, 0], [0, 0, 0]]}, r"K\[1, 0\] must be 0.*in K\[0, 1\]"),
+    "focal length zero": ({"K": [[0, 0, 5], [0, 9, 5], [0, 0, 1]]}, "focal lengths must be positive, got 0 and 9"),
+    "focal length flipped": ({"K": [[9, 0, 5], [0, -9, 5], [0, 0, 1]]}, "positive, got 9 and -9; a flipped image axis"),
+    "R scaled": ({"R": 2 * GOOD.R}, "R is not a rotation .* rows of unit length"),
+    "R sheared": ({"R": GOOD.R + [[0, 0.01, 0], [0, 0, 0], [0, 0, 0]]}, "R is not a rotation"),
+    "R zero": ({"R": np.zeros((3, 3))}, "R is not a rotation"),
+    "R huge": ({"R": np.full((3, 3), 1e300)}, "R is not a rotation"),
+    "R mirrored": ({"R": -GOOD.R}, "a reflection .*: flip one"),
+    "R as a vector": ({"R": [0.1, 0.2, 0.3]}, r"R must be \(3, 3\), got \(3,\)"),
+    "t a column": ({"t": GOOD.t[:, None]}, r"t must be \(3,\), got \(3, 1\)"),
+    "t not finite": ({"t": [np.nan, 0, 0]}, "t has values that are not finite"),
+    "four terms": ({"distortion": np.zeros(4)}, r"distortion \(k1 k2 p1 p2 k3, .*\) must be \(5,\), got \(4,\)"),
+    "distortion not finite": ({"distortion": [0, 0, np.inf, 0, 0]}, "distortion has values that are not finite"),
+    "no size": ({"size": (0, 0)}, r"size must be the image's width and height, .* got \(0, 0\)"),
+    "half a pixel": ({"size": (640.5, 480)}, r"size \(width, height\) must be numbers .* got 640\.5"),
+    "one size": ({"size": 640}, r"size \(width, height\) must be \(2,\), got \(\)"),
+    "size of a colour image": ({"size": (480, 640, 3)}, r"size \(width, height\) must be \(2,\), got \(3,\)"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_CAMERAS)
+def test_a_calibration_that_is_none_is_refused(name):
+    changes, message = BAD_CAMERAS[name]
+    fields = {"K": GOOD.K, "R": GOOD.R, "t": GOOD.t, "size": (640, 480), **changes}
+    with pytest.raises(ValueError, match=message) as error:
+        Camera(**fields, name="left")
+    assert "camera 'left'" in str(error.value)
+
+
+def test_odd_calibrations_are_cameras_all_the_same():
+    for K in (SKEWED, GOOD.K.astype(np.float32), GOOD.K + 1e-9, np.asfortranarray(GOOD.K)):
+        camera = Camera(K, np.round(GOOD.R, 5), GOOD.t, size=np.array([640.0, 480.0]))
+        assert camera.size == (640, 480)
+        assert camera.K.flags.c_contiguous
+    camera = Camera(SKEWED, GOOD.R, GOOD.t, LENSES[1], size=(640, 480))
+    points = points_before(GOOD, 50, 0)
+    rays = camera.rays(camera.project(points))
+    np.testing.assert_allclose(np.linalg.norm(np.cross(points - camera.center, rays), axis=1), 0, atol=1e-6)
+
+
+def test_rigs_that_are_none_are_refused():
+    elsewhere = look_at([-4, 0, 1], [0, 0, 1])
+    turned = Camera(GOOD.K, elsewhere.R, -elsewhere.R @ GOOD.center, size=(640, 480))
+    with pytest.raises(ValueError, match="at least 2 cameras to triangulate, got 1"):
+        Rig([GOOD])
+    with pytest.raises(ValueError, match="all 3 cameras of the rig stand in one point"):
+        Rig([GOOD, GOOD, turned])
+    with pytest.raises(ValueError, match=r"stand up to 4004 apart, .* in millimetres"):
+        Rig([GOOD, look_at([-4000, 0, 1000], [0, 0, 1000])])
+    with pytest.raises(ValueError, match="cannot be metres"):
+        Rig([GOOD, Camera(GOOD.K, GOOD.R, [1.7e308, -1.7e308, 1.7e308], size=(640, 480))])
+    with pytest.raises(ValueError, match=r"entry 1 is ndarray; pass mvpose\.Camera"):
+        Rig([GOOD, GOOD.P])
+    with pytest.raises(ValueError, match="sequence of cameras, got Camera"):
+        Rig(GOOD)
+
+
+def test_some_cameras_in_one_point_are_a_rig_and_say_nothing_of_each_other():
+    other = look_at([0, 4, 1], [0, 0, 1])
+    twin = Camera(GOOD.K, GOOD.R, GOOD.t + 1e-13, size=GOOD.size)
+    rig = Rig([GOOD, twin, other])
+    assert (rig.F[0, 1] == 0).all()
+    assert (rig.F[0, 2] != 0).any()
+
+
+@pytest.mark.parametrize("method", ["project", "depth", "undistort", "rays", "inside"])
+def test_arrays_of_another_shape_are_refused(method):
+    size = 3 if method in ("project", "depth") else 2
+    with pytest.raises(ValueError, match=rf"must be \(\.\.\., {size}\), got \(7, 4\)"):
+        getattr(GOOD, method)(np.zeros((7, 4)))
+    with pytest.raises(ValueError, match=rf"must be \(\.\.\., {size}\), got \(\)"):
+        getattr(GOOD, method)(5.0)
+    assert len(getattr(GOOD, method)(np.zeros((0, size)))) == 0

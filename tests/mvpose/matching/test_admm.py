@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from instances import filmed, instance, sort_by_view
 from scipy.optimize import linear_sum_assignment
 from test_projection import in_c
@@ -48,12 +50,44 @@ def test_constraints_hold_and_the_stop_is_honest(seed):
     assert not cut.converged
 
 
+@pytest.mark.parametrize("iterations", [1, 2, 5, 11, 40])
+@pytest.mark.parametrize("start", ["cold", "warm"])
+def test_residuals_are_honest_whenever_it_stops(iterations, start):
+    """The primal one bounds how far P is from the nearest positive semidefinite matrix, the dual one how far Y is from
+    the nearest matrix of spectral norm lambda.
+    """
+    affinity, view = sort_by_view(*filmed(1, views=10, people=6)[:2])
+    parts = cluster(affinity, view) if start == "warm" else None
+    result = admm.solve(affinity, view, parts=parts, most_iterations=iterations)
+    primal, dual = (residual * len(view) for residual in result.residuals)
+    negative = np.minimum(np.linalg.eigvalsh(result.P), 0.0)
+    beyond = np.maximum(np.abs(np.linalg.eigvalsh(result.Y)) - result.weight, 0.0)
+    assert 1e-3 < np.linalg.norm(negative) <= primal + 1e-3  # 1e-3: the spectral step is in single precision
+    assert 1e-3 < np.linalg.norm(beyond) <= dual + 1e-3
+
+
+@given(
+    m=st.integers(1, 90), positive=st.floats(0, 1), expected=st.integers(0, 9), single=st.booleans(),
+    seed=st.integers(0, 1000),
+)  # fmt: skip
+def test_the_spectral_step_misses_no_positive_eigenvalue(m, positive, expected, single, seed):
+    """However many were expected; only the upper triangle is read."""
+    rng = np.random.default_rng(seed)
+    vectors = np.linalg.qr(rng.standard_normal((m, m)))[0]
+    values = np.where(np.arange(m) < positive * m, 1.0, -1.0) * rng.uniform(0.1, 10.0, m)
+    kept, count = admm._positive_part(np.triu((vectors * values) @ vectors.T), expected, single=single)
+    assert count == (values > 0).sum()
+    np.testing.assert_allclose(kept, (vectors * np.maximum(values, 0)) @ vectors.T, atol=1e-4 if single else 1e-10)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_objective_is_that_of_a_long_fixed_step_run(seed):
+@pytest.mark.parametrize(("seed", "weight"), [(0, 5.0), (1, 5.0), (2, 5.0), (0, 0.3)])
+def test_objective_is_that_of_a_long_fixed_step_run(seed, weight):
+    """A weight of 0.3 lets the optimum have negative eigenvalues."""
     affinity, view, _ = instance(seed, views=4, people=3, noise=0.4)
-    expected = reference(affinity, view, alpha=0.5, weight=5.0)
-    result = admm.solve(affinity, view, alpha=0.5, weight=5.0, tolerance=1e-7, most_iterations=50_000)
+    expected = reference(affinity, view, alpha=0.5, weight=weight)
+    result = admm.solve(affinity, view, alpha=0.5, weight=weight, tolerance=1e-7, most_iterations=50_000)
+    assert (np.linalg.eigvalsh(result.P)[0] < -0.1) == (weight < 1)
     assert result.converged
     assert result.objective == pytest.approx(expected, abs=5e-4)  # of about 40; Q still differs from P by 1e-5
 

@@ -50,9 +50,13 @@ def test_small_instances_are_solved_nearly_always_exactly(make, views, people):
     assert total["admm"] < 0.96 * best_total
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed):
-    affinity, view, _ = filmed(seed, views=10, people=6)
+@pytest.mark.parametrize("noise", [None, 0.4])
+@pytest.mark.parametrize("seed", range(16))
+def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed, noise):
+    if noise is None:
+        affinity, view, _ = filmed(seed, views=10, people=6)
+    else:
+        affinity, view, _ = instance(seed, views=10, people=6, noise=noise, miss=0.3)
     part = cluster(affinity, view)
     gain = np.where(view[:, None] == view, 0.0, affinity - 0.5)
     members = (part[:, None] == np.unique(part)).astype(float)

@@ -12,7 +12,7 @@ from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bones import PROPORTION_DEVIATION, bone_lengths
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
-from mvpose.reconstruction.refinement import _marginalize, refine, tree
+from mvpose.reconstruction.refinement import _marginalize, climb, refine, tree
 
 
 def reconstruct(rays, method=None):
@@ -128,10 +128,15 @@ def test_refinement_climbs_and_never_runs_away(seed):
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(3), pixels, scores))
     length, deviation = bone_lengths(COCO17)
     start = STANDING + rng.normal(0, 0.2, (17, 3))
-    joints, _, _ = refine(start, rays, COCO17, noise=Noise(), length=length, deviation=deviation)
+    joints, noise = start.copy(), Noise()
+    alone = rays.directions.transpose(1, 0, 2)[:, :, None].copy(), rays.weights.T[:, :, None].copy()
+    skeletal = (*tree(COCO17), length, 1 / deviation**2)
+    climb(joints, rays.origins, *alone, noise.pixels * rays.pixel, noise.sigmas(COCO17), noise.floor, *skeletal)
     assert log_posterior(joints, rays) > log_posterior(start, rays)
+    refined, scores, _ = refine(start, rays, COCO17, noise=noise, length=length, deviation=deviation)
+    np.testing.assert_array_equal(refined, np.where(scores[:, None] > 0, joints, np.nan))
     whole, _, _ = reconstruct(rays)
-    assert np.linalg.norm(whole - STANDING, axis=1).max() < 1.5
+    assert np.nanmax(np.linalg.norm(whole - STANDING, axis=1)) < 1.5
 
 
 def test_the_prior_pulls_an_average_adult_little():
