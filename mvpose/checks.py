@@ -21,6 +21,8 @@ def as_array(
     Raises:
         ValueError: "keypoints must be (m, 17, 2), got (4, 17)".
     """
+    if _sealed(value, shape, dtype):
+        return value  # type: ignore[return-value]
     try:
         given = np.asarray(value)
         if given.dtype.kind == "O":
@@ -36,6 +38,25 @@ def as_array(
         raise ValueError(f"{name} must be {_written(shape)}, got {_written(array.shape)}")
     array.flags.writeable = False
     return array
+
+
+def seal(*arrays: NDArray) -> None:
+    """Make fresh arrays read-only, so that :func:`as_array` need not copy what nobody can write to."""
+    for array in arrays:
+        array.setflags(write=False)
+
+
+def _sealed(value: ArrayLike, shape: tuple[int | str, ...], dtype: type[np.generic]) -> bool:
+    """Whether the value is already what :func:`as_array` makes of it, and shares memory with no other array."""
+    return (
+        type(value) is np.ndarray
+        and not value.flags.writeable
+        and not isinstance(value.base, np.ndarray)
+        and value.dtype == dtype
+        and value.flags.c_contiguous
+        and value.ndim == len(shape)
+        and all(isinstance(wanted, str) or got == wanted for wanted, got in zip(shape, value.shape, strict=True))
+    )
 
 
 def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:

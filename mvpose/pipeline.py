@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mvpose.affinity import Affinity, AppearanceAffinity, FusedAffinity, GeometricAffinity
 from mvpose.camera import Rig
+from mvpose.checks import seal
 from mvpose.detections import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.estimate import Estimate, Matching
@@ -124,6 +125,7 @@ class UnmatchedPipeline:
 
 
 def _estimate(poses: Poses, matching: Matching, start: float, compared: float, matched: float) -> Estimate:
+    seal(*poses)
     end = time.perf_counter()
     timings = {
         "affinity": compared - start,

@@ -86,14 +86,14 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
     Raises:
         ValueError: a detection names a view that the rig does not have.
     """
-    if len(detections) and (last := int(detections.view.max())) >= len(rig):
+    origins, directions, weights, pixel, last = _viewing_rays(
+        rig.packed, detections.view, detections.keypoints, detections.scores
+    )
+    if last >= len(rig):
         raise ValueError(
             f"a detection names view {last}, but the rig has {len(rig)} cameras (0 to {len(rig) - 1}); "
             "pass the rig that the detections were made with, its cameras in that order"
         )
-    origins, directions, weights, pixel = _viewing_rays(
-        rig.packed, detections.view, detections.keypoints, detections.scores
-    )
     modes = None if detections.likelihoods is None else _modes(rig, detections.view, detections.likelihoods)
     return Rays(detections.view, origins, directions, weights, pixel, modes)
 
@@ -102,7 +102,7 @@ def _modes(rig: Rig, view: NDArray[np.int64], maps: Heatmaps) -> Modes:
     pixels, heights = maps.modes(_MODES)
     m, joints = heights.shape[:2]
     flat = pixels.reshape(m, joints * _MODES, 2), np.minimum(heights, 1.0).reshape(m, joints * _MODES)
-    _, directions, weights, _ = _viewing_rays(rig.packed, view, *flat)
+    _, directions, weights, _, _ = _viewing_rays(rig.packed, view, *flat)
     return Modes(
         directions.reshape(m, joints, _MODES, 3),
         weights.reshape(m, joints, _MODES),
@@ -114,12 +114,17 @@ def _modes(rig: Rig, view: NDArray[np.int64], maps: Heatmaps) -> Modes:
 
 @njit(cache=True)
 def _viewing_rays(cameras, view, keypoints, scores):  # type: ignore[no-untyped-def]
+    """The rays, and the greatest view; a view that there is no camera for sees nothing."""
     m, joints = scores.shape
+    last = -1
     origins, directions = np.empty((m, 3)), np.zeros((m, joints, 3))
     weights, pixel = np.zeros((m, joints)), np.empty(m)
     for d in range(m):
+        last = max(last, view[d])
+        if view[d] >= len(cameras):
+            continue
         camera = cameras[view[d]]  # see Rig.packed
-        fx, skew, cx, fy, cy = camera[0], camera[1], camera[2], camera[3], camera[4]
+        fx, skew, cx, fy, cy, lens = camera[0], camera[1], camera[2], camera[3], camera[4], camera[17:22]
         for r in range(3):
             origins[d, r] = camera[14 + r]
         pixel[d] = 1.0 / np.sqrt(fx * fy)
@@ -128,11 +133,11 @@ def _viewing_rays(cameras, view, keypoints, scores):  # type: ignore[no-untyped-
                 continue
             v = (keypoints[d, j, 1] - cy) / fy
             u = (keypoints[d, j, 0] - cx - skew * v) / fx
-            x, y = undistort(u, v, camera[17:22])
+            x, y = undistort(u, v, lens)
             if not abs(x) + abs(y) < 1e6:  # also false of NaN: across the line of sight, not on the image plane
                 continue
             scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
             for r in range(3):  # R transposed, times (x, y, 1)
                 directions[d, j, r] = (camera[5 + r] * x + camera[8 + r] * y + camera[11 + r]) * scale
             weights[d, j] = scores[d, j]
-    return origins, directions, weights, pixel
+    return origins, directions, weights, pixel, last

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.checks import seal
+
 
 def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5) -> NDArray[np.int64]:
     """Group detections whose P exceeds the threshold, at most one detection of a view in a group.
@@ -28,7 +30,9 @@ def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshol
 
 def number_people(group: NDArray[np.int64]) -> NDArray[np.int64]:
     """Renumber group names 0 to m - 1, (m,), as 0, 1, ... by first member; groups of one become -1."""
-    return _number_people(read_only(group, np.int64))
+    labels = _number_people(read_only(group, np.int64))
+    seal(labels)
+    return labels
 
 
 def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:

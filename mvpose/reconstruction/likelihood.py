@@ -45,7 +45,7 @@ class Noise:
 
     def sigmas(self, skeleton: Skeleton) -> Floats:
         """Standard deviation of every joint across the ray, (J,), metres."""
-        return np.hypot(self.area * np.asarray(skeleton.sigmas), self.definition)
+        return np.sqrt(0.25 * self.area**2 * skeleton.variances + self.definition**2)
 
 
 @njit(cache=True, fastmath=_FASTMATH)
@@ -132,6 +132,28 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
     b[1] += b1
     b[2] += b2
     return support, rights, misfit
+
+
+@njit(cache=True, fastmath=_FASTMATH)
+def look(point, origins, directions, weights, pixel, sigma, floor):  # type: ignore[no-untyped-def]
+    """What :func:`accumulate` returns, of the strongest modes alone, and the greatest squared error, m^2."""
+    support, rights, misfit, worst = 0.0, 0.0, 0.0, 0.0
+    for v in range(weights.shape[0]):
+        weight = weights[v, 0]
+        x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
+        along = x * directions[v, 0, 0] + y * directions[v, 0, 1] + z * directions[v, 0, 2]
+        e2 = max(x * x + y * y + z * z - along * along, 0.0)
+        if weight > 0.0:
+            worst = max(worst, e2)
+            if along > 0.0:
+                breadth = pixel[v] * along
+                sharpness = weight * weight / (sigma * sigma + breadth * breadth)
+                value = weight * np.exp(-0.5 * e2 * sharpness)
+                right = value / (value + floor)
+                support += weight * right
+                rights += right
+                misfit += right * e2 * sharpness
+    return support, rights, misfit, worst
 
 
 @njit(cache=True)

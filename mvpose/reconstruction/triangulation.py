@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, solve
+from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, look, solve
 from mvpose.reconstruction.poses import Poses, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
@@ -73,27 +73,28 @@ def _triangulate(labels, origins, directions, weights, pixel, sigmas, pixels, fl
         people = max(people, label + 1)
     points, scores = np.full((people, joints, 3), np.nan), np.zeros((people, joints))
     covariance = np.full((people, joints, 3, 3), np.nan)
-    misfit, rights = np.zeros(joints), np.zeros(joints)
+    misfit, rights = np.empty(joints), np.empty(joints)
     scratch = np.empty((8, 3))
     for person in range(people):
         mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixels * pixel)
-        point = points[person]
+        point, own, steps = points[person], 1.0, 0
         for j in range(joints):
-            misfit[j] = rights[j] = 0.0
+            rights[j] = misfit[j] = 0.0
             view = mine, towards[j], weight[j], angle, sigmas[j], floor
-            support = 0.0
             if method == 0:
-                support, rights[j], misfit[j] = consensus(point[j], view, scratch)
-            elif _all_views(point[j], view, scratch) if method == 1 else _best_pair(point[j], view):
-                support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, 0)
-            _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
+                _, rights[j], misfit[j] = consensus(point[j], view, scratch)
+            elif method == 1:
+                _all_views(point[j], view, scratch)
+            else:
+                _best_pair(point[j], view)
         if method == 0:  # what is wrong by this person's measure, not the model's
-            own = np.sqrt(person_scale(misfit, rights))
-            for j in range(joints):
-                if scores[person, j] > 0.0:
-                    view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
-                    support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, _MOST_STEPS)
-                    _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
+            own, steps = np.sqrt(person_scale(misfit, rights)), _MOST_STEPS
+        for j in range(joints):
+            support = 0.0
+            if not np.isnan(point[j, 0]):
+                view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
+                support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
+            _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
         scale = joint_scales(misfit, rights)
         for j in range(joints):
             for r in range(3):
@@ -131,6 +132,7 @@ def tie(point, A, b):  # type: ignore[no-untyped-def]
 
 
 _MOST_STEPS = 12
+_HOT = 4.0  # variances: with no view further off than two deviations, all agree
 _COOLING = 4.0  # of the temper, a step
 _STILL = 2.5e-5  # m^2: a step of less than 5 mm is far below the scatter of any detector, and the step is still taken
 _MAJORITY = 0.5  # of the score
@@ -157,17 +159,15 @@ def consensus(point, view, scratch):  # type: ignore[no-untyped-def]
     origins, directions, weights, pixel, sigma, floor = view
     if not _all_views(point, view, scratch):
         return 0.0, 0.0, 0.0
-    total, worst = 0.0, 0.0
+    total = 0.0
     for v in range(len(weights)):
-        if weights[v, 0] > 0.0:
-            total += weights[v, 0]
-            x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
-            along = x * directions[v, 0, 0] + y * directions[v, 0, 1] + z * directions[v, 0, 2]
-            worst = max(worst, x * x + y * y + z * z - along * along)
-    temper = min(max(worst / (4.0 * sigma * sigma), 1.0), 1e4)  # the worst view at two deviations
-    vouched = settle(point, view, scratch, temper, _MOST_STEPS)
-    if vouched[0] > (_MAJORITY if vouched[1] > _BEYOND_CHANCE else _NEARLY_ALL) * total:
-        return vouched
+        total += weights[v, 0]
+    support, rights, misfit, worst = look(point, origins, directions, weights, pixel, sigma, floor)
+    if worst > _HOT * sigma * sigma:
+        temper = min(worst / (_HOT * sigma * sigma), 1e4)
+        support, rights, misfit = settle(point, view, scratch, temper, _MOST_STEPS)
+    if support > (_MAJORITY if rights > _BEYOND_CHANCE else _NEARLY_ALL) * total:
+        return support, rights, misfit
     best = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
     trial = np.empty(3)
     for first in range(len(weights)):
