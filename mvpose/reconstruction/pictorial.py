@@ -15,19 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import STATURE_DEVIATION, bones
-from mvpose.reconstruction.likelihood import Noise, accumulate
+from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import climb, judge, leaves_first, tree
 from mvpose.reconstruction.sampling import rescore
-from mvpose.reconstruction.scatter import person_scale
 from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
-
-_NO_MAPS = np.zeros((0, 0, 0, 0), np.float32), np.zeros((0, 4)), np.zeros((0, 22))
-_NO_MAPS[0].flags.writeable = False  # as maps are: numba compiles once for each kind of array
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ class PictorialStructure:
 
     Attributes:
         noise: the error model of keypoints.
-        personal: scale the bone-length prior to the person, whose stature his well-seen bones tell.
+        personal: scale the bone-length prior to the person, whose stature the well-seen bones tell.
         most_pairs: pairs of views that propose for a joint, those that agree and meet at wide angles; 12 views and
             more have too many.
         most_states: proposals kept for a joint, the likeliest ones.
@@ -61,25 +57,26 @@ class PictorialStructure:
         """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
         length, definition = bones(skeleton)
         modes = rays.modes
-        maps = _NO_MAPS if modes is None else (modes.values, modes.grid, modes.cameras)
-        return Poses(
-            *_structures(
-                labels,
-                rays.origins,
-                rays.directions[:, :, None] if modes is None else modes.directions,
-                rays.weights[:, :, None] if modes is None else modes.weights,
-                rays.pixel,
-                maps,
-                self.noise.sigmas(skeleton),
-                np.array([self.noise.pixels, self.noise.floor, STATURE_DEVIATION]),
-                *tree(skeleton),
-                length,
-                definition,
-                self.personal,
-                self.most_pairs,
-                self.most_states,
-            )
+        maps = None if modes is None else (modes.values, modes.grid, modes.cameras)
+        poses = Poses.missing(int(labels.max(initial=-1)) + 1, len(skeleton))
+        _structures(
+            poses,
+            labels,
+            rays.origins,
+            rays.directions[:, :, None] if modes is None else modes.directions,
+            rays.weights[:, :, None] if modes is None else modes.weights,
+            self.noise.pixels * rays.pixel,
+            maps,
+            self.noise.sigmas(skeleton),
+            self.noise.floor,
+            *tree(skeleton),
+            length,
+            definition,
+            STATURE_DEVIATION if self.personal else 0.0,
+            self.most_pairs,
+            self.most_states,
         )
+        return poses
 
 
 def max_product(
@@ -111,54 +108,36 @@ def max_product(
 
 @njit(cache=True)
 def _structures(  # type: ignore[no-untyped-def]
-    labels, origins, directions, weights, pixel, maps, sigmas, noise,
-    parents, order, neighbours, bones, length, definition, personal, most_pairs, most_states,
+    poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
+    parents, order, neighbours, bones, length, definition, stature, most_pairs, most_states,
 ):  # fmt: skip
-    people, count = 0, len(sigmas)
-    for label in labels:
-        people = max(people, label + 1)
-    floor = noise[1]
-    joints, scores = np.full((people, count, 3), np.nan), np.zeros((people, count))
-    covariance = np.full((people, count, 3, 3), np.nan)
-    for person in range(people):
-        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, noise[0] * pixel)
-        states, unary, valid = propose_all(mine, towards, weight, angle, sigmas, floor, most_pairs, most_states)
-        if len(maps[0]):
-            rescore(states, unary, valid, labels, person, weight, maps, floor)
-        own_length, precision = personal_prior(
-            states, unary, valid, weight, sigmas, floor, parents, length, definition, noise[2], personal
+    for person in range(len(poses.joints)):
+        joints = poses.joints[person]
+        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
+        states, unary, count, scatter = propose_all(
+            mine, towards, weight, angle, sigmas, floor, most_pairs, most_states
         )
-        own = np.sqrt(_scatter(states, valid, mine, towards, weight, angle, sigmas, floor)) * sigmas
+        if maps is not None:
+            rescore(states, unary, count, labels, person, weight, maps, floor)
+        own_length, precision = personal_prior(states, count, weight, sigmas, parents, length, definition, stature)
         propose_single_views(
-            states, unary, valid, mine, towards, weight, floor, neighbours, bones, own_length, precision
+            states, unary, count, mine, towards, weight, floor, neighbours, bones, own_length, precision
         )
-        chosen = _max_product(states, unary, valid, parents, order, own_length, precision)
-        for j in range(count):
-            if valid[j] > 0:
+        chosen = _max_product(states, unary, count, parents, order, own_length, precision)
+        own = np.empty(len(sigmas))
+        for j in range(len(sigmas)):
+            own[j] = scatter * sigmas[j]
+            if count[j] > 0:
                 for r in range(3):
-                    joints[person, j, r] = states[j, chosen[j], r]
+                    joints[j, r] = states[j, chosen[j], r]
         climb(
-            joints[person], mine, towards, weight, angle, own, floor,
+            joints, mine, towards, weight, angle, own, floor,
             parents, order, neighbours, bones, own_length, precision,
         )  # fmt: skip
         judge(
-            scores[person], covariance[person], joints[person], mine, towards, weight, angle, own, floor,
+            poses.scores[person], poses.covariance[person], joints, mine, towards, weight, angle, own, floor,
             parents, order, neighbours, bones, own_length, precision,
         )  # fmt: skip
-    return joints, scores, covariance
-
-
-@njit(cache=True)
-def _scatter(states, count, origins, directions, weights, pixel, sigmas, floor):  # type: ignore[no-untyped-def]
-    """The scale of a person's errors, from the likeliest proposal of every joint."""
-    joints, A, b = len(count), np.zeros((3, 3)), np.zeros(3)
-    misfit, rights = np.zeros(joints), np.zeros(joints)
-    for j in range(joints):
-        if count[j] > 0:
-            _, rights[j], misfit[j] = accumulate(
-                states[j, 0], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b
-            )
-    return person_scale(misfit, rights)
 
 
 @njit(cache=True)

@@ -25,6 +25,15 @@ class Poses(NamedTuple):
     scores: Floats
     covariance: Floats
 
+    @classmethod
+    def missing(cls, people: int, joints: int) -> Poses:
+        """People of whom nothing is placed yet."""
+        return cls(
+            np.full((people, joints, 3), np.nan),
+            np.zeros((people, joints)),
+            np.full((people, joints, 3, 3), np.nan),
+        )
+
 
 @njit(cache=True)
 def gather(labels, person, origins, directions, weights, pixel):  # type: ignore[no-untyped-def]

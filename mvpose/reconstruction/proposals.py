@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from mvpose.reconstruction.likelihood import log_likelihood
+from mvpose.reconstruction.scatter import person_scale
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
 _SINGLE_VIEW_STATES = 16  # two depths from every neighbour
@@ -22,19 +23,22 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
     """Propose for every joint of one person in n views.
 
     Returns:
-        States (J, S, 3), metres, their log-likelihoods (J, S), the likeliest first, and how many of the S are valid,
-        (J,); there is room for what :func:`propose_single_views` adds.
+        States (J, S, 3), metres, their log-likelihoods (J, S), the likeliest first; how many of the S are valid,
+        (J,), with room for what :func:`propose_single_views` adds; and how much larger the errors of this person
+        are than the model's.
     """
     joints = len(weights)
     room = max(most_states, _SINGLE_VIEW_STATES)
-    states, unary = np.zeros((joints, room, 3)), np.full((joints, room), -np.inf)
-    count = np.zeros(joints, np.int64)
+    states, unary = np.empty((joints, room, 3)), np.empty((joints, room))
+    count, rights, misfit = np.zeros(joints, np.int64), np.zeros(joints), np.zeros(joints)
     points, quality, scratch = np.empty((most_pairs + 1, 3)), np.empty(most_pairs + 1), np.empty((8, 3))
     for j in range(joints):
         found = _pairs(origins, directions[j], weights[j], sigmas[j], points, quality)
         if found == 0:
             continue
-        if consensus(points[found], (origins, directions[j], weights[j], pixel, sigmas[j], floor), scratch)[0] > 0.0:
+        view = origins, directions[j], weights[j], pixel, sigmas[j], floor
+        support, rights[j], misfit[j] = consensus(points[found], view, scratch)
+        if support > 0.0:
             quality[found] = np.inf
             found += 1
         while count[j] < most_states:
@@ -61,7 +65,7 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
                 x, y, z = points[s, 0] - point[0], points[s, 1] - point[1], points[s, 2] - point[2]
                 if x * x + y * y + z * z <= _SAME * sigmas[j] * sigmas[j]:
                     quality[s] = -1.0
-    return states, unary, count
+    return states, unary, count, np.sqrt(person_scale(misfit, rights))
 
 
 @njit(cache=True)
@@ -75,7 +79,10 @@ def _pairs(origins, directions, weights, sigma, points, quality):  # type: ignor
         for second in range(first + 1, n):
             for mode in range(modes):
                 for other in range(modes):
-                    value = pair_point(origins, directions, weights, first, mode, second, other, point)
+                    value = pair_point(
+                        origins[first], directions[first, mode], weights[first, mode],
+                        origins[second], directions[second, other], weights[second, other], point,
+                    )  # fmt: skip
                     if value <= 0.0:
                         continue
                     if crowded:  # prefer pairs that agree
@@ -122,9 +129,9 @@ def propose_single_views(  # type: ignore[no-untyped-def]
     own neighbours in the next round.
     """
     joints, n, _ = weights.shape
-    only = np.full(joints, -1)
+    only = np.empty(joints, np.int64)
     for j in range(joints):
-        views = 0
+        views, only[j] = 0, -1
         for v in range(n):
             if weights[j, v, 0] > 0.0:
                 views, only[j] = views + 1, v

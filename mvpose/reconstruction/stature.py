@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mvpose.reconstruction.bones import PROPORTION_DEVIATION
+from mvpose.reconstruction.bones import PROPORTION_DEVIATION, STATURE_DEVIATION
 
 _OUTLIER = 9.0  # squared deviations at which a bone's say is halved
 _ROUNDS = 3
@@ -13,7 +13,7 @@ _ROUNDS = 3
 
 @njit(cache=True)
 def personal_prior(  # type: ignore[no-untyped-def]
-    states, unary, count, weights, sigmas, floor, parents, length, definition, stature, personal
+    states, count, weights, sigmas, parents, length, definition, stature
 ):
     """Mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, of one person.
 
@@ -23,21 +23,18 @@ def personal_prior(  # type: ignore[no-untyped-def]
 
     Args:
         states: proposals (J, S, 3), metres, the likeliest first.
-        unary: their log-likelihoods, (J, S).
         count: how many are valid, (J,).
         weights: scores in every view, (J, n, K).
         sigmas: deviation of each joint across a ray, (J,), metres.
-        floor: likelihood of a wrong keypoint.
         parents: the tree, (J,).
         length: of the population, (J,), metres.
         definition: deviation of what is called the joint, (J,), metres; infinite for no prior.
-        stature: deviation of the stature in the population, as a share.
-        personal: whether to scale at all.
+        stature: deviation of the stature in the population, as a share; 0 for the population's prior as it is.
     """
     joints, n, _ = weights.shape
-    scale, doubt = 1.0, stature
-    if personal:
-        views = np.zeros(joints)  # that agree on the likeliest proposal, about
+    scale, doubt = 1.0, STATURE_DEVIATION
+    if stature > 0.0:
+        views = np.zeros(joints)
         for j in range(joints):
             if count[j] > 0:
                 for v in range(n):

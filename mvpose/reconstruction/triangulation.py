@@ -51,33 +51,31 @@ class Triangulation:
 
     def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
         """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
-        return Poses(
-            *_triangulate(
-                labels,
-                rays.origins,
-                rays.directions[:, :, None],
-                rays.weights[:, :, None],
-                rays.pixel,
-                self.noise.sigmas(skeleton),
-                self.noise.pixels,
-                self.noise.floor,
-                _METHODS.index(self.method),
-            )
+        poses = Poses.missing(int(labels.max(initial=-1)) + 1, len(skeleton))
+        _triangulate(
+            poses,
+            labels,
+            rays.origins,
+            rays.directions[:, :, None],
+            rays.weights[:, :, None],
+            self.noise.pixels * rays.pixel,
+            self.noise.sigmas(skeleton),
+            self.noise.floor,
+            _METHODS.index(self.method),
         )
+        return poses
 
 
 @njit(cache=True)
-def _triangulate(labels, origins, directions, weights, pixel, sigmas, pixels, floor, method):  # type: ignore[no-untyped-def]
-    people, joints = 0, len(sigmas)
-    for label in labels:
-        people = max(people, label + 1)
-    points, scores = np.full((people, joints, 3), np.nan), np.zeros((people, joints))
-    covariance = np.full((people, joints, 3, 3), np.nan)
+def _triangulate(  # type: ignore[no-untyped-def]
+    poses, labels, origins, directions, weights, pixel, sigmas, floor, method
+):
+    joints = len(sigmas)
     misfit, rights = np.empty(joints), np.empty(joints)
     scratch = np.empty((8, 3))
-    for person in range(people):
-        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixels * pixel)
-        point, own, steps = points[person], 1.0, 0
+    for person in range(len(poses.joints)):
+        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
+        point, covariance, own, steps = poses.joints[person], poses.covariance[person], 1.0, 0
         for j in range(joints):
             rights[j] = misfit[j] = 0.0
             view = mine, towards[j], weight[j], angle, sigmas[j], floor
@@ -94,13 +92,12 @@ def _triangulate(labels, origins, directions, weights, pixel, sigmas, pixels, fl
             if not np.isnan(point[j, 0]):
                 view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
                 support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
-            _note(point[j], support / len(angle), scratch, j, scores[person], covariance[person])
+            _note(point[j], support / len(angle), scratch, j, poses.scores[person], covariance)
         scale = joint_scales(misfit, rights)
         for j in range(joints):
             for r in range(3):
                 for c in range(3):
-                    covariance[person, j, r, c] *= scale[j]
-    return points, scores, covariance
+                    covariance[j, r, c] *= scale[j]
 
 
 @njit(cache=True)
@@ -172,7 +169,10 @@ def consensus(point, view, scratch):  # type: ignore[no-untyped-def]
     trial = np.empty(3)
     for first in range(len(weights)):
         for second in range(first + 1, len(weights)):
-            if pair_point(origins, directions, weights, first, 0, second, 0, trial):
+            if pair_point(
+                origins[first], directions[first, 0], weights[first, 0],
+                origins[second], directions[second, 0], weights[second, 0], trial,
+            ):  # fmt: skip
                 value = log_likelihood(trial, origins, directions, weights, pixel, sigma, floor)
                 if value > best:
                     best = value
@@ -250,7 +250,10 @@ def _best_pair(point, view):  # type: ignore[no-untyped-def]
     best, trial = np.inf, np.empty(3)
     for first in range(len(weights)):
         for second in range(first + 1, len(weights)):
-            if pair_point(origins, directions, weights, first, 0, second, 0, trial):
+            if pair_point(
+                origins[first], directions[first, 0], weights[first, 0],
+                origins[second], directions[second, 0], weights[second, 0], trial,
+            ):  # fmt: skip
                 error, mass = 0.0, 0.0
                 for v in range(len(weights)):
                     if weights[v, 0] > 0.0:
@@ -270,31 +273,29 @@ _LEAST_SINE2 = 1e-10  # of the angle between two rays, squared; below, they are 
 
 
 @njit(cache=True)
-def pair_point(origins, directions, weights, first, mode, second, other, point):  # type: ignore[no-untyped-def]
-    """Write the point nearest to two rays, weighted by score; the agreement of the pair, 0 where they have no point.
+def pair_point(origin, direction, weight, other_origin, other_direction, other_weight, point):  # type: ignore[no-untyped-def]
+    """Write the point nearest to two rays, weighted by score; how well they pin it down, 0 where they have no point.
 
     Rays that are parallel, or that come nearest to each other behind a camera, have none.
 
     Returns:
-        Product of the scores and of the squared sine between the rays: how well the pair pins the joint down.
+        Product of the scores and of the squared sine between the rays.
     """
-    p, q = weights[first, mode], weights[second, other]
-    if p <= 0.0 or q <= 0.0:
+    if weight <= 0.0 or other_weight <= 0.0:
         return 0.0
-    wx = origins[second, 0] - origins[first, 0]
-    wy = origins[second, 1] - origins[first, 1]
-    wz = origins[second, 2] - origins[first, 2]
-    ux, uy, uz = directions[first, mode, 0], directions[first, mode, 1], directions[first, mode, 2]
-    vx, vy, vz = directions[second, other, 0], directions[second, other, 1], directions[second, other, 2]
-    cosine = ux * vx + uy * vy + uz * vz
+    cosine, along, other_along = 0.0, 0.0, 0.0
+    for r in range(3):
+        baseline = other_origin[r] - origin[r]
+        cosine += direction[r] * other_direction[r]
+        along += baseline * direction[r]
+        other_along += baseline * other_direction[r]
     sine2 = 1.0 - cosine * cosine
-    along_u, along_v = wx * ux + wy * uy + wz * uz, wx * vx + wy * vy + wz * vz
-    s, t = along_u - along_v * cosine, along_u * cosine - along_v  # both times sine2
+    s, t = along - other_along * cosine, along * cosine - other_along  # both times sine2
     if not (sine2 > _LEAST_SINE2 and s > 0.0 and t > 0.0):
         return 0.0
     s, t = s / sine2, t / sine2
-    p, q = p * p, q * q
-    point[0] = (p * (origins[first, 0] + s * ux) + q * (origins[second, 0] + t * vx)) / (p + q)
-    point[1] = (p * (origins[first, 1] + s * uy) + q * (origins[second, 1] + t * vy)) / (p + q)
-    point[2] = (p * (origins[first, 2] + s * uz) + q * (origins[second, 2] + t * vz)) / (p + q)
-    return np.sqrt(p * q) * sine2
+    share = weight * weight / (weight * weight + other_weight * other_weight)
+    for r in range(3):
+        here, there = origin[r] + s * direction[r], other_origin[r] + t * other_direction[r]
+        point[r] = there + share * (here - there)
+    return weight * other_weight * sine2

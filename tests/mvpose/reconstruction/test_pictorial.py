@@ -175,12 +175,13 @@ def test_every_pair_of_views_proposes_and_near_ones_are_one():
     pixels[4, 9] += [300, 0]  # one view is wrong about the wrist
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(5), pixels, np.full((5, 17), 0.9)))
     arrays = rays.directions.transpose(1, 0, 2)[:, :, None].copy(), rays.weights.T[:, :, None].copy()
-    states, unary, count = propose_all(rays.origins, *arrays, rays.pixel, Noise().sigmas(COCO17), 0.01, 64, 32)
+    states, unary, count, scatter = propose_all(rays.origins, *arrays, rays.pixel, Noise().sigmas(COCO17), 0.01, 64, 32)
     assert (np.delete(count, 9) == 1).all()  # ten pairs and all views, all at one place
     assert 2 <= count[9] <= 1 + 4  # the place of the four, and where each of them meets the fifth
     np.testing.assert_allclose(states[:, 0], STANDING, atol=1e-4)
     np.testing.assert_allclose(np.delete(unary[:, 0], 9), 5 * np.log(0.9 + 0.01), atol=1e-4)
     assert (np.diff(unary[9, : count[9]]) <= 0).all()
+    assert scatter < 0.6  # perfect but for one keypoint
 
 
 @given(st.integers(0, 100_000))

@@ -88,10 +88,11 @@ def test_consensus_is_as_likely_as_the_best_of_all_pairs():
         view = (rig.centers, directions[:, None], rng.uniform(0.4, 1.0, (len(rig), 1)), np.full(len(rig), 1e-3))
         point, tried = np.empty(3), np.empty(3)
         assert consensus(point, (*view, 0.05, 0.01), np.empty((8, 3)))[0] > 0
+        rays = list(zip(view[0], view[1][:, 0], view[2][:, 0], strict=True))
         likelihoods = [
             log_likelihood(tried, *view, 0.05, 0.01)
-            for first, second in itertools.combinations(range(len(rig)), 2)
-            if pair_point(*view[:3], first, 0, second, 0, tried) > 0
+            for one, other in itertools.combinations(rays, 2)
+            if pair_point(*one, *other, tried) > 0
         ]
         worse += log_likelihood(point, *view, 0.05, 0.01) < max(likelihoods, default=-np.inf) - 0.1
     assert worse <= 0.01 * trials
