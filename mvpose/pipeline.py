@@ -30,6 +30,9 @@ PRESETS: dict[str, str] = {
     "fast": "as full, with matching by clustering and robust triangulation",
 }
 
+NEED_DESCRIPTORS = frozenset({"appearance"})
+"""The presets that have nothing to go by where detections carry no descriptors."""
+
 
 class Estimator(Protocol):
     """Anything that finds the people of a frame."""

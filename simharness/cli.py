@@ -128,11 +128,17 @@ def shelf(
     """
     with _border():
         from mvpose import Pipeline
+        from mvpose.pipeline import NEED_DESCRIPTORS
         from simharness.datasets.evaluate import evaluate, print_evaluation
         from simharness.datasets.shelf import read_shelf
         from simharness.experiment.progress import reporter
 
         pipelines = {name: Pipeline.preset(name) for name in method or ["full"]}
+        if blind := NEED_DESCRIPTORS & pipelines.keys():
+            raise ValueError(
+                f"--method {', '.join(blind)}: goes by descriptors alone, and the detections of Shelf carry none; "
+                "choose another variant"
+            )
         data = read_shelf(folder)
         with (
             _after_reading(),

@@ -156,6 +156,20 @@ def look(point, origins, directions, weights, pixel, sigma, floor):  # type: ign
     return support, rights, misfit, worst
 
 
+LEASH = 1.0
+"""Information, 1/m^2, that ties a joint to where it is: it matters only where no view agrees."""
+
+
+@njit(cache=True)
+def tie(point, A, b):  # type: ignore[no-untyped-def]
+    """Begin normal equations with no more than that the joint is about here."""
+    for r in range(3):
+        for c in range(3):
+            A[r, c] = 0.0
+        A[r, r] = LEASH
+        b[r] = LEASH * point[r]
+
+
 @njit(cache=True)
 def solve(A, b, inverse, point):  # type: ignore[no-untyped-def]
     """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; False where A is singular in practice.

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+NOBODY = 1e-9
+"""Score up to which no view vouches for a joint: it is missing, whatever a prior says of it."""
+
+
 class Poses(NamedTuple):
     """The joints of n people.
 

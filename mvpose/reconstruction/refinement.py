@@ -15,10 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, solve
-from mvpose.reconstruction.poses import gather
+from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
+from mvpose.reconstruction.poses import NOBODY, gather
 from mvpose.reconstruction.scatter import joint_scales
-from mvpose.reconstruction.triangulation import LEASH, NOBODY, tie
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, look, solve
-from mvpose.reconstruction.poses import Poses, gather
+from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, look, solve, tie
+from mvpose.reconstruction.poses import NOBODY, Poses, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
@@ -109,23 +109,6 @@ def _note(point, score, scratch, j, scores, covariance):  # type: ignore[no-unty
             point[r] = np.nan
         for c in range(3):
             covariance[j, r, c] = scratch[r, c] if score > NOBODY else np.nan
-
-
-NOBODY = 1e-9
-"""Score up to which no view vouches for a joint."""
-
-LEASH = 1.0
-"""Information, 1/m^2, that ties a joint to where it is: it matters only where no view agrees."""
-
-
-@njit(cache=True)
-def tie(point, A, b):  # type: ignore[no-untyped-def]
-    """Begin normal equations with no more than that the joint is about here."""
-    for r in range(3):
-        for c in range(3):
-            A[r, c] = 0.0
-        A[r, r] = LEASH
-        b[r] = LEASH * point[r]
 
 
 _MOST_STEPS = 12

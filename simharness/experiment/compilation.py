@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
+from mvpose.pipeline import NEED_DESCRIPTORS
 
 
 class Compilation:
@@ -49,6 +50,6 @@ def compile_kernels(variants: Iterable[str]) -> None:
     bare = Detections.from_keypoints([0, 1], rig.project(body), np.ones((2, len(COCO17))))
     described = replace(bare, descriptors=np.ones((2, 8)))
     for variant in variants:
-        for detections in (described,) if variant == "appearance" else (bare, described):
+        for detections in (described,) if variant in NEED_DESCRIPTORS else (bare, described):
             if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
                 raise RuntimeError(f"{variant}: the one person before two perfect cameras was not found")

@@ -12,7 +12,7 @@ from typing import Any
 import polars as pl
 
 from mvpose import Detections, Estimate, Pipeline, Rig
-from mvpose.pipeline import Estimator
+from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
 from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
 from simharness.experiment.animation import animate, animated_frames
@@ -63,6 +63,11 @@ def prepare(scenario: Scenario) -> Trial:
         pipelines = {name: Pipeline.preset(name) for name in scenario.method.variants}
     except ValueError as error:
         raise ValueError(f"method.variants: {error}") from None
+    if blind := NEED_DESCRIPTORS & pipelines.keys():
+        raise ValueError(
+            f"method.variants: {', '.join(blind)} goes by descriptors alone, and the simulated detector makes none; "
+            "choose another variant"
+        )
     try:
         renderer_of(scenario.rendering.renderer)
     except Unavailable as error:

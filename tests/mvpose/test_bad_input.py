@@ -11,11 +11,11 @@ from people import crowd, look_at, ring
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import SHELF14, Camera, Detections, Pipeline, Rig
-from mvpose.pipeline import PRESETS
+from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 
-SEEING = [name for name in PRESETS if name != "appearance"]  # the others need no descriptors
+SEEING = [name for name in PRESETS if name not in NEED_DESCRIPTORS]
 BARREL = [-0.37, 0.15, 0.0, 0.0, 0.0]
 WEBCAM = [0.115, -0.219, 0.0012, 0.0086, 0.113]
 WILD = [np.nan, np.inf, -np.inf, 1e4, -1e6, 1e6, 1e12, 1e300, -1.7e308]

@@ -84,6 +84,14 @@ class TestBadInput:
         result = simharness("run", QUICKSTART, *TINY, "--set", 'method.variants=["best"]')
         assert_refused(result, "method.variants", "'best'", "full")
 
+    def test_variants_that_have_nothing_to_go_by(self, simharness):
+        assert_refused(
+            simharness("run", QUICKSTART, *TINY, "--set", 'method.variants=["appearance"]'), "appearance", "descriptors"
+        )
+        assert_refused(
+            simharness("evaluate", "shelf", "nowhere", "--method", "appearance"), "appearance", "descriptors"
+        )
+
     def test_out_that_cannot_be_a_folder(self, simharness, tmp_path):
         (tmp_path / "file").touch()
         assert_refused(simharness("run", QUICKSTART, *TINY, "--out", "file/deep"), "--out", "file")
