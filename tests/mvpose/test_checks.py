@@ -1,0 +1,25 @@
+import numpy as np
+import pytest
+
+from mvpose.checks import as_array, seal
+
+
+def test_what_is_sealed_is_taken_as_it_is_and_nothing_else():
+    fresh = np.zeros((2, 3))
+    assert as_array(fresh, ("n", 3), "x") is not fresh
+    seal(fresh)
+    assert as_array(fresh, ("n", 3), "x") is fresh
+    assert as_array(fresh, ("n", 3), "x", np.int64).dtype == np.int64
+    with pytest.raises(ValueError, match=r"x must be \(n, 4\), got \(2, 3\)"):
+        as_array(fresh, ("n", 4), "x")
+
+
+def test_a_read_only_view_of_what_others_write_to_is_copied():
+    mine = np.zeros(3)
+    view = mine.view()
+    seal(view)
+    kept = as_array(view, ("n",), "x")
+    mine[0] = 1.0
+    assert kept[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        kept[0] = 2.0
