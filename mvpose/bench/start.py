@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import statistics
 import tempfile
 import time
@@ -35,31 +34,26 @@ def measure(*, quick: bool = False) -> list[Start]:
         report(code)  # brings files into memory
         seconds = statistics.median(report(code) for _ in range(1 if quick else 7))
         starts.append(Start(statement, seconds, IMPORT_TARGET if "mvpose" in statement else None))
-    with tempfile.TemporaryDirectory() as cache:
-        for when, target in (("first call after install", COMPILE_TARGET), ("first call later", None)):
-            code = f"from mvpose.bench.start import in_process; in_process({PRESETS!r})"
-            begin = time.perf_counter()
-            seconds_of = report(code, environment={"NUMBA_CACHE_DIR": cache})
-            whole = time.perf_counter() - begin
-            starts += [Start(f"{when}: {preset}", seconds_of[preset]) for preset in PRESETS]
-            starts.append(Start(f"{when}: the whole process", whole, target))
+    for preset in PRESETS:
+        with tempfile.TemporaryDirectory() as cache:
+            for when, target in (("first call after install", COMPILE_TARGET), ("first call later", None)):
+                code = f"from mvpose.bench.start import in_process; in_process({preset!r})"
+                seconds = report(code, environment={"NUMBA_CACHE_DIR": cache})
+                starts.append(Start(f"{when}: {preset}", seconds, target))
     return starts
 
 
-def in_process(presets: tuple[str, ...]) -> None:
-    """Print the seconds of each preset's first frames, in turn; for a process of its own.
+def in_process(preset: str) -> None:
+    """Print the seconds of a preset's first frames, for a process of its own.
 
     The frames are hard ones, and several, so that no kernel is left to be compiled later.
     """
     scenes = frames(5, 4, 5, conditions=HARD)
-    seconds = {}
-    for preset in presets:
-        begin = time.perf_counter()
-        pipeline = Pipeline.preset(preset)
-        for scene in scenes:
-            pipeline.estimate(scene.rig, scene.detections)
-        seconds[preset] = time.perf_counter() - begin
-    print(json.dumps(seconds))
+    begin = time.perf_counter()
+    pipeline = Pipeline.preset(preset)
+    for scene in scenes:
+        pipeline.estimate(scene.rig, scene.detections)
+    print(time.perf_counter() - begin)
 
 
 def table_of(starts: list[Start]) -> str:
@@ -68,6 +62,5 @@ def table_of(starts: list[Start]) -> str:
     for start in starts:
         rows.append([start.what, figure(start.seconds), *against(start.seconds, start.target)])
     return table(rows, "<>^>", rules=(0, len(IMPORTS))) + caption(
-        "First calls: five hard 5×4 frames by fast, then by full, which compiles only what fast has not. The whole "
-        "process counts Python's start and the imports."
+        "First calls: five hard 5×4 frames, in a process of their own and with a cache of their own, empty or not."
     )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.checks import as_array
 from mvpose.estimate import Matching
 from mvpose.matching import admm
-from mvpose.matching.clustering import cluster
+from mvpose.matching.clustering import cluster, contract
 from mvpose.matching.pairwise import assign
 from mvpose.matching.rounding import number_people, read_only, round_to_people
 
@@ -46,7 +46,7 @@ class Matcher:
             return self._matching(round_to_people(matched, view, threshold=self.alpha), affinity)
         order = np.argsort(view, kind="stable")
         back = np.argsort(order, kind="stable")
-        parts = cluster(affinity, view, alpha=self.alpha)
+        parts = contract(affinity, view, alpha=self.alpha)
         relaxed = admm.solve(affinity[order[:, None], order], view[order], parts=parts[order], alpha=self.alpha)
         P = relaxed.P[back[:, None], back]
         return self._matching(

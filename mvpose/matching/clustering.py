@@ -47,6 +47,13 @@ def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: fl
     return part
 
 
+def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.int64]:
+    """Partition the detections by greedy contraction alone: what :func:`cluster` starts from; see there."""
+    affinity, alpha = read_only(affinity, np.float64), float(alpha)
+    rank, _ = rank_views(read_only(view, np.int64))
+    return _contract(_pair_gains(affinity, alpha, rank))
+
+
 @njit(cache=True)
 def _pair_gains(affinity, alpha, rank):  # type: ignore[no-untyped-def]
     m = len(rank)
