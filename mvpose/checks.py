@@ -48,15 +48,15 @@ def seal(*arrays: NDArray) -> None:
 
 def _sealed(value: ArrayLike, shape: tuple[int | str, ...], dtype: type[np.generic]) -> bool:
     """Whether the value is already what :func:`as_array` makes of it, and shares memory with no other array."""
-    return (
-        type(value) is np.ndarray
-        and not value.flags.writeable
-        and not isinstance(value.base, np.ndarray)
-        and value.dtype == dtype
-        and value.flags.c_contiguous
-        and value.ndim == len(shape)
-        and all(isinstance(wanted, str) or got == wanted for wanted, got in zip(shape, value.shape, strict=True))
-    )
+    if type(value) is not np.ndarray or value.dtype != dtype or isinstance(value.base, np.ndarray):
+        return False
+    flags = value.flags
+    if flags.writeable or not flags.c_contiguous or value.ndim != len(shape):
+        return False
+    for wanted, got in zip(shape, value.shape, strict=True):
+        if wanted != got and not isinstance(wanted, str):
+            return False
+    return True
 
 
 def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:

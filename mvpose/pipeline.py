@@ -95,9 +95,9 @@ class Pipeline:
         start = time.perf_counter()
         rays = viewing_rays(rig, detections)
         affinity = self.affinity(rig, detections, rays)
-        repeated = ~self.duplicates(detections)
-        if repeated.any():
-            affinity[repeated] = affinity[:, repeated] = 0.0
+        kept = self.duplicates(detections)
+        if not kept.all():
+            affinity[~kept] = affinity[:, ~kept] = 0.0
         compared = time.perf_counter()
         matching = self.matching(affinity, detections.view)
         matched = time.perf_counter()

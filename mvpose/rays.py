@@ -128,12 +128,15 @@ def _viewing_rays(cameras, view, keypoints, scores):  # type: ignore[no-untyped-
         for r in range(3):
             origins[d, r] = camera[14 + r]
         pixel[d] = 1.0 / np.sqrt(fx * fy)
+        bent = False
+        for k in range(len(lens)):
+            bent = bent or lens[k] != 0.0
         for j in range(joints):
             if not scores[d, j] > 0.0:
                 continue
             v = (keypoints[d, j, 1] - cy) / fy
             u = (keypoints[d, j, 0] - cx - skew * v) / fx
-            x, y = undistort(u, v, lens)
+            x, y = undistort(u, v, lens) if bent else (u, v)
             if not abs(x) + abs(y) < 1e6:  # also false of NaN: across the line of sight, not on the image plane
                 continue
             scale = 1.0 / np.sqrt(x * x + y * y + 1.0)

@@ -64,6 +64,9 @@ class Skeleton:
     def __len__(self) -> int:
         return len(self.joints)
 
+    def __hash__(self) -> int:
+        return hash(self.name)  # what depends on a skeleton alone is cached by it, and asked for in every frame
+
     @property
     def edges(self) -> tuple[tuple[int, int], ...]:
         """The bones of the tree as (parent, child), J - 1 of them."""

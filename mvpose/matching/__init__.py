@@ -59,7 +59,7 @@ class Matcher:
         )
 
     def _matching(self, labels: NDArray[np.int64], affinity: NDArray[np.float64], **solver: Any) -> Matching:
-        return Matching(labels=labels, objective=objective(labels, affinity, alpha=self.alpha), **solver)
+        return Matching(labels=labels, objective=_objective(labels, affinity, float(self.alpha)), **solver)
 
 
 def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alpha: float = 0.5) -> Matching:

@@ -13,11 +13,13 @@ weights (n, K), 0 where a view has no such mode, and the angle of a pixel (n,).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.checks import seal
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -45,7 +47,14 @@ class Noise:
 
     def sigmas(self, skeleton: Skeleton) -> Floats:
         """Standard deviation of every joint across the ray, (J,), metres."""
-        return np.sqrt(0.25 * self.area**2 * skeleton.variances + self.definition**2)
+        return _sigmas(self.area, self.definition, skeleton)
+
+
+@cache
+def _sigmas(area: float, definition: float, skeleton: Skeleton) -> Floats:
+    sigmas = np.hypot(area * np.array(skeleton.sigmas), definition)
+    seal(sigmas)
+    return sigmas
 
 
 @njit(cache=True, fastmath=_FASTMATH)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import STATURE_DEVIATION, bones
 from mvpose.reconstruction.likelihood import Noise
-from mvpose.reconstruction.poses import Poses, gather
+from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import climb, judge, leaves_first, tree
 from mvpose.reconstruction.sampling import rescore
@@ -58,7 +58,7 @@ class PictorialStructure:
         length, definition = bones(skeleton)
         modes = rays.modes
         maps = None if modes is None else (modes.values, modes.grid, modes.cameras)
-        poses = Poses.missing(int(labels.max(initial=-1)) + 1, len(skeleton))
+        poses = Poses.empty(labels, len(skeleton))
         _structures(
             poses,
             labels,
@@ -112,7 +112,8 @@ def _structures(  # type: ignore[no-untyped-def]
     parents, order, neighbours, bones, length, definition, stature, most_pairs, most_states,
 ):  # fmt: skip
     for person in range(len(poses.joints)):
-        joints = poses.joints[person]
+        joints, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
+        clear(joints, scores, covariance)
         mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
         states, unary, count, scatter = propose_all(
             mine, towards, weight, angle, sigmas, floor, most_pairs, most_states
@@ -135,7 +136,7 @@ def _structures(  # type: ignore[no-untyped-def]
             parents, order, neighbours, bones, own_length, precision,
         )  # fmt: skip
         judge(
-            poses.scores[person], poses.covariance[person], joints, mine, towards, weight, angle, own, floor,
+            scores, covariance, joints, mine, towards, weight, angle, own, floor,
             parents, order, neighbours, bones, own_length, precision,
         )  # fmt: skip
 

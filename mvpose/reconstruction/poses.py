@@ -30,13 +30,21 @@ class Poses(NamedTuple):
     covariance: Floats
 
     @classmethod
-    def missing(cls, people: int, joints: int) -> Poses:
-        """People of whom nothing is placed yet."""
-        return cls(
-            np.full((people, joints, 3), np.nan),
-            np.zeros((people, joints)),
-            np.full((people, joints, 3, 3), np.nan),
-        )
+    def empty(cls, labels: NDArray[np.int64], joints: int) -> Poses:
+        """Room for the people that labels (m,) name, all of it still to be written."""
+        people = int(labels.max()) + 1 if len(labels) else 0
+        return cls(np.empty((people, joints, 3)), np.empty((people, joints)), np.empty((people, joints, 3, 3)))
+
+
+@njit(cache=True)
+def clear(joints, scores, covariance):  # type: ignore[no-untyped-def]
+    """Mark all joints of one person as missing."""
+    for j in range(len(scores)):
+        scores[j] = 0.0
+        for r in range(3):
+            joints[j, r] = np.nan
+            for c in range(3):
+                covariance[j, r, c] = np.nan
 
 
 @njit(cache=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mvpose.rays import Rays
 from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, look, solve, tie
-from mvpose.reconstruction.poses import NOBODY, Poses, gather
+from mvpose.reconstruction.poses import NOBODY, Poses, clear, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
@@ -51,7 +51,7 @@ class Triangulation:
 
     def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
         """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
-        poses = Poses.missing(int(labels.max(initial=-1)) + 1, len(skeleton))
+        poses = Poses.empty(labels, len(skeleton))
         _triangulate(
             poses,
             labels,
@@ -75,7 +75,9 @@ def _triangulate(  # type: ignore[no-untyped-def]
     scratch = np.empty((8, 3))
     for person in range(len(poses.joints)):
         mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
-        point, covariance, own, steps = poses.joints[person], poses.covariance[person], 1.0, 0
+        point, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
+        clear(point, scores, covariance)
+        own, steps = 1.0, 0
         for j in range(joints):
             rights[j] = misfit[j] = 0.0
             view = mine, towards[j], weight[j], angle, sigmas[j], floor
@@ -92,7 +94,7 @@ def _triangulate(  # type: ignore[no-untyped-def]
             if not np.isnan(point[j, 0]):
                 view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
                 support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
-            _note(point[j], support / len(angle), scratch, j, poses.scores[person], covariance)
+            _note(point[j], support / len(angle), scratch, j, scores, covariance)
         scale = joint_scales(misfit, rights)
         for j in range(joints):
             for r in range(3):
