@@ -102,6 +102,24 @@ def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_th
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
 
 
+def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():
+    """The forearm points away from the one camera that sees the wrist: the nearer depth is the wrong one."""
+    rig, body = ring(4), STANDING.copy()
+    away = (body[7] - rig.centers[0]) / np.linalg.norm(body[7] - rig.centers[0])
+    across = np.cross(away, [0.0, 0.0, 1.0])
+    body[9] = body[7] + 0.25 * (0.9 * away + np.sqrt(1 - 0.9**2) * across)
+    scores = np.full((4, 17), 0.9)
+    scores[1:, 9] = 0
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(body), scores))
+    joints, _, covariance = reconstruct(rays)
+    off = joints[9] - body[9]
+    assert np.linalg.norm(off) > 0.3
+    assert off @ np.linalg.solve(covariance[9], off) < 6.25
+    known = joints[7] - body[7]
+    assert np.trace(covariance[9]) > 10 * np.trace(covariance[7])  # and the elbow's is its own
+    assert np.linalg.norm(known) < 0.03
+
+
 def log_posterior(joints, rays):
     """Likelihood times prior of a whole pose, written out from the docstrings."""
     noise, (length, deviation) = Noise(), bone_lengths(COCO17)
