@@ -65,8 +65,8 @@ class Rays:
     def __len__(self) -> int:
         return len(self.view)
 
-    def select(self, which: NDArray[np.bool_]) -> Rays:
-        """Keep only some of the detections, (m,)."""
+    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Rays:
+        """Some of the detections: a mask (m,), or their indices in a new order."""
         modes = self.modes and Modes(*(getattr(self.modes, field.name)[which] for field in fields(self.modes)))
         return Rays(
             self.view[which],

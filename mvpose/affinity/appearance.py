@@ -13,6 +13,7 @@ from mvpose.affinity.base import FASTMATH, Floats, falling
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays
+from mvpose.threads import one_thread
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,8 @@ def cosines(detections: Detections) -> tuple[NDArray[np.float32], NDArray[np.boo
     if descriptors is None:
         descriptors = np.zeros((len(detections), 0))
     unit, described = _unit(descriptors)
-    return unit @ unit.T, described
+    with one_thread():
+        return unit @ unit.T, described
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")

@@ -22,14 +22,13 @@ from any start.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from mvpose.matching.projection import block_starts, project_block
+from mvpose.threads import one_thread
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +105,7 @@ def solve(
     P = (parts[:, None] == parts).astype(np.float64)
     edges = np.maximum(gain, 0.0)
     S = np.diag((_WITHIN * P * edges).sum(axis=1)) - np.where(P > 0, _WITHIN, _BETWEEN) * edges
-    with _threads().limit(limits=1):  # the matrices are small: threads would only fight over them
+    with one_thread():
         iterations, primal, dual = _iterate(P, S, gain, starts, weight, rho, tolerance, most_iterations)
     P, S = (np.triu(upper) + np.triu(upper, k=1).T for upper in (P, S))
     converged = primal < tolerance and dual < tolerance
@@ -166,13 +165,6 @@ def _threshold(Z: Floats, gap: float) -> tuple[Floats, int]:
     values, vectors = np.linalg.eigh(Z, UPLO="U")
     shrunk = np.maximum(values, 0.0) + np.minimum(values + gap, 0.0)
     return (vectors * shrunk) @ vectors.T, int((values > 0.0).sum())
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    from scipy.linalg import lapack  # noqa: F401 - the controller sees only libraries that are loaded
-
-    return ThreadpoolController()
 
 
 @njit(cache=True, error_model="numpy")

@@ -60,10 +60,6 @@ class Bones(NamedTuple):
     length: Floats
     definition: Floats
 
-    def deviation(self, *, stature: float = STATURE_DEVIATION) -> Floats:
-        """Deviation of the length, (J,), metres, where stature itself deviates by this share; infinite: no prior."""
-        return np.hypot(np.hypot(stature, PROPORTION_DEVIATION) * self.length, self.definition)
-
 
 @cache
 def bones(skeleton: Skeleton) -> Bones:
@@ -85,4 +81,5 @@ def bone_lengths(skeleton: Skeleton) -> tuple[Floats, Floats]:
         Means (J,) and deviations (J,), metres. A bone without a published length, and the root, has an infinite
         deviation: it constrains nothing.
     """
-    return bones(skeleton).length, bones(skeleton).deviation()
+    length, definition = bones(skeleton)
+    return length, np.hypot(np.hypot(STATURE_DEVIATION, PROPORTION_DEVIATION) * length, definition)

@@ -1,9 +1,10 @@
 """How well a point in space explains what the views saw: the likelihood term of the paper's section 3.3.
 
-Each view that detected a joint says ``p(I_v | X) = floor + score * exp(-e^2 / (2 sigma^2))``, where e is the
-distance in metres from X to the viewing ray. The floor models a keypoint that is simply wrong; without it one bad
-view would veto the truth. sigma is the scatter of a detector across the body, in metres and so the same for every
-rig, with the angle of a pixel added: far away, pixels are what limits it. Where a view offers several keypoints for
+Each view that detected a joint says ``p(I_v | X) = floor + score * exp(-score^2 e^2 / (2 sigma^2))``, where e is the
+distance in metres from X to the viewing ray: a keypoint of half the score scatters twice as far, as the rows of a
+score-weighted DLT have it. The floor models a keypoint that is simply wrong; without it one bad view would veto the
+truth. sigma is the scatter of a sure detector across the body, in metres and so the same for every rig, with the angle
+of a pixel added: far away, pixels are what limits it. Where a view offers several keypoints for
 one joint (the modes of a heat map), the best of them counts (a max-mixture: Olson & Agarwal, IJRR 2013).
 
 The kernels work on one joint of one person in n views with K modes each: origins (n, 3), directions (n, K, 3),
@@ -46,7 +47,7 @@ class Noise:
     floor: float = 0.01
 
     def sigmas(self, skeleton: Skeleton) -> Floats:
-        """Standard deviation of every joint across the ray, (J,), metres."""
+        """Standard deviation of every joint of score 1 across the ray, (J,), metres."""
         return _sigmas(self.area, self.definition, skeleton)
 
 

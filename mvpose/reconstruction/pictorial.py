@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.bones import STATURE_DEVIATION, bones
+from mvpose.reconstruction.bones import bones
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
-from mvpose.reconstruction.refinement import climb, judge, leaves_first, tree
+from mvpose.reconstruction.refinement import climb, judge, tree
 from mvpose.reconstruction.sampling import rescore
 from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
@@ -72,44 +72,17 @@ class PictorialStructure:
             *tree(skeleton),
             length,
             definition,
-            STATURE_DEVIATION if self.personal else 0.0,
+            self.personal,
             self.most_pairs,
             self.most_states,
         )
         return poses
 
 
-def max_product(
-    states: Floats,
-    unary: Floats,
-    count: NDArray[np.int64],
-    *,
-    parents: ArrayLike,
-    length: Floats,
-    deviation: Floats,
-) -> NDArray[np.int64]:
-    """The combination of states with the greatest sum of unaries and log-Gaussian bone lengths.
-
-    Args:
-        states: candidate positions, (J, S, 3), metres.
-        unary: their log-likelihoods, (J, S).
-        count: how many of the S are valid for each joint, (J,). A joint without any is passed over: its neighbours
-            are not constrained by it.
-        parents: the tree, (J,), -1 for the root.
-        length: mean bone length to the parent, (J,), metres.
-        deviation: its deviation, (J,), metres; infinite for no constraint.
-
-    Returns:
-        Index of the chosen state of every joint, (J,); 0 for a joint without states.
-    """
-    parents = np.asarray(parents, np.int64)
-    return _max_product(states, unary, count, parents, leaves_first(parents), length, 1.0 / deviation**2)
-
-
 @njit(cache=True)
 def _structures(  # type: ignore[no-untyped-def]
     poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
-    parents, order, neighbours, bones, length, definition, stature, most_pairs, most_states,
+    parents, order, neighbours, bones, length, definition, personal, most_pairs, most_states,
 ):  # fmt: skip
     for person in range(len(poses.joints)):
         joints, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
@@ -120,11 +93,11 @@ def _structures(  # type: ignore[no-untyped-def]
         )
         if maps is not None:
             rescore(states, unary, count, labels, person, weight, maps, floor)
-        own_length, precision = personal_prior(states, count, weight, sigmas, parents, length, definition, stature)
+        own_length, precision = personal_prior(states, count, weight, sigmas, parents, length, definition, personal)
         propose_single_views(
             states, unary, count, mine, towards, weight, floor, neighbours, bones, own_length, precision
         )
-        chosen = _max_product(states, unary, count, parents, order, own_length, precision)
+        chosen = max_product(states, unary, count, parents, order, own_length, precision)
         own = np.empty(len(sigmas))
         for j in range(len(sigmas)):
             own[j] = scatter * sigmas[j]
@@ -142,7 +115,22 @@ def _structures(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _max_product(states, unary, count, parents, order, length, precision):  # type: ignore[no-untyped-def]
+def max_product(states, unary, count, parents, order, length, precision):  # type: ignore[no-untyped-def]
+    """The combination of states with the greatest sum of unaries and log-Gaussian bone lengths.
+
+    Args:
+        states: candidate positions, (J, S, 3), metres.
+        unary: their log-likelihoods, (J, S).
+        count: how many of the S are valid for each joint, (J,). A joint without any is passed over: its neighbours
+            are not constrained by it.
+        parents: the tree, (J,), -1 for the root.
+        order: its joints, leaves first, (J,).
+        length: mean bone length to the parent, (J,), metres.
+        precision: inverse variance of the length, (J,), 1/m^2; 0 for no constraint.
+
+    Returns:
+        Index of the chosen state of every joint, (J,); 0 for a joint without states.
+    """
     joints = len(parents)
     belief = np.empty(unary.shape)
     choice = np.zeros(unary.shape, np.int64)  # best state of a joint for each state of its parent

@@ -50,15 +50,7 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
                 break
             point = points[best]
             value = log_likelihood(point, origins, directions[j], weights[j], pixel, sigmas[j], floor)
-            place = count[j]  # the likeliest first
-            while place > 0 and unary[j, place - 1] < value:
-                unary[j, place] = unary[j, place - 1]
-                for r in range(3):
-                    states[j, place, r] = states[j, place - 1, r]
-                place -= 1
-            unary[j, place] = value
-            for r in range(3):
-                states[j, place, r] = point[r]
+            insert(states[j], unary[j], count[j], value, point[0], point[1], point[2])
             count[j] += 1
             # What is this near adds nothing.
             for s in range(found):
@@ -66,6 +58,19 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
                 if x * x + y * y + z * z <= _SAME * sigmas[j] * sigmas[j]:
                     quality[s] = -1.0
     return states, unary, count, np.sqrt(person_scale(misfit, rights))
+
+
+@njit(cache=True)
+def insert(states, unary, count, value, x, y, z):  # type: ignore[no-untyped-def]
+    """Put a point among the ``count`` states (S, 3) of a joint, the likeliest first."""
+    place = count
+    while place > 0 and unary[place - 1] < value:
+        unary[place] = unary[place - 1]
+        for r in range(3):
+            states[place, r] = states[place - 1, r]
+        place -= 1
+    unary[place] = value
+    states[place, 0], states[place, 1], states[place, 2] = x, y, z
 
 
 @njit(cache=True)

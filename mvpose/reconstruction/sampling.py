@@ -11,6 +11,7 @@ from numba import njit
 
 from mvpose.heatmaps import height
 from mvpose.lens import distort
+from mvpose.reconstruction.proposals import insert
 
 
 @njit(cache=True)
@@ -39,14 +40,7 @@ def rescore(states, unary, count, labels, person, weights, maps, floor):  # type
                     if weights[j, v, 0] > 0.0:
                         total += np.log(floor + _look_up(x, y, z, d, j, values, grid[d], cameras[d]))
                     v += 1
-            place = s
-            while place > 0 and unary[j, place - 1] < total:
-                unary[j, place] = unary[j, place - 1]
-                for r in range(3):
-                    states[j, place, r] = states[j, place - 1, r]
-                place -= 1
-            unary[j, place] = total
-            states[j, place, 0], states[j, place, 1], states[j, place, 2] = x, y, z
+            insert(states[j], unary[j], s, total, x, y, z)
 
 
 @njit(cache=True)

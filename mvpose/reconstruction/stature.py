@@ -13,7 +13,7 @@ _ROUNDS = 3
 
 @njit(cache=True)
 def personal_prior(  # type: ignore[no-untyped-def]
-    states, count, weights, sigmas, parents, length, definition, stature
+    states, count, weights, sigmas, parents, length, definition, personal
 ):
     """Mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, of one person.
 
@@ -29,18 +29,18 @@ def personal_prior(  # type: ignore[no-untyped-def]
         parents: the tree, (J,).
         length: of the population, (J,), metres.
         definition: deviation of what is called the joint, (J,), metres; infinite for no prior.
-        stature: deviation of the stature in the population, as a share; 0 for the population's prior as it is.
+        personal: whether to scale; if not, this is the population's prior.
     """
     joints, n, _ = weights.shape
     scale, doubt = 1.0, STATURE_DEVIATION
-    if stature > 0.0:
+    if personal:
         views = np.zeros(joints)
         for j in range(joints):
             if count[j] > 0:
                 for v in range(n):
                     views[j] += weights[j, v, 0] > 0.0
         for _ in range(_ROUNDS):
-            top, mass = 1.0 / stature**2, 1.0 / stature**2
+            top, mass = 1.0 / STATURE_DEVIATION**2, 1.0 / STATURE_DEVIATION**2
             for j in range(joints):
                 parent = parents[j]
                 if parent < 0 or length[j] == 0.0 or views[j] < 2 or views[parent] < 2:

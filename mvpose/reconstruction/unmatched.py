@@ -72,9 +72,7 @@ class UnmatchedPictorialStructure:
             one of a view.
         """
         order = np.argsort(rays.view, kind="stable")
-        by_view = Rays(
-            rays.view[order], rays.origins[order], rays.directions[order], rays.weights[order], rays.pixel[order]
-        )
+        by_view = rays.select(order)
         found = self._find(by_view, skeleton)
         labels = np.empty(len(rays), np.int64)
         labels[order] = _label(found, by_view.view)

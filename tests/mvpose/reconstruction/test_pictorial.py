@@ -12,7 +12,7 @@ from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bones import PROPORTION_DEVIATION, bone_lengths
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
-from mvpose.reconstruction.refinement import _marginalize, climb, refine, tree
+from mvpose.reconstruction.refinement import _marginalize, climb, leaves_first, refine, tree
 
 
 def reconstruct(rays, method=None):
@@ -44,7 +44,7 @@ def test_max_product_is_the_best_of_all_combinations(seed):
     states, unary = rng.standard_normal((joints, most, 3)), 3 * rng.standard_normal((joints, most))
     length, deviation = rng.uniform(0.5, 2, joints), rng.choice([0.2, 0.5, np.inf], joints)
     problem = (parents, length, deviation, count)
-    chosen = max_product(states, unary, count, parents=parents, length=length, deviation=deviation)
+    chosen = max_product(states, unary, count, parents, leaves_first(parents), length, 1 / deviation**2)
     best = max(
         total(states, unary, choice, *problem) for choice in itertools.product(*(range(max(c, 1)) for c in count))
     )
