@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import bone_lengths
 from mvpose.reconstruction.likelihood import Noise
+from mvpose.reconstruction.triangulation import pair_point
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -81,16 +82,13 @@ def hypothesize(
 
 
 def _sights(rays: Rays, joint: int, seen: Integers, noise: Noise) -> Floats:
-    """The rays of one joint, a row each: origin, direction, score over floor, pixel angle squared, and a bound.
+    """The rays of one joint, a row each: origin, direction, score, score over floor, pixel angle squared, and a bound.
 
     At more than that many variances, squared distance from the ray, the keypoint does not vouch.
     """
-    odds = rays.weights[seen, joint] / noise.floor
-    pixel = (noise.pixels * rays.pixel[seen]) ** 2
-    return np.column_stack([rays.origins[seen], rays.directions[seen, joint], odds, pixel, 2 * np.log(odds)])
-
-
-_LEAST_SINE2 = 1e-10  # of the angle between two rays, squared; below, they are parallel
+    score = rays.weights[seen, joint]
+    odds, pixel = score / noise.floor, (noise.pixels * rays.pixel[seen]) ** 2
+    return np.column_stack([rays.origins[seen], rays.directions[seen, joint], score, odds, pixel, 2 * np.log(odds)])
 
 
 def _propose(view: Integers, sights: Floats, sigma: float, agreement: float, most: int) -> Floats:
@@ -107,27 +105,16 @@ def _meetings(view, sights, sigma, agreement):  # type: ignore[no-untyped-def]
     ends = np.empty((len(points), 2), np.int64)
     pairs = 0
     for a in range(n):
-        ux, uy, uz = sights[a, 3], sights[a, 4], sights[a, 5]
         for b in range(a + 1, n):
-            if view[a] == view[b]:
+            if view[a] == view[b] or not pair_point(
+                sights[a, :3], sights[a, 3:6], sights[a, 6], sights[b, :3], sights[b, 3:6], sights[b, 6], points[pairs]
+            ):
                 continue
-            vx, vy, vz = sights[b, 3], sights[b, 4], sights[b, 5]
-            wx, wy, wz = sights[b, 0] - sights[a, 0], sights[b, 1] - sights[a, 1], sights[b, 2] - sights[a, 2]
-            cosine = ux * vx + uy * vy + uz * vz
-            sine2 = 1.0 - cosine * cosine
-            along_u, along_v = wx * ux + wy * uy + wz * uz, wx * vx + wy * vy + wz * vz
-            s, t = along_u - along_v * cosine, along_u * cosine - along_v  # both times sine2
-            if sine2 < _LEAST_SINE2 or s <= 0.0 or t <= 0.0:
+            # Across both rays the errors add up to what parts them.
+            near, far = _across(points, pairs, sights, a, sigma), _across(points, pairs, sights, b, sigma)
+            gap = np.sqrt(near[0]) + np.sqrt(far[0])
+            if gap * gap > agreement * agreement * (near[1] + far[1]):
                 continue
-            s, t = s / sine2, t / sine2
-            gx, gy, gz = wx + t * vx - s * ux, wy + t * vy - s * uy, wz + t * vz - s * uz
-            near, far = sigma * sigma + sights[a, 7] * s * s, sigma * sigma + sights[b, 7] * t * t
-            if gx * gx + gy * gy + gz * gz > agreement * agreement * (near + far):
-                continue
-            share = near / (near + far)
-            points[pairs, 0] = sights[a, 0] + s * ux + share * gx
-            points[pairs, 1] = sights[a, 1] + s * uy + share * gy
-            points[pairs, 2] = sights[a, 2] + s * uz + share * gz
             ends[pairs, 0], ends[pairs, 1] = a, b
             total, best = 0.0, 0.0
             for k in range(n):
@@ -162,12 +149,19 @@ def _distinct(points, ends, order, rays, sigma, most):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def _odds(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
-    """How many times likelier a keypoint is with the joint at the point than without; 0 where it does not vouch."""
+def _across(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
+    """Squared distance of a point from a ray and its variance, m^2, and how far along the ray the point is, metres."""
     x, y, z = points[s, 0] - sights[k, 0], points[s, 1] - sights[k, 1], points[s, 2] - sights[k, 2]
     along = x * sights[k, 3] + y * sights[k, 4] + z * sights[k, 5]
-    e2, variance = x * x + y * y + z * z - along * along, sigma * sigma + sights[k, 7] * along * along
-    return sights[k, 6] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < sights[k, 8] * variance else 0.0
+    variance = (sigma * sigma + sights[k, 8] * along * along) / (sights[k, 6] * sights[k, 6])
+    return max(x * x + y * y + z * z - along * along, 0.0), variance, along
+
+
+@njit(cache=True)
+def _odds(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
+    """How many times likelier a keypoint is with the joint at the point than without; 0 where it does not vouch."""
+    e2, variance, along = _across(points, s, sights, k, sigma)
+    return sights[k, 7] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < sights[k, 9] * variance else 0.0
 
 
 @njit(cache=True)
