@@ -82,6 +82,46 @@ def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):  #
     return total + np.log(product)
 
 
+NO_RAYS = (0.0,) * 9
+"""What :func:`add_ray` starts from."""
+
+
+@njit(cache=True, fastmath=_FASTMATH)
+def add_ray(sums, weight, direction, origin):  # type: ignore[no-untyped-def]
+    """Add ``weight * (I - d dᵀ)`` and its product with the origin to normal equations held in nine numbers.
+
+    They stay in registers, where matrices would go through memory: the upper triangle by rows, then the right side.
+    """
+    a00, a01, a02, a11, a12, a22, b0, b1, b2 = sums
+    dx, dy, dz = direction[0], direction[1], direction[2]
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    wx, wy, wz, ahead = weight * dx, weight * dy, weight * dz, dx * ox + dy * oy + dz * oz
+    return (
+        a00 + weight - wx * dx,
+        a01 - wx * dy,
+        a02 - wx * dz,
+        a11 + weight - wy * dy,
+        a12 - wy * dz,
+        a22 + weight - wz * dz,
+        b0 + weight * ox - wx * ahead,
+        b1 + weight * oy - wy * ahead,
+        b2 + weight * oz - wz * ahead,
+    )
+
+
+@njit(cache=True)
+def add_sums(sums, A, b):  # type: ignore[no-untyped-def]
+    """Add what :func:`add_ray` has gathered to A (3, 3) and b (3,)."""
+    k = 0
+    for r in range(3):
+        b[r] += sums[6 + r]
+        for c in range(r, 3):
+            A[r, c] += sums[k]
+            if c > r:
+                A[c, r] += sums[k]
+            k += 1
+
+
 @njit(cache=True, fastmath=_FASTMATH)
 def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):  # type: ignore[no-untyped-def]
     """Add what the views say of a joint near the point to its normal equations A (3, 3) and b (3,).
@@ -93,11 +133,10 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
         Support, the sum of score times responsibility; the sum of responsibilities; and the misfit, the sum of
         responsibility times squared error over variance.
     """
-    a00, a01, a02, a11, a12, a22, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    sums = NO_RAYS
     support, rights, misfit, cold = 0.0, 0.0, 0.0, -0.5 / temper
     for v in range(weights.shape[0]):
-        ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
-        x, y, z = point[0] - ox, point[1] - oy, point[2] - oz
+        x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
         best, mode, precision, error = 0.0, -1, 1.0, 0.0
         for k in range(weights.shape[1]):
             if weights[v, k] > 0.0:
@@ -116,31 +155,8 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
         support += weights[v, mode] * right
         rights += right
         misfit += weight * error
-        dx, dy, dz = directions[v, mode, 0], directions[v, mode, 1], directions[v, mode, 2]
-        # weight (I - d dᵀ), and its product with the origin
-        wx, wy, wz = weight * dx, weight * dy, weight * dz
-        a00 += weight - wx * dx
-        a11 += weight - wy * dy
-        a22 += weight - wz * dz
-        a01 -= wx * dy
-        a02 -= wx * dz
-        a12 -= wy * dz
-        ahead = dx * ox + dy * oy + dz * oz
-        b0 += weight * ox - wx * ahead
-        b1 += weight * oy - wy * ahead
-        b2 += weight * oz - wz * ahead
-    A[0, 0] += a00
-    A[1, 1] += a11
-    A[2, 2] += a22
-    A[0, 1] += a01
-    A[1, 0] += a01
-    A[0, 2] += a02
-    A[2, 0] += a02
-    A[1, 2] += a12
-    A[2, 1] += a12
-    b[0] += b0
-    b[1] += b1
-    b[2] += b2
+        sums = add_ray(sums, weight, directions[v, mode], origins[v])
+    add_sums(sums, A, b)
     return support, rights, misfit
 
 

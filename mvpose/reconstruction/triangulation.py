@@ -16,7 +16,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.likelihood import Noise, accumulate, log_likelihood, look, solve, tie
+from mvpose.reconstruction.likelihood import (
+    NO_RAYS,
+    Noise,
+    accumulate,
+    add_ray,
+    add_sums,
+    log_likelihood,
+    look,
+    solve,
+    tie,
+)
 from mvpose.reconstruction.poses import NOBODY, Poses, clear, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
@@ -198,33 +208,20 @@ def settle(point, view, scratch, temper, steps):  # type: ignore[no-untyped-def]
 def _all_views(point, view, scratch):  # type: ignore[no-untyped-def]
     """Write the point nearest to all rays, weighted by score; False where fewer than two views see the joint."""
     origins, directions, weights = view[:3]
-    a00, a01, a02, a11, a12, a22, b0, b1, b2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    views = 0
+    sums, views = NO_RAYS, 0
     for v in range(len(weights)):
         if weights[v, 0] > 0.0:
             views += 1
-            weight = weights[v, 0] ** 2  # in the DLT the rows are weighted by score, and a row is a residual
-            dx, dy, dz = directions[v, 0, 0], directions[v, 0, 1], directions[v, 0, 2]
-            ox, oy, oz = origins[v, 0], origins[v, 1], origins[v, 2]
-            wx, wy, wz = weight * dx, weight * dy, weight * dz
-            a00 += weight - wx * dx
-            a11 += weight - wy * dy
-            a22 += weight - wz * dz
-            a01 -= wx * dy
-            a02 -= wx * dz
-            a12 -= wy * dz
-            ahead = dx * ox + dy * oy + dz * oz
-            b0 += weight * ox - wx * ahead
-            b1 += weight * oy - wy * ahead
-            b2 += weight * oz - wz * ahead
+            # Squared: in the DLT the rows are weighted by score, and a row is a residual.
+            sums = add_ray(sums, weights[v, 0] ** 2, directions[v, 0], origins[v])
     if views < 2:
         return False
     inverse, A, b = scratch[:3], scratch[3:6], scratch[6]
-    A[0, 0], A[1, 1], A[2, 2] = a00, a11, a22
-    A[0, 1] = A[1, 0] = a01
-    A[0, 2] = A[2, 0] = a02
-    A[1, 2] = A[2, 1] = a12
-    b[0], b[1], b[2] = b0, b1, b2
+    for r in range(3):
+        b[r] = 0.0
+        for c in range(3):
+            A[r, c] = 0.0
+    add_sums(sums, A, b)
     return solve(A, b, inverse, point)
 
 
