@@ -79,3 +79,14 @@ def lay_out(directions, weights, order, channels):  # type: ignore[no-untyped-de
             if weights[order[i], j] > 0.0 and x * x + y * y + z * z > 0.5:  # false of NaN
                 pose[i, 0, j], pose[i, 1, j], pose[i, 2, j], pose[i, 3, j] = x, y, z, weights[order[i], j]
     return pose
+
+
+@njit(cache=True, fastmath=FASTMATH)
+def in_common(one, other):  # type: ignore[no-untyped-def]
+    """Sum of the products of two poses' weights, (J,) each, and how many joints both have."""
+    mass, count = 0.0, 0
+    for j in range(len(one)):
+        weight = one[j] * other[j]
+        mass += weight
+        count += weight > 0.0
+    return mass, count

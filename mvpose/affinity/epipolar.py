@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, lay_out
+from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, in_common, lay_out
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays, viewing_rays
@@ -135,12 +135,7 @@ def _compare_lines(  # type: ignore[no-untyped-def]
                 for b in range(start[q], start[q + 1]):
                     if excess[b] > 0.0 and not distances:  # on average beyond the threshold
                         continue
-                    weight_b = lines_b[b, 5]
-                    mass, count = 0.0, 0
-                    for j in range(padded):
-                        weight = wa[j] * weight_b[j]
-                        mass += weight
-                        count += weight > 0.0
+                    mass, count = in_common(wa, lines_b[b, 5])
                     if count < least:
                         continue
                     i, k = order[a], order[b]

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, lay_out
+from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, in_common, lay_out
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays
@@ -126,12 +126,7 @@ def _compare_rays(  # type: ignore[no-untyped-def]
                 for b in range(start[q], start[q + 1]):
                     if excess[b] > 0.0 and not distances:  # on average beyond the threshold
                         continue
-                    weight_b = pose[b, 3]
-                    mass, count = 0.0, 0
-                    for j in range(padded):
-                        weight = weight_a[j] * weight_b[j]
-                        mass += weight
-                        count += weight > 0.0
+                    mass, count = in_common(weight_a, pose[b, 3])
                     if count < least:
                         continue
                     i, k = order[a], order[b]
