@@ -61,7 +61,9 @@ def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, *, 
     curves["lumbar_bending"] = np.degrees(pelvis.list)
     feet = {side: _planted(kinematics, spot, side, len(time)) for side in SIDES}
     angles = pose_angles(len(time), **curves)
-    return stand_on(kinematics, pelvis, feet, angles, guess=dict.fromkeys(SIDES, _AT_EASE), straightest=_AT_EASE[1])
+    return stand_on(
+        kinematics, time, pelvis, feet, angles, guess=dict.fromkeys(SIDES, _AT_EASE), straightest=_AT_EASE[1]
+    )
 
 
 def _planted(kinematics: Kinematics, spot: Spot, side: str, frames: int) -> Foot:

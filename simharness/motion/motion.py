@@ -1,49 +1,53 @@
-"""What a person does over time: the pelvis and the joint angles of every frame."""
+"""What a person does over time: the pelvis and the joint angles, to be read at any moment."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
 from simharness.humans.anatomy import DOFS
+from simharness.motion.trajectory import check_poses, check_times, through, through_poses
 
 Floats = NDArray[np.float64]
-
-_UNIT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The configuration of one person in T frames.
+    """The configuration of one person at T times, and smoothly between them.
 
     Attributes:
+        time: seconds, (T,), ascending.
         root: position of the pelvis in metres and its orientation as a unit quaternion w x y z, (T, 7).
         angles: joint angles in radians, (T, D), in the order of ``simharness.humans.anatomy.DOFS``.
 
     Raises:
-        ValueError: a wrong shape, a value that is not finite, a quaternion that is not of unit length.
+        ValueError: a wrong shape, a value that is not finite, times that do not ascend, a quaternion that is not of
+            unit length.
     """
 
+    time: Floats
     root: Floats
     angles: Floats
 
     def __post_init__(self) -> None:
-        root = as_array(self.root, ("T", 7), "motion root")
-        angles = as_array(self.angles, (len(root), len(DOFS)), "motion angles")
-        if not (np.isfinite(root).all() and np.isfinite(angles).all()):
-            bad = int(np.flatnonzero(~(np.isfinite(root).all(axis=1) & np.isfinite(angles).all(axis=1)))[0])
-            raise ValueError(f"motion root and angles must be finite; frame {bad} is not")
-        off = np.abs(np.linalg.norm(root[:, 3:], axis=1) - 1.0)
-        if (off > _UNIT_TOLERANCE).any():
-            raise ValueError(
-                f"motion root quaternions (w x y z) must have unit length, the one of frame {int(off.argmax())} is "
-                f"off by {off.max():.2g}"
-            )
-        object.__setattr__(self, "root", root)
-        object.__setattr__(self, "angles", angles)
+        time = as_array(self.time, ("T",), "motion time")
+        root = as_array(self.root, (len(time), 7), "motion root")
+        angles = as_array(self.angles, (len(time), len(DOFS)), "motion angles")
+        check_times(time, "motion")
+        check_poses(root, "motion root")
+        if not np.isfinite(angles).all():
+            bad = int(np.flatnonzero(~np.isfinite(angles).all(axis=1))[0])
+            raise ValueError(f"motion angles must be finite; those at index {bad} are not")
+        for key, value in (("time", time), ("root", root), ("angles", angles)):
+            object.__setattr__(self, key, value)
 
     def __len__(self) -> int:
         return len(self.root)
+
+    def at(self, time: ArrayLike) -> Motion:
+        """The same motion sampled at other times (n,); before its first and after its last it stands still."""
+        time = np.asarray(time, float)
+        return Motion(time, through_poses(self.time, self.root, time), through(self.time, self.angles, time))

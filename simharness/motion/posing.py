@@ -70,6 +70,7 @@ def pose_angles(frames: int, **degrees: ArrayLike) -> Floats:
 
 def stand_on(
     kinematics: Kinematics,
+    time: Floats,
     pelvis: Pelvis,
     feet: Mapping[str, Foot],
     angles: Floats,
@@ -81,6 +82,7 @@ def stand_on(
 
     Args:
         kinematics: the body.
+        time: seconds, (T,).
         pelvis: its motion.
         feet: by side.
         angles: of the upper body, (T, D); the legs' columns are overwritten.
@@ -105,7 +107,7 @@ def stand_on(
         solved = kinematics.legs[side].solve(inward @ feet[side].turn, place, start=start)
         angles[:, [DOFS.index(f"{side}_{name}") for name in order]] = solved
     quaternion = Rotation.from_matrix(turn).as_quat(scalar_first=True)
-    return Motion(root=np.concatenate([position, quaternion], axis=1), angles=angles)
+    return Motion(time, root=np.concatenate([position, quaternion], axis=1), angles=angles)
 
 
 def riding_height(

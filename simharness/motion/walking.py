@@ -78,7 +78,7 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
         **{f"{side}_wrist_flexion": 6.0 for side in forward},
     )
     guess = {side: gait.leg(own[side]) for side in SIDES}
-    return stand_on(kinematics, pelvis, feet, angles, guess=guess, straightest=_STRAIGHTEST)
+    return stand_on(kinematics, time, pelvis, feet, angles, guess=guess, straightest=_STRAIGHTEST)
 
 
 def _steps(kinematics: Kinematics, loop: Loop, gait: Gait, side: str, phase: Floats, time: Floats) -> Foot:

@@ -22,7 +22,7 @@ def _lines(section: BaseModel, name: str = "") -> list[str]:
         value = getattr(section, key)
         if isinstance(value, BaseModel):
             nested += ["", *_lines(value, f"{name}.{key}" if name else key)]
-        else:
+        elif value is not None:
             assignment = f"{key} = {_written(value)}"
             lines.append(f"{assignment:<32}# {field.description}" if field.description else assignment)
     return lines + nested

@@ -17,6 +17,7 @@ from pydantic.fields import FieldInfo
 
 from simharness.scenario.models import Scenario
 
+_FILES = (("people", "motion", "file"), ("people", "motion", "skeleton"), ("cameras", "file"))
 _SHOWN = 60  # characters of a refused value that a message repeats
 
 
@@ -39,6 +40,7 @@ def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = 
     """
     path = Path(path)
     data = _read(path)
+    _locate_files(data, path.parent)
     places: dict[tuple[str, ...], str] = {}
     for override in overrides:
         key = _override(data, override)
@@ -56,9 +58,12 @@ def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = 
 
 
 def fingerprint(scenario: Scenario) -> str:
-    """Ten hexadecimal digits that change with any value of the scenario and with the version of the code."""
+    """Ten hexadecimal digits that change with any value of the scenario, its files and the version of the code."""
     resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
-    return hashlib.blake2b(resolved.encode(), digest_size=5).hexdigest()
+    digest = hashlib.blake2b(resolved.encode(), digest_size=5)
+    for file in scenario.files:
+        digest.update(file.read_bytes() if file.is_file() else b"")
+    return digest.hexdigest()
 
 
 def code_version() -> str:
@@ -82,6 +87,16 @@ def _read(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         what, line, column = _toml_place(str(error), text)
         raise ScenarioError(f"{path}, line {line}, column {column}: not valid TOML: {what}") from None
+
+
+def _locate_files(data: dict[str, Any], folder: Path) -> None:
+    """Files that a scenario file names are relative to its folder; what the command line names is not."""
+    for *sections, key in _FILES:
+        section: Any = data
+        for name in sections:
+            section = section.get(name) if isinstance(section, dict) else None
+        if isinstance(section, dict) and isinstance(section.get(key), str) and section[key]:
+            section[key] = str(folder / section[key])
 
 
 def _toml_place(message: str, text: str) -> tuple[str, int, int]:

@@ -5,60 +5,32 @@ Metres and seconds as everywhere; angles are in degrees here, for people write a
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0)]
+from simharness.scenario.cameras import Cameras, Faults, Sensor
+from simharness.scenario.people import People
+from simharness.scenario.room import Clutter, Decoys, Room
+from simharness.scenario.section import Positive, Section, Share
 
-Activity = Literal["walk", "stand", "wave", "point", "talk", "reach"]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Room(_Section):
-    """The room: a floor and four walls around the origin."""
-
-    size: tuple[Positive, Positive, Positive] = Field((8.0, 8.0, 3.0), description="x, y, z in metres")
-
-
-class People(_Section):
-    """Who is in the room and what they do."""
-
-    count: int = Field(4, ge=0, le=100)
-    activities: tuple[Activity, ...] = Field(
-        ("walk", "wave"), min_length=1, description="handed out in turn: person i does activities[i % len]"
-    )
-    area: Positive = Field(2.0, description="half the side of the square about the origin that they stay in, metres")
-    spacing: Positive = Field(0.8, description="least distance between the pelvises of two people, metres")
+__all__ = [
+    "Cameras",
+    "Clutter",
+    "Decoys",
+    "Detector",
+    "Faults",
+    "Method",
+    "People",
+    "Rendering",
+    "Room",
+    "Scenario",
+    "Sensor",
+]
 
 
-class Clutter(_Section):
-    """Things that stand in the way."""
-
-    boxes: int = Field(0, ge=0, le=50)
-    shelves: int = Field(0, ge=0, le=10)
-
-
-class Cameras(_Section):
-    """The rig: cameras on a ring, evenly spaced, all looking at one point."""
-
-    layout: Literal["ring"] = "ring"
-    count: int = Field(5, ge=0, le=64)
-    radius: Positive = Field(3.5, description="metres from the z axis")
-    height: float = Field(2.2, description="metres above the floor")
-    aim: tuple[float, float, float] = Field((0.0, 0.0, 0.9), description="the point that all look at, metres")
-    start: float = Field(0.0, description="bearing of the first camera from the x axis, degrees")
-    fov: Annotated[float, Field(gt=1.0, lt=170.0)] = Field(75.0, description="horizontal field of view, degrees")
-    size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
-        (800, 600), description="width, height in pixels"
-    )
-
-
-class Detector(_Section):
+class Detector(Section):
     """How the simulated 2D detector errs. All zero is a perfect detector of whatever is visible."""
 
     jitter: float = Field(0.35, ge=0.0, description="keypoint noise as a multiple of OKS sigma x sqrt(area)")
@@ -73,23 +45,24 @@ class Detector(_Section):
     box_jitter: float = Field(0.03, ge=0.0, le=0.5, description="box side noise as a share of the box's size")
 
 
-class Method(_Section):
+class Method(Section):
     """Which variants of the method run on the detections."""
 
     variants: tuple[str, ...] = Field(("full", "no-3dps"), min_length=1, description="presets of mvpose.Pipeline")
 
 
-class Rendering(_Section):
+class Rendering(Section):
     """How the views are made."""
 
-    renderer: Literal["auto", "raster", "gl"] = Field(
+    renderer: Literal["auto", "raster", "gl", "rays"] = Field(
         "raster",
-        description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made",
+        description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made; "
+        "rays: no pictures at all, visibility by rays: fast",
     )
     color: bool = Field(True, description="shade every picture; without it there are depth and ids, and no film")
 
 
-class Scenario(_Section):
+class Scenario(Section):
     """A whole scenario file."""
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
@@ -100,7 +73,10 @@ class Scenario(_Section):
     room: Room = Room()
     people: People = People()
     clutter: Clutter = Clutter()
+    decoys: Decoys = Decoys()
     cameras: Cameras = Cameras()
+    faults: Faults = Faults()
+    sensor: Sensor = Sensor()
     detector: Detector = Detector()
     method: Method = Method()
     rendering: Rendering = Rendering()
@@ -109,3 +85,9 @@ class Scenario(_Section):
     def frames(self) -> int:
         """How many frames the duration holds at the rate; at least one."""
         return max(1, round(self.duration * self.rate))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it names: recorded motion and calibration."""
+        named = (self.people.motion.file, self.people.motion.skeleton, self.cameras.file)
+        return tuple(Path(name) for name in named if name)

@@ -13,10 +13,10 @@ from simharness.humans.body import Body, make_body
 from simharness.humans.looks import draw_looks, dress, face_colors
 from simharness.humans.model import person_spec
 from simharness.humans.population import draw_shape
-from simharness.motion.activities import perform
+from simharness.motion.choreography import choreograph
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
-from simharness.motion.paths import plan_tracks
+from simharness.motion.trajectory import motion_clock
 from simharness.random import stream
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Scenario
@@ -25,8 +25,7 @@ from simharness.scene.placement import BODY_HALF_WIDTH, FreeSpace, place_clutter
 from simharness.scene.room import make_room
 
 _WALL_MARGIN = 0.1  # metres between a camera and a wall
-_FROUDE = (0.28, 0.39)  # speed over sqrt(g x leg): people stroll in a room; 0.42 is comfortable outdoors
-_PACE = (1.05, 1.25)  # and their steps are short and quick
+CLOCK_MARGIN = 1.0  # seconds that motions go on before and after: clocks of cameras are off by less
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Scene:
     Attributes:
         model: people ("person0/..."), room and clutter in one MuJoCo model; what stands has geoms of its name.
         bodies: P bodies.
-        motions: their motions, T frames each.
+        motions: their motions, to be read at any time.
         solids: the room, then the clutter.
         skins: colour of every face of each body, (k, 3) float32 0..1.
         time: seconds, (T,).
@@ -62,27 +61,12 @@ def build(scenario: Scenario) -> Scene:
     seed, people = scenario.seed, scenario.people
     _check_area(scenario)
     time = np.arange(scenario.frames) / scenario.rate
-    count = people.count
-    activities = [people.activities[i % len(people.activities)] for i in range(count)]
-    looks = draw_looks(seed, count)
+    looks = draw_looks(seed, people.count)
     bodies = tuple(
         dress(make_body(draw_shape(stream(seed, "people", i, "shape"))), look) for i, look in enumerate(looks)
     )
     kinematics = [Kinematics(body) for body in bodies]
-    manner = [stream(seed, "people", i, "gait") for i in range(count)]
-    drawn = [(rng.uniform(*_FROUDE), rng.uniform(*_PACE)) for rng in manner]
-    speeds = [froude * np.sqrt(9.81 * mover.leg_length) for (froude, _), mover in zip(drawn, kinematics, strict=True)]
-    tracks = plan_tracks(
-        seed,
-        [speed if activity == "walk" else None for speed, activity in zip(speeds, activities, strict=True)],
-        area=people.area,
-        spacing=people.spacing,
-        duration=scenario.duration,
-    )
-    motions = tuple(
-        perform(activity, mover, track, time, pace=pace, rng=stream(seed, "people", i, "motion"))
-        for i, (activity, mover, track, (_, pace)) in enumerate(zip(activities, kinematics, tracks, drawn, strict=True))
-    )
+    motions = choreograph(scenario, kinematics, motion_clock(scenario.duration, margin=CLOCK_MARGIN)).motions
     pelvises = np.concatenate([np.zeros((0, 3)), *(motion.root[:, :3] for motion in motions)])
     joints = [
         body.joints(mover.transforms(m)).reshape(-1, 3)

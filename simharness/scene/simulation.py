@@ -24,8 +24,9 @@ def simulate(scene: Scene) -> Sequence:
     turns = np.empty((people, frames, bones, 3, 3))
     addresses = [Addresses(scene.model, body, prefix=f"person{i}/") for i, body in enumerate(scene.bodies)]
     data = mujoco.MjData(scene.model)
+    motions = [motion.at(scene.time) for motion in scene.motions]
     for frame in range(frames):
-        for address, motion in zip(addresses, scene.motions, strict=True):
+        for address, motion in zip(addresses, motions, strict=True):
             address.write(data.qpos, motion.root[frame], motion.angles[frame])
         mujoco.mj_kinematics(scene.model, data)
         for i, address in enumerate(addresses):

@@ -5,10 +5,9 @@ from mvpose.skeleton import COCO17
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.activities import perform
 from simharness.motion.gestures import GESTURES, gesture, strokes, wander
 from simharness.motion.kinematics import Kinematics
-from simharness.motion.paths import SWAY, Spot, plan_tracks
+from simharness.motion.paths import SWAY, Spot
 from simharness.random import stream
 
 TIME = np.arange(0.0, 8.0, 1 / 40)
@@ -114,12 +113,3 @@ def test_motion_at_an_instant_does_not_depend_on_the_others(kinematics):
     every_other = gesture("wave", kinematics, SPOT, TIME[::2], rng=stream(1, "t")).angles
     upper = [k for k, name in enumerate(DOFS) if "hip" not in name and "knee" not in name and "ankle" not in name]
     np.testing.assert_allclose(whole[::2, upper], every_other[:, upper], atol=1e-12)
-
-
-def test_perform_wants_the_track_that_goes_with_the_activity(kinematics):
-    (loop,) = plan_tracks(0, [1.0], area=2.0, spacing=0.8, duration=1.0)
-    with pytest.raises(ValueError, match="'wave' does not go with a Loop"):
-        perform("wave", kinematics, loop, TIME, rng=stream(0, "x"))
-    with pytest.raises(ValueError, match="'walk' does not go with a Spot"):
-        perform("walk", kinematics, SPOT, TIME, rng=stream(0, "x"))
-    assert len(perform("walk", kinematics, loop, TIME[:3], rng=stream(0, "x"))) == 3
