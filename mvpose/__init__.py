@@ -4,6 +4,17 @@ from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate, Matching
 from mvpose.pipeline import Pipeline
-from mvpose.skeleton import COCO17, SHELF14, Skeleton
+from mvpose.skeleton import COCO17, PANOPTIC19, SHELF14, Skeleton
 
-__all__ = ["COCO17", "SHELF14", "Camera", "Detections", "Estimate", "Matching", "Pipeline", "Rig", "Skeleton"]
+__all__ = [
+    "COCO17",
+    "PANOPTIC19",
+    "SHELF14",
+    "Camera",
+    "Detections",
+    "Estimate",
+    "Matching",
+    "Pipeline",
+    "Rig",
+    "Skeleton",
+]

@@ -113,6 +113,22 @@ SHELF14 = Skeleton(
     sigmas=(.089, .087, .107, .107, .087, .089, .062, .072, .079, .079, .072, .062, .079, .079),
 )
 
+PANOPTIC19 = Skeleton(
+    name="panoptic19",
+    joints=(
+        "neck", "nose", "mid_hip", "left_shoulder", "left_elbow", "left_wrist", "left_hip", "left_knee", "left_ankle",
+        "right_shoulder", "right_elbow", "right_wrist", "right_hip", "right_knee", "right_ankle",
+        "left_eye", "left_ear", "right_eye", "right_ear",
+    ),
+    parents=(-1, 0, 0, 0, 3, 4, 2, 6, 7, 0, 9, 10, 2, 12, 13, 1, 15, 1, 17),
+    mirror=(0, 1, 2, 9, 10, 11, 12, 13, 14, 3, 4, 5, 6, 7, 8, 17, 18, 15, 16),
+    # COCO's; the neck as the shoulders and the middle of the hips as the hips.
+    sigmas=(
+        .079, .026, .107, .079, .072, .062, .107, .087, .089,
+        .079, .072, .062, .107, .087, .089, .025, .035, .025, .035,
+    ),
+)  # the order of the CMU Panoptic dataset's joints19: BodyCenter is mid_hip
+
 _LIMBS_COCO17_TO_SHELF14 = (16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9)
 # fmt: on
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simharness.detector.truth import KeypointError, Truth
-    from simharness.rendering.film import Views
+    from simharness.rendering.views import Views
     from simharness.rendering.visibility import Visibility
     from simharness.scenario.models import Scenario
     from simharness.scene.sequence import Sequence
@@ -17,7 +17,7 @@ _HOMES = {
     "Scenario": "simharness.scenario.models",
     "Sequence": "simharness.scene.sequence",
     "Truth": "simharness.detector.truth",
-    "Views": "simharness.rendering.film",
+    "Views": "simharness.rendering.views",
     "Visibility": "simharness.rendering.visibility",
 }
 

@@ -1,4 +1,4 @@
-"""The command line: ``simharness run`` and ``simharness evaluate``.
+"""The command line: ``simharness run``, ``simharness render`` and ``simharness evaluate``.
 
 Exit codes: 0 fine, 2 bad input (one message on stderr), 3 the run itself failed (with its traceback).
 Nothing heavy is imported before a command needs it.
@@ -104,6 +104,42 @@ def run(
     console = Console()
     console.print(_headline(summary))
     console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
+
+
+@app.command()
+def render(
+    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]room.floor=wood[/]. Repeatable."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
+    video: Annotated[bool, typer.Option("--video", help="MP4 films instead of PNG pictures.")] = False,
+    overlay: Annotated[
+        str,
+        typer.Option(metavar="LAYERS", help="Draw in [cyan]truth[/], [cyan]detections[/], [cyan]estimates[/]: a list."),
+    ] = "",
+    every: Annotated[int, typer.Option(metavar="N", help="Render one frame of N.")] = 1,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the folder NAME goes.", file_okay=False)] = Path(
+        "results/renders"
+    ),
+) -> None:
+    """Render what the cameras of a scenario record, and a mosaic of them all.
+
+    The pictures appear, when whole, in FOLDER/NAME: CAMERA/0000.png, ... or CAMERA.mp4, and mosaic.
+    """
+    with _border():
+        from simharness.experiment.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        from simharness.experiment.footage import Footage
+        from simharness.experiment.footage import render as render_scenario
+
+        layers = frozenset(name.strip() for name in overlay.split(",") if name.strip())
+        with reporter() as bars:
+            folder = render_scenario(loaded, Footage(video, layers, every), out=out, reporter=bars)
+    typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
 
 
 @evaluating.command()

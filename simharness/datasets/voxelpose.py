@@ -6,6 +6,7 @@ One JSON object; a key for each camera with ``fx fy cx cy`` (pixels), ``R`` (3x3
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
+from simharness.datasets.calibration import check_names
 from simharness.datasets.files import read_json
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
@@ -47,6 +49,31 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
         return Rig([_camera(name, entry, size) for name, entry in cameras.items()])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def write_calibration(path: str | Path, rig: Rig) -> None:
+    """Write a rig as a VoxelPose calibration, which does not hold the size of its images.
+
+    Raises:
+        ValueError: a camera has a skew, or not a name of its own.
+    """
+    check_names(rig)
+    entries = {}
+    for camera in rig:
+        if camera.K[0, 1]:
+            raise ValueError(f"camera {camera.name!r}: a VoxelPose calibration has no skew, got {camera.K[0, 1]:g}")
+        k1, k2, p1, p2, k3 = camera.distortion.tolist()
+        entries[camera.name] = {
+            "fx": camera.K[0, 0],
+            "fy": camera.K[1, 1],
+            "cx": camera.K[0, 2],
+            "cy": camera.K[1, 2],
+            "R": camera.R.tolist(),
+            "T": (1000.0 * camera.center)[:, None].tolist(),
+            "k": [[k1], [k2], [k3]],
+            "p": [[p1], [p2]],
+        }
+    Path(path).write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
 
 
 def _center(name: str, entry: Any) -> np.ndarray:

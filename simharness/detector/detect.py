@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections
 from mvpose.camera import Rig
+from simharness.detector.delivery import arriving, delivered
 from simharness.detector.phantoms import phantoms
 from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError, Truth
 from simharness.random import stream
-from simharness.rendering.film import Views
+from simharness.rendering.views import Views
 from simharness.rendering.visibility import Visibility
 from simharness.scenario.models import Detector
 from simharness.scene.sequence import Sequence
@@ -37,6 +38,8 @@ def detect(
 ) -> list[tuple[Detections, Truth]]:
     """Detect the people of every frame in every view.
 
+    A repeated picture gives the detections of the frame that it was taken in.
+
     Args:
         sequence: where everyone is, T frames.
         views: the same in the V pictures.
@@ -51,7 +54,13 @@ def detect(
     keypoints, scores, error = _keypoints(views, config, seed)
     boxes, box_scores, found = _boxes(views, rig, config, seed)
     found &= (scores > 0).any(axis=-1)
+    # A detector finds the same in the same picture, and nothing in one that never arrives.
+    keypoints, scores, error, boxes, box_scores, found = (
+        delivered(each, views.source) for each in (keypoints, scores, error, boxes, box_scores, found)
+    )
+    found &= (views.source >= 0)[..., None]
     ghosts = phantoms(rig, len(sequence), rate=config.phantoms, seed=seed)
+    ghosts = [arriving(ghosts, sources) for sources in views.source]
     frames = []
     for t in range(len(sequence)):
         view, person = np.nonzero(found[t])

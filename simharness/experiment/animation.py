@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,11 +42,11 @@ def animated_frames(count: int) -> list[int]:
     return list(range(0, count, -(-count // _MOST_FRAMES)))
 
 
-def animate(previews: Mapping[int, NDArray[np.uint8]], record: Record) -> Animation:
+def animate(previews: Mapping[int, Sequence[NDArray[np.uint8]]], record: Record) -> Animation:
     """Lay out the views of each frame as one picture and join them at the speed of life.
 
     Args:
-        previews: colour pictures by frame, each (V, h, w, 3), at least one frame.
+        previews: colour pictures by frame, one (h, w, 3) of each view, at least one frame.
         record: names the cameras and knows when each frame was.
     """
     frames = sorted(previews)

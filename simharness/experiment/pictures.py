@@ -12,15 +12,19 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from mvpose import Camera, Detections
+from mvpose import Camera, Detections, Estimate
+from simharness.detector.truth import Truth
 from simharness.experiment.store import Record
-from simharness.rendering.film import antialiased, meshes_at
+from simharness.experiment.trial import Trial
+from simharness.experiment.work import studio_of
+from simharness.motion.choreography import roles
 from simharness.rendering.mosaic import Mark, legend, mosaic
+from simharness.rendering.optics import appear
 from simharness.rendering.overlay import COCO17_BODY, Overlay
 from simharness.rendering.palette import TRUTH, UNMATCHED, Color, person_color
-from simharness.rendering.renderer import Renderer
+from simharness.rendering.picture import Studio
 from simharness.scene.build import Scene
-from simharness.scene.sequence import Sequence as PeopleSequence
+from simharness.scene.playback import Playback
 from simharness.scoring.pose import LIMIT, pair
 
 Rgb = NDArray[np.uint8]
@@ -29,15 +33,6 @@ MOST_VIEWS = 8  # with the legend a square of tiles
 MOST_NAMED = 6  # people in the legend
 _WIDEST = 2400  # pixels of a picture on the page
 _JPEG_QUALITY = 88
-
-
-@dataclass(frozen=True)
-class Footage:
-    """What pictures of a run are made from."""
-
-    scene: Scene
-    sequence: PeopleSequence
-    renderer: Renderer = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -75,7 +70,7 @@ def _encoded(rgb: Rgb, suffix: str, options: list[int]) -> bytes:
 
 
 def draw_pictures(
-    record: Record, footage: Footage, *, progress: Callable[[int], None] = lambda pictures: None
+    trial: Trial, record: Record, *, progress: Callable[[int], None] = lambda pictures: None
 ) -> list[Picture]:
     """Draw the typical frame of a run, and the worst where it is worse; by the first variant's scores."""
     variant = next(iter(record.estimates))
@@ -85,9 +80,10 @@ def draw_pictures(
     frames = {"A typical frame": typical}
     if costs[worst] > costs[typical]:
         frames["The worst frame"] = worst
+    studio = studio_of(trial.scenario, Playback(trial.scene))
     pictures = []
     for title, frame in frames.items():
-        rgb = draw_frame(record, footage, frame, variant=variant)
+        rgb = draw_frame(trial, record, studio, frame, variant=variant)
         pictures.append(Picture(title, _caption(record, variant, frame), rgb))
         progress(1)
     return pictures
@@ -110,39 +106,66 @@ def _caption(record: Record, variant: str, frame: int) -> str:
     return f"{where}: {found}, {ghosts}{error}{views}."
 
 
-def draw_frame(record: Record, footage: Footage, frame: int, *, variant: str) -> Rgb:
-    """Draw every view of a frame into one picture, with a legend.
-
-    True skeletons are thin and white. Detections are boxes and dots, estimates broad limbs; both take the colour of
-    the true person that the estimate is paired with, and grey where there is none.
-    """
-    truth, detections = record.truth[frame], record.detections[frame]
-    estimate = record.estimates[variant][frame]
-    owner = np.full(len(estimate), -1)  # true person of each estimate
-    partner = pair(truth.joints, estimate.joints).estimate
-    owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
-    labels = estimate.matching.labels
-    taken = np.append(owner, -1)[labels]  # true person of each detection as the method sees it; label -1 has none
+def draw_frame(trial: Trial, record: Record, studio: Studio, frame: int, *, variant: str) -> Rgb:
+    """Draw every view of a frame into one picture, with a legend: see :func:`annotate`."""
+    truth, detections, estimate = record.truth[frame], record.detections[frame], record.estimates[variant][frame]
     views = np.unique(np.linspace(0, len(record.rig) - 1, min(len(record.rig), MOST_VIEWS)).astype(int))
-    meshes = meshes_at(footage.scene, footage.sequence, frame)
     tiles = []
-    for view in views:
-        camera = record.rig[view]
-        overlay = Overlay(antialiased(footage.renderer, camera, meshes))
-        for joints, person in zip(estimate.joints, owner, strict=True):
-            _draw_estimate(overlay, camera, joints, person_color(int(person)))
-        for pixels in truth.pixels[view]:
-            overlay.skeleton(pixels, color=TRUTH, width=1.3, dots=1.8, outline=0.9)
-        for index in np.flatnonzero(detections.view == view):
-            _draw_detection(overlay, detections, int(index), said=int(taken[index]), true=int(truth.person[index]))
-        tiles.append(overlay.rgb)
+    for view in map(int, views):
+        rgb = studio.picture(trial.shots, frame, view, finer=2)
+        camera = trial.shots.camera(frame, view)
+        tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
     titles = [record.rig[view].name for view in views]
     explained = legend(_legend_entries(record), size=record.rig[0].size, title="What is drawn")
     return mosaic([*tiles, explained], [*titles, ""], columns=math.ceil(math.sqrt(len(tiles) + 1)))
 
 
+def annotate(
+    rgb: Rgb,
+    camera: Camera,
+    view: int,
+    *,
+    truth: Truth,
+    detections: Detections | None = None,
+    estimate: Estimate | None = None,
+    show_truth: bool = True,
+) -> Rgb:
+    """Draw what is known about one view into its picture.
+
+    True skeletons are thin and white. Detections are boxes and dots, estimates broad limbs; both take the colour of
+    the true person that the estimate is paired with, and grey where there is none. Without estimates detections take
+    the colour of the person that they truly show.
+
+    Args:
+        rgb: the picture, (h, w, 3).
+        camera: that took it.
+        view: of the rig.
+        truth: about the frame.
+        detections: of the frame; drawn where given.
+        estimate: of the frame; drawn where given.
+        show_truth: draw the true skeletons.
+    """
+    overlay = Overlay(rgb)
+    said = truth.person
+    if estimate is not None:
+        owner = np.full(len(estimate), -1)  # true person of each estimate
+        partner = pair(truth.joints, estimate.joints).estimate
+        owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
+        # True person of each detection as the method sees it; label -1 has none.
+        said = np.append(owner, -1)[estimate.matching.labels]
+        for joints, person in zip(estimate.joints, owner, strict=True):
+            _draw_estimate(overlay, camera, joints, person_color(int(person)))
+    if show_truth:
+        for pixels in truth.pixels[view]:
+            overlay.skeleton(pixels, color=TRUTH, width=1.3, dots=1.8, outline=0.9)
+    if detections is not None:
+        for index in np.flatnonzero(detections.view == view):
+            _draw_detection(overlay, detections, int(index), said=int(said[index]), true=int(truth.person[index]))
+    return overlay.rgb
+
+
 def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64], color: Color) -> None:
-    overlay.skeleton(camera.project(joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
+    overlay.skeleton(appear(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
 
 
 def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, said: int, true: int) -> None:
@@ -156,11 +179,9 @@ def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, sai
 
 
 def _legend_entries(record: Record) -> list[tuple[Mark, Color, str]]:
-    activities = record.scenario.people.activities
-    count = record.truth[0].joints.shape[0]
     people: Sequence[tuple[Mark, Color, str]] = [
-        ("limbs", person_color(person), f"person {person} as estimated ({activities[person % len(activities)]})")
-        for person in range(min(count, MOST_NAMED))
+        ("limbs", person_color(person), f"person {person} as estimated ({role})")
+        for person, role in enumerate(roles(record.scenario.people)[:MOST_NAMED])
     ]
     return [
         ("skeleton", TRUTH, "true skeleton"),
@@ -172,5 +193,5 @@ def _legend_entries(record: Record) -> list[tuple[Mark, Color, str]]:
 
 
 def outlines(scene: Scene) -> list[NDArray[np.float64]]:
-    """The clutter seen from above: the ground plan of each thing, (4, 2) metres."""
-    return [solid.hull.corners[[0, 2, 6, 4], :2] for solid in scene.solids if solid.kind == "clutter"]
+    """The things in the room seen from above: the ground plan of each thing, (4, 2) metres."""
+    return [solid.hull.corners[[0, 2, 6, 4], :2] for solid in scene.solids if solid.kind != "room"]

@@ -18,6 +18,7 @@ from simharness.experiment.animation import Animation
 from simharness.experiment.headline import COLUMNS, NOTHING
 from simharness.experiment.pictures import Picture
 from simharness.experiment.store import Record
+from simharness.motion.choreography import roles
 from simharness.rendering.palette import css, person_color
 from simharness.rendering.visibility import Visibility
 from simharness.scenario.dump import dumps
@@ -81,11 +82,11 @@ def render(
 
 def _facts(record: Record) -> list[tuple[str, str]]:
     scenario = record.scenario
-    clutter = scenario.clutter.boxes + scenario.clutter.shelves
+    things = (*scenario.clutter.model_dump(exclude={"coverage"}).values(), *scenario.decoys.model_dump().values())
     return [
         ("people", f"{scenario.people.count}"),
-        ("cameras", f"{len(record.rig)} × {scenario.cameras.size[0]}×{scenario.cameras.size[1]}"),
-        ("things in the way", f"{clutter}"),
+        ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
+        ("things in the way", f"{sum(things)}"),
         ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
         ("detections", f"{sum(map(len, record.detections))}"),
         ("seed", f"{scenario.seed}"),
@@ -112,7 +113,7 @@ def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
     """How each person fared: a row each."""
     errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
-    activities = record.scenario.people.activities
+    doing = roles(record.scenario.people)
     rows = []
     for person in range(errors.shape[1]):
         mine, counted = errors[:, person], parts[:, person] != Part.UNDEFINED
@@ -122,7 +123,7 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
             {
                 "name": f"person {person}",
                 "color": _line_color(person),
-                "activity": activities[person % len(activities)],
+                "activity": doing[person],
                 "found": f"{100 * found.mean():.1f}",
                 "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
                 "mpjpe": f"{mine[found].mean():.1f}" if found.any() else NOTHING,

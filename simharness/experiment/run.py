@@ -5,80 +5,31 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
-from mvpose import Detections, Estimate, Pipeline, Rig
-from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
+from mvpose import Detections, Estimate
 from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
 from simharness.experiment.animation import animate, animated_frames
 from simharness.experiment.atomic import appearing
+from simharness.experiment.audit import audit
 from simharness.experiment.compilation import Compilation
 from simharness.experiment.execution import RunError, map_frames
-from simharness.experiment.pictures import Footage, draw_pictures, outlines
+from simharness.experiment.pictures import draw_pictures, outlines
 from simharness.experiment.progress import Advance, Reporter, Silence
 from simharness.experiment.store import Record, write_run
-from simharness.experiment.work import Estimating, Filming, renderer_of
-from simharness.rendering.film import Views
-from simharness.rendering.renderer import Unavailable
-from simharness.rigs.layouts import build_rig
+from simharness.experiment.trial import Trial, prepare
+from simharness.experiment.work import Estimating, Filming
+from simharness.rendering.views import Views
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Scenario
-from simharness.scene.build import Scene, build, check_rig
-from simharness.scene.sequence import Sequence as PeopleSequence
 from simharness.scene.simulation import simulate
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_pairs
 from simharness.scoring.summary import VariantScores, summarize
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A scenario that can be run: everything in it is built and checked.
-
-    Attributes:
-        scenario: what was asked for.
-        scene: the compiled room with its people, and how they move.
-        rig: the cameras.
-        pipelines: the variants of the method, by name.
-    """
-
-    scenario: Scenario
-    scene: Scene
-    rig: Rig
-    pipelines: Mapping[str, Estimator]
-
-
-def prepare(scenario: Scenario) -> Trial:
-    """Build what a scenario describes.
-
-    Raises:
-        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant.
-    """
-    try:
-        pipelines = {name: Pipeline.preset(name) for name in scenario.method.variants}
-    except ValueError as error:
-        raise ValueError(f"method.variants: {error}") from None
-    if blind := NEED_DESCRIPTORS & pipelines.keys():
-        raise ValueError(
-            f"method.variants: {', '.join(blind)} goes by descriptors alone, and the simulated detector makes none; "
-            "choose another variant"
-        )
-    try:
-        renderer_of(scenario.rendering.renderer)
-    except Unavailable as error:
-        raise ValueError(f"rendering.renderer: {error}") from None
-    try:
-        rig = build_rig(scenario.cameras)
-    except ValueError as error:
-        raise ValueError(f"cameras: {error}") from None
-    scene = build(scenario)
-    check_rig(scenario, scene, rig)
-    return Trial(scenario, scene, rig, pipelines)
 
 
 def run(
@@ -114,9 +65,11 @@ def run(
     compilation.start()
     with clock.stage("simulate", 1):
         sequence = simulate(trial.scene)
-    views = _film(trial, sequence, workers, clock)
+    views = _film(trial, workers, clock)
+    with clock.stage("audit", 1):
+        audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
-        answers = detect(sequence, views, trial.rig, scenario.detector, seed=scenario.seed)
+        answers = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed)
         detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
     estimates = _estimate(trial, detections, compilation, workers, clock)
     with clock.stage("score", len(estimates)) as advance:
@@ -135,7 +88,7 @@ def run(
         )
     record = Record(
         scenario=scenario,
-        rig=trial.rig,
+        rig=trial.shots.believed,
         time=sequence.time,
         detections=detections,
         truth=truth,
@@ -143,11 +96,10 @@ def run(
         scores=score_table(scores),
         summary=summary,
     )
-    footage = Footage(trial.scene, sequence, renderer_of(scenario.rendering.renderer))
     with clock.stage("report", 3) as advance:
         from simharness.experiment.report import render  # and with it matplotlib: late, for it loads slowly
 
-        pictures = draw_pictures(record, footage, progress=advance)
+        pictures = [] if scenario.rendering.renderer == "rays" else draw_pictures(trial, record, progress=advance)
         animation = animate(views.previews, record) if views.previews else None
         page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation)
         advance(1)
@@ -155,7 +107,8 @@ def run(
     with clock.stage("write", 1), appearing(folder) as partial:
         write_run(record, partial)
         (partial / "report.html").write_text(page, encoding="utf-8")
-        (partial / "mosaic.png").write_bytes(pictures[0].png())
+        if pictures:
+            (partial / "mosaic.png").write_bytes(pictures[0].png())
         if animation:
             (partial / "film.webp").write_bytes(animation.webp)
     return folder
@@ -199,11 +152,13 @@ def _make_folder(out: Path) -> None:
         raise ValueError(f"--out {out}: cannot make this folder: {error.strerror}") from None
 
 
-def _film(trial: Trial, sequence: PeopleSequence, workers: int, clock: _Clock) -> Views:
+def _film(trial: Trial, workers: int, clock: _Clock) -> Views:
     frames, rendering = range(trial.scenario.frames), trial.scenario.rendering
     with clock.stage("film", len(frames)) as advance:
-        previews = frozenset(animated_frames(len(frames)) if rendering.color else ())
-        filming = Filming(trial.scene, sequence, trial.rig, rendering.renderer, rendering.color, previews)
+        shown = rendering.color and rendering.renderer != "rays"
+        filming = Filming(
+            trial.scenario, trial.scene, trial.shots, frozenset(animated_frames(len(frames)) if shown else ())
+        )
         return Views.concatenate(map_frames(filming, frames, workers=workers, progress=advance))
 
 
@@ -213,7 +168,7 @@ def _estimate(
     with clock.stage("compile", 1):
         compilation.wait()
     with clock.stage("estimate", len(detections)) as advance:
-        estimating = Estimating(trial.rig, detections, trial.pipelines)
+        estimating = Estimating(trial.shots.believed, detections, trial.pipelines)
         parts = map_frames(estimating, range(len(detections)), workers=workers, progress=advance)
         return {name: tuple(each for part in parts for each in part[name]) for name in trial.pipelines}
 

@@ -3,7 +3,8 @@
 A result folder holds, for T frames, V cameras, P people, J joints and n detections in all frames together:
 
 `scenario.toml`
-    the whole scenario, defaults and overrides written out.
+    the whole scenario, defaults and overrides written out; files that it names are relative to where the run was
+    started.
 `rig.npz`
     the calibration: ``names`` (V,), ``K`` (V, 3, 3), ``R`` (V, 3, 3), ``t`` (V, 3) metres,
     ``distortion`` (V, 5), ``size`` (V, 2) width and height.
@@ -122,7 +123,7 @@ def read_run(folder: Path | str) -> Record:
     rig, detected, true, answered = (dict(np.load(folder / name)) for name in names[1:5])
     detections = _detections(detected)
     return Record(
-        scenario=load(folder / "scenario.toml"),
+        scenario=load(folder / "scenario.toml", folder=Path()),
         rig=_rig(rig),
         time=true["time"],
         detections=detections,

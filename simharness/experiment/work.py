@@ -14,36 +14,57 @@ from mvpose import Detections, Estimate, Rig
 from mvpose.pipeline import Estimator
 
 if TYPE_CHECKING:
-    from simharness.rendering.film import Views
+    from simharness.rendering.film import Eye
+    from simharness.rendering.picture import Studio
     from simharness.rendering.renderer import Renderer, RendererName
+    from simharness.rendering.views import Views
+    from simharness.rigs.shots import Shots
+    from simharness.scenario.models import Scenario
     from simharness.scene.build import Scene
-    from simharness.scene.sequence import Sequence
+    from simharness.scene.playback import Playback
 
 
 @dataclass(frozen=True)
 class Filming:
     """Film some frames. Holds the renderer's name, for a renderer may hold a GL context, which cannot travel."""
 
+    scenario: Scenario
     scene: Scene
-    sequence: Sequence
-    rig: Rig
-    renderer: RendererName
-    color: bool
+    shots: Shots
     previews: frozenset[int]
 
     def __call__(self, frames: range) -> Views:
         """The views of these frames."""
         from simharness.rendering.film import film
+        from simharness.scene.playback import Playback
 
+        playback = Playback(self.scene)
         return film(
-            self.scene,
-            self.sequence,
-            self.rig,
-            renderer_of(self.renderer),
+            playback,
+            self.shots,
+            eye_of(self.scenario, playback),
             frames=frames,
-            color=self.color,
+            studio=studio_of(self.scenario, playback) if self.previews else None,
             previews=self.previews,
         )
+
+
+def eye_of(scenario: Scenario, playback: Playback) -> Eye:
+    """How a scenario finds out what its cameras see."""
+    from simharness.rendering.film import PictureEye
+    from simharness.rendering.rays import RayEye
+
+    if scenario.rendering.renderer == "rays":
+        return RayEye(playback)
+    return PictureEye(playback, renderer_of(scenario.rendering.renderer))
+
+
+def studio_of(scenario: Scenario, playback: Playback) -> Studio:
+    """What makes a scenario's colour pictures; the rasteriser where the scenario itself needs none."""
+    from simharness.rendering.picture import Studio
+
+    name = "raster" if scenario.rendering.renderer == "rays" else scenario.rendering.renderer
+    return Studio(playback, renderer_of(name), sensor=scenario.sensor, seed=scenario.seed)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.skeleton import COCO17, Skeleton
+from simharness.humans import segments
+from simharness.humans.landmarks import LANDMARKS, of_skeleton
+from simharness.humans.limbs import LIMBS, lengthened, stretches
 from simharness.humans.shape import Shape
-from simharness.humans.skinning import skin
+from simharness.humans.skinning import Skirt, enclosed, mix, skin
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,18 +46,19 @@ class Part(IntEnum):
     LEG = 9
     SHOE = 10
     SOLE = 11
+    SKIRT = 12
 
 
 @dataclass(frozen=True)
 class BodyModel:
-    """The baked space of adult bodies: n vertices of which the first ``shown`` are drawn, B bones, C components.
+    """The baked space of bodies: n vertices of which the first ``shown`` are drawn, B bones, C components.
 
     Attributes:
         bones: names, the CMU skeleton of MakeHuman, parents before children.
         parents: (B,), -1 for the pelvis.
         anchors: of every phenotype, the values at the corners of the grid.
-        coefficients: (2, 2, 3, 3, 2, 2, C) of the corner bodies, in the order of ``PHENOTYPES``.
-        mean, deltas: vertices (n, 3) and (C, n, 3), metres.
+        coefficients: (2, 3, 3, 3, 2, 2, C) of the corner bodies, in the order of ``PHENOTYPES``.
+        mean, deltas, step: vertices (n, 3), metres, and what a component adds to them, (C, n, 3) times ``step``.
         mean_heads, delta_heads: bone heads (B, 3) and (C, B, 3), metres.
         weight_bones, weights: skinning, (n, 4).
         faces, part, level: of the shown mesh, (k, 3), (k,), (k,).
@@ -67,7 +72,8 @@ class BodyModel:
     anchors: Mapping[str, Floats]
     coefficients: Floats
     mean: Floats
-    deltas: Floats
+    deltas: NDArray[np.int16]
+    step: float
     mean_heads: Floats
     delta_heads: Floats
     weight_bones: NDArray[np.uint8]
@@ -93,7 +99,8 @@ class BodyModel:
                 anchors={name: data[f"anchors_{name}"].astype(float) for name in PHENOTYPES},
                 coefficients=data["coefficients"].astype(float),
                 mean=data["mean"].astype(float),
-                deltas=data["deltas"] * float(data["step"]),
+                deltas=data["deltas"],
+                step=float(data["step"]),
                 mean_heads=data["mean_heads"].astype(float),
                 delta_heads=data["delta_heads"].astype(float),
                 weight_bones=data["weight_bones"],
@@ -114,31 +121,67 @@ class BodyModel:
     def rest(self, phenotypes: Mapping[str, float]) -> tuple[Floats, Floats]:
         """Rest vertices (n, 3) and bone heads (B, 3) of one phenotype each of ``PHENOTYPES``, where anny puts them.
 
-        Values beyond the anchors are clipped to them.
+        Values beyond the anchors are extrapolated.
         """
         coefficients = self._coefficients(phenotypes)
-        vertices = self.mean + np.tensordot(coefficients, self.deltas, axes=1)
+        vertices = np.empty_like(self.mean)
+        mix(self.mean.ravel(), self.deltas.reshape(len(coefficients), -1), self.step * coefficients, vertices.ravel())
         return vertices, self.mean_heads + np.tensordot(coefficients, self.delta_heads, axes=1)
 
-    def stature(self, phenotypes: Mapping[str, float]) -> float:
-        """Metres from the soles to the crown of the bare head."""
-        crown, soles = (mean + self._coefficients(phenotypes) @ deltas for mean, deltas in self._ends)
-        return float(crown.max() - soles.min())
+    def figure(self, shape: Shape) -> tuple[Floats, Floats]:
+        """Rest vertices (n, 3) and bone heads (B, 3) of a shape, limbs included; pelvis over the origin, soles on 0."""
+        vertices, heads = self.rest({name: getattr(shape, name) for name in PHENOTYPES})
+        factors = {limb: getattr(shape, limb) for limb in LIMBS}
+        if any(factor != 1 for factor in factors.values()):
+            maps, heads = stretches(heads, factors, bones=self.bones, parents=self.parents.tolist())
+            vertices = lengthened(vertices, self.weight_bones, self._light_weights, maps)
+        origin = np.array([*heads[0, :2], vertices[: self.shown, 2].min()])
+        return vertices - origin, heads - origin
+
+    def stature(self, vertices: Floats) -> float:
+        """Metres from the soles to the crown of the bare head, of rest vertices (n, 3)."""
+        return float(vertices[self.crown, 2] - vertices[self._soles, 2].min())
+
+    def mass(self, vertices: Floats) -> float:
+        """Kilograms of the body of rest vertices (n, 3)."""
+        return DENSITY * volume(vertices, self.skin_faces)
+
+    def joints(self, vertices: Floats) -> Floats:
+        """COCO-17 joints (17, 3) of vertices (n, 3)."""
+        joint, vertex, weight = self.regressor
+        return np.stack([np.bincount(joint, weight * vertices[vertex, k], len(COCO17)) for k in range(3)], axis=1)
 
     @cached_property
-    def _ends(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-        """Heights of the vertices that may be the highest and the lowest: mean (e,) and deltas (C, e)."""
-        height = self.mean[:, 2]
-        high, low = np.flatnonzero(height > height.max() - 0.06), np.flatnonzero(height < height.min() + 0.04)
-        return (height[high], self.deltas[:, high, 2]), (height[low], self.deltas[:, low, 2])
+    def crown(self) -> int:
+        """The vertex on top of the bare head."""
+        bare = np.unique(self.skin_faces)
+        return int(bare[self.mean[bare, 2].argmax()])
+
+    @cached_property
+    def _soles(self) -> Ints:
+        """The bare vertices that may be the lowest."""
+        bare = np.unique(self.skin_faces)
+        return bare[self.mean[bare, 2] < self.mean[bare, 2].min() + 0.04]
+
+    @cached_property
+    def _light_weights(self) -> NDArray[np.float32]:
+        return np.ascontiguousarray(self.weights, np.float32)
 
     def _coefficients(self, phenotypes: Mapping[str, float]) -> Floats:
         coefficients = self.coefficients
         for name in PHENOTYPES:
-            anchors = self.anchors[name]
-            hats = [np.interp(phenotypes[name], anchors, hat) for hat in np.eye(len(anchors))]
-            coefficients = np.tensordot(hats, coefficients, axes=1)
+            coefficients = np.tensordot(interpolation(phenotypes[name], self.anchors[name]), coefficients, axes=1)
         return coefficients
+
+
+def interpolation(value: float, anchors: ArrayLike) -> Floats:
+    """Weights (a,) of the values at ``anchors`` (a,) in linear interpolation, beyond the last ones extrapolation."""
+    anchors = np.asarray(anchors, float)
+    below = int(np.clip(np.searchsorted(anchors, value, side="right") - 1, 0, len(anchors) - 2))
+    weights = np.zeros(len(anchors))
+    weights[below + 1] = (value - anchors[below]) / (anchors[below + 1] - anchors[below])
+    weights[below] = 1 - weights[below + 1]
+    return weights
 
 
 @cache
@@ -157,17 +200,20 @@ class Body:
         faces: (k, 3) int32, counter-clockwise seen from outside.
         part: what every face shows, (k,) :class:`Part`.
         level: of faces on arms and legs how far down the limb, 0 at shoulder or hip, 1 at elbow or knee, 2 at wrist
-            or ankle; on the torso 0 at the hips and 1 at the root of the neck; (k,).
+            or ankle; on the torso 0 at the hips and 1 at the root of the neck; of a skirt as of the legs; (k,).
         heads: where every bone begins, (B, 3).
         parents: (B,), -1 for the pelvis.
         bones: names, parents before children.
         weight_bones, weights: skinning, (n, 4).
-        keypoints: COCO-17 joints as linear functions of the bone transforms, (17, B, 4): a joint is the sum over
-            bones of ``transform @ keypoints[joint, bone]``, which is exact, for skinning and regression are linear.
-        joint_radii: how deep the joints lie, (17,) metres: twice the distance to the nearest skin, for limbs are not
+        keypoints: the L landmarks as linear functions of the bone transforms, (L, B, 4), in the order of
+            ``simharness.humans.landmarks.LANDMARKS``, COCO-17 first: a landmark is the sum over bones of
+            ``transform @ keypoints[landmark, bone]``, which is exact, for skinning and regression are linear.
+        depths: how deep the landmarks lie, (L,) metres: twice the distance to the nearest skin, for limbs are not
             round and clothes have thickness; at least 15 mm.
         thumbs: direction at rest from the little finger's side of the left and right palm to the thumb's, (2, 3).
         stature: metres from sole to crown. mass: kilograms.
+        snug: how many of the vertices, the first ones, follow the skin; skirt and long hair come after them.
+        skirt: how the last of the vertices hang, where a skirt or coat is worn.
     """
 
     shape: Shape
@@ -181,10 +227,12 @@ class Body:
     weight_bones: NDArray[np.uint8]
     weights: NDArray[np.float32]
     keypoints: Floats
-    joint_radii: Floats
+    depths: Floats
     thumbs: Floats
     stature: float
     mass: float
+    snug: int
+    skirt: Skirt | None = None
     _index: Mapping[str, int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -198,8 +246,8 @@ class Body:
             ("parents", (count,)),
             ("weight_bones", (n, 4)),
             ("weights", (n, 4)),
-            ("keypoints", (17, count, 4)),
-            ("joint_radii", (17,)),
+            ("keypoints", (len(LANDMARKS), count, 4)),
+            ("depths", (len(LANDMARKS),)),
             ("thumbs", (2, 3)),
         ):
             if np.shape(getattr(self, key)) != shape:
@@ -212,11 +260,31 @@ class Body:
             raise ValueError(f"the body has no bone {bone!r}; it has {', '.join(self.bones)}")
         return self._index[bone]
 
-    def joints(self, transforms: ArrayLike) -> Floats:
-        """COCO-17 joints (..., 17, 3) in the world from bone transforms (..., B, 3, 4)."""
+    @cached_property
+    def segments(self) -> NDArray[np.int8]:
+        """Which :class:`~simharness.humans.segments.Segment` every face is of, (k,)."""
+        return segments.of_faces(self.faces, self.weight_bones, self.weights, bones=self.bones)
+
+    @property
+    def joint_radii(self) -> Floats:
+        """How deep the joints of COCO-17 lie, (17,) metres."""
+        return self.depths[: len(COCO17)]
+
+    def landmarks(self, transforms: ArrayLike) -> Floats:
+        """Landmarks (..., L, 3) in the world from bone transforms (..., B, 3, 4)."""
         transforms = np.asarray(transforms, float)
         self._check(transforms)
-        return np.einsum("...brc,jbc->...jr", transforms, self.keypoints, optimize=True)
+        rows = transforms.swapaxes(-3, -2).reshape(*transforms.shape[:-3], 3, -1)
+        return (rows @ self._columns).swapaxes(-1, -2)
+
+    def joints(self, transforms: ArrayLike, skeleton: Skeleton = COCO17) -> Floats:
+        """Joints of a skeleton (..., J, 3) in the world from bone transforms (..., B, 3, 4)."""
+        return self.landmarks(transforms)[..., of_skeleton(skeleton), :]
+
+    @cached_property
+    def _columns(self) -> Floats:
+        """The keypoints as a matrix (4 B, L)."""
+        return np.ascontiguousarray(self.keypoints.reshape(len(self.keypoints), -1).T)
 
     def skin(self, transforms: ArrayLike) -> NDArray[np.float32]:
         """Vertices (n, 3) float32 in the world from bone transforms (B, 3, 4)."""
@@ -228,6 +296,8 @@ class Body:
         self._check(transforms)
         out = np.empty_like(self.vertices)
         skin(self.vertices, self.weight_bones, self.weights, transforms, out)
+        if self.skirt is not None:
+            self.skirt.hang(transforms, out)
         return out
 
     def _check(self, transforms: NDArray[np.floating]) -> None:
@@ -238,13 +308,9 @@ class Body:
 def make_body(shape: Shape) -> Body:
     """Make one person's body."""
     model = body_model()
-    phenotypes = {name: getattr(shape, name) for name in PHENOTYPES}
-    vertices, heads = model.rest(phenotypes)
-    floor = vertices[: model.shown, 2].min()
-    origin = np.array([*heads[0, :2], floor])
-    vertices, heads = vertices - origin, heads - origin
+    vertices, heads = model.figure(shape)
     skin_vertices = np.unique(model.skin_faces)
-    keypoints = _keypoints(model, vertices)
+    keypoints = _keypoints(model, vertices, heads)
     joints = keypoints[..., :3].sum(1)
     thumbs = vertices[model.palms[:, 0]] - vertices[model.palms[:, 1]]
     return Body(
@@ -259,27 +325,37 @@ def make_body(shape: Shape) -> Body:
         weight_bones=np.ascontiguousarray(model.weight_bones[: model.shown]),
         weights=np.ascontiguousarray(model.weights[: model.shown], np.float32),
         keypoints=keypoints,
-        joint_radii=np.maximum(2 * _nearest(joints, vertices[skin_vertices]), 0.015),
+        depths=np.maximum(2 * _nearest(joints, vertices[skin_vertices]), 0.015),
         thumbs=thumbs / np.linalg.norm(thumbs, axis=1, keepdims=True),
-        stature=model.stature(phenotypes),
-        mass=DENSITY * volume(vertices, model.skin_faces),
+        stature=model.stature(vertices),
+        mass=model.mass(vertices),
+        snug=model.shown,
     )
 
 
 def volume(vertices: ArrayLike, faces: ArrayLike) -> float:
     """Volume inside a closed surface of vertices (n, 3) and faces (k, 3), counter-clockwise seen from outside."""
-    a, b, c = np.moveaxis(np.asarray(vertices, float)[np.asarray(faces)], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+    return float(enclosed(np.ascontiguousarray(vertices, float), np.ascontiguousarray(faces, np.int64)))
 
 
-def _keypoints(model: BodyModel, vertices: Floats) -> Floats:
-    """Push the regressor through the skinning: (17, B, 4)."""
+def _keypoints(model: BodyModel, vertices: Floats, heads: Floats) -> Floats:
+    """Push the regressor of vertices (n, 3) through the skinning, and pin the rest to their bones: (L, B, 4)."""
     joint, vertex, weight = model.regressor
-    result = np.zeros((17, len(model.bones), 4))
+    result = np.zeros((len(LANDMARKS), len(model.bones), 4))
     point = np.column_stack([vertices[vertex], np.ones(len(vertex))])
     for k in range(4):
         share = weight * model.weights[vertex, k]
         np.add.at(result, (joint, model.weight_bones[vertex, k]), share[:, None] * point)
+    bone = {name: i for i, name in enumerate(model.bones)}
+    pins = {
+        "head_bottom": ("Neck", 0.5 * (heads[bone["Neck"]] + heads[bone["Neck1"]])),
+        "head_top": ("Head", vertices[model.crown]),
+        "neck": ("Neck", heads[bone["Neck"]]),
+    }
+    for name, (owner, place) in pins.items():
+        result[LANDMARKS.index(name), bone[owner]] = [*place, 1.0]
+    hips = [LANDMARKS.index(f"{side}_hip") for side in ("left", "right")]
+    result[LANDMARKS.index("mid_hip")] = result[hips].mean(0)
     return result
 
 

@@ -7,14 +7,17 @@ pose) into the anatomical neutral, which is the zero of all joints.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.humans.anatomy import DOFS, RANGES, SIDES, mass_fractions
+from simharness.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.humans.body import Body
+from simharness.humans.capsules import Capsule, fit_capsules
+from simharness.humans.inertia import capsule_masses, limb_inertials
 
 Floats = NDArray[np.float64]
 
@@ -163,8 +166,9 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
 
     Bodies are named as the bones and stand at their heads, in the order of ``body.bones``; ``Hips`` has the free
     joint ``root``; the hinges are named as ``DOFS``. In the initial configuration the person stands in the neutral
-    pose on z = 0 over the origin. Capsules (group 1) collide with the world and with other people, not with the
-    person's own; their masses follow de Leva (1996) and sum to ``body.mass``.
+    pose on z = 0 over the origin. The capsules of :mod:`simharness.humans.capsules` (group 1, named as their bone, or
+    "bone k" where it has several) collide with the world and with other people, not with the person's own. Masses and
+    inertias are those of :mod:`simharness.humans.inertia`; they sum to ``body.mass``.
 
     Args:
         body: the person's body.
@@ -193,88 +197,35 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
                     limited=True,
                 )
         bodies.append(part)
-    fleshy = []
-    for capsule in _capsules(body):
+    capsules = fit_capsules(body)
+    for capsule, mass, label in zip(capsules, capsule_masses(body, capsules), _labels(capsules), strict=True):
         bodies[body.index(capsule.bone)].add_geom(
-            name=capsule.bone,
+            name=label,
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[*capsule.start, *capsule.end],
             size=[capsule.radius, 0, 0],
-            mass=capsule.mass,
+            mass=mass,
             group=SKIN_GROUP,
         )
-        fleshy.append(capsule.bone)
+    for inertial in limb_inertials(body):
+        part = bodies[body.index(inertial.bone)]
+        part.explicitinertial = True  # instead of what its capsules would give
+        part.mass, part.ipos = inertial.mass, inertial.center
+        part.fullinertia = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    fleshy = list(dict.fromkeys(capsule.bone for capsule in capsules))
     for i, first in enumerate(fleshy):
         for second in fleshy[i + 1 :]:
             spec.add_exclude(name=f"{first}-{second}", bodyname1=first, bodyname2=second)
     return spec
 
 
+def _labels(capsules: Sequence[Capsule]) -> list[str]:
+    """A name for each capsule: its bone's, numbered where the bone has several."""
+    bones = [capsule.bone for capsule in capsules]
+    return [bone if bones.count(bone) == 1 else f"{bone} {bones[:k].count(bone)}" for k, bone in enumerate(bones)]
+
+
 def _quaternion(rotation: Floats) -> Floats:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
     return quaternion
-
-
-@dataclass(frozen=True)
-class _Capsule:
-    bone: str
-    start: Floats  # in the bone's frame
-    end: Floats
-    radius: float
-    mass: float
-
-
-# Capsules: the bone, the bone at whose head it ends (none: near the crown), the segment and the share of its mass.
-# A twist bone starts where its parent does and moves the far half; so parent and twist have half the limb each.
-_TRUNK_CAPSULES = (
-    ("Hips", "LowerBack", "lower_trunk", 1.0),
-    ("LowerBack", "Spine1", "middle_trunk", 1.0),
-    ("Spine1", "Neck", "upper_trunk", 0.8),
-    ("Neck", "Head", "head", 0.15),
-    ("Head", "", "head", 0.85),
-)
-_LIMB_CAPSULES = (
-    ("Shoulder", "Arm", "upper_trunk", 0.1),
-    ("Arm", "ForeArm", "upper_arm", 0.5),
-    ("ArmTwist", "ForeArm", "upper_arm", 0.5),
-    ("ForeArm", "Hand", "forearm", 0.5),
-    ("ForeArmTwist", "Hand", "forearm", 0.5),
-    ("Hand", "HandFinger1", "hand", 1.0),
-    ("UpLeg", "Leg", "thigh", 1.0),
-    ("Leg", "Foot", "shank", 1.0),
-    ("Foot", "ToeBase", "foot", 1.0),
-)
-_LARGEST_RADIUS = 0.14  # metres; a capsule is round and a trunk is not, so the width must not set the depth
-
-
-def _capsules(body: Body) -> list[_Capsule]:
-    fractions = mass_fractions(body.shape.gender)
-    rows = [(bone, end, segment, share) for bone, end, segment, share in _TRUNK_CAPSULES]
-    rows += [
-        (f"{side}{bone}", f"{side}{end}", segment, share)
-        for side in ("Left", "Right")
-        for bone, end, segment, share in _LIMB_CAPSULES
-    ]
-    dominant = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(1)]
-    result = []
-    for bone, end, segment, share in rows:
-        head = body.heads[body.index(bone)]
-        skin = body.vertices[dominant == body.index(bone)] - head
-        crown = np.array([0.0, 0.0, 0.8 * skin[:, 2].max()])
-        stop = body.heads[body.index(end)] - head if end else crown
-        start = np.zeros(3)
-        if bone.endswith("ArmTwist"):
-            start = stop / 2
-        elif f"{bone}Twist" in body.bones:
-            stop = stop / 2
-        result.append(_Capsule(bone, start, stop, _radius(skin, start, stop), share * fractions[segment] * body.mass))
-    return result
-
-
-def _radius(points: Floats, start: Floats, end: Floats) -> float:
-    """Median distance of points (n, 3) from the segment."""
-    axis = end - start
-    along = np.clip((points - start) @ axis / (axis @ axis), 0, 1)
-    distance = np.linalg.norm(points - start - along[:, None] * axis, axis=1)
-    return float(min(np.median(distance), _LARGEST_RADIUS)) if len(points) else 0.04

@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from simharness.humans.body import Part
-from simharness.humans.looks import HEMS, LEGS, SLEEVES
+from simharness.humans.wardrobe import HEMS, LEGS, SLEEVES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -48,6 +48,9 @@ class Motion:
         return len(self.root)
 
     def at(self, time: ArrayLike) -> Motion:
-        """The same motion sampled at other times (n,); before its first and after its last it stands still."""
-        time = np.asarray(time, float)
-        return Motion(time, through_poses(self.time, self.root, time), through(self.time, self.angles, time))
+        """The same motion at other times (n,), ascending; before its first and after its last it stands still."""
+        return Motion(np.asarray(time, float), *self.read(time))
+
+    def read(self, time: ArrayLike) -> tuple[Floats, Floats]:
+        """Root (..., 7) and angles (..., D) at any times (...)."""
+        return through_poses(self.time, self.root, time), through(self.time, self.angles, time)

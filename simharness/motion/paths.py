@@ -1,35 +1,33 @@
-"""Where people go: spots to stand on, smooth closed loops to walk, and a plan that keeps people apart."""
+"""Where people go: spots to stay on, smooth closed loops to walk or run round, recorded ways."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
-
-from simharness.random import stream
 
 Floats = NDArray[np.float64]
 
 SWAY = 0.05  # metres: how far a pelvis strays from its track, by swaying, shifting weight and reaching
 _TIGHTEST = 0.8  # metres: least radius of a turn, where there is room
 _FASTEST_TURN = 1.3  # radians a second: in a narrow space people walk more slowly
-_NARROWEST = 0.45  # metres: half side of the least square to walk round in
+_HARDEST_TURN = 3.5  # m/s², towards the middle of the bend: a runner leans by 20 degrees
 _KNOTS = 48
-_IN_FILE = (0.3, 0.2)  # chance of trying to walk behind someone rather than one's own way, and more for each plan
-_TRIES = 300  # draws for each person before the plan starts over
-_PLANS = 6  # plans before giving up
-_CHECKS = 30.0  # Hz: spacing is checked at this rate, whatever the rate of the frames
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Standing still at ``place`` (2,), metres, facing ``bearing``, radians from the x axis."""
+    """Staying at ``place`` (2,), metres, facing ``bearing``, radians from the x axis."""
 
     place: Floats
     bearing: float
+
+    @property
+    def fastest(self) -> float:
+        """Metres a second."""
+        return 0.0
 
     def position(self, time: ArrayLike) -> Floats:
         """Where the pelvis is, (..., 2) metres."""
@@ -38,7 +36,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Loop:
-    """Walking round a closed smooth curve at constant speed.
+    """Going round a closed smooth curve at constant speed.
 
     Attributes:
         curve: the curve as a periodic spline of arc length, metres to (2,) metres.
@@ -55,6 +53,11 @@ class Loop:
         """Once round, metres."""
         return float(self.curve.x[-1])
 
+    @property
+    def fastest(self) -> float:
+        """Metres a second."""
+        return self.speed
+
     def position(self, time: ArrayLike) -> Floats:
         """Where the pelvis is, (..., 2) metres."""
         return self.curve(self._arc(time))
@@ -67,15 +70,76 @@ class Loop:
     def curvature(self, time: ArrayLike) -> Floats:
         """How sharply the way turns to the left, (...) radians a metre."""
         arc = self._arc(time)
-        tangent, bend = self.curve(arc, 1), self.curve(arc, 2)
-        cross = tangent[..., 0] * bend[..., 1] - tangent[..., 1] * bend[..., 0]
-        return cross / np.linalg.norm(tangent, axis=-1) ** 3
+        return _curvature(self.curve(arc, 1), self.curve(arc, 2))
 
     def _arc(self, time: ArrayLike) -> Floats:
         return np.mod(self.start + self.speed * np.asarray(time, float), self.length)
 
 
-Track = Spot | Loop
+@dataclass(frozen=True)
+class Recorded:
+    """A recorded way, begun at a spot.
+
+    Attributes:
+        spot: where it begins at time 0, and the bearing that turns it.
+        time: seconds, (N,), ascending.
+        offset: where the pelvis is at these times from where it begins, before the turn, (N, 2) metres.
+    """
+
+    spot: Spot
+    time: Floats
+    offset: Floats
+
+    @property
+    def fastest(self) -> float:
+        """Metres a second."""
+        moved = np.linalg.norm(np.diff(self.offset, axis=0), axis=1)
+        return float((moved / np.diff(self.time)).max(initial=0.0))
+
+    def position(self, time: ArrayLike) -> Floats:
+        """Where the pelvis is, (..., 2) metres."""
+        time = np.asarray(time, float)
+        way = np.stack([np.interp(time, self.time, self.offset[:, k]) for k in range(2)], axis=-1)
+        return self.spot.place + way @ turned(self.spot.bearing).T
+
+
+Track = Spot | Loop | Recorded
+
+
+@dataclass(frozen=True)
+class Bends:
+    """How fast someone goes round a loop, and how tightly it may turn.
+
+    Attributes:
+        speed: preferred, metres a second; ``slowest`` and ``fastest`` are what they also do to keep in time.
+        tightest: least radius of a turn, metres.
+    """
+
+    speed: float
+    slowest: float
+    fastest: float
+    tightest: float
+
+
+def bends(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> Bends:
+    """What a square of half side ``half``, metres, lets of the speeds that someone would go at, metres a second.
+
+    A walker turns at 1.3 rad/s at most and else goes more slowly, however slowly; a runner is held on the bend by
+    3.5 m/s² at most. Nobody is asked to run more slowly than that allows: see whether ``slowest`` is above ``speed``.
+    """
+    if running:
+        tightest = min(max(_TIGHTEST, speed**2 / _HARDEST_TURN), 0.85 * half)
+        limit = float(np.sqrt(_HARDEST_TURN * tightest))
+        return Bends(min(speed, limit), slowest, min(fastest, limit), tightest)
+    tightest = min(_TIGHTEST, 0.7 * half)
+    limit = _FASTEST_TURN * tightest
+    return Bends(min(speed, limit), min(slowest, 0.85 * limit), min(fastest, limit), tightest)
+
+
+def turned(bearing: float) -> Floats:
+    """The rotation of the floor, (2, 2), that turns x into ``bearing``, radians."""
+    c, s = np.cos(bearing), np.sin(bearing)
+    return np.array([[c, -s], [s, c]])
 
 
 def make_loop(points: Floats, *, speed: float, start: float) -> Loop:
@@ -90,109 +154,68 @@ def make_loop(points: Floats, *, speed: float, start: float) -> Loop:
     return Loop(curve=CubicSpline(knots, places, bc_type="periodic"), speed=speed, start=start * arc[-1])
 
 
-def draw_spot(rng: np.random.Generator, *, half: float) -> Spot:
-    """A spot in the square of half side ``half``, facing roughly towards the middle, as people in a group do."""
+def draw_spot(rng: np.random.Generator, *, half: float, apart: bool = False) -> Spot:
+    """A spot in the square of half side ``half``.
+
+    Its bearing leads roughly towards the middle, as people in a group face, or anywhere for two who face each other
+    (``apart``).
+    """
     place = rng.uniform(-half, half, 2)
     inward = np.arctan2(-place[1], -place[0])
-    return Spot(place=place, bearing=float(inward + rng.normal(0.0, 0.6)))
+    off, anywhere = rng.normal(0.0, 0.6), rng.uniform(-np.pi, np.pi)
+    return Spot(place=place, bearing=float(anywhere if apart else inward + off))
 
 
-def draw_loop(rng: np.random.Generator, *, half: float, speed: float) -> Loop | None:
-    """A wobbly ellipse in the square of half side ``half``; None where the draw leaves it or turns too tightly."""
-    tightest = min(_TIGHTEST, 0.7 * half)
-    speed = min(speed, _FASTEST_TURN * tightest)
-    wide = rng.uniform(tightest, half)
+def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset: Floats) -> Recorded | None:
+    """A recorded way turned and shifted by chance; None where the turned way does not fit into the square."""
+    bearing = float(rng.uniform(-np.pi, np.pi))
+    share = rng.uniform(size=2)
+    way = offset @ turned(bearing).T
+    low, high = -half - way.min(axis=0), half - way.max(axis=0)
+    if (low > high).any():
+        return None
+    return Recorded(Spot(low + share * (high - low), bearing), time, offset)
+
+
+def draw_loop(
+    rng: np.random.Generator, *, half: float, speed: float, tightest: float = _TIGHTEST, widest: float | None = None
+) -> Loop | None:
+    """A wobbly ellipse in the square of half side ``half``; None where the draw leaves it or turns too tightly.
+
+    Args:
+        rng: draws it.
+        half: metres.
+        speed: metres a second.
+        tightest: least radius of its turns, metres.
+        widest: half of the longest that it is, metres; None: as long as fits.
+    """
+    start = float(rng.uniform())
+    points = _ellipse(rng, half, tightest, half if widest is None else widest)
+    if np.abs(points).max() > half or _sharpest(points) > 1.0 / tightest:
+        return None
+    loop = make_loop(points, speed=speed, start=start)
+    bend = loop.curvature(np.linspace(0.0, loop.length / speed, 2 * _KNOTS))
+    return loop if np.abs(bend).max() < 1.0 / tightest else None
+
+
+def _ellipse(rng: np.random.Generator, half: float, tightest: float, widest: float) -> Floats:
+    wide = rng.uniform(tightest, widest)
     slim = rng.uniform(np.sqrt(tightest * wide), wide)  # an ellipse turns most tightly at its ends, by slim² / wide
     center = rng.uniform(-1.0, 1.0, 2) * (half - 0.9 * slim)
     wobble = rng.uniform(0.0, 0.12) * (1.0 - tightest * wide / slim**2)
-    tilt, wobble_phase, start = rng.uniform(0.0, 2 * np.pi, 3)
-    sense = rng.choice([-1.0, 1.0])
-    around = sense * np.linspace(0.0, 2 * np.pi, 8 * _KNOTS, endpoint=False)
-    radial = 1.0 + wobble * np.cos(3 * around + wobble_phase)
+    tilt, phase = rng.uniform(0.0, 2 * np.pi, 2)
+    around = rng.choice([-1.0, 1.0]) * np.linspace(0.0, 2 * np.pi, 8 * _KNOTS, endpoint=False)
+    radial = 1.0 + wobble * np.cos(3 * around + phase)
     ellipse = np.stack([wide * radial * np.cos(around), slim * radial * np.sin(around)], axis=-1)
-    turn = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
-    points = center + ellipse @ turn.T
-    if np.abs(points).max() > half:
-        return None
-    loop = make_loop(points, speed=speed, start=float(start / (2 * np.pi)))
-    bends = loop.curvature(np.linspace(0.0, loop.length / speed, 2 * _KNOTS))
-    return loop if np.abs(bends).max() < 1.0 / tightest else None
+    return center + ellipse @ turned(tilt).T
 
 
-def plan_tracks(
-    seed: int, speeds: Sequence[float | None], *, area: float, spacing: float, duration: float
-) -> tuple[Track, ...]:
-    """Give everyone a track that stays in the area and ``spacing`` away from everyone else at all times.
-
-    People are placed one after another, each by draws of their own, so that one more person leaves the earlier
-    ones where they are. Only when someone finds no place does the whole plan start over with other draws.
-
-    Args:
-        seed: the scenario's seed.
-        speeds: for each person the walking speed in metres a second, or None to stand.
-        area: half the side of the square about the origin that pelvises stay in, metres.
-        spacing: least distance between two pelvises, metres.
-        duration: seconds that the plan must hold for.
-
-    Raises:
-        ValueError: no such plan was found, or the area is too small to walk in.
-    """
-    half = area - SWAY
-    if any(speed is not None for speed in speeds) and half < _NARROWEST:
-        raise ValueError(
-            f"people.area = {area:g} m is too small to walk in: a loop needs {_NARROWEST + SWAY:.2f} m or more; "
-            "enlarge people.area or take activities without walk"
-        )
-    if speeds and half <= 0:
-        raise ValueError(f"people.area = {area:g} m is too small to stand in: take {2 * SWAY:.2f} m or more")
-    time = np.linspace(0.0, duration, max(2, round(duration * _CHECKS) + 1))
-    furthest = 0
-    for plan in range(_PLANS):
-        tracks: list[Track] = []
-        taken = np.empty((0, len(time), 2))
-        for person, speed in enumerate(speeds):
-            rng = stream(seed, "people", person, "track", plan)
-            in_file = min(0.95, _IN_FILE[0] + plan * _IN_FILE[1])
-            found = _find_track(rng, tracks, taken, time, speed, half=half, spacing=spacing, in_file=in_file)
-            if found is None:
-                furthest = max(furthest, person)
-                break
-            tracks.append(found)
-            taken = np.concatenate([taken, found.position(time)[None]])
-        else:
-            return tuple(tracks)
-    raise ValueError(
-        f"people.count = {len(speeds)} people do not fit: only {furthest} found a place in people.area = {area:g} m "
-        f"(half the side of their square) with people.spacing = {spacing:g} m between any two for {duration:g} s; "
-        "lower people.count or people.spacing, or enlarge people.area"
-    )
+def _sharpest(points: Floats) -> float:
+    """About the greatest curvature of a closed curve given by close points (n, 2): cheap, before any spline."""
+    ahead, behind = np.roll(points, -1, axis=0), np.roll(points, 1, axis=0)
+    return float(np.abs(_curvature((ahead - behind) / 2, ahead - 2 * points + behind)).max())
 
 
-def _find_track(
-    rng: np.random.Generator,
-    tracks: Sequence[Track],
-    taken: Floats,
-    time: Floats,
-    speed: float | None,
-    *,
-    half: float,
-    spacing: float,
-    in_file: float,
-) -> Track | None:
-    """Draw tracks until one keeps its distance from where the others are at the same times, (n, T, 2)."""
-    loops = [track for track in tracks if isinstance(track, Loop)]
-    for _ in range(_TRIES):
-        track: Track | None
-        if speed is None:
-            track = draw_spot(rng, half=half)
-        elif loops and rng.uniform() < in_file:
-            ahead = loops[rng.integers(len(loops))]
-            track = replace(ahead, start=float(rng.uniform(0.0, ahead.length)))
-        else:
-            track = draw_loop(rng, half=half, speed=speed)
-        if track is None:
-            continue
-        apart = np.linalg.norm(taken - track.position(time), axis=-1)
-        if apart.min(initial=np.inf) >= spacing + 2 * SWAY:
-            return track
-    return None
+def _curvature(tangent: Floats, bend: Floats) -> Floats:
+    cross = tangent[..., 0] * bend[..., 1] - tangent[..., 1] * bend[..., 0]
+    return cross / np.linalg.norm(tangent, axis=-1) ** 3

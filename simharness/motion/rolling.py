@@ -45,7 +45,7 @@ def roll(sole: Floats) -> Rolling:
     Args:
         sole: points of the sole relative to the ankle, x forward, z up, while it lies flat, (n, 3) metres.
     """
-    pitch = np.radians(np.arange(-90.0, 50.0, _STEP))
+    pitch = np.radians(np.arange(-95.0, 95.0, _STEP))
     forward, up = sole[:, 0], sole[:, 2]
     x = forward * np.cos(pitch)[:, None] - up * np.sin(pitch)[:, None]
     z = forward * np.sin(pitch)[:, None] + up * np.cos(pitch)[:, None]

@@ -7,10 +7,18 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
+from simharness.motion.carrying import carry
+from simharness.motion.dancing import dance
 from simharness.motion.gestures import GESTURES, gesture
+from simharness.motion.lowering import crouch, kneel, squat
+from simharness.motion.lying import lie
 from simharness.motion.motion import Motion
 from simharness.motion.paths import Loop, Spot
 from simharness.motion.performance import Activity, solo
+from simharness.motion.reaching import reach
+from simharness.motion.running import run
+from simharness.motion.seating import sit
+from simharness.motion.stepping import step, turn
 from simharness.motion.walking import walk
 
 
@@ -24,6 +32,17 @@ SINGLES: Mapping[str, Activity] = MappingProxyType(
         for activity in (
             Activity("walk", 1, Loop, 0.0, solo(walk)),
             *(Activity(name, 1, Spot, 0.0, solo(partial(_gesture, name))) for name in GESTURES),
+            Activity("squat", 1, Spot, 0.2, solo(squat)),
+            Activity("crouch", 1, Spot, 0.4, solo(crouch)),
+            Activity("kneel", 1, Spot, 0.5, solo(kneel)),
+            Activity("turn", 1, Spot, 0.0, solo(turn)),
+            Activity("step", 1, Spot, 0.3, step),
+            Activity("run", 1, Loop, 0.0, solo(run), froude=(0.6, 0.95)),
+            Activity("reach", 1, Spot, 0.2, solo(reach)),
+            Activity("carry", 1, Spot, 0.5, carry),
+            Activity("dance", 1, Spot, 0.2, solo(dance)),
+            Activity("lie", 1, Spot, 1.0, solo(lie)),
+            Activity("sit", 1, Spot, 0.5, sit),
         )
     }
 )

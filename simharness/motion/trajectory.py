@@ -63,7 +63,7 @@ def through(time: Floats, values: Floats, when: ArrayLike) -> Floats:
     Cubic Hermite with central differences (Catmull and Rom, 1974): continuous velocity, and local, so that a curve
     does not depend on how long it goes on. Held at its ends.
     """
-    when = np.clip(np.asarray(when, float), time[0], time[-1])
+    when = np.asarray(np.clip(when, time[0], time[-1]), float)
     if len(time) == 1:
         return np.broadcast_to(values[0], (*when.shape, values.shape[1])).copy()
     k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)

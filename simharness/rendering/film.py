@@ -1,157 +1,159 @@
-"""Filming a simulated sequence: what every camera sees of every person in every frame.
+"""Filming a scene: what every camera sees of every person in every frame.
 
-Frames are independent of each other, so processes can share them and :meth:`Views.concatenate` the parts.
+Frames stream: one is posed, pictured and labelled before the next, and only what :class:`Views` holds is kept. They are
+independent of each other, so processes can share them and :meth:`Views.concatenate` the parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import itertools
+from collections.abc import Collection, Iterator
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.camera import Camera, Rig
-from mvpose.checks import as_array
-from simharness.rendering.mesh import Mesh
-from simharness.rendering.renderer import NEAR, Image, Renderer
-from simharness.rendering.visibility import label
+from mvpose.camera import Camera
+from simharness.rendering.optics import appear
+from simharness.rendering.picture import Studio, meshes_at
+from simharness.rendering.renderer import NEAR, Renderer
+from simharness.rendering.shutter import moments, rolled, stitched
+from simharness.rendering.views import Views
+from simharness.rendering.visibility import Visibility, label
 
 if TYPE_CHECKING:
-    from simharness.scene.build import Scene
-    from simharness.scene.sequence import Sequence
-
+    from simharness.rigs.shots import Shots
+    from simharness.scene.playback import Playback, State
 
 PREVIEW = 320  # pixels: width of the reduced pictures
 
 
 @dataclass(frozen=True)
-class Views:
-    """The truth in the pictures of V cameras over T frames.
-
-    Attributes:
-        pixels: where each joint projects, (T, V, P, J, 2); NaN behind the camera.
-        visibility: :class:`simharness.rendering.visibility.Visibility`, (T, V, P, J) int8.
-        boxes: x, y, width, height in pixels of the part of each person's silhouette that falls on the image,
-            whatever stands in front, (T, V, P, 4); zeros where none does.
-        area_visible: pixels in which each person is seen, (T, V, P).
-        previews: reduced colour pictures of some frames, by frame, each (V, h, w, 3) uint8.
-    """
+class Seen:
+    """What one camera sees in one picture: as :class:`Views`, without T and V."""
 
     pixels: NDArray[np.float64]
     visibility: NDArray[np.int8]
     boxes: NDArray[np.float64]
     area_visible: NDArray[np.int64]
-    previews: Mapping[int, NDArray[np.uint8]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        pixels = as_array(self.pixels, ("T", "V", "P", "J", 2), "pixels")
-        shape = pixels.shape[:4]
-        for key, value in (
-            ("pixels", pixels),
-            ("visibility", as_array(self.visibility, shape, "visibility", np.int8)),
-            ("boxes", as_array(self.boxes, (*shape[:3], 4), "boxes")),
-            ("area_visible", as_array(self.area_visible, shape[:3], "area_visible", np.int64)),
-        ):
-            object.__setattr__(self, key, value)
 
-    def __len__(self) -> int:
-        return len(self.pixels)
+class Eye(Protocol):
+    """A way to find out what cameras see."""
 
-    @classmethod
-    def concatenate(cls, parts: Many[Self]) -> Self:
-        """Join films of consecutive frames.
+    def see(self, states: Many[State], cameras: Many[Camera]) -> list[Seen]:
+        """What cameras see whose shutters are open together.
 
-        Raises:
-            ValueError: no parts, or parts of different views, people or joints.
+        Args:
+            states: the scene at the moments of a picture's bands (:func:`simharness.rendering.shutter.moments`); one
+                state where all rows are taken at once.
+            cameras: any number.
         """
-        shapes = {part.pixels.shape[1:] for part in parts}
-        if len(shapes) != 1:
-            raise ValueError(f"films to join must share views, people and joints, got {sorted(shapes) or 'none'}")
-        return cls(
-            pixels=np.concatenate([part.pixels for part in parts]),
-            visibility=np.concatenate([part.visibility for part in parts]),
-            boxes=np.concatenate([part.boxes for part in parts]),
-            area_visible=np.concatenate([part.area_visible for part in parts]),
-            previews={frame: pictures for part in parts for frame, pictures in part.previews.items()},
-        )
+        ...
 
 
-def meshes_at(scene: Scene, sequence: Sequence, frame: int) -> list[Mesh]:
-    """Everything to be seen in one frame: people first, so that a mesh index below P is a person; then things."""
-    people = [
-        Mesh(vertices=body.skin(bones), faces=body.faces, colors=colors, smooth=True)
-        for body, bones, colors in zip(scene.bodies, sequence.bones[frame], scene.skins, strict=True)
-    ]
-    return [*people, *(solid.mesh for solid in scene.solids)]
+class PictureEye:
+    """Sees by pictures of depth and ids.
 
+    Args:
+        playback: the scene.
+        renderer: makes the pictures.
+    """
 
-def image(scene: Scene, sequence: Sequence, camera: Camera, frame: int, renderer: Renderer, *, finer: int = 1) -> Image:
-    """Picture one frame from one camera; with ``finer`` the colours are :func:`antialiased`."""
-    meshes = meshes_at(scene, sequence, frame)
-    if finer == 1:
-        return renderer.render(camera, meshes)
-    rgb = antialiased(renderer, camera, meshes, finer=finer)
-    return replace(renderer.render(camera, meshes, color=False), rgb=rgb)
+    def __init__(self, playback: Playback, renderer: Renderer) -> None:
+        self._scene = playback.scene
+        self._renderer = renderer
+        people = len(self._scene.bodies)
+        radii = [body.joint_radii for body in self._scene.bodies]
+        self._radii = np.stack(radii) if people else np.zeros((0, 17))
 
-
-def antialiased(renderer: Renderer, camera: Camera, meshes: Many[Mesh], *, finer: int = 2) -> NDArray[np.uint8]:
-    """Picture for people to look at, (h, w, 3): ``finer`` x ``finer`` samples a pixel, so that outlines are smooth."""
-    K = camera.K.copy()
-    K[:2] *= finer
-    K[:2, 2] += (finer - 1) / 2  # pixel centres are integers at either size
-    width, height = camera.size
-    large = renderer.render(replace(camera, K=K, size=(finer * width, finer * height)), meshes).rgb
-    return cv2.resize(large, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    def see(self, states: Many[State], cameras: Many[Camera]) -> list[Seen]:
+        """See :class:`Eye`."""
+        people = len(self._scene.bodies)
+        meshes = [meshes_at(self._scene, state) for state in states]
+        result = []
+        for camera in cameras:
+            drawn = [self._renderer.render(camera, each, color=False) for each in meshes]
+            image = replace(drawn[0], **{key: stitched([getattr(d, key) for d in drawn]) for key in ("depth", "ids")})
+            joints = rolled(np.stack([state.joints for state in states]), camera)
+            boxes = np.zeros((people, 4))
+            for person in range(people):
+                boxes[person] = silhouette_box(camera, [each[person].vertices for each in meshes])
+            result.append(
+                Seen(
+                    pixels=appear(camera, joints),
+                    visibility=label(image, camera, joints=joints, radii=self._radii),
+                    boxes=boxes,
+                    area_visible=np.bincount(image.ids.ravel() + 1, minlength=people + 1)[1 : people + 1],
+                )
+            )
+        return result
 
 
 def film(
-    scene: Scene,
-    sequence: Sequence,
-    rig: Rig,
-    renderer: Renderer,
+    playback: Playback,
+    shots: Shots,
+    eye: Eye,
     *,
     frames: Many[int] | None = None,
-    color: bool = False,
+    studio: Studio | None = None,
     previews: Collection[int] = (),
 ) -> Views:
-    """Film ``frames`` (all by default) of a sequence with every camera of a rig.
+    """Film ``frames`` (all by default) of a scene.
 
     Args:
-        scene: people, their colours and the things around them.
-        sequence: where everyone is in every frame.
-        rig: the V cameras.
-        renderer: makes colour, depth and ids.
-        frames: indices into the sequence.
-        color: shade the pictures; labels and boxes need depth and ids only.
+        playback: the scene.
+        shots: when and with which lens every picture is taken.
+        eye: how it is found out what is seen.
+        frames: indices of frames.
+        studio: makes the colour pictures; not needed without previews.
         previews: frames of which to keep the colour pictures, reduced to a width of ``PREVIEW`` pixels.
     """
-    frames = range(len(sequence.joints)) if frames is None else frames
-    people, joints = sequence.joints.shape[1:3]
-    radii = np.reshape([body.joint_radii for body in scene.bodies], (people, joints))
-    shape = (len(frames), len(rig), people)
-    pixels, visibility = np.full((*shape, joints, 2), np.nan), np.zeros((*shape, joints), np.int8)
+    frames = range(len(shots.time)) if frames is None else frames
+    people, joints = len(playback.scene.bodies), 17
+    views = len(shots.believed)
+    shape = (len(frames), views, people)
+    pixels = np.full((*shape, joints, 2), np.nan)
+    visibility = np.full((*shape, joints), int(Visibility.OUTSIDE), np.int8)
     boxes, area = np.zeros((*shape, 4)), np.zeros(shape, np.int64)
-    kept: dict[int, NDArray[np.uint8]] = {}
-    for f, frame in enumerate(frames):
-        meshes = meshes_at(scene, sequence, frame)
-        where = sequence.joints[frame]
-        reduced = []
-        for v, camera in enumerate(rig):
-            picture = renderer.render(camera, meshes, color=color)
-            if frame in previews:
-                reduced.append(_reduced(picture.rgb))
-            pixels[f, v] = camera.project(where)
-            visibility[f, v] = label(picture, camera, joints=where, radii=radii)
-            area[f, v] = np.bincount(picture.ids.ravel() + 1, minlength=people + 1)[1 : people + 1]
-            for p in range(people):
-                boxes[f, v, p] = silhouette_box(camera, meshes[p].vertices)
-        if reduced:
-            kept[frame] = np.stack(reduced)
-    return Views(pixels=pixels, visibility=visibility, boxes=boxes, area_visible=area, previews=kept)
+    for f, view_group, states in _moments(playback, shots, frames):
+        cameras = [shots.camera(frames[f], view) for view in view_group]
+        for view, seen in zip(view_group, eye.see(states, cameras), strict=True):
+            pixels[f, view], visibility[f, view] = seen.pixels, seen.visibility
+            boxes[f, view], area[f, view] = seen.boxes, seen.area_visible
+    kept: dict[int, tuple[NDArray[np.uint8], ...]] = {}
+    for frame in frames:
+        if studio is not None and frame in previews:
+            kept[frame] = tuple(_reduced(studio.picture(shots, frame, view)) for view in range(views))
+    return Views(
+        pixels=pixels,
+        visibility=visibility,
+        boxes=boxes,
+        area_visible=area,
+        source=shots.source[list(frames)],
+        previews=kept,
+    )
+
+
+_BLOCK = 64  # frames whose motions are sampled together
+
+
+def _moments(
+    playback: Playback, shots: Shots, frames: Many[int]
+) -> Iterator[tuple[int, NDArray[np.int64], list[State]]]:
+    """Position in ``frames``, views whose pictures are taken together, and the scene at the moments of their bands."""
+    for start in range(0, len(frames), _BLOCK):
+        groups = []
+        for f in range(start, min(start + _BLOCK, len(frames))):
+            delivered = np.flatnonzero(shots.source[frames[f]] >= 0)
+            when = shots.time[frames[f], delivered]
+            groups += [(f, delivered[when == time], moments(time, shots.readout)) for time in np.unique(when)]
+        states = playback.over(np.concatenate([np.zeros(0), *(times for *_, times in groups)]))
+        for f, views, times in groups:
+            yield f, views, list(itertools.islice(states, len(times)))
 
 
 def _reduced(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -160,24 +162,24 @@ def _reduced(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return cv2.resize(rgb, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
-def silhouette_box(camera: Camera, vertices: NDArray) -> NDArray[np.float64]:
+def silhouette_box(camera: Camera, bands: Many[NDArray]) -> NDArray[np.float64]:
     """Box x, y, width, height of the part of a body that projects onto the image; zeros where none does.
 
     Taken over the projected vertices that fall on the image, which lie a pixel or two apart; points nearer than
-    the near plane are not seen. The camera is a pinhole.
+    the near plane are not seen.
 
     Args:
         camera: the camera.
-        vertices: of the body's skin, (n, 3), metres.
+        bands: vertices of the body's skin, (n, 3) metres, in the moments of the bands of rows from the top; one where
+            all rows are taken at once.
     """
-    # Row by row rather than by a matrix product: BLAS may round differently from one process to the next.
-    x, y, z = np.ascontiguousarray(vertices.T, float)
-    u, v, depth = (row[0] * x + row[1] * y + row[2] * z + row[3] for row in camera.P)
-    front = depth >= NEAR
-    u, v = u[front] / depth[front], v[front] / depth[front]
-    width, height = camera.size
-    seen = (u >= -0.5) & (u < width - 0.5) & (v >= -0.5) & (v < height - 0.5)
-    if not seen.any():
+    height = camera.size[1]
+    found = []
+    for band, vertices in enumerate(bands):
+        pixels = appear(camera, vertices, near=NEAR)
+        pixels = pixels[camera.inside(pixels)]
+        found.append(pixels[np.floor((pixels[:, 1] + 0.5) / height * len(bands)) == band])
+    seen = np.concatenate(found)
+    if not len(seen):
         return np.zeros(4)
-    u, v = u[seen], v[seen]
-    return np.array([u.min(), v.min(), np.ptp(u), np.ptp(v)])
+    return np.concatenate([seen.min(axis=0), np.ptp(seen, axis=0)])

@@ -1,16 +1,32 @@
-"""The compiled loops of the rasteriser: private, on plain arrays, single-threaded."""
+"""The compiled loops of the rasteriser: private, on plain arrays, single-threaded.
+
+A triangle with vertices ``a, b, c`` in homogeneous pixel coordinates (``P @ (x, 1)``, the third is depth) is hit by the
+ray ``d = (x, y, 1)`` of a pixel where all of ``[b x c, c x a, a x b] . d`` have the sign of the determinant
+``a . (b x c)``, and their sum over the determinant is the inverse depth of the hit. That needs no clipping: vertices
+behind the camera are as good as any (Olano & Greer, "Triangle scan conversion using 2D homogeneous coordinates",
+1997). Two triangles on one edge compute it with opposite signs and the same rounding, so no pixel falls between them.
+
+Float64 throughout: a room's floor and a fingertip go through the same arithmetic. Most triangles of a body are about as
+large as a pixel, and what they cost is the processor's wrong guesses at a dozen random branches each. So they pass
+through short loops that select, cover and fill without guessing: each loop hands a list to the next.
+"""
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
-# The kernels are typed by the arrays that the first call hands in. Float64 throughout: a room's floor and a
-# fingertip go through the same arithmetic.
+# The kernels are typed by the arrays that the first call hands in. What picks entries of others is unsigned, or counts
+# from 0: an index that may be negative would be checked at every use, and keeps loops from running on vectors.
+
+_SLACK = 4e-3  # pixels: bounding boxes are of single precision, edges decide
+_TILE = 4  # pixels
+_SMALL = 12  # pixels: larger triangles are drawn row by row
+_CHUNK = 512  # triangles on their way together: their lists stay in the processor's nearest cache
+_LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # set bit of 16, by a de Bruijn sequence
+_DE_BRUIJN = 0x09AF
 
 
 @njit(cache=True, error_model="numpy")
@@ -21,51 +37,253 @@ def rasterise(
     near: float,
     inverse_depth: np.ndarray,
     triangle: np.ndarray,
-) -> None:
+) -> np.ndarray:
     """Write the nearest triangle at every pixel centre into ``inverse_depth`` and ``triangle``, in place.
 
-    A triangle with vertices ``a, b, c`` in homogeneous pixel coordinates (``P @ (x, 1)``, the third is depth) is
-    hit by the ray ``d = (x, y, 1)`` of a pixel where all of ``[b x c, c x a, a x b] . d`` have the sign of the
-    determinant ``a . (b x c)``, and their sum over the determinant is the inverse depth of the hit. That needs
-    no clipping: vertices behind the camera are as good as any (Olano & Greer, "Triangle scan conversion using
-    2D homogeneous coordinates", 1997). Two triangles on one edge compute it with opposite signs and the same
-    rounding, so no pixel falls between them. Both sides of a triangle are drawn.
+    Both sides of a triangle are drawn, but those seen from behind last: the far sides of bodies, half of all triangles,
+    are then mostly known to be hidden before any work is spent on them.
 
     Args:
         vertices: (n, 3) float32, world.
-        faces: (k, 3) int32.
+        faces: (k, 3) uint32.
         P: projection matrix, (3, 4), its last row unit: ``K [R | t]``.
         near: depth below which nothing is drawn.
         inverse_depth: (h, w) float32, zeros before the first call.
         triangle: (h, w) int32, index of the face seen; -1 before the first call.
+
+    Returns:
+        Homogeneous pixel coordinates of the vertices, (n, 3).
     """
     height, width = triangle.shape
-    q = np.empty((len(vertices), 3))
-    uv = np.empty((len(vertices), 2))
+    q, seen = np.empty((len(vertices), 3)), np.empty((len(vertices), 3), np.float32)
     for i in range(len(vertices)):
-        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        x, y, z = np.float64(vertices[i, 0]), np.float64(vertices[i, 1]), np.float64(vertices[i, 2])
         for k in range(3):
             q[i, k] = P[k, 0] * x + P[k, 1] * y + P[k, 2] * z + P[k, 3]
-        if q[i, 2] >= near:
-            uv[i, 0] = q[i, 0] / q[i, 2]
-            uv[i, 1] = q[i, 1] / q[i, 2]
+        # Pixel and inverse depth; of no use behind the near plane, and not used.
+        scale = 1.0 / q[i, 2]
+        seen[i, 0], seen[i, 1], seen[i, 2] = q[i, 0] * scale, q[i, 1] * scale, scale
 
-    edge, plane = np.empty((4, 3)), np.empty(3)
+    lists, counts = _select(faces, q, seen, near, width, height)
+    tiles = (_SMALL // _TILE) ** 2
+    hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
+    for averted in range(2):
+        small, large = lists[2 * averted, : counts[2 * averted]], lists[2 * averted + 1, : counts[2 * averted + 1]]
+        if averted:
+            small = small[: _drop_hidden(small, faces, seen, _blocks(inverse_depth))]
+        for start in range(0, len(small), _CHUNK):
+            count = _cover(small[start : start + _CHUNK], faces, q, seen, width, height, hits, planes)
+            _fill(hits, planes, count, inverse_depth, triangle)
+        _draw(large, faces, q, seen, near, inverse_depth, triangle)
+    return q
+
+
+@njit(cache=True, error_model="numpy")
+def _select(
+    faces: np.ndarray, q: np.ndarray, seen: np.ndarray, near: float, width: int, height: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that may cover a pixel's centre: lists (4, k) and how long they are.
+
+    Small ones that face the camera; large ones, and all that the near plane cuts; and the same two of those seen from
+    behind.
+    """
+    lists, counts = np.empty((4, len(faces) + 1), np.uint32), np.zeros(4, np.int64)
+    facing_small, facing_large, averted_small, averted_large, slack = 0, 0, 0, 0, np.float32(_SLACK)
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        least = min(q[a, 2], q[b, 2], q[c, 2])
-        most = max(q[a, 2], q[b, 2], q[c, 2])
-        if most < near:
-            continue
-        left, right, top, bottom = 0.0, width - 1.0, 0.0, height - 1.0
-        if least >= near:
-            left = max(left, np.ceil(min(uv[a, 0], uv[b, 0], uv[c, 0])))
-            right = min(right, np.floor(max(uv[a, 0], uv[b, 0], uv[c, 0])))
-            top = max(top, np.ceil(min(uv[a, 1], uv[b, 1], uv[c, 1])))
-            bottom = min(bottom, np.floor(max(uv[a, 1], uv[b, 1], uv[c, 1])))
-        if left > right or top > bottom:  # most triangles of a body: they cover no pixel's centre
-            continue
+        az, bz, cz = q[a, 2], q[b, 2], q[c, 2]
+        ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
+        whole = (az >= near) & (bz >= near) & (cz >= near)
+        cut = ((az >= near) | (bz >= near) | (cz >= near)) & ~whole
+        low, high = (ax, bx) if ax < bx else (bx, ax)
+        low, high = cx if cx < low else low, cx if cx > high else high
+        first, last = np.ceil(low - slack), np.floor(high + slack)
+        whole = whole & (first <= last) & (last >= 0.0) & (first < width)
+        small = last - first < _SMALL
+        low, high = (ay, by) if ay < by else (by, ay)
+        low, high = cy if cy < low else low, cy if cy > high else high
+        first, last = np.ceil(low - slack), np.floor(high + slack)
+        whole = whole & (first <= last) & (last >= 0.0) & (first < height)
+        small = small & (last - first < _SMALL) & whole
+        averted = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)  # y is down: clockwise
+        lists[0, facing_small] = t
+        lists[1, facing_large] = t
+        lists[2, averted_small] = t
+        lists[3, averted_large] = t
+        facing_small += small & ~averted
+        facing_large += cut | (whole & ~small & ~averted)
+        averted_small += small & averted
+        averted_large += whole & ~small & averted
+    counts[0], counts[1], counts[2], counts[3] = facing_small, facing_large, averted_small, averted_large
+    return lists, counts
 
+
+@njit(cache=True, error_model="numpy")
+def _blocks(inverse_depth: np.ndarray) -> np.ndarray:
+    """The farthest of every 4 x 4 pixels, inverse depth; one row and column more, of zeros."""
+    height, width = inverse_depth.shape
+    rows, columns = (height + _TILE - 1) // _TILE, (width + _TILE - 1) // _TILE
+    blocks = np.zeros((rows + 1, columns + 1), np.float32)
+    for row in range(height // _TILE):  # what the border cuts stays 0: seen through
+        for column in range(width // _TILE):
+            least = inverse_depth[_TILE * row, _TILE * column]
+            for y in range(_TILE):
+                for x in range(_TILE):
+                    value = inverse_depth[_TILE * row + y, _TILE * column + x]
+                    least = value if value < least else least
+            blocks[row, column] = least
+    return blocks
+
+
+@njit(cache=True, error_model="numpy")
+def _box(
+    a: int, b: int, c: int, seen: np.ndarray, width: int, height: int
+) -> tuple[np.int32, np.int32, np.int32, np.int32, np.float32, np.float32]:
+    """Pixels that a triangle ahead may cover: left, right, top, bottom; its least and greatest inverse depth."""
+    slack = np.float32(_SLACK)
+    ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
+    low, high = (ax, bx) if ax < bx else (bx, ax)
+    low, high = cx if cx < low else low, cx if cx > high else high
+    left, right = np.int32(np.ceil(low - slack)), np.int32(np.floor(high + slack))
+    low, high = (ay, by) if ay < by else (by, ay)
+    low, high = cy if cy < low else low, cy if cy > high else high
+    top, bottom = np.int32(np.ceil(low - slack)), np.int32(np.floor(high + slack))
+    low, high = (seen[a, 2], seen[b, 2]) if seen[a, 2] < seen[b, 2] else (seen[b, 2], seen[a, 2])
+    low, high = seen[c, 2] if seen[c, 2] < low else low, seen[c, 2] if seen[c, 2] > high else high
+    left, right = max(left, np.int32(0)), min(right, np.int32(width - 1))
+    top, bottom = max(top, np.int32(0)), min(bottom, np.int32(height - 1))
+    return left, right, top, bottom, low, high
+
+
+@njit(cache=True, error_model="numpy")
+def _drop_hidden(small: np.ndarray, faces: np.ndarray, seen: np.ndarray, blocks: np.ndarray) -> int:
+    """Move to the front of a list those that are not behind all that is seen where they are; how many."""
+    rows, columns, kept = blocks.shape[0], blocks.shape[1], 0
+    for index in range(len(small)):
+        t = small[index]
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        left, right, top, bottom, _, nearest = _box(a, b, c, seen, _TILE * columns, _TILE * rows)
+        left, right, top, bottom = left // _TILE, right // _TILE, top // _TILE, bottom // _TILE
+        one, two, three, four = blocks[top, left], blocks[top, right], blocks[bottom, left], blocks[bottom, right]
+        one, three = two if two < one else one, four if four < three else three
+        one = three if three < one else one
+        # Only the corners of the box were asked: enough where it spans no more than two blocks each way.
+        small[kept] = t
+        kept += (nearest >= one) | (right - left > 1) | (bottom - top > 1)
+    return kept
+
+
+@njit(cache=True, error_model="numpy")
+def _cover(
+    small: np.ndarray,
+    faces: np.ndarray,
+    q: np.ndarray,
+    seen: np.ndarray,
+    width: int,
+    height: int,
+    hits: np.ndarray,
+    planes: np.ndarray,
+) -> int:
+    """Which pixels small triangles cover, in tiles of 4 x 4.
+
+    Args:
+        small: indices of triangles.
+        faces: (k, 3) uint32.
+        q: homogeneous pixel coordinates of the vertices, (n, 3).
+        seen: pixels and inverse depths of the vertices, (n, 3) float32.
+        width: of the picture.
+        height: of the picture.
+        hits: gets, for every tile with pixels that are covered, the triangle, the tile's first column and row, and one
+            bit for each of its pixels, (most, 4) int32.
+        planes: gets the plane of inverse depth over pixels, and its least and greatest value, (most, 5).
+
+    Returns:
+        How many tiles.
+    """
+    count = 0
+    for index in range(len(small)):
+        t = small[index]
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        left, right, top, bottom, low, high = _box(a, b, c, seen, width, height)
+        ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
+        cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
+        ex, ey, ez = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        fx, fy, fz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+        gx, gy, gz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        determinant = ax * ex + ay * ey + az * ez
+        scale = 1.0 / determinant
+        px, py, pz = (ex + fx + gx) * scale, (ey + fy + gy) * scale, (ez + fz + gz) * scale
+        sign = 1.0 if determinant > 0 else -1.0
+        ex, ey, ez, fx, fy, fz = sign * ex, sign * ey, sign * ez, sign * fx, sign * fy, sign * fz
+        gx, gy, gz = sign * gx, sign * gy, sign * gz
+        for tile_top in range(top, bottom + 1, _TILE):
+            for tile_left in range(left, right + 1, _TILE):
+                inside, first, row = np.int32(0), np.int32(tile_left), np.int32(tile_top)
+                for i in range(16):  # at once, on processors that can
+                    x, y = np.float64(first + np.int32(i & 3)), np.float64(row + np.int32(i >> 2))
+                    e, f, g = ex * x + (ey * y + ez), fx * x + (fy * y + fz), gx * x + (gy * y + gz)
+                    inside |= np.int32((e >= 0.0) & (f >= 0.0) & (g >= 0.0)) << np.int32(i)
+                columns, rows = min(right - tile_left + 1, _TILE), min(bottom - tile_top + 1, _TILE)
+                box = (0x1111 * ((1 << columns) - 1)) & ((1 << (_TILE * rows)) - 1)
+                covered = (inside & box) if determinant != 0.0 else 0  # 0 is seen from its edge
+                hits[count, 0], hits[count, 1], hits[count, 2], hits[count, 3] = t, tile_left, tile_top, covered
+                planes[count, 0], planes[count, 1], planes[count, 2] = px, py, pz
+                planes[count, 3], planes[count, 4] = low, high
+                count += covered != 0
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(hits: np.ndarray, planes: np.ndarray, count: int, inverse_depth: np.ndarray, triangle: np.ndarray) -> None:
+    """Write small triangles where they are the nearest; arguments as :func:`_cover` returns them."""
+    for index in range(count):
+        t, left, top, inside = hits[index, 0], hits[index, 1], hits[index, 2], np.int64(hits[index, 3])
+        # Rounding must not lift a sliver out of its own range of depth.
+        low, high = np.float32(planes[index, 3]), np.float32(planes[index, 4])
+        while inside:
+            i = _LOWEST[(((inside & -inside) * _DE_BRUIJN) >> 12) & 15]
+            inside &= inside - 1
+            x, y = left + (i & 3), top + (i >> 2)
+            w = np.float32(planes[index, 0] * x + (planes[index, 1] * y + planes[index, 2]))
+            w = low if w < low else (high if w > high else w)
+            if w > inverse_depth[y, x]:
+                inverse_depth[y, x] = w
+                triangle[y, x] = t
+
+
+@njit(cache=True, error_model="numpy")
+def _draw(
+    large: np.ndarray,
+    faces: np.ndarray,
+    q: np.ndarray,
+    seen: np.ndarray,
+    near: float,
+    inverse_depth: np.ndarray,
+    triangle: np.ndarray,
+) -> None:
+    """Write triangles of any size where they are the nearest, row by row."""
+    height, width = triangle.shape
+    edge, run = np.empty((4, 3)), np.empty(4)
+    for index in range(len(large)):
+        t = large[index]
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        least, most = min(q[a, 2], q[b, 2], q[c, 2]), max(q[a, 2], q[b, 2], q[c, 2])
+        whole = least >= near
+        # The box around what of it lies before the near plane.
+        left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
+        for k in range(3):
+            i, j = (b, c) if k == 0 else ((c, a) if k == 1 else (a, b))
+            if q[i, 2] >= near:
+                x, y = q[i, 0] / q[i, 2], q[i, 1] / q[i, 2]
+                left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+            if (q[i, 2] >= near) != (q[j, 2] >= near):
+                share = (near - q[i, 2]) / (q[j, 2] - q[i, 2])
+                x, y = (q[i, 0] + share * (q[j, 0] - q[i, 0])) / near, (q[i, 1] + share * (q[j, 1] - q[i, 1])) / near
+                left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+        left, right = max(np.ceil(left - _SLACK), 0.0), min(np.floor(right + _SLACK), width - 1.0)
+        top, bottom = max(np.ceil(top - _SLACK), 0.0), min(np.floor(bottom + _SLACK), height - 1.0)
+        if left > right or top > bottom:
+            continue
         for k in range(3):
             i, j = (b, c) if k == 0 else ((c, a) if k == 1 else (a, b))
             edge[k, 0] = q[i, 1] * q[j, 2] - q[i, 2] * q[j, 1]
@@ -74,182 +292,58 @@ def rasterise(
         determinant = q[a, 0] * edge[0, 0] + q[a, 1] * edge[0, 1] + q[a, 2] * edge[0, 2]
         if determinant == 0.0:  # seen from its edge
             continue
-        sides = 3
-        for k in range(3):
-            plane[k] = (edge[0, k] + edge[1, k] + edge[2, k]) / determinant
-            for n in range(3):
-                edge[n, k] = edge[n, k] if determinant > 0 else -edge[n, k]
+        scale = 1.0 / determinant
+        px = (edge[0, 0] + edge[1, 0] + edge[2, 0]) * scale
+        py = (edge[0, 1] + edge[1, 1] + edge[2, 1]) * scale
+        pz = (edge[0, 2] + edge[1, 2] + edge[2, 2]) * scale
+        if determinant < 0:
+            edge[:3] = -edge[:3]
+        edge[3, 0], edge[3, 1], edge[3, 2] = -px, -py, 1.0 / near - pz  # where the near plane cuts: one more side
+        for n in range(4):
+            run[n] = -1.0 / edge[n, 0]
+        label = np.int32(t)
         # Rounding must not lift a sliver out of its own range of depth.
-        floor, ceiling = np.float32(1.0 / most), np.float32(1.0 / near)
-        if least >= near:
-            ceiling = np.float32(1.0 / least)
-        else:  # the near plane cuts it: one more side
-            sides = 4
-            edge[3, 0], edge[3, 1], edge[3, 2] = -plane[0], -plane[1], 1.0 / near - plane[2]
-
-        for y in range(int(top), int(bottom) + 1):
+        low, high = np.float32(1.0 / most), np.float32(1.0 / (least if whole else near))
+        for row in range(int(top), int(bottom) + 1):
             start, end = left, right
-            for n in range(sides):
-                rise = edge[n, 0]
-                offset = edge[n, 1] * y + edge[n, 2]
+            for n in range(3 if whole else 4):
+                rise, offset = edge[n, 0], edge[n, 1] * row + edge[n, 2]
                 if rise > 0:
-                    start = max(start, np.ceil(-offset / rise))
+                    edge_x = np.ceil(offset * run[n])
+                    # The sign of the edge at a pixel decides, as in a tile, however this was rounded.
+                    if rise * edge_x + offset < 0:
+                        edge_x += 1.0
+                    elif rise * (edge_x - 1.0) + offset >= 0:
+                        edge_x -= 1.0
+                    start = edge_x if edge_x > start else start
                 elif rise < 0:
-                    end = min(end, np.floor(-offset / rise))
+                    edge_x = np.floor(offset * run[n])
+                    if rise * edge_x + offset < 0:
+                        edge_x -= 1.0
+                    elif rise * (edge_x + 1.0) + offset >= 0:
+                        edge_x += 1.0
+                    end = edge_x if edge_x < end else end
                 elif offset < 0:
                     end = -1.0
             if start > end:
                 continue
-            slope, offset = plane[0], plane[1] * y + plane[2]
-            depths, triangles = inverse_depth[y], triangle[y]
-            for x in range(int(start), int(end) + 1):
-                w = min(max(np.float32(offset + slope * x), floor), ceiling)
-                if w > depths[x]:
-                    depths[x] = w
-                    triangles[x] = t
+            first = int(start)
+            depths, triangles = inverse_depth[row, first : int(end) + 1], triangle[row, first : int(end) + 1]
+            offset = px * first + (py * row + pz)
+            for x in range(len(depths)):  # without a branch: several pixels at once
+                w, before, other = np.float32(px * np.int32(x) + offset), depths[x], triangles[x]
+                w = low if w < low else (high if w > high else w)
+                depths[x] = w if w > before else before
+                triangles[x] = label if w > before else other
 
 
 @njit(cache=True, error_model="numpy")
-def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals of faces (k, 3) and, area-weighted over the smooth faces, of vertices (n, 3); float32."""
-    of_face = np.zeros((len(faces), 3), np.float32)
-    of_vertex = np.zeros((len(vertices), 3), np.float32)
-    for t in range(len(faces)):
-        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        ux, uy, uz = (
-            vertices[b, 0] - vertices[a, 0],
-            vertices[b, 1] - vertices[a, 1],
-            vertices[b, 2] - vertices[a, 2],
-        )
-        vx, vy, vz = (
-            vertices[c, 0] - vertices[a, 0],
-            vertices[c, 1] - vertices[a, 1],
-            vertices[c, 2] - vertices[a, 2],
-        )
-        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        if smooth[t]:
-            for i in (a, b, c):
-                of_vertex[i, 0] += nx
-                of_vertex[i, 1] += ny
-                of_vertex[i, 2] += nz
-        length = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-20)
-        of_face[t, 0], of_face[t, 1], of_face[t, 2] = nx / length, ny / length, nz / length
-    for i in range(len(vertices)):
-        nx, ny, nz = of_vertex[i, 0], of_vertex[i, 1], of_vertex[i, 2]
-        length = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-20)
-        of_vertex[i, 0], of_vertex[i, 1], of_vertex[i, 2] = nx / length, ny / length, nz / length
-    return of_face, of_vertex
-
-
-@njit(cache=True, error_model="numpy", fastmath=True)
-def shade(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    colors: np.ndarray,
-    smooth: np.ndarray,
-    face_normals: np.ndarray,
-    vertex_normals: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    light: np.ndarray,
-    light_P: np.ndarray,
-    shadow: np.ndarray,
-    texel: float,
-    background: np.ndarray,
-) -> np.ndarray:
-    """Colour every pixel: sky light from above, a key light with shadows, a little light from the camera.
-
-    Args:
-        triangle: (h, w) int32, face seen or -1.
-        inverse_depth: (h, w) float32, 1/m.
-        vertices: (n, 3) float32, world.
-        faces: (k, 3) int32.
-        colors: (k, 3) float32, sRGB albedo.
-        smooth: (k,) bool, interpolate the normals of the vertices.
-        face_normals: (k, 3) float32.
-        vertex_normals: (n, 3) float32.
-        center: the camera in the world, (3,).
-        rays: (3, 3), so that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
-        light: unit direction to the key light, (3,).
-        light_P: projection into the shadow map, (3, 4).
-        shadow: inverse depth from the light, (s, s) float32, 0 where nothing stands in the light.
-        texel: side of a pixel of the shadow map in the scene, metres.
-        background: sRGB of what is not hit, (3,).
-
-    Returns:
-        (h, w, 3) uint8, sRGB.
-    """
+def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Depth (h, w) float32, +inf where nothing is, and the label of the face seen (h, w); ``labels[-1]`` for none."""
     height, width = triangle.shape
-    side = shadow.shape[0]
-    rgb = np.empty((height, width, 3), np.uint8)
+    depth, seen = np.empty((height, width), np.float32), np.empty((height, width), labels.dtype)
     for y in range(height):
         for x in range(width):
-            t = triangle[y, x]
-            if t < 0:
-                for k in range(3):
-                    rgb[y, x, k] = np.uint8(255.0 * background[k] + 0.5)
-                continue
-            vx = rays[0, 0] * x + rays[0, 1] * y + rays[0, 2]
-            vy = rays[1, 0] * x + rays[1, 1] * y + rays[1, 2]
-            vz = rays[2, 0] * x + rays[2, 1] * y + rays[2, 2]
-            depth = 1.0 / inverse_depth[y, x]
-            px, py, pz = center[0] + depth * vx, center[1] + depth * vy, center[2] + depth * vz
-            fx, fy, fz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
-            nx, ny, nz = fx, fy, fz
-            if smooth[t]:
-                nx, ny, nz = 0.0, 0.0, 0.0
-                for k in range(3):  # barycentric weight: area of the triangle that the point spans with the far edge
-                    i, j = faces[t, (k + 1) % 3], faces[t, (k + 2) % 3]
-                    ax, ay, az = vertices[i, 0] - px, vertices[i, 1] - py, vertices[i, 2] - pz
-                    bx, by, bz = vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz
-                    weight = fx * (ay * bz - az * by) + fy * (az * bx - ax * bz) + fz * (ax * by - ay * bx)
-                    a = faces[t, k]
-                    nx += weight * vertex_normals[a, 0]
-                    ny += weight * vertex_normals[a, 1]
-                    nz += weight * vertex_normals[a, 2]
-                length = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-20)
-                nx, ny, nz = nx / length, ny / length, nz / length
-            facing = -(fx * vx + fy * vy + fz * vz)
-            if facing < 0:  # seen from behind: the sheet's other side
-                nx, ny, nz = -nx, -ny, -nz
-                fx, fy, fz = -fx, -fy, -fz
-            glance = -(nx * vx + ny * vy + nz * vz)  # the ray is a little longer than 1: near enough
-
-            lit = nx * light[0] + ny * light[1] + nz * light[2]
-            if lit > 0.0:
-                # Step off the surface by the size of a shadow pixel, or the surface shadows itself.
-                sx, sy, sz = px + 2.0 * texel * fx, py + 2.0 * texel * fy, pz + 2.0 * texel * fz
-                w = 1.0 / (light_P[2, 0] * sx + light_P[2, 1] * sy + light_P[2, 2] * sz + light_P[2, 3])
-                u = (light_P[0, 0] * sx + light_P[0, 1] * sy + light_P[0, 2] * sz + light_P[0, 3]) * w - 1.0
-                v = (light_P[1, 0] * sx + light_P[1, 1] * sy + light_P[1, 2] * sz + light_P[1, 3]) * w - 1.0
-                if 0 <= u < side - 3 and 0 <= v < side - 3:
-                    c, r = int(u), int(v)
-                    # Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3, but for the
-                    # most part the corners agree and speak for the rest.
-                    here = np.float32(w)
-                    corners = (
-                        int(shadow[r, c] > here)
-                        + int(shadow[r, c + 3] > here)
-                        + int(shadow[r + 3, c] > here)
-                        + int(shadow[r + 3, c + 3] > here)
-                    )
-                    blocked = 2.25 * corners
-                    if 0 < corners < 4:
-                        du, dv = u - c, v - r
-                        blocked = 0.0
-                        for m in range(4):
-                            row = 0.0
-                            for n in range(4):
-                                if shadow[r + m, c + n] > here:
-                                    row += (1.0 - du) if n == 0 else (du if n == 3 else 1.0)
-                            blocked += row * ((1.0 - dv) if m == 0 else (dv if m == 3 else 1.0))
-                    lit *= 1.0 - blocked / 9.0
-            else:
-                lit = 0.0
-            intensity = 0.26 + 0.14 * nz + 0.12 * min(max(glance, 0.0), 1.0) + 0.62 * lit
-            gain = 255.0 * math.sqrt(min(max(intensity, 0.0), 1.0))  # sRGB is about the root of light
-            for k in range(3):
-                rgb[y, x, k] = np.uint8(min(gain * colors[t, k] + 0.5, 255.0))
-    return rgb
+            depth[y, x] = np.float32(1.0) / inverse_depth[y, x]
+            seen[y, x] = labels[triangle[y, x]]
+    return depth, seen

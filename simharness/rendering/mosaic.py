@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +22,7 @@ _ZIGZAG = ((0, 1), (1, 2))
 def mosaic(
     images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None, gap: int | None = None
 ) -> NDArray[np.uint8]:
-    """Lay out pictures of one size row by row, each under its title.
+    """Lay out pictures row by row, each under its title; smaller ones keep their shape amid tiles of the largest size.
 
     Args:
         images: (h, w, 3) uint8 each.
@@ -33,13 +34,11 @@ def mosaic(
         (H, W, 3) uint8.
 
     Raises:
-        ValueError: no picture, pictures of different sizes, or a title too few or too many.
+        ValueError: no picture, or a title too few or too many.
     """
     if not images or len(images) != len(titles):
         raise ValueError(f"a mosaic needs pictures and as many titles, got {len(images)} and {len(titles)}")
-    if len({picture.shape for picture in images}) != 1:
-        raise ValueError(f"the pictures of a mosaic must have one size, got {[picture.shape for picture in images]}")
-    height, width = images[0].shape[:2]
+    height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
     gap = max(2, height // 60) if gap is None else gap
     columns = math.ceil(math.sqrt(len(images))) if columns is None else columns
     rows = math.ceil(len(images) / columns)
@@ -51,9 +50,20 @@ def mosaic(
     paper = Overlay(sheet, scale=scale)
     for k, (picture, title) in enumerate(zip(images, titles, strict=True)):
         top, left = gap + k // columns * (height + band + gap), gap + k % columns * (width + gap)
-        paper.rgb[top + band : top + band + height, left : left + width] = picture
+        fitted = _fitted(picture, height, width)
+        down, right = top + band + (height - fitted.shape[0]) // 2, left + (width - fitted.shape[1]) // 2
+        paper.rgb[down : down + fitted.shape[0], right : right + fitted.shape[1]] = fitted
         paper.text(title, at=(left + 2 * scale, top), size=_TITLE)
     return paper.rgb
+
+
+def _fitted(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+    """The picture as large as it can be within a tile."""
+    grow = min(height / picture.shape[0], width / picture.shape[1])
+    if grow == 1.0:
+        return picture
+    size = (min(width, round(grow * picture.shape[1])), min(height, round(grow * picture.shape[0])))
+    return cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR).astype(np.uint8, copy=False)
 
 
 def legend(entries: Sequence[tuple[Mark, Color, str]], *, size: tuple[int, int], title: str = "") -> NDArray[np.uint8]:

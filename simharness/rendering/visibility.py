@@ -1,11 +1,11 @@
-"""What hides a joint: the pixel it projects to, and what is seen there.
+"""What hides a joint: the place that it projects to, and what is seen there, in a picture or by a ray.
 
 A joint centre lies inside its body, so the surface seen at its pixel is in front of it even where nothing hides
 it. What separates "the skin around the joint" from "something in front of it" is how far in front:
 
 - Up to the joint's radius plus ``_MARGIN`` it is the skin around the joint. The radius that comes with a body is
-  1.5 times the distance to the nearest skin: on the way out of a limb of radius r, at an angle to its axis, the
-  skin is r / sin(angle) away, and 1.5 covers angles down to 42 degrees. Steeper than that the joint lies behind
+  twice the distance to the nearest skin: on the way out of a limb of radius r, at an angle to its axis, the skin is
+  r / sin(angle) away, and 2 covers angles down to 30 degrees. Steeper than that the joint lies behind
   the length of its own limb; the far hip or shoulder seen from the side is further behind still.
 - ``_MARGIN`` = 4 cm is for joints on or near the skin: the face, where the radius is near 0, and flat wrists,
   which are thicker one way than the other. Seen from all sides, the near eyes and ears lie at most 2 cm under the
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera
+from simharness.rendering.optics import appear
 from simharness.rendering.renderer import Image
 
 _MARGIN = 0.04  # metres
@@ -60,8 +61,7 @@ def label(image: Image, camera: Camera, *, joints: ArrayLike, radii: ArrayLike) 
             f"the image must be of camera {camera.name!r}, {camera.size[0]} x {camera.size[1]} pixels, "
             f"got {image.depth.shape[1]} x {image.depth.shape[0]}"
         )
-    people = len(joints)
-    pixels = camera.project(joints)
+    pixels = appear(camera, joints)
     inside = camera.inside(pixels)
     column, row = np.moveaxis(np.floor(np.where(inside[..., None], pixels, 0) + 0.5).astype(int), -1, 0)
     seen = image.ids[row, column]
@@ -70,10 +70,26 @@ def label(image: Image, camera: Camera, *, joints: ArrayLike, radii: ArrayLike) 
     stretch = np.where(inside, np.linalg.norm(joints - camera.center, axis=-1), 1.0) / np.where(inside, depth, 1.0)
     in_front = (depth - image.depth[row, column]) * stretch  # -inf where nothing is seen
 
-    own = seen == np.arange(people)[:, None]
-    person = (seen >= 0) & (seen < people)
-    return np.select(
-        [~inside, in_front <= np.where(own, radii + _MARGIN, 0.0), own, person],
-        [Visibility.OUTSIDE, Visibility.VISIBLE, Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON],
-        Visibility.OCCLUDED_BY_CLUTTER,
-    ).astype(np.int8)
+    return decide(seen, in_front, inside, radii=radii)
+
+
+def decide(owner: ArrayLike, in_front: ArrayLike, inside: ArrayLike, *, radii: ArrayLike) -> NDArray[np.int8]:
+    """The rule, whoever looked: what to call a joint by what is seen at its place.
+
+    Args:
+        owner: whose surface is seen, (..., P, J) int: 0 to P - 1 the people, P or more a thing, -1 nothing.
+        in_front: how far in front of the joint it is, metres along the ray, (..., P, J); negative behind the joint.
+        inside: whether the joint is in the picture, (..., P, J).
+        radii: how far in front of each joint its own skin may be, (P, J), metres.
+
+    Returns:
+        :class:`Visibility`, (..., P, J) int8.
+    """
+    owner, in_front, radii = np.asarray(owner), np.asarray(in_front), np.asarray(radii, float)
+    people = len(radii)
+    own = owner == np.arange(people)[:, None]
+    person = (owner >= 0) & (owner < people)
+    hidden = np.where(person, int(Visibility.OCCLUDED_BY_PERSON), int(Visibility.OCCLUDED_BY_CLUTTER))
+    hidden = np.where(own, int(Visibility.SELF_OCCLUDED), hidden)
+    hidden = np.where(in_front <= np.where(own, radii + _MARGIN, 0.0), int(Visibility.VISIBLE), hidden)
+    return np.where(inside, hidden, int(Visibility.OUTSIDE)).astype(np.int8)

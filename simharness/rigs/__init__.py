@@ -1,1 +1,1 @@
-"""Rigs of cameras: layouts to watch a room with."""
+"""Rigs of cameras: layouts, published rigs and calibration files, and what goes wrong with them."""

@@ -2,77 +2,141 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera, Rig
+from simharness.random import stream
+from simharness.rigs.files import read_rig
+from simharness.rigs.lenses import check_lens, intrinsics
+from simharness.rigs.places import places
+from simharness.rigs.presets import preset_rig
 from simharness.scenario.models import Cameras
 
 _STEEPEST = 1e-6  # sine of the angle to the vertical below which a camera has no upright roll
+_SAME = 1e-9  # metres
+_NO_TURN = 1e-6  # of a rotation matrix' elements
 
 
-def build_rig(cameras: Cameras) -> Rig:
+def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, float] | None = None) -> Rig:
     """Place the cameras of a scenario.
 
-    Camera k of a ring stands at the bearing ``start + 360 k / count`` degrees, counter-clockwise from the x
-    axis as seen from above; cameras are upright, have square pixels and no distortion, and look at ``aim``.
-
-    Returns:
-        The rig, its cameras named "cam0", "cam1", ...
-
-    Raises:
-        ValueError: fewer than two cameras, or an aim that a camera cannot look at upright (it stands in the
-            aim, or straight above or below it).
-    """
-    bearings = np.radians(cameras.start + 360.0 * np.arange(cameras.count) / max(cameras.count, 1))
-    centers = np.column_stack(
-        [
-            cameras.radius * np.cos(bearings),
-            cameras.radius * np.sin(bearings),
-            np.full(cameras.count, cameras.height),
-        ]
-    )
-    K = intrinsics(cameras.fov, cameras.size)
-    return Rig([look_at(c, cameras.aim, K=K, size=cameras.size, name=f"cam{k}") for k, c in enumerate(centers)])
-
-
-def intrinsics(fov: float, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Intrinsics (3, 3) of a lens with square pixels, its axis in the middle of the image.
+    :func:`simharness.rigs.places.places` says where those of a layout stand. They are upright, have square pixels
+    and look at ``aim``; ``jitter`` and ``aim_jitter`` draw how far off each stands and looks, from streams of that
+    camera. Presets and calibrations in files are taken as they are.
 
     Args:
-        fov: horizontal field of view, degrees, from the outer edge of the first pixel to that of the last.
-        size: width and height in pixels.
+        cameras: the section of the scenario.
+        seed: of the scenario.
+        room: its x, y, z, metres, for cameras in its corners; None: it has no walls.
+
+    Returns:
+        The rig; the cameras of a layout are named "cam0", "cam1", ...
+
+    Raises:
+        ValueError: numbers that make no layout, a camera that stands in what it looks at, a lens that folds over
+            within the picture, a file that cannot be read, names that the rig has not; the message names the key.
     """
-    width, height = size
-    focal = width / (2 * math.tan(math.radians(fov) / 2))
-    return np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+    if "layout" not in cameras.model_fields_set:
+        for key, layout in (("preset", "preset"), ("file", "file"), ("positions", "free")):
+            if getattr(cameras, key):
+                raise ValueError(f"cameras.{key} is given, but no layout: add cameras.layout = {layout!r}")
+    if cameras.layout == "preset":
+        if cameras.preset is None:
+            raise ValueError("cameras.layout = 'preset' needs cameras.preset: the name of a published rig")
+        rig = preset_rig(cameras.preset, only=cameras.only)
+    elif cameras.layout == "file":
+        rig = _from_file(cameras)
+    else:
+        rig = _laid_out(cameras, seed, room)
+    where = {"preset": "cameras.preset", "file": cameras.file}.get(cameras.layout, "cameras.distortion")
+    for camera in rig:
+        try:
+            check_lens(camera)
+        except ValueError as error:
+            raise ValueError(f"{where}: {error}") from None
+    return rig
 
 
-def look_at(center: ArrayLike, aim: ArrayLike, *, K: ArrayLike, size: tuple[int, int], name: str = "") -> Camera:
+def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | None) -> Rig:
+    centers = places(cameras, room=room)
+    aims = np.array(cameras.aims if cameras.layout == "free" and cameras.aims else [cameras.aim] * len(centers))
+    if len(aims) != len(centers):
+        raise ValueError(
+            f"cameras.aims has {len(aims)} points and cameras.positions {len(centers)}; expected one aim for every "
+            "camera, or none where all look at cameras.aim"
+        )
+    for k in range(len(centers)):
+        centers[k] += cameras.jitter * stream(seed, "cameras", "position", k).standard_normal(3)
+        aims[k] += cameras.aim_jitter * stream(seed, "cameras", "aim", k).standard_normal(3)
+    K = intrinsics(cameras.fov, cameras.size)
+    distortion = np.array(cameras.distortion)
+    return Rig(
+        [
+            look_at(center, aim, K=K, size=cameras.size, distortion=distortion, name=f"cam{k}")
+            for k, (center, aim) in enumerate(zip(centers, aims, strict=True))
+        ]
+    )
+
+
+def _from_file(cameras: Cameras) -> Rig:
+    if not cameras.file:
+        raise ValueError("cameras.layout = 'file' needs cameras.file: a calibration, relative to the scenario's folder")
+    rig = read_rig(cameras.file, size=cameras.size, only=cameras.only)
+    for camera in rig:
+        if np.abs(camera.R - np.eye(3)).max() < _NO_TURN and np.abs(camera.t).max() < _SAME:
+            # The world is that camera's, as a stereo calibration leaves it: it hangs where a ring's first one would.
+            bearing = np.radians(cameras.start)
+            center = (cameras.radius * np.cos(bearing), cameras.radius * np.sin(bearing), cameras.height)
+            return carried(rig, camera, to=look_at(center, cameras.aim, K=camera.K, size=camera.size))
+    return rig
+
+
+def carried(rig: Rig, camera: Camera, *, to: Camera) -> Rig:
+    """The rig moved as a whole so that ``camera``, one of it, stands and looks as ``to`` does."""
+    turn = camera.R.T @ to.R  # from the new world to the old
+    shift = camera.R.T @ (to.t - camera.t)
+    return Rig([replace(each, R=each.R @ turn, t=each.R @ shift + each.t) for each in rig])
+
+
+def look_at(
+    center: ArrayLike,
+    aim: ArrayLike,
+    *,
+    K: ArrayLike,
+    size: tuple[int, int],
+    distortion: ArrayLike | None = None,
+    name: str = "",
+) -> Camera:
     """Return the upright camera at ``center`` that looks at ``aim``: image y is down, the horizon is level.
+
+    A camera straight above or below its aim has no horizon: its image x is the world's.
 
     Args:
         center: where the camera stands, (3,), metres.
         aim: the point on its optical axis, (3,), metres.
         K: intrinsics, (3, 3).
         size: width and height in pixels.
+        distortion: k1 k2 p1 p2 k3, (5,); none by default.
         name: the camera's name.
 
     Raises:
-        ValueError: the camera stands in the point, or straight above or below it.
+        ValueError: the camera stands in the point.
     """
     center, aim = np.asarray(center, float), np.asarray(aim, float)
     forward = aim - center
     distance = float(np.linalg.norm(forward))
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    if np.linalg.norm(right) <= _STEEPEST * max(distance, 1e-9):
+    if distance <= _SAME:
         raise ValueError(
-            f"camera {name!r} at {center.tolist()} cannot look at {aim.tolist()} upright: the point must not "
-            "lie in the camera or straight above or below it; move the aim or the camera sideways"
+            f"camera {name!r} at {center.tolist()} stands in the point that it looks at: move cameras.aim or the camera"
         )
     forward /= distance
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    if np.linalg.norm(right) <= _STEEPEST:
+        right = np.array([1.0, 0.0, 0.0]) - forward[0] * forward
     right /= np.linalg.norm(right)
-    R = np.stack([right, np.cross(forward, right), forward])
-    return Camera(K=np.asarray(K, float), R=R, t=-R @ center, size=size, name=name)
+    R: NDArray[np.float64] = np.stack([right, np.cross(forward, right), forward])
+    terms = np.zeros(5) if distortion is None else np.asarray(distortion, float)
+    return Camera(K=np.asarray(K, float), R=R, t=-R @ center, distortion=terms, size=size, name=name)

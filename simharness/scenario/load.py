@@ -25,7 +25,9 @@ class ScenarioError(ValueError):
     """A scenario that cannot be read: every message names the place, the key and how to mend it."""
 
 
-def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
+def load(
+    path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, folder: Path | None = None
+) -> Scenario:
     """Read a scenario file.
 
     Args:
@@ -33,6 +35,7 @@ def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = 
         overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the file's; a value that
             is not TOML is taken as a bare word, so ``rendering.renderer=gl`` needs no quotes.
         seed: replaces the scenario's seed.
+        folder: what files that the scenario file names are relative to; by default its own.
 
     Raises:
         ScenarioError: a file that is missing or not TOML, a key that does not exist (the nearest one is
@@ -40,7 +43,7 @@ def load(path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = 
     """
     path = Path(path)
     data = _read(path)
-    _locate_files(data, path.parent)
+    _locate_files(data, path.parent if folder is None else folder)
     places: dict[tuple[str, ...], str] = {}
     for override in overrides:
         key = _override(data, override)

@@ -1,142 +1,84 @@
-"""Things that stand in the way: boxes, stacked or not, and open bookshelves with things on their boards.
-
-A thing is drawn standing on the origin; ``placement.py`` finds it a place.
-"""
+"""Clutter by kind and amount: things drawn, and put where they hide people from cameras but are in nobody's way."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from simharness.scene.solids import TOP, Box, Solid, box_mesh
-
-Floats = NDArray[np.float64]
-
-_BOX_SIDE = (0.40, 0.75)  # metres
-_BOX_HEIGHT = (0.40, 1.10)
-_STACKED = 0.35  # chance of a smaller box on top of a low one
-_STACK_HEIGHT = (0.25, 0.45)
-_BOX_COLORS = np.array(
-    [
-        [0.76, 0.60, 0.42],
-        [0.70, 0.52, 0.35],
-        [0.36, 0.50, 0.55],
-        [0.80, 0.66, 0.38],
-        [0.66, 0.42, 0.34],
-        [0.50, 0.56, 0.46],
-    ]
-)
-_TAPE = 0.06  # metres
-_SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
-_BOARD = 0.025
-_WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
-_BOOK_COLORS = np.array(
-    [
-        [0.55, 0.22, 0.20],
-        [0.20, 0.32, 0.46],
-        [0.25, 0.42, 0.32],
-        [0.78, 0.62, 0.30],
-        [0.82, 0.79, 0.72],
-        [0.36, 0.26, 0.40],
-    ]
-)
+from simharness.random import stream
+from simharness.scenario.room import Clutter, Room
+from simharness.scene.carts import place_cart
+from simharness.scene.coverage import cover
+from simharness.scene.fixtures import draw_partition, draw_pillar
+from simharness.scene.furniture import draw_chair, draw_table
+from simharness.scene.placement import TRIES, FreeSpace, Site, Where, about, beside
+from simharness.scene.plants import draw_plant
+from simharness.scene.solids import Solid, Thing
+from simharness.scene.storage import draw_box, draw_shelf
 
 
 @dataclass(frozen=True)
-class Thing:
-    """Clutter that has no place yet, standing on z = 0 around the origin; a shelf opens towards +x.
+class Species:
+    """One kind of clutter that stands still.
 
     Attributes:
-        boxes: what it is made of.
-        colors: albedo of every side of every box, (n, 6, 3).
+        name: of one; ``plural``: the key of the scenario.
+        draw: draws one for a room.
+        where: draws a place for it.
+        fills: whether it may be added to reach ``clutter.coverage``.
     """
 
-    boxes: tuple[Box, ...]
-    colors: Floats
-
-    def hull(self, place: ArrayLike, yaw: float) -> Box:
-        """The box around all of it when it stands at ``place`` (2,) turned by ``yaw``."""
-        corners = np.concatenate([box.corners for box in self.boxes])
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        center, half = (low + high) / 2, (high - low) / 2
-        return Box(tuple(center.tolist()), tuple(half.tolist())).moved(place, yaw)
-
-    def at(self, place: ArrayLike, yaw: float, *, name: str) -> Solid:
-        """The thing at ``place`` (2,), turned by ``yaw``."""
-        boxes = tuple(box.moved(place, yaw) for box in self.boxes)
-        return Solid("clutter", name, box_mesh(boxes, self.colors), boxes, self.hull(place, yaw))
+    name: str
+    plural: str
+    draw: Callable[[np.random.Generator, Room], Thing]
+    where: Where
+    fills: bool = True
 
 
-def draw_box(rng: np.random.Generator) -> Thing:
-    """A box of 0.4 to 1.1 m with a strip of tape over it, sometimes with a smaller one on top."""
-    size = np.array([rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_HEIGHT)])
-    upper = np.array([*(size[:2] * rng.uniform(0.55, 0.85, 2)), rng.uniform(*_STACK_HEIGHT)])
-    turn = rng.uniform(-0.4, 0.4)
-    stacked = rng.uniform() < _STACKED and size[2] + upper[2] < _BOX_HEIGHT[1]
-    colors = _BOX_COLORS[rng.integers(len(_BOX_COLORS), size=2)]
-    boxes, painted = _taped(size, colors[0], base=0.0, yaw=0.0)
-    if stacked:
-        more, more_painted = _taped(upper, colors[1], base=size[2], yaw=turn)
-        boxes, painted = boxes + more, painted + more_painted
-    return Thing(tuple(boxes), np.array(painted))
+# In the order in which they find their places: the large ones first, for they find one less easily.
+SPECIES = (
+    Species("pillar", "pillars", lambda rng, room: draw_pillar(rng, room.size[2]), about),
+    Species("shelf", "shelves", lambda rng, room: draw_shelf(rng), beside),
+    Species("partition", "partitions", lambda rng, room: draw_partition(rng), beside),
+    Species("table", "tables", lambda rng, room: draw_table(rng), beside, fills=False),
+    Species("box", "boxes", lambda rng, room: draw_box(rng), about),
+    Species("plant", "plants", lambda rng, room: draw_plant(rng), about),
+    Species("chair", "chairs", lambda rng, room: draw_chair(rng), about, fills=False),
+)
 
 
-def _taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list[Box], list[Floats]]:
-    """A box in three slices side by side, the middle one with a paler top: a strip of packing tape."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    edges = np.array([-size[1] / 2, -_TAPE / 2, _TAPE / 2, size[1] / 2])
-    boxes, painted = [], []
-    for k, (low, high) in enumerate(pairwise(edges)):
-        across = float(low + high) / 2
-        center = (float(-s * across), float(c * across), float(base + size[2] / 2))
-        boxes.append(Box(center, (float(size[0] / 2), float(high - low) / 2, float(size[2] / 2)), yaw))
-        sides = np.tile(color, (6, 1))
-        if k == 1:
-            sides[TOP] = 0.45 * color + 0.55 * np.array([0.93, 0.89, 0.80])
-        painted.append(sides)
-    return boxes, painted
+def place_clutter(seed: int, clutter: Clutter, space: FreeSpace) -> tuple[Solid, ...]:
+    """Draw the clutter and find a place for each thing.
+
+    Each thing is drawn and placed by a stream of its own: one more box moves nothing that stood before it. Nothing
+    comes within 0.5 m of a lens, and all things at rest fill at most 60 % of any one picture.
+
+    Raises:
+        ValueError: a thing finds no place, or ``clutter.coverage`` cannot be reached.
+    """
+    site = Site(space)
+    for species in SPECIES:
+        for k in range(getattr(clutter, species.plural)):
+            site.add(_place(seed, species, k, site))
+    for k in range(clutter.carts):
+        site.add(place_cart(seed, k, site))
+    if clutter.coverage is not None:
+        fillers = {species.name: species.draw for species in SPECIES if species.fills}
+        cover(seed, clutter.coverage, fillers, site)
+    return tuple(site.solids[len(space.taken) :])
 
 
-def draw_shelf(rng: np.random.Generator) -> Thing:
-    """An open bookshelf about 1.8 m tall: two sides, boards, a cross brace low at the back, books and cartons."""
-    width, height, depth = rng.uniform(*_SHELF_WIDTH), rng.uniform(*_SHELF_HEIGHT), rng.uniform(*_SHELF_DEPTH)
-    boards = int(rng.integers(5, 7))
-    wood = _WOOD[rng.integers(len(_WOOD))]
-    inner = width - 2 * _BOARD
-    parts: list[tuple[Box, Floats]] = []
-    for side in (-1.0, 1.0):
-        place = (0.0, side * (width - _BOARD) / 2, height / 2)
-        parts.append((Box(place, (depth / 2, _BOARD / 2, height / 2)), wood))
-    levels = np.linspace(0.08, height - _BOARD / 2, boards)
-    for z in levels:
-        parts.append((Box((0.0, 0.0, float(z)), (depth / 2, inner / 2, _BOARD / 2)), 0.94 * wood))
-    for z, above in pairwise(levels):
-        parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
-    boxes, colors = zip(*parts, strict=True)
-    return Thing(boxes, np.repeat(np.array(colors)[:, None], 6, axis=1))
-
-
-def _things(
-    rng: np.random.Generator, floor: float, room: float, inner: float, depth: float
-) -> list[tuple[Box, Floats]]:
-    """What stands on one board: a row of books from one end and perhaps a carton, with air between."""
-    parts: list[tuple[Box, Floats]] = []
-    end = rng.choice([-1.0, 1.0])
-    filled = inner * rng.uniform(0.25, 0.7)
-    at = 0.0
-    while at < filled:
-        thick, tall, deep = rng.uniform(0.02, 0.05), room * rng.uniform(0.55, 0.9), depth * rng.uniform(0.55, 0.85)
-        y = end * (inner / 2 - at - thick / 2)
-        color = _BOOK_COLORS[rng.integers(len(_BOOK_COLORS))] * rng.uniform(0.85, 1.1)
-        parts.append((Box((0.0, float(y), float(floor + tall / 2)), (deep / 2, thick / 2, tall / 2)), color))
-        at += thick
-    free = inner - at
-    if free > 0.25 and rng.uniform() < 0.6:
-        wide, tall, deep = min(0.3, 0.8 * free), room * rng.uniform(0.4, 0.75), 0.75 * depth
-        y = -end * (inner / 2 - wide / 2 - rng.uniform(0.0, free - wide) * 0.5)
-        color = _BOX_COLORS[rng.integers(len(_BOX_COLORS))]
-        parts.append((Box((0.0, float(y), float(floor + tall / 2)), (deep / 2, wide / 2, tall / 2)), color))
-    return parts
+def _place(seed: int, species: Species, k: int, site: Site) -> Solid:
+    thing = species.draw(stream(seed, "clutter", species.name, k), site.space.room)
+    rng = stream(seed, "clutter", species.name, k, "place")
+    name = f"{species.name}{k}"
+    solid = site.find(rng, thing, species.where, kind="clutter", name=name)
+    if solid is None:
+        raise ValueError(
+            f"clutter.{species.plural}: {species.name} {k} finds no place in {TRIES} tries beside {len(site.solids)} "
+            "other things, the people's paths and the cameras, of whose pictures 40 % stay clear, in room.size = "
+            f"{list(site.space.room.size)}; lower clutter.{species.plural} or people.count, or enlarge room.size"
+        )
+    return solid

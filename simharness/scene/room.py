@@ -1,4 +1,4 @@
-"""The room: a tiled floor and four walls, open above.
+"""The room: a floor and four walls, open above; or the floor alone.
 
 The floor's faces look up and the walls' faces look into the room: counter-clockwise as seen from inside, which is
 the outside of the wall as a thing.
@@ -6,30 +6,47 @@ the outside of the wall as a thing.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
+from simharness.random import stream
 from simharness.rendering.mesh import Mesh
-from simharness.scene.solids import Box, Solid, quad_mesh
+from simharness.scenario.room import Room
+from simharness.scene.geoms import Box
+from simharness.scene.lighting import room_lighting
+from simharness.scene.shapes import quad_mesh
+from simharness.scene.solids import Solid
+from simharness.scene.surfaces import FLOORS, WALLS, Finish
 
 Floats = NDArray[np.float64]
+Choice = TypeVar("Choice")
 
-_TILE = 0.5  # metres, about
-_PANEL = 1.0  # metres, about: walls are cut into panels, for light falls off from vertex to vertex
+_CELL = 1.0  # metres, about: of the grids of floor and walls
 _THICK = 0.1  # metres: of the floor and the walls as solids, away from the room
-_SKIRTING = 0.1  # metres
-_LIGHT_TILE, _DARK_TILE = (0.86, 0.84, 0.80), (0.74, 0.73, 0.70)
-_SKIRTING_COLOR = (0.55, 0.53, 0.51)
+_AROUND = 4.0  # metres of ground around an open floor
+_RIM = 0.25  # metres, about: cells of that ground, which fades into the background
 # Facing walls share a tone, so that the corners read and a picture tells where one looks.
-_WALLS = {"wall -x": (0.88, 0.92, 0.94), "wall +x": (0.88, 0.92, 0.94), "wall -y": (0.95, 0.93, 0.88)}
-_WALLS |= {"wall +y": (0.95, 0.93, 0.88)}
+_TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
 
 
-def make_room(size: tuple[float, float, float]) -> tuple[Solid, ...]:
-    """Floor and walls of a room of ``size`` x, y, z metres around the origin, its floor at z = 0."""
-    x, y, z = size[0] / 2, size[1] / 2, size[2]
+def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
+    """Floor and walls of a room around the origin, its floor at z = 0; without walls, floor and ground around it.
+
+    Looks are drawn by streams of the room's own: the size changes none, and one look not the other.
+    """
+    x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
+    rng = stream(seed, "room", "floor")
+    finish = _chosen(FLOORS, room.floor, rng)(rng)
     slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
-    floor = Solid("room", "floor", _floor(x, y), (slab,), slab)
+    floor = Solid("room", "floor", _floor(x, y, finish), (slab,), slab)
+    if not room.walls:
+        return floor, _ground(room, seed, finish)
+    rng = stream(seed, "room", "wall")
+    paper = _chosen(WALLS, room.wall, rng)(rng, z)
     # Each wall from its left corner to its right corner as seen from inside.
     runs = {
         "wall +x": ((x, y), (x, -y)),
@@ -37,46 +54,88 @@ def make_room(size: tuple[float, float, float]) -> tuple[Solid, ...]:
         "wall +y": ((-x, y), (x, y)),
         "wall -y": ((x, -y), (-x, -y)),
     }
-    walls = []
-    for name, (left, right) in runs.items():
-        start, end = np.array(left), np.array(right)
-        length = np.linalg.norm(end - start)
-        along = (end - start) / length
-        out = np.array([-along[1], along[0]])
-        middle = (start + end) / 2 + out * _THICK / 2
-        block = Box(
-            (float(middle[0]), float(middle[1]), z / 2),
-            (float(length / 2 + _THICK), _THICK / 2, z / 2),
-            float(np.arctan2(along[1], along[0])),
-        )
-        heights = np.concatenate([[0.0], np.linspace(min(_SKIRTING, z / 2), z, max(2, round(z / _PANEL) + 1))])
-        columns = np.linspace(0.0, length, max(2, round(length / _PANEL) + 1))
-        walls.append(Solid("room", name, _wall(start, along, columns, heights, _WALLS[name]), (block,), block))
-    return (floor, *walls)
+    return floor, *(_wall(name, np.array(left), np.array(right), z, paper) for name, (left, right) in runs.items())
 
 
-def _floor(x: float, y: float) -> Mesh:
-    columns = np.linspace(-x, x, max(1, round(2 * x / _TILE)) + 1)
-    rows = np.linspace(-y, y, max(1, round(2 * y / _TILE)) + 1)
-    i, j = np.meshgrid(np.arange(len(columns) - 1), np.arange(len(rows) - 1), indexing="ij")
-    dark = ((i + j) % 2 == 1)[..., None]
-    grain = 1.0 + 0.02 * np.sin(12.9898 * i + 78.233 * j)[..., None]  # no two tiles are quite alike
-    colors = np.where(dark, _DARK_TILE, _LIGHT_TILE) * grain
+def _chosen(looks: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
+    """A look by its name; drawn for "any". The draw is made in any case, so that what follows is not shifted."""
+    drawn = list(looks)[rng.integers(len(looks))]
+    return looks[drawn if name == "any" else name]
+
+
+def _floor(x: float, y: float, finish: Finish) -> Mesh:
+    columns, rows = _ticks(-x, x, _CELL), _ticks(-y, y, _CELL)
     grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
-    return quad_mesh(grid.reshape(-1, 3), _grid_quads(len(columns), len(rows)), colors.reshape(-1, 3))
+    return _papered(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
 
 
-def _wall(start: Floats, along: Floats, columns: Floats, heights: Floats, color: tuple[float, float, float]) -> Mesh:
-    grid = np.empty((len(columns), len(heights), 3))
-    grid[..., :2] = (start + columns[:, None] * along)[:, None]
-    grid[..., 2] = heights
-    colors = np.broadcast_to(np.array(color), (len(columns) - 1, len(heights) - 1, 3)).copy()
-    colors[:, 0] = _SKIRTING_COLOR
-    return quad_mesh(grid.reshape(-1, 3), _grid_quads(len(columns), len(heights)), colors.reshape(-1, 3))
+def _wall(name: str, left: Floats, right: Floats, height: float, finish: Finish) -> Solid:
+    length = float(np.linalg.norm(right - left))
+    along = (right - left) / length
+    out = np.array([-along[1], along[0]])
+    middle = (left + right) / 2 + out * _THICK / 2
+    block = Box(
+        (float(middle[0]), float(middle[1]), height / 2),
+        (length / 2 + _THICK, _THICK / 2, height / 2),
+        float(np.arctan2(along[1], along[0])),
+    )
+    columns, rows = _ticks(0.0, length, _CELL), _ticks(0.0, height, _CELL)
+    grid = np.empty((len(columns), len(rows), 3))
+    grid[..., :2] = (left + columns[:, None] * along)[:, None]
+    grid[..., 2] = rows
+    place = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1)
+    return Solid("room", name, _papered(grid, place, finish, _TONES[name[-1]]), (block,), block)
 
 
-def _grid_quads(columns: int, rows: int) -> NDArray[np.int_]:
-    """Cells of a grid of vertices in column-major order: right, then up, is counter-clockwise."""
+def _ground(room: Room, seed: int, finish: Finish) -> Solid:
+    """A plain ring around an open floor, of the floor's mean colour and paler and paler outwards, as haze would."""
+    half = np.array(room.size[:2]) / 2
+    light = room_lighting(room, seed)
+    shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
+    mean = finish.texture.reshape(-1, 3).mean(axis=0) / 255
+    steps = round(_AROUND / _RIM)
+    rings = np.stack([_outline(half + _AROUND * k / steps) for k in range(steps + 1)])
+    sides = rings.shape[1]
+    k = np.arange(sides)
+    after = (k + 1) % sides
+    quads = np.concatenate(
+        [
+            np.column_stack([n * sides + k, (n + 1) * sides + k, (n + 1) * sides + after, n * sides + after])
+            for n in range(steps)
+        ]
+    )
+    fade = np.repeat(((np.arange(steps) + 1) / steps) ** 1.5, sides)[:, None]
+    mesh = quad_mesh(rings.reshape(-1, 3), quads, (1 - fade) * mean + fade * np.clip(shown, 0, 1))
+    slab = Box((0.0, 0.0, -_THICK / 2), (float(half[0] + _AROUND), float(half[1] + _AROUND), _THICK / 2))
+    return Solid("room", "ground", mesh, (slab,), slab)
+
+
+def _outline(half: Floats, each: int = 8) -> Floats:
+    """The outline (n, 3) on the floor of a rectangle, counter-clockwise from above, in equal parts."""
+    corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
+    share = np.arange(each)[:, None] / each
+    sides = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return np.pad(np.concatenate(sides), ((0, 0), (0, 1)))
+
+
+def _ticks(low: float, high: float, step: float) -> Floats:
+    return np.linspace(low, high, max(1, round((high - low) / step)) + 1)
+
+
+def _papered(grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float]) -> Mesh:
+    """A grid of vertices (c, r, 3) that shows a texture.
+
+    Args:
+        grid: column by column; right, then up, is counter-clockwise.
+        place: where the vertices are on the surface, metres to the right and up, (c, r, 2); the texture's lower edge
+            is at height 0.
+        finish: the texture.
+        tone: what multiplies it.
+    """
+    columns, rows = grid.shape[:2]
     i, j = np.meshgrid(np.arange(columns - 1), np.arange(rows - 1), indexing="ij")
     corner = (i * rows + j).ravel()
-    return np.stack([corner, corner + rows, corner + rows + 1, corner + 1], axis=-1)
+    quads = np.stack([corner, corner + rows, corner + rows + 1, corner + 1], axis=-1)
+    mesh = quad_mesh(grid.reshape(-1, 3), quads, np.broadcast_to(np.array(tone), (len(quads), 3)))
+    uv = place.reshape(-1, 2) / finish.size * [1.0, -1.0] + [0.0, 1.0]
+    return replace(mesh, texture=finish.texture, uv=uv[mesh.faces].astype(np.float32))

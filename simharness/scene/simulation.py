@@ -1,39 +1,22 @@
-"""Kinematic playback: the motions drive the MuJoCo model, and its bodies tell where every bone is."""
+"""The truth at the frames' own times, whatever the cameras' clocks say."""
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
-from simharness.humans.body import body_model
-from simharness.humans.model import bone_transforms
-from simharness.motion.kinematics import Addresses
+from simharness.humans.landmarks import LANDMARKS
 from simharness.scene.build import Scene
+from simharness.scene.playback import Playback
 from simharness.scene.sequence import Sequence
 
 
 def simulate(scene: Scene) -> Sequence:
-    """Play the scene's motions through its MuJoCo model, frame by frame.
+    """Play the scene through, frame by frame.
 
     Returns:
-        The joints and bone transforms of everyone in every frame; arrays of P = 0 for an empty room.
+        The landmarks of everyone in every frame; arrays of P = 0 for an empty room.
     """
-    frames, people = len(scene.time), len(scene.bodies)
-    bones = len(body_model().bones)
-    places = np.empty((people, frames, bones, 3))
-    turns = np.empty((people, frames, bones, 3, 3))
-    addresses = [Addresses(scene.model, body, prefix=f"person{i}/") for i, body in enumerate(scene.bodies)]
-    data = mujoco.MjData(scene.model)
-    motions = [motion.at(scene.time) for motion in scene.motions]
-    for frame in range(frames):
-        for address, motion in zip(addresses, motions, strict=True):
-            address.write(data.qpos, motion.root[frame], motion.angles[frame])
-        mujoco.mj_kinematics(scene.model, data)
-        for i, address in enumerate(addresses):
-            places[i, frame], turns[i, frame] = address.read(data)
-    transforms = np.empty((frames, people, bones, 3, 4))
-    joints = np.empty((frames, people, 17, 3))
-    for i, body in enumerate(scene.bodies):
-        transforms[:, i] = bone_transforms(body, places[i], turns[i])
-        joints[:, i] = body.joints(transforms[:, i])
-    return Sequence(joints=joints, ids=np.arange(people), time=scene.time, bones=transforms)
+    landmarks = np.empty((len(scene.time), len(scene.bodies), len(LANDMARKS), 3))
+    for frame, state in enumerate(Playback(scene).over(scene.time)):
+        landmarks[frame] = state.landmarks
+    return Sequence(landmarks=landmarks, ids=np.arange(len(scene.bodies)), time=scene.time)

@@ -1,121 +1,125 @@
-"""Static things: boxes in the world, and the solids that are built from them."""
+"""Things in the scene, each with its looks for pictures and its geoms for rays and contacts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simharness.motion.trajectory import Trajectory
 from simharness.rendering.mesh import Mesh
+from simharness.rendering.mirrors import Mirror
+from simharness.scene.geoms import Box, Geom, carried
+
+if TYPE_CHECKING:
+    import mujoco
 
 Floats = NDArray[np.float64]
-
-_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-# Corners of each side in the order of _SIGNS, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
-_QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-TOP = 5  # of a box's sides
+Kind = Literal["room", "clutter", "prop", "decoy"]
 
 
 @dataclass(frozen=True)
-class Box:
-    """A cuboid that stands upright, turned about the vertical.
+class Thing:
+    """Something that has no place yet: it stands on z = 0 around the origin, its front towards +x.
 
     Attributes:
-        center: metres, (3,).
-        half: half its sides along its own axes, metres, (3,).
-        yaw: its turn about z, radians.
+        mesh: how it looks.
+        geoms: what it is made of.
+        figure: COCO-17 joints (17, 3), metres, where a detector may take it for a person.
+        mirror: its glass, where it is one.
     """
 
-    center: tuple[float, float, float]
-    half: tuple[float, float, float]
-    yaw: float = 0.0
+    mesh: Mesh
+    geoms: tuple[Geom, ...]
+    figure: Floats | None = None
+    mirror: Mirror | None = None
 
     @cached_property
-    def axes(self) -> Floats:
-        """Its own axes as columns, (3, 3)."""
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    def extent(self) -> Box:
+        """The box around all of it."""
+        return Box.around(self.mesh.vertices)
 
-    @property
-    def corners(self) -> Floats:
-        """The eight corners, (8, 3) metres."""
-        return np.array(self.center) + (_SIGNS * self.half) @ self.axes.T
+    def hull(self, place: ArrayLike, yaw: float) -> Box:
+        """The box around all of it when it stands at ``place`` (2,) turned by ``yaw``."""
+        return self.extent.moved(place, yaw)
 
-    def distance(self, points: ArrayLike) -> Floats:
-        """Distance of points (..., 3) to the box, (...) metres; 0 inside."""
-        return np.linalg.norm(self._outside(points), axis=-1)
+    def at(self, place: ArrayLike, yaw: float, *, kind: Kind, name: str) -> Solid:
+        """The thing at ``place`` (2,), turned by ``yaw``."""
+        return Solid(
+            kind,
+            name,
+            replace(self.mesh, vertices=carried(self.mesh.vertices, place, yaw).astype(np.float32)),
+            tuple(geom.moved(place, yaw) for geom in self.geoms),
+            self.hull(place, yaw),
+            figure=None if self.figure is None else carried(self.figure, place, yaw),
+            mirror=None if self.mirror is None else self.mirror.moved(place, yaw),
+        )
 
-    def distance_on_floor(self, points: ArrayLike) -> Floats:
-        """Horizontal distance of points (..., 3) to the box's ground plan, (...) metres; 0 over it."""
-        return np.linalg.norm(self._outside(points)[..., :2], axis=-1)
-
-    def _outside(self, points: ArrayLike) -> Floats:
-        local = (np.asarray(points, float) - self.center) @ self.axes
-        return np.maximum(np.abs(local) - self.half, 0.0)
-
-    def gap_on_floor(self, other: Box) -> float:
-        """Horizontal distance between two boxes' ground plans by separating axes, metres; 0 where they overlap.
-
-        Corner to corner the true distance is larger; never smaller.
-        """
-        best = 0.0
-        for axis in (*self.axes.T[:2], *other.axes.T[:2]):
-            mine, theirs = self.corners @ axis, other.corners @ axis
-            best = max(best, mine.min() - theirs.max(), theirs.min() - mine.max())
-        return best
-
-    def moved(self, place: ArrayLike, yaw: float) -> Box:
-        """The box turned about the world's z axis and then carried to ``place`` (2,) on the floor."""
-        c, s = np.cos(yaw), np.sin(yaw)
-        x, y, z = self.center
-        dx, dy = np.asarray(place, float)
-        return Box((float(c * x - s * y + dx), float(s * x + c * y + dy), z), self.half, self.yaw + yaw)
+    def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> Solid:
+        """The thing on its way."""
+        corners = np.concatenate([_posed(self.extent.corners, pose) for pose in trajectory.pose])
+        return Solid(kind, name, self.mesh, self.geoms, Box.around(corners), trajectory=trajectory)
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A static thing in the room.
+    """A thing in the room, at rest or moving.
 
     Attributes:
-        kind: "room" (floor, walls) or "clutter".
+        kind: "room" (floor, walls), "clutter", "prop" (people use it) or "decoy" (may be taken for a person).
         name: what messages and the MuJoCo model call it.
-        mesh: how it looks.
-        boxes: what it is made of; geoms of the MuJoCo model.
-        hull: a box around all of it; for a shelf the space between the boards is inside.
+        mesh: how it looks; in the world, of a moving thing in its own frame.
+        geoms: what it is made of, in the same frame.
+        hull: a box in the world around all of it, and of a moving thing around all of its way; the space between
+            the boards of a shelf is inside.
+        trajectory: where the frame of a moving thing is; None of one at rest.
+        figure: COCO-17 joints (17, 3) in the world, metres, that a detector may find on a decoy.
+        mirror: the glass of a mirror, in the world.
     """
 
-    kind: Literal["room", "clutter"]
+    kind: Kind
     name: str
     mesh: Mesh
-    boxes: tuple[Box, ...]
+    geoms: tuple[Geom, ...]
     hull: Box
+    trajectory: Trajectory | None = None
+    figure: Floats | None = None
+    mirror: Mirror | None = None
+
+    def hull_at(self, time: float) -> Box:
+        """A box in the world around all of it at one moment, seconds; of one that is tilted, along the world's axes."""
+        if self.trajectory is None:
+            return self.hull
+        pose = self.trajectory.at(time)
+        if np.abs(pose[4:6]).max() < 1e-6:  # upright
+            return self._extent.moved(pose[:2], _yaw(pose)).raised(pose[2])
+        return Box.around(_posed(self._extent.corners, pose))
+
+    @cached_property
+    def _extent(self) -> Box:
+        return Box.around(self.mesh.vertices)
+
+    def add_to(self, spec: mujoco.MjSpec) -> None:
+        """Add it to a MuJoCo model.
+
+        At rest its geoms belong to the world; a moving one is a mocap body of its name. A single geom has its name,
+        several have a number after it: "box0 0", "box0 1".
+        """
+        body = spec.worldbody if self.trajectory is None else spec.worldbody.add_body(name=self.name, mocap=True)
+        for k, geom in enumerate(self.geoms):
+            geom.add_to(spec, body, self.name if len(self.geoms) == 1 else f"{self.name} {k}")
 
 
-def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
-    """Boxes as one mesh of flat faces, counter-clockwise from outside.
+def _posed(points: Floats, pose: Floats) -> Floats:
+    import mujoco
 
-    Args:
-        boxes: n boxes.
-        colors: albedo 0..1 of each box (n, 3) or of each of its sides -x, +x, -y, +y, -z, +z (n, 6, 3).
-    """
-    colors = np.asarray(colors, float)
-    if colors.ndim == 2:
-        colors = np.repeat(colors[:, None], 6, axis=1)
-    vertices = np.concatenate([box.corners for box in boxes])
-    quads = (8 * np.arange(len(boxes))[:, None, None] + _QUADS).reshape(-1, 4)
-    return quad_mesh(vertices, quads, colors.reshape(-1, 3))
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, pose[3:])
+    return np.asarray(points @ turn.reshape(3, 3).T + pose[:3])
 
 
-def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh:
-    """Quadrilaterals (k, 4), counter-clockwise from outside, each with a colour (k, 3), as triangles."""
-    faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return Mesh(
-        vertices=vertices.astype(np.float32),
-        faces=faces.astype(np.int32),
-        colors=np.repeat(np.clip(colors, 0, 1), 2, axis=0).astype(np.float32),
-        smooth=False,
-    )
+def _yaw(pose: Floats) -> float:
+    return float(2 * np.arctan2(pose[6], pose[3]))

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from people import STANDING
 
-from mvpose import COCO17, SHELF14, Skeleton
+from mvpose import COCO17, PANOPTIC19, SHELF14, Skeleton
 from mvpose.skeleton import coco17_to_shelf14
 
 
-@pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19])
 def test_mirror_swaps_left_and_right_and_nothing_else(skeleton):
     for joint, mirrored in enumerate(skeleton.mirror):
         swapped = skeleton.joints[joint].replace("left", "?").replace("right", "left").replace("?", "right")
@@ -14,7 +14,7 @@ def test_mirror_swaps_left_and_right_and_nothing_else(skeleton):
         assert skeleton.sigmas[joint] == skeleton.sigmas[mirrored]
 
 
-@pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19])
 def test_edges_join_all_joints(skeleton):
     assert len(skeleton.edges) == len(skeleton) - 1
     reached = {skeleton.parents.index(-1)}
@@ -48,6 +48,23 @@ def test_a_skeleton_that_is_none_is_refused(name):
     with pytest.raises(ValueError, match=message) as error:
         Skeleton("limb", **{**good, **changes})
     assert "skeleton 'limb'" in str(error.value)
+
+
+def test_panoptic_is_in_the_order_of_its_files():
+    """joints19 of the CMU Panoptic dataset: spot checks of the published order, and one sigma a kind of joint."""
+    order = {
+        0: "neck",
+        1: "nose",
+        2: "mid_hip",
+        5: "left_wrist",
+        8: "left_ankle",
+        9: "right_shoulder",
+        14: "right_ankle",
+    }
+    order |= {15: "left_eye", 16: "left_ear", 17: "right_eye", 18: "right_ear"}
+    assert {i: PANOPTIC19.joints[i] for i in order} == order
+    for joint in set(PANOPTIC19.joints) & set(COCO17.joints):
+        assert PANOPTIC19.sigmas[PANOPTIC19.index(joint)] == COCO17.sigmas[COCO17.index(joint)]
 
 
 def test_lists_make_a_skeleton_too():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom, chi
@@ -5,7 +7,8 @@ from scipy.stats import binom, chi
 from mvpose import COCO17, Camera, Rig
 from simharness.detector.detect import BOX_SHARE, detect
 from simharness.detector.truth import KeypointError
-from simharness.rendering.film import Views
+from simharness.humans.landmarks import LANDMARKS
+from simharness.rendering.views import Views
 from simharness.rendering.visibility import Visibility
 from simharness.scenario.models import Detector
 from simharness.scene.sequence import Sequence
@@ -27,13 +30,9 @@ def scene(frames=60, views=3, people=2, *, visibility=Visibility.VISIBLE, height
     boxes = np.concatenate([corner[..., 0, :], np.broadcast_to(size, (*shape, 2))], axis=-1)
     seen = np.full((*shape, 17), visibility) if np.isscalar(visibility) else visibility
     area = np.zeros(shape, int)
-    sequence = Sequence(
-        rng.random((frames, people, 17, 3)),
-        np.arange(people),
-        0.1 * np.arange(frames),
-        np.zeros((frames, people, 1, 3, 4)),
-    )
-    return sequence, Views(pixels, seen, boxes, area), rig
+    sequence = Sequence(rng.random((frames, people, len(LANDMARKS), 3)), np.arange(people), 0.1 * np.arange(frames))
+    source = np.broadcast_to(np.arange(frames)[:, None], (frames, views))
+    return sequence, Views(pixels, seen, boxes, area, source), rig
 
 
 def run(world, *, seed=3, **dials):
@@ -180,3 +179,32 @@ def test_nobody_and_phantoms_only():
     frames = run(scene(people=0), phantoms=2.0)
     assert all((truth.person == -1).all() and truth.joints.shape == (0, 17, 3) for _, truth in frames)
     assert sum(len(detections) for detections, _ in frames) > 100
+
+
+class TestDelivery:
+    """A detector works on the pictures that arrive."""
+
+    @staticmethod
+    def late(source):
+        sequence, views, rig = scene(frames=6, views=2)
+        return sequence, replace(views, source=np.array(source)), rig
+
+    def test_a_repeated_picture_gives_the_same_detections(self):
+        source = [[0, 0], [0, 1], [2, 2], [2, 3], [2, 4], [5, 5]]
+        dials = {"jitter": 0.5, "phantoms": 1.5, "miss_visible": 0.2, "miss_person": 0.3, "box_jitter": 0.1}
+        frozen, live = run(self.late(source), **dials), run(scene(frames=6, views=2), **dials)
+        for t, row in enumerate(source):
+            for v, frame in enumerate(row):
+                (got, told), (expected, true) = frozen[t], live[frame]
+                mine, theirs = got.view == v, expected.view == v
+                np.testing.assert_array_equal(got.keypoints[mine], expected.keypoints[theirs])
+                np.testing.assert_array_equal(got.boxes[mine], expected.boxes[theirs])
+                np.testing.assert_array_equal(told.person[mine], true.person[theirs])
+                np.testing.assert_array_equal(told.error[mine], true.error[theirs])
+        assert any((got.view == 0).any() for got, _ in frozen)
+
+    def test_nothing_is_found_in_a_picture_that_never_arrives(self):
+        source = [[0, -1], [-1, 1], [-1, -1], [3, 3], [4, -1], [5, -1]]
+        found = run(self.late(source), phantoms=3.0)
+        for (detections, _), row in zip(found, source, strict=True):
+            assert set(detections.view.tolist()) == {v for v, frame in enumerate(row) if frame >= 0}

@@ -9,10 +9,12 @@ import polars as pl
 import pytest
 
 from simharness.experiment import run as running
+from simharness.experiment import trial
 from simharness.experiment.execution import RunError
 from simharness.experiment.pictures import frame_costs
-from simharness.experiment.run import prepare, run
+from simharness.experiment.run import run
 from simharness.experiment.store import read_run
+from simharness.experiment.trial import prepare
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
 from simharness.scoring.summary import VariantScores
@@ -164,7 +166,7 @@ class TestPrepare:
         def nothing(_name):
             raise Unavailable("no EGL here")
 
-        monkeypatch.setattr(running, "renderer_of", nothing)
+        monkeypatch.setattr(trial, "renderer_of", nothing)
         with pytest.raises(ValueError, match=r"rendering\.renderer: no EGL here"):
             prepare(tiny(rendering=Rendering(renderer="gl")))
 

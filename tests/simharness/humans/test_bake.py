@@ -14,7 +14,7 @@ def test_baked_anchors_are_the_bakes():
 def test_a_corner_of_the_grid_is_one_body():
     corner = np.array([[1.0, 2 / 3, 0.5, 1.0, 0.0, 1.0]])
     weights = corner_weights(corner)
-    assert weights.shape == (1, 144)
+    assert weights.shape == (1, 216)
     assert np.sort(weights[0])[-2:] == pytest.approx([0, 1])
 
 
@@ -22,9 +22,9 @@ def test_rest_bodies_interpolate_the_corners_as_the_bake_weighs_them():
     """The run time's nested interpolation against the bake's flat one."""
     model = body_model()
     people = population(5)
-    flat = model.coefficients.reshape(144, -1)
+    flat = model.coefficients.reshape(216, -1)
     for row, weights in zip(people, corner_weights(people), strict=True):
-        expected = model.mean + np.tensordot(weights @ flat, model.deltas, axes=1)
+        expected = model.mean + model.step * np.tensordot(weights @ flat, model.deltas.astype(float), axes=1)
         vertices, _ = model.rest(dict(zip(PHENOTYPES, row, strict=True)))
         np.testing.assert_allclose(vertices, expected, atol=1e-6)
 

@@ -120,7 +120,7 @@ def test_volume_of_a_tetrahedron():
 
 def test_every_part_is_shown_on_both_sides(body):
     middle = body.vertices[body.faces].mean(1)
-    for part in Part:
+    for part in set(Part) - {Part.SKIRT}:
         mine = middle[body.part == part]
         assert (mine[:, 1] > 0).sum() == pytest.approx((mine[:, 1] < 0).sum(), rel=0.1), part
         assert len(mine) > 10, part

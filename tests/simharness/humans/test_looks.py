@@ -1,12 +1,12 @@
-import colorsys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from simharness.humans.body import Part, make_body
-from simharness.humans.looks import HEMS, LEGS, SLEEVES, Garment, draw_look, draw_looks, dress, face_colors, garments
+from simharness.humans.looks import Garment, dress, face_colors, garments, paint
 from simharness.humans.shape import Shape
+from simharness.humans.wardrobe import HEMS, LEGS, SLEEVES, draw_look
 from simharness.random import stream
 
 
@@ -17,25 +17,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def look():
-    return draw_look(stream(0, "test"))
-
-
-def hue(look):
-    return colorsys.rgb_to_hsv(*look.top)[0]
-
-
-@pytest.mark.parametrize("count", [2, 4, 8])
-def test_hues_of_one_scene_are_spread_over_the_circle(count):
-    for seed in range(5):
-        hues = np.sort([hue(look) for look in draw_looks(seed, count)])
-        gaps = np.diff([*hues, hues[0] + 1])
-        assert gaps.min() > 0.5 / count
-
-
-def test_looks_depend_on_the_seed_and_not_on_who_else_is_there():
-    assert draw_looks(0, 3) == draw_looks(0, 5)[:3]
-    assert draw_looks(0, 3) != draw_looks(1, 3)
-    assert draw_looks(0, 0) == ()
+    return replace(draw_look(stream(0, "test")), below="trousers", hair_style="short", fit=0.3)
 
 
 def test_colors_are_albedos_of_every_face(body, look):
@@ -111,7 +93,62 @@ def test_vertices_of_two_garments_are_not_shared(body, look):
     assert (owner >= 0).all()
 
 
-@pytest.mark.parametrize(("key", "value"), [("sleeves", "huge"), ("legs", ""), ("top", (2.0, 0, 0)), ("volume", -1.0)])
-def test_an_impossible_look_is_refused(look, key, value):
-    with pytest.raises(ValueError, match=key):
-        replace(look, **{key: value})
+def test_wide_clothes_stand_out_further(body, look):
+    def stands_out(fit, garment):
+        dressed = dress(body, replace(look, fit=fit, legs="long"))
+        moved = np.linalg.norm(dressed.vertices[dressed.faces] - body.vertices[body.faces], axis=2)
+        return np.median(moved[garments(body, replace(look, legs="long")) == garment])
+
+    for garment in (Garment.TOP, Garment.TROUSERS):
+        assert stands_out(1.0, garment) > stands_out(0.5, garment) > stands_out(0.0, garment) + 0.002
+
+
+def test_wide_trousers_lie_on_the_shoe(body, look):
+    """Seen from the side there is no gap between hem and shoe: the hem is lower than the top of the shoe."""
+    for fit in (0.0, 1.0):
+        wide = replace(look, fit=fit, legs="long")
+        dressed, worn = dress(body, wide), garments(body, wide)
+        hem = dressed.vertices[dressed.faces[worn == Garment.TROUSERS], 2].min()
+        shoe = dressed.vertices[dressed.faces[worn == Garment.SHOE], 2].max()
+        assert hem < shoe + 0.002
+
+
+@pytest.mark.parametrize("below", ["trousers", "skirt", "dress", "coat"])
+@pytest.mark.parametrize("hair_style", ["short", "long", "bun"])
+def test_joints_do_not_move_when_dressed_and_nothing_of_the_body_is_lost(body, look, below, hair_style):
+    dressed = dress(body, replace(look, below=below, hair_style=hair_style))
+    pose = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
+    np.testing.assert_array_equal(dressed.landmarks(pose), body.landmarks(pose))
+    np.testing.assert_array_equal(dressed.part[: len(body.part)], body.part)
+    added = dressed.part[len(body.part) :]
+    assert (Part.SKIRT in added) == (below != "trousers")
+    assert (Part.SCALP in added) == (hair_style != "short")
+    assert dressed.vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(dressed.skin(pose), dressed.vertices, atol=1e-5)
+
+
+def test_dress_and_coat_are_of_the_tops_colour_and_a_skirt_is_not(body, look):
+    for below, color in (("skirt", "trousers"), ("dress", "top"), ("coat", "top")):
+        own = replace(look, below=below)
+        dressed = dress(body, own)
+        shown = face_colors(dressed, own)[dressed.part == Part.SKIRT]
+        np.testing.assert_allclose(np.unique(shown, axis=0), [getattr(own, color)], atol=1e-6)
+
+
+def test_plain_clothes_need_no_texture(body, look):
+    coat = paint(body, replace(look, top_pattern="plain", bottom_pattern="plain"))
+    assert coat.texture is None
+    assert coat.uv is None
+    np.testing.assert_array_equal(coat.colors, face_colors(body, look))
+
+
+def test_people_can_be_painted_in_every_light(body, look):
+    """What a renderer multiplies is within its range, and cloth with a pattern gets all its colour from that."""
+    own = replace(look, top_pattern="checks", bottom_pattern="stripes", below="skirt")
+    dressed = dress(body, own)
+    coat, worn = paint(dressed, own), garments(dressed, own)
+    assert coat.uv.shape == (len(dressed.faces), 3, 2)
+    assert coat.texture.dtype == np.uint8
+    patterned = np.isin(worn, [Garment.TOP, Garment.TROUSERS])
+    assert (coat.colors[patterned] == 1).all()
+    np.testing.assert_array_equal(coat.colors[~patterned], face_colors(dressed, own)[~patterned])

@@ -5,7 +5,7 @@ from mvpose.skeleton import COCO17
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.gestures import GESTURES, gesture, strokes, wander
+from simharness.motion.gestures import GESTURES, gesture
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.paths import SWAY, Spot
 from simharness.random import stream
@@ -76,7 +76,6 @@ def test_hands_do_what_the_name_says(kinematics):
         name: np.linalg.norm((x[:, hands] - x[:, shoulders])[..., :2], axis=-1).max() for name, x in joints.items()
     }
     assert stretched["point"] > arm
-    assert stretched["reach"] > arm
     assert stretched["stand"] < 0.5 * arm
     assert 0.5 * arm < ahead["talk"] < 1.7 * arm
     assert above["stand"] < -0.3
@@ -85,21 +84,6 @@ def test_hands_do_what_the_name_says(kinematics):
     wave = joints["wave"][:, hands][:, (joints["wave"][:, hands, 2].max(axis=0)).argmax()]
     sideways = np.diff(wave @ np.cross([0, 0, 1], facing))
     assert np.count_nonzero(np.diff(np.sign(sideways))) >= 6
-
-
-def test_strokes_and_wander_keep_their_bounds():
-    for k in range(50):
-        on = strokes(TIME, stream(k, "on"), hold=2.0, rest=0.8)
-        assert on.min() >= 0
-        assert on.max() <= 1
-        assert on.max() > 0.99  # in 8 s it is done at least once
-        assert np.abs(np.diff(on)).max() < 0.12
-        assert np.abs(wander(TIME, stream(k, "w"), 0.3)).max() <= 1.0
-
-
-def test_in_four_seconds_everyone_makes_the_gesture():
-    early = TIME[TIME < 4]
-    assert all(strokes(early, stream(k, "on"), hold=2.4, rest=0.8).max() > 0.9 for k in range(200))
 
 
 def test_same_stream_same_motion(kinematics):
@@ -111,5 +95,12 @@ def test_same_stream_same_motion(kinematics):
 def test_motion_at_an_instant_does_not_depend_on_the_others(kinematics):
     whole = gesture("wave", kinematics, SPOT, TIME, rng=stream(1, "t")).angles
     every_other = gesture("wave", kinematics, SPOT, TIME[::2], rng=stream(1, "t")).angles
-    upper = [k for k, name in enumerate(DOFS) if "hip" not in name and "knee" not in name and "ankle" not in name]
-    np.testing.assert_allclose(whole[::2, upper], every_other[:, upper], atol=1e-12)
+    np.testing.assert_allclose(whole[::2], every_other, atol=1e-9)
+
+
+def test_knees_are_never_quite_straight_nor_much_bent(done):
+    _, _, motion = done
+    for side in ("left", "right"):
+        knee = np.degrees(motion.angles[:, DOFS.index(f"{side}_knee_flexion")])
+        assert knee.min() > 6
+        assert knee.max() < 22

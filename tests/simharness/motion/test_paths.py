@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simharness.motion.paths import SWAY, Loop, Spot, draw_loop, make_loop, plan_tracks
+from simharness.motion.paths import Loop, Recorded, Spot, bends, draw_loop, draw_recorded, draw_spot, make_loop, turned
 from simharness.random import stream
 
 TIME = np.linspace(0.0, 6.0, 301)
@@ -24,23 +24,24 @@ def test_circle_has_its_length_speed_and_curvature():
     np.testing.assert_allclose(circle(1.5, clockwise=True).curvature(TIME), -1 / 1.5, rtol=1e-2)
 
 
+def draw_some_loop(seed: int, *, half: float = 2.0) -> Loop:
+    rng = stream(seed, "loop")
+    limits = bends(1.0, slowest=0.8, fastest=1.2, half=half, running=False)
+    loops = (draw_loop(rng, half=half, speed=limits.speed, tightest=limits.tightest) for _ in range(1000))
+    return next(loop for loop in loops if loop is not None)
+
+
 def test_heading_is_the_way_it_goes():
-    loop = draw_some_loop(0)
+    loop = draw_some_loop(0, half=3.0)
     step = loop.position(TIME + 1e-4) - loop.position(TIME - 1e-4)
     heading = loop.heading(TIME)
     off = np.angle(np.exp(1j * (np.arctan2(step[:, 1], step[:, 0]) - heading)))
     assert np.abs(off).max() < 1e-3
 
 
-def draw_some_loop(seed: int, *, half: float = 2.0) -> Loop:
-    rng = stream(seed, "loop")
-    loops = (draw_loop(rng, half=half, speed=1.0) for _ in range(200))
-    return next(loop for loop in loops if loop is not None)
-
-
 @given(seed=st.integers(0, 10**6), half=st.floats(0.5, 4.0))
 @settings(max_examples=20, deadline=None)
-def test_loops_stay_in_and_turn_gently(seed, half):
+def test_loops_stay_in_turn_gently_and_close(seed, half):
     loop = draw_some_loop(seed, half=half)
     once = np.linspace(0.0, loop.length / loop.speed, 400)
     assert np.abs(loop.position(once)).max() <= half + 0.01
@@ -49,45 +50,46 @@ def test_loops_stay_in_and_turn_gently(seed, half):
     assert closed < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize(("count", "area", "spacing"), [(4, 2.0, 0.8), (9, 2.0, 0.8), (6, 3.0, 1.5)])
-def test_plan_keeps_everyone_apart_and_inside(seed, count, area, spacing):
-    speeds = [1.1 if i % 2 == 0 else None for i in range(count)]
-    tracks = plan_tracks(seed, speeds, area=area, spacing=spacing, duration=6.0)
-    assert [isinstance(track, Loop) for track in tracks] == [speed is not None for speed in speeds]
-    ways = np.stack([track.position(TIME) for track in tracks])
-    assert np.abs(ways).max() <= area - SWAY + 0.01
-    apart = np.linalg.norm(ways[:, None] - ways[None], axis=-1)[~np.eye(count, dtype=bool)]
-    assert apart.min() >= spacing + 2 * SWAY - 0.03  # between the planner's instants
+@given(half=st.floats(0.5, 6.0), speed=st.floats(0.5, 4.0), running=st.booleans())
+def test_nobody_is_thrown_off_a_bend(half, speed, running):
+    limits = bends(speed, slowest=0.5, fastest=5.0, half=half, running=running)
+    assert limits.tightest < half  # a circle of that radius fits
+    assert limits.speed <= min(speed, limits.fastest) + 1e-9
+    assert limits.fastest**2 / limits.tightest <= (3.5 if running else 1.3**2 * limits.tightest) + 1e-9
 
 
-def test_one_more_person_moves_nobody():
-    four = plan_tracks(5, [1.0, None, 1.0, None], area=2.0, spacing=0.8, duration=4.0)
-    five = plan_tracks(5, [1.0, None, 1.0, None, 1.0], area=2.0, spacing=0.8, duration=4.0)
-    for before, after in zip(four, five, strict=False):
-        np.testing.assert_array_equal(before.position(TIME), after.position(TIME))
+def test_spots_are_inside_and_face_the_middle():
+    spots = [draw_spot(stream(0, k), half=1.5) for k in range(300)]
+    assert np.abs([spot.place for spot in spots]).max() <= 1.5
+    inward = [-spot.place @ [np.cos(spot.bearing), np.sin(spot.bearing)] for spot in spots]
+    assert np.mean(np.array(inward) > 0) > 0.9
+    pairs = [draw_spot(stream(0, k), half=1.5, apart=True).bearing for k in range(300)]
+    assert abs(np.mean(np.exp(1j * np.array(pairs)))) < 0.15  # those of two face anywhere
+    np.testing.assert_array_equal(spots[0].position(TIME), np.tile(spots[0].place, (len(TIME), 1)))
 
 
-def test_plans_differ_by_seed_and_repeat():
-    one, again, other = (
-        plan_tracks(seed, [1.0, None], area=2.0, spacing=0.8, duration=4.0)[0].position(TIME) for seed in (1, 1, 2)
-    )
-    np.testing.assert_array_equal(one, again)
-    assert np.abs(one - other).max() > 0.1
+@given(seed=st.integers(0, 10**6))
+def test_recorded_way_is_turned_shifted_and_kept_inside(seed):
+    offset = np.column_stack([TIME * 0.5, np.sin(TIME)])
+    for k in range(50):
+        way = draw_recorded(stream(seed, k), half=2.0, time=TIME, offset=offset)
+        if way is not None:
+            break
+    places = way.position(TIME)
+    assert np.abs(places).max() <= 2.0 + 1e-9
+    np.testing.assert_allclose((places - places[0]) @ turned(way.spot.bearing), offset - offset[0], atol=1e-9)
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(TIME)
+    assert way.fastest == pytest.approx(steps.max())
 
 
-def test_nobody_needs_no_room():
-    assert plan_tracks(0, [], area=0.01, spacing=9.0, duration=4.0) == ()
+def test_recorded_way_that_fits_at_no_bearing_is_not_drawn():
+    long = np.column_stack([TIME, 0 * TIME])
+    assert all(draw_recorded(stream(0, k), half=1.0, time=TIME, offset=long) is None for k in range(50))
 
 
-def test_a_crowd_that_does_not_fit_is_told_what_to_change():
-    with pytest.raises(ValueError, match=r"people.count = 9 .*people.area = 1 m.*people.spacing = 1.5 m") as error:
-        plan_tracks(0, [None] * 9, area=1.0, spacing=1.5, duration=1.0)
-    assert "lower people.count" in str(error.value)
-
-
-def test_too_small_to_walk_in():
-    with pytest.raises(ValueError, match=r"people.area = 0.3 m is too small to walk"):
-        plan_tracks(0, [1.0], area=0.3, spacing=0.5, duration=1.0)
-    (track,) = plan_tracks(0, [None], area=0.3, spacing=0.5, duration=1.0)
-    assert isinstance(track, Spot)
+def test_fastest_bounds_every_track():
+    tracks = [Spot(np.ones(2), 0.3), circle(1.0, speed=0.8), Recorded(Spot(np.zeros(2), 1.0), TIME, np.c_[TIME, TIME])]
+    for track, fastest in zip(tracks, (0.0, 0.8, np.sqrt(2)), strict=True):
+        moved = np.linalg.norm(np.diff(track.position(TIME), axis=0), axis=1) / np.diff(TIME)
+        assert track.fastest == pytest.approx(fastest)
+        assert moved.max() <= fastest + 1e-3

@@ -11,7 +11,8 @@ from simharness.humans.population import draw_shape
 from simharness.motion.gait import make_gait
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
-from simharness.motion.paths import SWAY, Loop, make_loop, plan_tracks
+from simharness.motion.paths import SWAY, Loop, make_loop
+from simharness.motion.planning import Going, plan_tracks
 from simharness.motion.walking import walk
 from simharness.random import stream
 
@@ -33,7 +34,9 @@ class Walk:
 def walked(request) -> Walk:
     seed = request.param
     kinematics = Kinematics(make_body(draw_shape(stream(seed, "walk"))))
-    (loop,) = plan_tracks(seed, [[0.75, 0.85, 0.95, 1.05, 1.15][seed]], area=2.0, spacing=0.8, duration=4.0)
+    speed = [0.75, 0.85, 0.95, 1.05, 1.15][seed]
+    (loop,) = plan_tracks(seed, [Going("walk", speed, speed, speed)], area=2.0, spacing=0.8, span=(0.0, 4.0))
+    assert isinstance(loop, Loop)
     motion = walk(kinematics, loop, TIME, rng=stream(seed, "manner"), pace=1.1)
     body = kinematics.body
     skins = np.array([body.skin(transforms) for transforms in kinematics.transforms(motion)])

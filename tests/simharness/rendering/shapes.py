@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from simharness.rendering.mesh import Mesh
@@ -108,3 +110,22 @@ def disc(center, normal, radius, color=(0.9, 0.2, 0.2), *, sides=48):
     rim = center + radius * (np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.cross(normal, u))
     k = np.arange(sides)
     return _mesh(np.vstack([rim, center]), np.stack([k, (k + 1) % sides, np.full(sides, sides)], axis=-1), color)
+
+
+def with_parts(mesh, labels):
+    """The mesh with a label for each face."""
+    return replace(mesh, parts=np.asarray(labels, np.int8))
+
+
+def chequered(size, *, repeat=(1, 1), color=(1.0, 1.0, 1.0)):
+    """An upright board in the plane x = 0, its foot at z = 0, seen from -x: fields of four colours, 40 x 24 texels.
+
+    From there +y is to the left: u grows against y, v against z.
+    """
+    width, height = size
+    fields = np.array([[[220, 60, 50], [60, 190, 70]], [[60, 70, 210], [240, 230, 90]]], np.uint8)
+    texture = np.tile(np.repeat(np.repeat(fields, 8, axis=0), 8, axis=1), (2, 3, 1))[:24, :40]
+    y, (u, v) = width / 2, repeat
+    board = sheet([(0, y, 0), (0, -y, 0), (0, -y, height), (0, y, height)], color)
+    corners = np.array([(0, v), (u, v), (u, 0), (0, 0)], np.float32)
+    return replace(board, texture=texture, uv=corners[[[0, 1, 2], [0, 2, 3]]])

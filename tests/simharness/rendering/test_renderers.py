@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import _mesh, ball, box, crowd, disc, room, sheet
+from shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
-from mvpose.camera import Camera
 from simharness.rendering.choice import make_renderer
+from simharness.rendering.lighting import Lighting
 from simharness.rendering.renderer import NEAR
 from simharness.rigs.layouts import build_rig, intrinsics, look_at
 from simharness.scenario.models import Cameras
 
 MILLIMETRE = 1e-3
+SLANTING = Lighting(direction=(-0.8, 0.3, 0.45), key=0.8, sky=0.3, fill=0.05, tint=(1.0, 0.9, 0.75))
 
 
 def camera_at(center, aim, *, size=(160, 120), fov=70.0, **changes):
@@ -201,14 +203,6 @@ def test_colours_are_those_of_the_faces(renderer):
         assert (seen.argmax(axis=1) == k).all()
 
 
-def test_distortion_is_refused(renderer):
-    bent = Camera(
-        K=VIEWS[0].K, R=VIEWS[0].R, t=VIEWS[0].t, distortion=[-0.3, 0, 0, 0, 0], size=(160, 120), name="gopro"
-    )
-    with pytest.raises(ValueError, match="'gopro' has lens distortion"):
-        renderer.render(bent, [])
-
-
 def test_gl_refuses_more_meshes_than_it_can_tell_apart(gl):
     with pytest.raises(ValueError, match="at most 254 meshes apart, got 255"):
         gl.render(VIEWS[0], [ball((0, 0, 1), 0.1, rings=3)] * 255)
@@ -249,10 +243,11 @@ def test_the_renderers_agree_on_a_crowd(raster, gl):
 
 
 def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
-    from simharness.rendering.film import meshes_at
+    from simharness.rendering.picture import meshes_at
+    from simharness.rendering.visibility import label
     from simharness.scenario.models import Clutter, People, Scenario
     from simharness.scene.build import build
-    from simharness.scene.simulation import simulate
+    from simharness.scene.playback import Playback
 
     scenario = Scenario(
         name="agree",
@@ -261,9 +256,145 @@ def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
         clutter=Clutter(boxes=2, shelves=1),
         cameras=Cameras(count=2, size=(800, 600)),
     )
-    scene = build(scenario)
-    meshes = meshes_at(scene, simulate(scene), 0)
-    for camera in build_rig(scenario.cameras):
-        one = raster.render(camera, meshes)
-        assert set(range(3)) <= set(np.unique(one.ids))
-        assert_agree(one, gl.render(camera, meshes))
+    rig = build_rig(scenario.cameras)
+    scene = build(scenario, rig)
+    playback = Playback(scene)
+    radii = np.stack([body.joint_radii for body in scene.bodies])
+    same, joints = 0, 0
+    for time in (0.0, 0.05):
+        state = playback.at(time)
+        meshes = meshes_at(scene, state)
+        for camera in rig:
+            one, other = raster.render(camera, meshes), gl.render(camera, meshes)
+            assert set(range(3)) <= set(np.unique(one.ids))
+            assert_agree(one, other)
+            labels = [label(image, camera, joints=state.joints, radii=radii) for image in (one, other)]
+            same, joints = same + (labels[0] == labels[1]).sum(), joints + labels[0].size
+    assert same >= 0.999 * joints
+
+
+@pytest.mark.parametrize("lighting", [Lighting(), SLANTING], ids=["day", "slanting"])
+def test_the_renderers_agree_on_colours(raster, gl, lighting):
+    scene = crowd(24)
+    board = chequered((2.0, 2.0))
+    scene[4:4] = [board.moved(board.vertices + np.float32([-1.5, 1.5, 0.3]))]
+    for camera in build_rig(Cameras(count=2, radius=3.4, height=2.2, size=(640, 480))):
+        one, other = (each.render(camera, scene, lighting=lighting).rgb.astype(int) for each in (raster, gl))
+        apart = np.abs(one - other).max(axis=-1)
+        assert (apart <= 2).mean() > 0.995  # the levels of detail of the board change a few pixels apart
+        assert apart.mean() < 0.1
+
+
+def test_parts_are_the_labels_of_the_faces(renderer):
+    """Quarters of a board, seen from the front: each pixel has the label of the quarter that it shows."""
+    corners = np.array([(1, y, z) for z in (0, 1, 2) for y in (1, 0, -1)], float)
+    quads = [(3 * r + c, 3 * r + c + 1, 3 * r + c + 4, 3 * r + c + 3) for r in range(2) for c in range(2)]
+    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
+    board = with_parts(_mesh(corners, faces, (0.5, 0.5, 0.5)), np.repeat([0, 7, 126, -1], 2))
+    plain = box((2, 0, 1), (0.1, 0.1, 0.1))
+    camera = camera_at((-1.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    for color in (True, False):
+        image = renderer.render(camera, [board, plain], color=color, parts=True)
+        assert image.parts.dtype == np.int8
+        y, z = np.moveaxis((camera.center + image.depth[..., None] * axis_rays(camera))[..., 1:], -1, 0)
+        seen = image.ids == 0
+        assert seen.mean() > 0.1
+        wanted = np.array([[0, 7], [126, -1]])[(z > 1).astype(int), (y < 0).astype(int)]
+        np.testing.assert_array_equal(image.parts[seen], wanted[seen])
+        assert (image.parts[~seen] == -1).all()
+    assert renderer.render(camera, [board]).parts is None
+
+
+def test_a_texture_shows_what_it_says_where_it_says(renderer):
+    """Colour at every pixel of a board against the texel that its place on the board names, v down, repeating."""
+    board = chequered((1.5, 1.0), repeat=(3, 2))
+    camera = camera_at((-1.7, 0.4, 0.8), (0.0, 0.0, 0.4), size=(320, 240))
+    flat = Lighting(key=0.0, sky=0.0, fill=0.0, background=(0, 0, 0))
+    ambient = replace(flat, sky=1 / 0.65)  # on a vertical board: light of 1, so albedo as it is
+    image = renderer.render(camera, [board], lighting=ambient)
+    place = camera.center + image.depth[..., None] * axis_rays(camera)
+    u, v = 3 * (0.75 - place[..., 1]) / 1.5, 2 * (1.0 - place[..., 2]) / 1.0
+    height, width = board.texture.shape[:2]
+    with np.errstate(invalid="ignore"):
+        column, row = (u % 1) * width, (v % 1) * height
+        inner = (image.ids == 0) & (np.abs(column % 8 - 4) < 3) & (np.abs(row % 8 - 4) < 3)  # not at a border of fields
+    assert inner.sum() > 3000
+    wanted = board.texture[row[inner].astype(int), column[inner].astype(int)]
+    assert np.abs(image.rgb[inner].astype(int) - wanted).max() <= 2
+    dark = renderer.render(camera, [board], lighting=flat)
+    assert not dark.rgb.any()
+
+
+def test_a_texture_far_away_is_its_mean(renderer):
+    """Where a whole texture falls into a pixel there is no pattern left, and no shimmer."""
+    board = chequered((4.0, 4.0), repeat=(64, 64))
+    camera = camera_at((-9.0, 0.0, 2.0), (0.0, 0.0, 2.0), size=(160, 120))
+    image = renderer.render(camera, [board], lighting=Lighting(key=0, sky=1 / 0.65, fill=0))
+    seen = image.rgb[image.ids == 0].astype(float)
+    assert len(seen) > 800
+    np.testing.assert_allclose(seen.mean(axis=0), board.texture.mean(axis=(0, 1)), atol=3)
+    assert seen.std(axis=0).max() < 6 < board.texture.std(axis=(0, 1)).min()
+
+
+def test_texture_multiplies_the_colour_of_the_face(renderer):
+    white, red = chequered((1, 1)), chequered((1, 1), color=(1.0, 0.5, 0.25))
+    camera = camera_at((-1.5, 0.0, 0.5), (0.0, 0.0, 0.5))
+    one, other = (renderer.render(camera, [board]).rgb.astype(float) for board in (white, red))
+    seen = renderer.render(camera, [white]).ids == 0
+    np.testing.assert_allclose(other[seen], one[seen] * [1.0, 0.5, 0.25], atol=1.1)
+
+
+def test_light_is_what_its_rule_says(renderer):
+    """A board, a light of each kind alone: closed forms."""
+    board = sheet([(0, -1, 0), (0, 1, 0), (0, 1, 2), (0, -1, 2)], (1.0, 0.8, 0.6))
+    camera = camera_at((3.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    middle = np.s_[60, 80]
+    for lighting, light in [
+        (Lighting(key=0, sky=0.5, fill=0), 0.5 * 0.65),
+        (Lighting(key=0, sky=0, fill=0.4), 0.4),
+        (Lighting(direction=(3, 0, 4), key=0.9, sky=0, fill=0), 0.9 * 0.6),
+        (Lighting(direction=(-3, 0, 4), key=0.9, sky=0, fill=0), 0.0),
+        (Lighting(direction=(3, 0, 4), key=0.9, sky=0.2, fill=0.1), 0.9 * 0.6 + 0.2 * 0.65 + 0.1),
+        (Lighting(key=0, sky=0, fill=0.4, tint=(1.0, 0.5, 0.25)), 0.4 * np.array([1.0, 0.5, 0.25])),
+    ]:
+        wanted = 255 * np.array([1.0, 0.8, 0.6]) * np.sqrt(light)
+        np.testing.assert_allclose(renderer.render(camera, [board], lighting=lighting).rgb[middle], wanted, atol=1.01)
+
+
+def test_light_changes_no_more_than_colours(renderer):
+    scene = crowd(12)
+    one, other = renderer.render(VIEWS[0], scene), renderer.render(VIEWS[0], scene, lighting=SLANTING)
+    np.testing.assert_array_equal(one.ids, other.ids)
+    np.testing.assert_array_equal(one.depth, other.depth)
+    assert np.abs(one.rgb.astype(int) - other.rgb).mean() > 5
+    np.testing.assert_array_equal(renderer.render(VIEWS[0], scene).rgb, one.rgb)  # and back
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 2.0, 4.5])
+def test_a_shadow_lies_where_the_light_throws_it(renderer, azimuth):
+    lighting = Lighting(direction=(np.cos(azimuth), np.sin(azimuth), 1.2))
+    floor = sheet([(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], (0.8, 0.8, 0.8))
+    bird = box((0.2, -0.1, 1.0), (0.5, 0.5, 0.02))
+    camera = camera_at((0.05, 0.0, 7.0), (0.0, 0.0, 0.0), size=(240, 240), fov=60.0)
+    bare, image = (renderer.render(camera, meshes, lighting=lighting) for meshes in ([floor], [floor, bird]))
+    darker = (bare.rgb.astype(int) - image.rgb).max(axis=-1) > 20
+    place = camera.center + image.depth[..., None] * axis_rays(camera)
+    to_light = np.array(lighting.direction)
+    above = (place + (1.0 / to_light[2]) * to_light)[..., :2] - [0.2, -0.1]
+    off = 0.25 - np.abs(above).max(axis=-1)  # metres inside the shadow's edge
+    on_floor = image.ids == 0
+    assert darker[on_floor & (off > 0.06)].all()
+    assert not darker[on_floor & (off < -0.06)].any()
+    assert (on_floor & (off > 0.06)).sum() > 50
+
+
+def test_moved_meshes_are_drawn_where_they_are(renderer):
+    scene = crowd(8)
+    renderer.render(VIEWS[0], scene)
+    shift = np.float32([0.1, -0.2, 0.05])
+    moved = [mesh.moved(mesh.vertices + shift) for mesh in scene]
+    fresh = [replace(mesh, vertices=mesh.vertices + shift, faces=mesh.faces.copy()) for mesh in scene]
+    one, other = renderer.render(VIEWS[0], moved), renderer.render(VIEWS[0], fresh)
+    for key in ("rgb", "depth", "ids"):
+        np.testing.assert_array_equal(getattr(one, key), getattr(other, key))
+    assert (one.ids != renderer.render(VIEWS[0], scene).ids).any()

@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
+from simharness.humans.landmarks import LANDMARKS
 from simharness.scene.sequence import Sequence
 
 
 def arrays(frames: int, people: int) -> dict[str, np.ndarray]:
     return {
-        "joints": np.zeros((frames, people, 17, 3)),
+        "landmarks": np.zeros((frames, people, len(LANDMARKS), 3)),
         "ids": np.arange(people),
         "time": np.arange(frames) / 10,
-        "bones": np.zeros((frames, people, 35, 3, 4)),
     }
 
 
@@ -23,10 +23,9 @@ def test_any_number_of_people(people):
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("joints", np.zeros((3, 2, 16, 3)), r"sequence joints must be \(3, 2, 17, 3\), got \(3, 2, 16, 3\)"),
-        ("bones", np.zeros((3, 1, 35, 3, 4)), r"sequence bones must be \(3, 2, B, 3, 4\)|must be"),
+        ("landmarks", np.zeros((3, 2, 16, 3)), r"sequence landmarks must be \(3, 2, 21, 3\), got \(3, 2, 16, 3\)"),
         ("ids", np.arange(3), "must be"),
-        ("joints", np.full((3, 2, 17, 3), np.nan), "never missing"),
+        ("landmarks", np.full((3, 2, len(LANDMARKS), 3), np.nan), "never missing"),
     ],
 )
 def test_bad_sequences_are_refused(key, value, message):

@@ -1,0 +1,178 @@
+"""What the cameras of a scenario record, as files: a picture or a film for each camera, and one of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose import Detections, Estimate
+from simharness.detector.detect import detect
+from simharness.detector.truth import Truth
+from simharness.experiment.atomic import appearing
+from simharness.experiment.pictures import annotate
+from simharness.experiment.progress import Reporter, Silence
+from simharness.experiment.trial import Trial, prepare
+from simharness.experiment.work import Estimating, Filming, studio_of
+from simharness.rendering.mosaic import mosaic
+from simharness.scenario.models import Scenario
+from simharness.scene.playback import Playback
+from simharness.scene.simulation import simulate
+
+Rgb = NDArray[np.uint8]
+
+LAYERS = ("truth", "detections", "estimates")
+_WIDEST = 1920  # pixels of a mosaic
+
+
+@dataclass(frozen=True)
+class Footage:
+    """How a scenario is rendered.
+
+    Attributes:
+        video: one MP4 a camera instead of one PNG a picture.
+        overlay: which of ``LAYERS`` are drawn in.
+        every: frames from one that is rendered to the next.
+        finer: samples a pixel each way.
+    """
+
+    video: bool = False
+    overlay: frozenset[str] = frozenset()
+    every: int = 1
+    finer: int = 2
+
+    def __post_init__(self) -> None:
+        unknown = self.overlay - set(LAYERS)
+        if unknown:
+            raise ValueError(f"--overlay: {', '.join(sorted(unknown))} is no layer; there are {', '.join(LAYERS)}")
+        if self.every < 1:
+            raise ValueError(f"--every must be 1 or more, got {self.every}")
+
+
+def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporter | None = None) -> Path:
+    """Render a scenario.
+
+    Args:
+        scenario: what to film.
+        footage: how.
+        out: where the folder ``<name>`` goes; it appears when it is whole, and replaces an earlier one.
+        reporter: is told of the stages.
+
+    Returns:
+        The folder: ``<camera>/0000.png`` or ``<camera>.mp4`` for each camera, and ``mosaic`` like them.
+
+    Raises:
+        ValueError: the scenario cannot be built, or a layer that does not exist.
+    """
+    reporter = reporter or Silence()
+    with reporter.stage("build", 1):
+        trial = prepare(scenario)
+    layers = _layers(trial, footage, reporter)
+    frames = range(0, scenario.frames, footage.every)
+    names = [*(camera.name for camera in trial.shots.believed), "mosaic"]
+    folder = out / scenario.name
+    with reporter.stage("render", len(frames)) as advance, appearing(folder) as partial, ExitStack() as stack:
+        write: Callable[[str, int, Rgb], None] = _Stills(partial)
+        if footage.video:
+            write = stack.enter_context(_Films(partial, rate=scenario.rate / footage.every))
+        for frame, pictures in zip(frames, _pictures(trial, footage, layers, frames), strict=True):
+            sheet = mosaic(pictures, names[:-1])
+            shrink = min(1.0, _WIDEST / sheet.shape[1])
+            small = cv2.resize(sheet, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA).astype(np.uint8)
+            for name, picture in zip(names, [*pictures, small], strict=True):
+                write(name, frame, picture)
+            advance(1)
+    return folder
+
+
+@dataclass(frozen=True)
+class _Layers:
+    """What is known of every frame; estimates only where they are drawn."""
+
+    truth: Sequence[Truth]
+    detections: Sequence[Detections]
+    estimates: Sequence[Estimate] | None
+
+
+def _layers(trial: Trial, footage: Footage, reporter: Reporter) -> _Layers | None:
+    if not footage.overlay:
+        return None
+    scenario, frames = trial.scenario, range(trial.scenario.frames)
+    with reporter.stage("film", 1):
+        views = Filming(scenario, trial.scene, trial.shots, frozenset())(frames)
+    answers = detect(simulate(trial.scene), views, trial.shots.believed, scenario.detector, seed=scenario.seed)
+    detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
+    estimates = None
+    if "estimates" in footage.overlay:
+        with reporter.stage("estimate", 1):
+            name, pipeline = next(iter(trial.pipelines.items()))
+            estimates = Estimating(trial.shots.believed, detections, {name: pipeline})(frames)[name]
+    return _Layers(truth, detections, estimates)
+
+
+def _pictures(trial: Trial, footage: Footage, layers: _Layers | None, frames: range) -> Iterator[list[Rgb]]:
+    """The pictures of all views of each frame, one frame after the other."""
+    studio = studio_of(trial.scenario, Playback(trial.scene))
+    shown = footage.overlay
+    for frame in frames:
+        pictures = []
+        for view in range(len(trial.shots.believed)):
+            rgb = studio.picture(trial.shots, frame, view, finer=footage.finer)
+            if layers is not None:
+                rgb = annotate(
+                    rgb,
+                    trial.shots.camera(frame, view),
+                    view,
+                    truth=layers.truth[frame],
+                    detections=layers.detections[frame] if "detections" in shown else None,
+                    estimate=layers.estimates[frame] if layers.estimates is not None else None,
+                    show_truth="truth" in shown,
+                )
+            pictures.append(rgb)
+        yield pictures
+
+
+class _Stills:
+    """A PNG for each picture, in a folder for each name."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
+        (self._folder / name).mkdir(exist_ok=True)
+        path = self._folder / name / f"{frame:04d}.png"
+        if not cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)):
+            raise RuntimeError(f"OpenCV cannot write a picture of {rgb.shape} to {path}")
+
+
+class _Films:
+    """An MP4 for each name, written as the frames come."""
+
+    def __init__(self, folder: Path, *, rate: float) -> None:
+        self._folder = folder
+        self._rate = rate
+        self._writers: dict[str, cv2.VideoWriter] = {}
+
+    def __enter__(self) -> _Films:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for writer in self._writers.values():
+            writer.release()
+
+    def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
+        even = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]  # the codec halves colour both ways
+        if name not in self._writers:
+            path, size = self._folder / f"{name}.mp4", (even.shape[1], even.shape[0])
+            writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), self._rate, size)
+            if not writer.isOpened():
+                raise RuntimeError(
+                    f"OpenCV cannot write a film of {size[0]} x {size[1]} at {self._rate:g} Hz to {path}"
+                )
+            self._writers[name] = writer
+        self._writers[name].write(cv2.cvtColor(even, cv2.COLOR_RGB2BGR))

@@ -1,0 +1,69 @@
+"""A scenario that can be run: everything in it built and checked before any work is done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mvpose import Pipeline, Rig
+from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
+from simharness.experiment.work import renderer_of
+from simharness.rendering.renderer import Unavailable
+from simharness.rigs.faults import shoot
+from simharness.rigs.layouts import build_rig
+from simharness.rigs.shots import Shots
+from simharness.scenario.models import Scenario
+from simharness.scene.build import Scene, build
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scenario that can be run: everything in it is built and checked.
+
+    Attributes:
+        scenario: what was asked for.
+        scene: the compiled room with its people, and how they move.
+        shots: when and with which lens every picture is taken; also the calibration that the method is told.
+        pipelines: the variants of the method, by name.
+    """
+
+    scenario: Scenario
+    scene: Scene
+    shots: Shots
+    pipelines: Mapping[str, Estimator]
+
+
+def prepare(scenario: Scenario) -> Trial:
+    """Build what a scenario describes.
+
+    Raises:
+        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant.
+    """
+    try:
+        pipelines = {name: Pipeline.preset(name) for name in scenario.method.variants}
+    except ValueError as error:
+        raise ValueError(f"method.variants: {error}") from None
+    if blind := NEED_DESCRIPTORS & pipelines.keys():
+        raise ValueError(
+            f"method.variants: {', '.join(blind)} goes by descriptors alone, and the simulated detector makes none; "
+            "choose another variant"
+        )
+    if scenario.rendering.renderer != "rays":
+        try:
+            renderer_of(scenario.rendering.renderer)
+        except Unavailable as error:
+            raise ValueError(f"rendering.renderer: {error}") from None
+    rig = rig_of(scenario)
+    scene = build(scenario, rig)
+    shots = shoot(rig, scenario.faults, scene.time, seed=scenario.seed)
+    return Trial(scenario, scene, shots, pipelines)
+
+
+def rig_of(scenario: Scenario) -> Rig:
+    """The true cameras of a scenario.
+
+    Raises:
+        ValueError: a rig that cannot be: the message names the key or the file.
+    """
+    room = scenario.room.size if scenario.room.walls else None
+    return build_rig(scenario.cameras, seed=scenario.seed, room=room)

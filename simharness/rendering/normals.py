@@ -1,0 +1,72 @@
+"""Compiled loops over faces: their normals, and which of them may throw shadows. Private, on plain arrays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_BOUND = 0.02  # metres
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals of faces (k, 3) and, area-weighted over the smooth faces, of vertices (n, 3); float32."""
+    of_face = np.zeros((len(faces), 3), np.float32)
+    of_vertex = np.zeros((len(vertices), 3), np.float32)
+    for t in range(len(faces)):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        ax, ay, az = vertices[a, 0], vertices[a, 1], vertices[a, 2]
+        ux, uy, uz = vertices[b, 0] - ax, vertices[b, 1] - ay, vertices[b, 2] - az
+        vx, vy, vz = vertices[c, 0] - ax, vertices[c, 1] - ay, vertices[c, 2] - az
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        if smooth[t]:
+            for i in (a, b, c):
+                of_vertex[i, 0] += nx
+                of_vertex[i, 1] += ny
+                of_vertex[i, 2] += nz
+        scale = np.float32(1.0) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-20))
+        of_face[t, 0], of_face[t, 1], of_face[t, 2] = nx * scale, ny * scale, nz * scale
+    for i in range(len(vertices)):
+        nx, ny, nz = of_vertex[i, 0], of_vertex[i, 1], of_vertex[i, 2]
+        scale = np.float32(1.0) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-20))
+        of_vertex[i, 0], of_vertex[i, 1], of_vertex[i, 2] = nx * scale, ny * scale, nz * scale
+    return of_face, of_vertex
+
+
+@njit(cache=True, error_model="numpy")
+def casters(
+    vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, light: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Faces (m, 3) that may throw shadows, and the least and greatest coordinates of their vertices, (3,) each.
+
+    Those turned to ``light`` (3,) with something of the box around all vertices behind them by more than ``_BOUND``.
+    """
+    low, high = np.zeros(3), np.zeros(3)
+    for i in range(len(vertices)):
+        for k in range(3):
+            value = vertices[i, k]
+            low[k] = value if i == 0 or value < low[k] else low[k]
+            high[k] = value if i == 0 or value > high[k] else high[k]
+    kept, count = np.empty_like(faces), 0
+    least, most = np.full(3, np.inf), np.full(3, -np.inf)
+    for t in range(len(faces)):
+        nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
+        if not nx * light[0] + ny * light[1] + nz * light[2] > 0:
+            continue
+        a = faces[t, 0]
+        behind = nx * ((low[0] if nx > 0 else high[0]) - vertices[a, 0])
+        behind += ny * ((low[1] if ny > 0 else high[1]) - vertices[a, 1])
+        behind += nz * ((low[2] if nz > 0 else high[2]) - vertices[a, 2])
+        if behind > -_BOUND:
+            continue
+        for j in range(3):
+            kept[count, j] = faces[t, j]
+            for k in range(3):
+                value = np.float64(vertices[faces[t, j], k])
+                least[k], most[k] = min(least[k], value), max(most[k], value)
+        count += 1
+    if count == 0:
+        least[:], most[:] = low, high
+    return kept[:count], least, most

@@ -1,0 +1,160 @@
+"""Pictures of a scene: what is put before a renderer, and what comes out of a camera with a shutter and a sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence as Many
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.camera import Camera
+from simharness.rendering.lighting import Lighting
+from simharness.rendering.mesh import Mesh
+from simharness.rendering.mirrors import Mirror, with_mirrors
+from simharness.rendering.renderer import Image, Renderer
+from simharness.rendering.sensor import blur, develop
+from simharness.rendering.shutter import moments, stitched
+
+if TYPE_CHECKING:
+    from simharness.rigs.shots import Shots
+    from simharness.scenario.models import Sensor
+    from simharness.scene.build import Scene
+    from simharness.scene.playback import Playback, State
+
+Rgb = NDArray[np.uint8]
+
+_BLUR_STEPS = 6  # moments that make up the blur of one picture
+
+
+def meshes_at(scene: Scene, state: State) -> list[Mesh]:
+    """Everything to be seen in one state: people first, so that a mesh index below P is a person; then things."""
+    people = [
+        figure.moved(body.skin(bones))
+        for body, bones, figure in zip(scene.bodies, state.bones, scene.figures, strict=True)
+    ]
+    placements = iter(state.placements)
+    things = [
+        solid.mesh if solid.trajectory is None else _placed(solid.mesh, next(placements)) for solid in scene.solids
+    ]
+    return [*people, *things]
+
+
+def _placed(mesh: Mesh, pose: NDArray[np.float64]) -> Mesh:
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, pose[3:])
+    return mesh.moved((mesh.vertices @ turn.reshape(3, 3).T + pose[:3]).astype(np.float32))
+
+
+def antialiased(
+    renderer: Renderer,
+    camera: Camera,
+    meshes: Many[Mesh],
+    *,
+    finer: int = 2,
+    lighting: Lighting | None = None,
+    mirrors: Mapping[int, Mirror] = MappingProxyType({}),
+) -> Rgb:
+    """Picture for people to look at: ``finer`` x ``finer`` samples a pixel, so that outlines are smooth.
+
+    Args:
+        renderer: draws it.
+        camera: takes it.
+        meshes: what is there.
+        finer: samples a pixel each way.
+        lighting: the light; by default that of ``Lighting()``.
+        mirrors: the glass of those meshes that are mirrors, by their index.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
+    lighting = lighting or Lighting()
+    large = enlarged(camera, finer)
+    image = renderer.render(large, meshes, lighting=lighting)
+    rgb = with_mirrors(renderer, large, meshes, mirrors, image, lighting=lighting)
+    return cv2.resize(rgb, camera.size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def enlarged(camera: Camera, finer: int) -> Camera:
+    """The same camera with ``finer`` x ``finer`` pixels for each of its own."""
+    K = camera.K.copy()
+    K[:2] *= finer
+    K[:2, 2] += (finer - 1) / 2  # pixel centres are integers at either size
+    width, height = camera.size
+    return replace(camera, K=K, size=(finer * width, finer * height))
+
+
+class Studio:
+    """Makes the pictures that the cameras deliver, with their shutters and sensors.
+
+    Args:
+        playback: the scene.
+        renderer: draws it.
+        sensor: what the pictures are like.
+        seed: of the scenario.
+    """
+
+    def __init__(self, playback: Playback, renderer: Renderer, *, sensor: Sensor, seed: int) -> None:
+        self._playback = playback
+        self._renderer = renderer
+        self._sensor = sensor
+        self._seed = seed
+
+    def picture(self, shots: Shots, frame: int, view: int, *, finer: int = 1) -> Rgb:
+        """The colour picture that ``view`` delivers in ``frame``, (h, w, 3); black where none arrives.
+
+        Args:
+            shots: when and with which lens it is taken.
+            frame: of the sequence.
+            view: of the rig.
+            finer: samples a pixel each way; 2 makes smooth outlines.
+        """
+        if shots.source[frame, view] < 0:
+            width, height = shots.believed[view].size
+            return np.zeros((height, width, 3), np.uint8)
+        camera = shots.camera(frame, view)
+        exposed = [
+            stitched([self._drawn(state, camera, finer) for state in self._playback.over(moments(time, shots.readout))])
+            for time in self._open(shots.time[frame, view])
+        ]
+        taken = int(shots.source[frame, view])
+        return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken)
+
+    def image(self, shots: Shots, frame: int, view: int) -> Image:
+        """Depth, ids and body parts of the middle of the exposure.
+
+        Raises:
+            ValueError: a picture that never arrives.
+        """
+        if shots.source[frame, view] < 0:
+            raise ValueError(f"view {view} delivers no picture in frame {frame}")
+        camera, scene = shots.camera(frame, view), self._playback.scene
+        bands = [
+            self._renderer.render(camera, meshes_at(scene, state), color=False, parts=True)
+            for state in self._playback.over(moments(shots.time[frame, view], shots.readout))
+        ]
+        return Image(
+            **{key: stitched([getattr(band, key) for band in bands]) for key in ("rgb", "depth", "ids", "parts")}
+        )
+
+    def _open(self, middle: float) -> NDArray[np.float64]:
+        """Moments that one exposure is the mean of, seconds."""
+        shutter = self._sensor.shutter
+        steps = _BLUR_STEPS if shutter else 1
+        return middle + shutter * ((np.arange(steps) + 0.5) / steps - 0.5)
+
+    def _drawn(self, state: State, camera: Camera, finer: int) -> Rgb:
+        scene = self._playback.scene
+        return antialiased(
+            self._renderer,
+            camera,
+            meshes_at(scene, state),
+            finer=finer,
+            lighting=scene.lighting,
+            mirrors=scene.mirrors,
+        )
