@@ -60,6 +60,7 @@ class _Staged:
 def measure(*, quick: bool = False) -> list[Size]:
     """Time a long sequence of 4 people before 5 cameras, then shorter ones along the sweeps."""
     rounds = 2 if quick else 4
+    _staged(4, 10)  # loads and compiles
     sizes = [_size("target", _staged(4, 50 if quick else 2000), 5, rounds)]
     scenes = {}
     for sweep, points in SWEEPS.items():
@@ -138,9 +139,7 @@ def table_of(sizes: list[Size]) -> str:
         for size, total in mine:
             pairs = size.people * size.cameras
             cells = [figure(total), *(figure(size.ms[stage]) for stage in STAGES), figure(1e3 * total / pairs)]
-            rows.append(
-                [f"{size.people} × {size.cameras}", *cells, bar(total, min(totals) / 1.5, max(totals), width=16)]
-            )
+            rows.append([f"{size.people} × {size.cameras}", *cells, bar(total, *scale, width=16)])
         grows = [size.people * size.cameras for size, _ in mine]  # one of the two stays the same, or both grow
         rows.append(["exponent", f"{exponent(grows, [total for _, total in mine]):.2f}", "", "", "", "", ""])
     return (
@@ -150,8 +149,8 @@ def table_of(sizes: list[Size]) -> str:
         + caption(
             "People × cameras, without pictures: visibility by rays. Building is done once and spread over the frames; "
             "simulate is the truth at the frames' times, film is posing again, rays, pixels and boxes, detect is the "
-            "simulated detector. Processor time of one process, least of the rounds. Exponents: growth of a frame's cost with people, cameras, or "
-            "people × cameras, by least squares of logarithms on the larger half of the sizes; 1 is linear. Bars are "
-            "logarithmic."
+            "simulated detector. Processor time of one process, least of the rounds. Exponents: growth of a frame's "
+            "cost with people, cameras, or people × cameras, by least squares of logarithms on the larger half of the "
+            "sizes; 1 is linear. Bars are logarithmic."
         )
     )

@@ -185,6 +185,7 @@ def _beside(points: Floats, way: Floats, count: int) -> Floats:
 def _fitted(first: Floats, points: Floats, own: NDArray[np.bool_]) -> Floats:
     """Capsules (c, 7), ``first`` at first, fitted to points (n, 3) of which each has some of its ``own``, (n, c)."""
     capsules = first.copy()
+    soles, crown = points[:, 2].min(), points[:, 2].max()
     stiff, force = np.empty((len(first), 7, 7)), np.empty((len(first), 7))
     for k in range(sum(_ROUNDS)):
         nearest, error = _nearest(points, capsules, own if k < _ROUNDS[0] else np.ones_like(own))
@@ -195,6 +196,9 @@ def _fitted(first: Floats, points: Floats, own: NDArray[np.bool_]) -> Floats:
         force += _STAY * (capsules - first)
         capsules -= np.linalg.solve(stiff, force[..., None])[..., 0]
         capsules[:, 6] = np.maximum(capsules[:, 6], first[:, 6] / 3)  # none may vanish, whatever points it is left with
+        # Soles are flat and capsules round: who stands must stand on the floor, not in it.
+        radius = capsules[:, 6:]
+        capsules[:, [2, 5]] = np.clip(capsules[:, [2, 5]], soles + radius, crown - radius)
     return capsules
 
 

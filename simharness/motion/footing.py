@@ -97,8 +97,8 @@ def tread(
         tilt = tilt + on * (after.pitch - before.pitch)
         climb = after.floor - before.floor
         # Up early and down late, so that the edge of a step is cleared.
-        quick = ease((time - start) / (0.65 * (end - start)))
-        late = ease((time - start - 0.35 * (end - start)) / (0.65 * (end - start)))
+        quick = ease((time - start) / (0.55 * (end - start)))
+        late = ease((time - start - 0.45 * (end - start)) / (0.55 * (end - start)))
         floor += climb * (quick if climb > 0 else late)
         up = bump(time, start, end)
         aloft += lift * up

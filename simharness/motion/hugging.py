@@ -34,8 +34,9 @@ _APART = np.arange(0.7, 0.2, -0.01)  # metres between pelvises that are tried
 _ON_SKIN = 0.028  # metres from the skin of a back to the skin of the palm that lies on it
 _TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "LeftShoulder", "RightShoulder")
 _LEVEL = 0.03  # metres up and down that make one level of a trunk
-_WRAPS = np.array([1.0, 0.75, 0.5, 0.25, 0.0])  # how far round the other arms may reach, at best first
-_PRESSED = 0.025  # metres that an arm may press into the other
+# How far round arms may reach, at best first; in the end, as with a small child, they stay open.
+_WRAPS: tuple[float | None, ...] = (1.0, 0.75, 0.5, 0.25, 0.0, None)
+_PRESSED, _MOST_PRESSED = 0.02, 0.045  # metres that an arm may press into the other: at ease, and rather than stay open
 _ARMS_BACK = limbs(shoulder_flexion=-35.0, shoulder_abduction=12.0, elbow_flexion=5.0)
 _LEAN = 8.0  # degrees; and more for the taller, per metre that the shoulders are higher
 _LEAN_MORE, _MOST_LEAN = 70.0, 36.0
@@ -105,8 +106,9 @@ class _Course:
         return ease((u - begun) / 0.8) * (1 - ease((u - self.let_go) / (self.back + 0.1 - self.let_go)))
 
     def instants(self, count: int) -> Floats:
-        """Instants from coming near to letting go, (count,)."""
-        return np.linspace(0.4 * self.close, self.back + 0.3 * (self.away - self.back), count)
+        """Instants from coming near to letting go; ``count`` of them while the arms are closed."""
+        there = np.linspace(0.4 * self.close, 0.84 * self.close, 4, endpoint=False)
+        return np.concatenate([there, np.linspace(0.86 * self.close, self.back + 0.1, count)])
 
 
 def hug(
@@ -132,12 +134,12 @@ def hug(
 
 def _fit(
     performers: Sequence[Kinematics], roles: tuple[Role, Role], course: _Course
-) -> tuple[float, tuple[float, float]]:
+) -> tuple[float, tuple[float | None, float | None]]:
     """How near their pelvises come, metres, when their bodies just touch, and how far round each then reaches.
 
-    The second is as of :func:`_laid`: as far as the arms can without going through the other.
+    The second is as of :func:`_laid`: as far as the arms can without going through the other; None: not at all.
     """
-    crowd, instants = Crowd(performers), course.instants(12)
+    crowd, instants = Crowd(performers), course.instants(30)
     homes, leans = _homes(performers, Spot(np.zeros(2), 0.0), _APART[0]), _leans(performers)
     came = [
         _come(mover, home, course, instants, instants, {}, lean=lean)
@@ -151,7 +153,7 @@ def _fit(
             break
     came[1], bare[1] = _shifted(came[1], distance - _APART[0]), nearer
 
-    def around(person: int, wrap: float) -> Motion:
+    def around(person: int, wrap: float | None) -> Motion:
         other = 1 - person
         role = roles[person]
         return _embrace(performers[person], came[person], performers[other], came[other], role, wrap, course, instants)
@@ -162,8 +164,10 @@ def _fit(
         tried = [around(person, wrap) for wrap in _WRAPS]
         depths = [crowd.penetration(crowd.presence(person, own, instants), other).max() for own in tried]
         free = np.flatnonzero(np.array(depths) < _PRESSED)
-        best = int(free[0] if len(free) else np.argmin(depths))
-        wraps.append(float(_WRAPS[best]))
+        best = int(free[0] if len(free) else np.argmin(depths[:-1]))
+        if depths[best] > _MOST_PRESSED:
+            best = int(np.argmin(depths))
+        wraps.append(_WRAPS[best])
         shown[person] = tried[best]
     return float(distance), (wraps[0], wraps[1])
 
@@ -234,7 +238,7 @@ def _embrace(
     other: Kinematics,
     others: Motion,
     role: Role,
-    wrap: float,
+    wrap: float | None,
     course: _Course,
     u: Floats,
 ) -> Motion:
@@ -250,6 +254,8 @@ def _embrace(
     if role == "over":  # outside of the other's arms, which come up at the same time
         out = _DETOUR * 4 * opened * (1 - opened)
         motion = nudged(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
+    if wrap is None:
+        return motion
     guess = np.radians([hold.raised, hold.out, hold.turned, hold.bent, 15.0, 0.0])
     # Nobody reaches up to a back that is higher than the own shoulders.
     shoulder = other.arms["left"].anchors[0][2]
@@ -285,6 +291,7 @@ def _laid(mover: Kinematics, height: float, left: float, wrap: float) -> Floats:
     body = mover.body
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     trunk = mover.neutral_skin[np.isin(most, [body.index(name) for name in _TRUNK])]
+    height = float(np.clip(height, trunk[:, 2].min() + _LEVEL, trunk[:, 2].max() - _LEVEL))
     near = trunk[np.argsort(np.abs(trunk[:, 1] - left) + np.abs(trunk[:, 2] - height))[:40]]
     back = np.array([near[:, 0].min() - _ON_SKIN, left, height])
     level = trunk[np.abs(trunk[:, 2] - height) < _LEVEL]

@@ -140,9 +140,10 @@ def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:
 
 
 def _kneeling(kinematics: Kinematics) -> tuple[float, float, float]:
-    """Of a leg whose knee is on the floor: shank and thigh, radians from upright, and the pitch of the foot on its toes.
+    """Of a leg whose knee is on the floor: shank and thigh, radians from upright, and the pitch of the foot.
 
-    Long feet stand higher and so tilt the shank more than an ankle allows: they tip over their toes a little.
+    The foot stands on its toes. A long one stands higher and so tilts the shank more than an ankle allows: it tips over
+    its toes a little.
     """
     _, lower = kinematics.leg_parts
     _, ankle = kinematics.rolling.at(np.array([_ON_TOES]))

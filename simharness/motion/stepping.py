@@ -95,7 +95,7 @@ def step(
     lead = "right" if handed < 0.6 else "left"
     trail = _OTHER[lead]
     length = kinematics.leg_length
-    height, way = (0.13 + 0.09 * tall) * length, 0.55 * length
+    height, way = (0.13 + 0.09 * tall) * length, 0.57 * length
     u, marks = rounds(time, (0.7, 0.75, 0.7, 0.7, 0.75, 0.6), rng=rng, pace=pace)
     led, up, stood, lowered, down, _ = marks[1:]
 
@@ -129,7 +129,7 @@ def step(
     )
     # The foot that stays behind on the floor comes up onto its toes, and lands on them when it is the first down.
     rolled = {lead: 0.0 * u, trail: -np.radians(38.0) * (bump(u, 0.6 * led, up) + bump(u, stood + 0.2, lowered + 0.5))}
-    feet = {side: tread(kinematics, track, u, own[side], steps[side], pitch=rolled[side], lift=0.06) for side in SIDES}
+    feet = {side: tread(kinematics, track, u, own[side], steps[side], pitch=rolled[side], lift=0.07) for side in SIDES}
     curves = at_ease(time, rng)
     moving = bump(u, 0.1, led + 0.2) - bump(u, led, up + 0.2)
     for side, sign in ((lead, -1.0), (trail, 1.0)):
@@ -138,7 +138,7 @@ def step(
     motion = plant(kinematics, time, pelvis, rise, feet, pose_angles(len(time), **curves))
     foot = kinematics.soles["left"]
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
-    depth = float(front - back) + 0.1
+    depth = float(front - back) + 0.08
     middle = in_world(track, [(front + back) / 2, 0.0])
     pose = np.array([[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]])
     return Performance((motion,), (Prop("step", (depth, 0.6, float(height)), Trajectory(time[:1], pose)),))

@@ -45,7 +45,9 @@ class Caster:
             for bone, name in enumerate(body.bones):
                 for geom in np.flatnonzero(model.geom_bodyid == model.body(f"person{person}/{name}").id):
                     if model.geom_group[geom] == SKIN_GROUP:
-                        capsules.append((person, bone, *_ends(model, geom, body.heads[bone]), model.geom_size[geom, 0]))
+                        capsules.append(
+                            (person, bone, *_ends(model, int(geom), body.heads[bone]), model.geom_size[geom, 0])
+                        )
         self._person, self._bone = (np.array([c[k] for c in capsules], int) for k in (0, 1))
         self._rest = np.reshape([c[2:4] for c in capsules], (-1, 2, 3))
         self._radii = np.array([c[4] for c in capsules], float)
@@ -136,7 +138,7 @@ def _place(rest, bone, radii, first, bones, placed, around):  # type: ignore[no-
 
 @njit(cache=True)
 def _meet(start, way, near, length, placed, radii, first, around, owner, distance):  # type: ignore[no-untyped-def]
-    """The nearest person on each ray between ``near`` and its ``length``: who, and how far off; untouched where none."""
+    """Who is nearest on each ray between ``near`` and its ``length``, and how far off; untouched where nobody is."""
     for i in range(len(way)):
         dx, dy, dz = way[i, 0], way[i, 1], way[i, 2]
         x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz

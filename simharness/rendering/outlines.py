@@ -98,12 +98,12 @@ def packed(camera: Camera) -> Floats:
 def _end(camera: Camera) -> float:
     """Squared distance from the axis, at unit depth, at which the radial polynomial of a lens folds over."""
     k1, k2, _, _, k3 = camera.distortion
-    roots = np.roots(np.trim_zeros([7 * k3, 5 * k2, 3 * k1, 1.0], "f"))
+    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
     ends = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(ends.min(initial=np.inf))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def framed(points, edges, cameras, first_row, last_row, out):  # type: ignore[no-untyped-def]
     """Box the part of a person that falls on each image.
 
@@ -139,14 +139,16 @@ def framed(points, edges, cameras, first_row, last_row, out):  # type: ignore[no
             state[i] = imaged
         if not all_in:
             for e in range(len(edges)):
-                _cut(edges[e, 0], edges[e, 1], local, pixel, state, c, image, box)
+                i, j = edges[e, 0], edges[e, 1]
+                if state[i] + state[j] < 2 * _IN_IMAGE:
+                    _cut(i, j, local, pixel, state, c, image, box)
         out[view] = box
 
 
 _BEYOND, _BEHIND, _IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond what the lens images; nearer than ``NEAR``
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _project(x, y, z, c):  # type: ignore[no-untyped-def]
     """Whether a point of the camera's frame is imaged, and its pixel."""
     if z < NEAR:
@@ -159,18 +161,17 @@ def _project(x, y, z, c):  # type: ignore[no-untyped-def]
     return _IN_FRONT, c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _widen(box, u, v):  # type: ignore[no-untyped-def]
     box[0], box[1] = min(box[0], u), min(box[1], v)
     box[2], box[3] = max(box[2], u), max(box[3], v)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _cut(i, j, local, pixel, state, c, image, box):  # type: ignore[no-untyped-def]
     """Widen a box by what an edge has within the image: Liang and Barsky, ACM Trans. Graphics 3, 1984."""
     one, two = state[i], state[j]
-    whole = one == _IN_IMAGE and two == _IN_IMAGE
-    if whole or one == _BEYOND or two == _BEYOND or (one == _BEHIND and two == _BEHIND):
+    if one == _BEYOND or two == _BEYOND or (one == _BEHIND and two == _BEHIND):
         return
     u, v, to_u, to_v = pixel[i, 0], pixel[i, 1], pixel[j, 0], pixel[j, 1]
     if one == _BEHIND or two == _BEHIND:
@@ -183,6 +184,8 @@ def _cut(i, j, local, pixel, state, c, image, box):  # type: ignore[no-untyped-d
             u, v = new_u, new_v
         else:
             to_u, to_v = new_u, new_v
+    if max(u, to_u) < image[0] or min(u, to_u) > image[2] or max(v, to_v) < image[1] or min(v, to_v) > image[3]:
+        return
     low, high = 0.0, 1.0
     du, dv = to_u - u, to_v - v
     for step, room in ((-du, u - image[0]), (du, image[2] - u), (-dv, v - image[1]), (dv, image[3] - v)):

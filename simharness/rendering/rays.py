@@ -1,7 +1,7 @@
 """Seeing without pictures: a ray from every lens to every joint, and boxes from the outlines of bodies.
 
-For sweeps that need no images. What a ray meets first is :mod:`simharness.rendering.casting`'s to say; from there on the
-rule is that of pictures, :func:`simharness.rendering.visibility.decide`.
+For sweeps that need no images. What a ray meets first is :mod:`simharness.rendering.casting`'s to say; from there on
+the rule is that of pictures, :func:`simharness.rendering.visibility.decide`.
 """
 
 from __future__ import annotations

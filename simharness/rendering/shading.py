@@ -22,7 +22,9 @@ BIAS = 2.5  # pixels of the map of shadows, over the cosine: what a surface must
 LEAST_COSINE = 0.25
 _BRIGHTEST = 4.0
 _STRIDE = 16  # pixels along a row over which a texture keeps its level of detail
-_BLOCK = 16  # pixels of the map of shadows
+_BLOCK_SHIFT = np.uint32(4)
+_BLOCK = 1 << 4  # pixels of the map of shadows
+_LAST = np.uint32(3)
 _FILTER = 4  # pixels of the map under the filter that softens edges
 _SHIFT = 6
 _STEPS = 1 << _SHIFT  # between two texels
@@ -280,13 +282,13 @@ def _darken(
         u, v, here = map_x[x], map_y[x], near[x]
         if not ((u >= 0) & (u < end) & (v >= 0) & (v < end)):
             continue
-        i, j = np.int64(u), np.int64(v)
-        if blocks[j // _BLOCK, i // _BLOCK] <= here:  # nothing thereabouts is nearer to the light
+        i, j = np.uint32(u), np.uint32(v)
+        if blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] <= here:  # nothing thereabouts is nearer to the light
             continue
         # Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3, but for the most part the corners
         # agree and speak for the rest.
-        corners = int(shadow[j, i] > here) + int(shadow[j, i + 3] > here)
-        corners += int(shadow[j + 3, i] > here) + int(shadow[j + 3, i + 3] > here)
+        corners = int(shadow[j, i] > here) + int(shadow[j, i + _LAST] > here)
+        corners += int(shadow[j + _LAST, i] > here) + int(shadow[j + _LAST, i + _LAST] > here)
         blocked = 0.25 * corners
         if 0 < corners < 4:
             du, dv = u - i, v - j
@@ -294,7 +296,7 @@ def _darken(
             for m in range(_FILTER):
                 row = 0.0
                 for n in range(_FILTER):
-                    if shadow[j + m, i + n] > here:
+                    if shadow[j + np.uint32(m), i + np.uint32(n)] > here:
                         row += (1.0 - du) if n == 0 else (du if n == _FILTER - 1 else 1.0)
                 blocked += row * ((1.0 - dv) if m == 0 else (dv if m == _FILTER - 1 else 1.0)) / 9.0
         key_light[x] *= 1.0 - blocked

@@ -58,7 +58,8 @@ class People(Section):
         "kinematic", description="kinematic: as planned; dynamic: tracked by actuators under gravity and contact"
     )
     assist: Positive = Field(
-        300.0, description="dynamic playback: the largest force that helps a pelvis along, newtons"
+        300.0,
+        description="dynamic playback: the largest force that helps a pelvis along, newtons; who runs needs 1000 or so",
     )
     motion: Mocap = Mocap()
 

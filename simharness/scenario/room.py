@@ -32,8 +32,8 @@ class Clutter(Section):
     carts: Count = Field(0, description="these move about")
     coverage: Share | None = Field(
         None,
-        description="share of the joints in the pictures to be hidden by things, whoever else hides them too; more things "
-        "are added to reach it",
+        description="share of the joints in the pictures to be hidden by things, whoever else hides them too; more "
+        "things are added to reach it",
     )
 
 

@@ -64,12 +64,12 @@ class TestBadInput:
 
     def test_one_camera(self, simharness):
         assert_refused(
-            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=1"), "cameras.count", "at least 2 cameras", "got 1"
+            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=1"), "cameras.count", "at least 2", "got 1"
         )
 
     def test_no_camera(self, simharness):
         assert_refused(
-            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=0"), "cameras.count", "at least 2 cameras", "got 0"
+            simharness("run", QUICKSTART, *TINY, "--set", "cameras.count=0"), "cameras.count", "at least 2", "got 0"
         )
 
     def test_camera_in_a_wall(self, simharness):

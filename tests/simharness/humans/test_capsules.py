@@ -13,9 +13,9 @@ from mvpose.camera import Camera
 from simharness.humans.body import make_body
 from simharness.humans.capsules import fit_capsules
 from simharness.humans.looks import dress
-from simharness.humans.wardrobe import draw_looks
 from simharness.humans.population import draw_shape
 from simharness.humans.shape import Shape
+from simharness.humans.wardrobe import draw_looks
 from simharness.random import stream
 from simharness.rendering.mesh import Mesh
 from simharness.rendering.raster import RasterRenderer
@@ -99,7 +99,7 @@ def on_capsules(starts, ends, radii):
     points = []
     for start, end, radius in zip(starts, ends, radii, strict=True):
         length = np.linalg.norm(end - start)
-        count = int(5e4 * 2 * np.pi * radius * (length + 2 * radius))
+        count = int(2e4 * 2 * np.pi * radius * (length + 2 * radius))
         out = rng.standard_normal((count, 3))
         out /= np.linalg.norm(out, axis=1, keepdims=True)
         axis = (end - start) / length
@@ -140,6 +140,14 @@ def test_skin_and_capsules_of_a_crowd_differ_little(distances):
     crowd = np.concatenate([distances(name) for name in NAMES])
     assert crowd.mean() < 0.007
     assert np.quantile(crowd, 0.95) < 0.02
+
+
+def test_capsules_neither_top_the_crown_nor_sink_below_the_soles(name):
+    body = somebody(name)
+    starts, ends, radii = placed(body, fitted(name))
+    ends = np.stack([starts, ends])[..., 2]
+    assert (ends + radii).max() == pytest.approx(body.vertices[:, 2].max(), abs=0.015)
+    assert (ends - radii).min() == pytest.approx(body.vertices[:, 2].min(), abs=0.015)
 
 
 def test_no_more_capsules_than_rays_can_afford(name):

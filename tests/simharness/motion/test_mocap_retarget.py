@@ -196,7 +196,7 @@ def test_names_of_all_styles_mean_the_same(perform, style):
     np.testing.assert_allclose(other.root, same.root, atol=1e-9)
 
 
-def test_the_unit_of_length_and_the_vertical_do_not_matter(perform):
+def test_the_unit_of_length_does_not_matter(perform):
     place = np.tile([0.0, 94.0, 0.0], (FRAMES, 1)) + slowly(z=0, x=0, y=60)
     one = perform(bvh(**HANG, place=place))
     text = bvh(**HANG, place=place * 0.3937)
@@ -210,6 +210,18 @@ def test_the_unit_of_length_and_the_vertical_do_not_matter(perform):
     way = np.linalg.norm(one.root[-1, :2] - one.root[0, :2])
     leg = perform.kinematics.leg_parts
     assert way == pytest.approx(60 * sum(leg) / 82, abs=0.01)
+
+
+@pytest.mark.parametrize("height", [-60.0, 40.0])
+def test_where_the_recording_has_its_floor_does_not_matter(perform, height):
+    bent = {"left_thigh": slowly(x=-20), "left_shank": slowly(x=40), "left_foot": slowly(x=-20)}
+    bent |= {name.replace("left", "right"): turn for name, turn in bent.items()}
+    sinking = np.tile([0.0, 94.0, 0.0], (FRAMES, 1)) - slowly(x=82 * (1 - np.cos(np.radians(20))))
+    one = perform(bvh(**HANG, **bent, place=sinking))
+    two = perform(bvh(**HANG, **bent, place=sinking + [0.0, height, 0.0]))
+    np.testing.assert_allclose(two.root, one.root, atol=1e-6)
+    np.testing.assert_allclose(two.angles, one.angles, atol=1e-5)
+    assert last(one)["left_knee_flexion"] == pytest.approx(40, abs=4)
 
 
 def test_what_is_missing_is_told_with_what_is_there(perform):

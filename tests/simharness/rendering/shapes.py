@@ -118,13 +118,13 @@ def with_parts(mesh, labels):
 
 
 def chequered(size, *, repeat=(1, 1), color=(1.0, 1.0, 1.0)):
-    """An upright board in the plane x = 0, its foot at z = 0, seen from -x: fields of four colours, 40 x 24 texels.
+    """An upright board in the plane x = 0, its foot at z = 0, seen from -x: 5 x 3 fields, no two alike, 40 x 24 texels.
 
     From there +y is to the left: u grows against y, v against z.
     """
     width, height = size
-    fields = np.array([[[220, 60, 50], [60, 190, 70]], [[60, 70, 210], [240, 230, 90]]], np.uint8)
-    texture = np.tile(np.repeat(np.repeat(fields, 8, axis=0), 8, axis=1), (2, 3, 1))[:24, :40]
+    fields = np.random.default_rng(2).permutation(np.linspace(20, 250, 45)).reshape(3, 5, 3).astype(np.uint8)
+    texture = np.repeat(np.repeat(fields, 8, axis=0), 8, axis=1)
     y, (u, v) = width / 2, repeat
     board = sheet([(0, y, 0), (0, -y, 0), (0, -y, height), (0, y, height)], color)
     corners = np.array([(0, v), (u, v), (u, 0), (0, 0)], np.float32)

@@ -11,10 +11,10 @@ from test_renderers import camera_at
 
 from simharness.humans.body import make_body
 from simharness.humans.looks import dress
-from simharness.humans.wardrobe import draw_looks
 from simharness.humans.model import neutral_transforms
 from simharness.humans.population import draw_shape
 from simharness.humans.shape import Shape
+from simharness.humans.wardrobe import draw_looks
 from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
 from simharness.random import stream

@@ -398,3 +398,27 @@ def test_moved_meshes_are_drawn_where_they_are(renderer):
     for key in ("rgb", "depth", "ids"):
         np.testing.assert_array_equal(getattr(one, key), getattr(other, key))
     assert (one.ids != renderer.render(VIEWS[0], scene).ids).any()
+
+
+@pytest.mark.parametrize("field", ["colors", "smooth", "parts", "texture", "uv"])
+def test_what_is_kept_of_a_scene_is_what_did_not_change(renderer, field):
+    """One thing of a mesh changes and all else is the same object."""
+    mesh = with_parts(chequered((2.0, 1.6)), [1, 2])
+    camera = camera_at((-2.0, 0.3, 0.9), (0.0, 0.0, 0.8))
+    changed = {
+        "colors": mesh.colors * np.float32(0.5),
+        "smooth": True,
+        "parts": mesh.parts[::-1].copy(),
+        "texture": 255 - mesh.texture,
+        "uv": mesh.uv * np.float32(2),
+    }
+    other = replace(mesh, **{field: changed[field]})
+    fresh = replace(other, faces=mesh.faces.copy())
+    renderer.render(camera, [fresh], parts=True)
+    wanted = renderer.render(camera, [fresh], parts=True)
+    before = renderer.render(camera, [mesh], parts=True)
+    image = renderer.render(camera, [other], parts=True)
+    np.testing.assert_array_equal(image.rgb, wanted.rgb)
+    np.testing.assert_array_equal(image.parts, wanted.parts)
+    if field != "smooth":  # a flat board has the same normals either way
+        assert (image.rgb != before.rgb).any() or (image.parts != before.parts).any()
