@@ -34,7 +34,7 @@ def arriving(frames: Sequence[Detections], source: NDArray[np.int64]) -> Detecti
     if not views:
         return Detections.empty(frames[0].skeleton)
     fields = ("view", "keypoints", "scores", "boxes", "box_scores")
-    chosen = {
+    chosen: dict[str, Any] = {
         field: np.concatenate([getattr(found, field)[found.view == view] for found, view in views]) for field in fields
     }
     return Detections(**chosen, skeleton=frames[0].skeleton)

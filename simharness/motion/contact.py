@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.humans.model import person_spec
 from simharness.motion.kinematics import Addresses, Kinematics
 from simharness.motion.motion import Motion
 
@@ -87,15 +85,6 @@ def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: Arr
     return depth
 
 
-_SPECS: WeakKeyDictionary[Kinematics, mujoco.MjSpec] = WeakKeyDictionary()  # shapes take long to fit to a body
-
-
-def _spec(mover: Kinematics) -> mujoco.MjSpec:
-    if mover not in _SPECS:
-        _SPECS[mover] = person_spec(mover.body, "person")
-    return _SPECS[mover]
-
-
 class _Pair:
     """Two people in a MuJoCo model."""
 
@@ -103,7 +92,7 @@ class _Pair:
         spec = mujoco.MjSpec()
         spec.modelname = "pair"
         for prefix, mover in (("one/", one), ("other/", other)):
-            spec.attach(_spec(mover).copy(), prefix=prefix, frame=spec.worldbody.add_frame())
+            spec.attach(mover.spec.copy(), prefix=prefix, frame=spec.worldbody.add_frame())
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         self._one = Addresses(self._model, one.body, prefix="one/")

@@ -42,6 +42,7 @@ class Kinematics:
 
     Attributes:
         body: the body.
+        spec: its MuJoCo model, made once, for it takes long: copies of it can be attached to others.
         legs: by side, the six hinges from the pelvis to the ankle, which is the end.
         leg_order: the hinges of a leg, without the side, in the chain's order.
         trunks: by side, the seven hinges from the pelvis over lumbar spine and thorax to the clavicle. Its end is the
@@ -58,7 +59,8 @@ class Kinematics:
 
     def __init__(self, body: Body) -> None:
         self.body = body
-        self._model = person_spec(body, "person").compile()
+        self.spec = person_spec(body, "person")
+        self._model = self.spec.copy().compile()
         self._data = mujoco.MjData(self._model)
         self._address = Addresses(self._model, body, prefix="")
         self.ranges = np.array([RANGES[name] for name in DOFS])

@@ -297,7 +297,8 @@ def _draw(
         py = (edge[0, 1] + edge[1, 1] + edge[2, 1]) * scale
         pz = (edge[0, 2] + edge[1, 2] + edge[2, 2]) * scale
         if determinant < 0:
-            edge[:3] = -edge[:3]
+            for k in range(3):
+                edge[k, 0], edge[k, 1], edge[k, 2] = -edge[k, 0], -edge[k, 1], -edge[k, 2]
         edge[3, 0], edge[3, 1], edge[3, 2] = -px, -py, 1.0 / near - pz  # where the near plane cuts: one more side
         for n in range(4):
             run[n] = -1.0 / edge[n, 0]

@@ -67,6 +67,4 @@ def casters(
                 value = np.float64(vertices[faces[t, j], k])
                 least[k], most[k] = min(least[k], value), max(most[k], value)
         count += 1
-    if count == 0:
-        least[:], most[:] = low, high
-    return kept[:count], least, most
+    return kept[:count], least if count else low, most if count else high

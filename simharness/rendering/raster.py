@@ -75,8 +75,9 @@ def _shaded(
     triangle: NDArray[np.int32],
     q: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
+    empty = np.round(255 * np.array(lighting.background))
     if not len(soup.fabric.faces):
-        return np.full((*triangle.shape, 3), np.round(255 * np.array(lighting.background)), np.uint8)
+        return np.full((*triangle.shape, 3), empty, np.uint8)
     fabric, shadows = soup.fabric, soup.shadows(lighting)
     return shade(
         triangle,
@@ -93,8 +94,8 @@ def _shaded(
         np.ascontiguousarray(np.linalg.inv(camera.P[:, :3])),
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
-        np.array(lighting.tint),
-        np.array(lighting.background),
+        255 * np.sqrt(lighting.tint),  # sRGB is about the root of light
+        empty,
         shadows.P,
         shadows.nearest,
         shadows.blocks,

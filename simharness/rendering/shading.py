@@ -21,17 +21,18 @@ from numba import njit
 BIAS = 2.5  # pixels of the map of shadows, over the cosine: what a surface must be nearer to throw a shadow
 LEAST_COSINE = 0.25
 _BRIGHTEST = 4.0
-_STRIDE = 16  # pixels along a row over which a texture keeps its level of detail
-_BLOCK_SHIFT = np.uint32(4)
-_BLOCK = 1 << 4  # pixels of the map of shadows
+_STRIDE = 32  # pixels along a row over which a texture keeps its level of detail
+_BLOCK_SHIFT = np.uint32(3)
+_BLOCK = 1 << 3  # pixels of the map of shadows
 _LAST = np.uint32(3)
 _FILTER = 4  # pixels of the map under the filter that softens edges
 _SHIFT = 6
 _STEPS = 1 << _SHIFT  # between two texels
 _ONE = np.uint64(1)
 _ZERO, _UNIT, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-30)
-_LANE = 20  # bits: 255 x 64 x 64 fits
-_MASK = (1 << _LANE) - 1
+_LANE = np.uint64(20)  # bits: 255 x 64 x 64 fits
+_TWO_LANES = np.uint64(40)
+_MASK = np.uint64((1 << 20) - 1)
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
@@ -52,8 +53,8 @@ def shade(
     rays: np.ndarray,
     light: np.ndarray,
     strengths: np.ndarray,
-    tint: np.ndarray,
-    background: np.ndarray,
+    gains: np.ndarray,
+    empty: np.ndarray,
     light_P: np.ndarray,
     shadow: np.ndarray,
     blocks: np.ndarray,
@@ -79,8 +80,8 @@ def shade(
         rays: (3, 3), so that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
         light: unit direction to the key light, (3,).
         strengths: of key, sky and fill, (3,).
-        tint: colour of the light, linear, (3,).
-        background: sRGB of what is not hit, (3,).
+        gains: 255 times what the colour of the light makes of an albedo, sRGB, (3,).
+        empty: what is not hit, of 255, (3,).
         light_P: projection into the map of shadows, (3, 4).
         shadow: the map: inverse depth from the light, (s, s) float32, 0 where nothing stands in the light.
         blocks: the nearest in every block of it, see :func:`nearest_blocks`.
@@ -96,7 +97,6 @@ def shade(
     light_x, light_y, light_z = np.float32(light[0]), np.float32(light[1]), np.float32(light[2])
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     slope_bias, least_cosine = np.float32(bias), np.float32(LEAST_COSINE)
-    gains = 255.0 * np.sqrt(tint)  # sRGB is about the root of light
     # The light's view of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)
     for i in range(3):
@@ -113,7 +113,8 @@ def shade(
     shade_light, key_light = np.empty(width, np.float32), np.empty(width, np.float32)
     red, green, blue = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     steps_x, steps_y = np.empty(_STRIDE, np.int32), np.empty(_STRIDE, np.int32)
-    empty = np.round(255 * background)
+    mixed, half = np.empty(_STRIDE, np.uint64), np.int32(_STEPS // 2)
+    base, rows, columns, stride, wide, high = 0, 1, 1, 3, 1.0, 1.0
     edge, across = np.zeros((3, 3)), np.zeros((3, 3))
     normal, turning = np.zeros(3, np.float32), np.zeros(3, np.float32)
     for y in range(height):
@@ -130,6 +131,7 @@ def shade(
             map_y[x] = (away_y * w + (seen_y * place + from_y)) * scale - np.float32(1.0)
             near[x] = w * scale
 
+        kept, kept_until = -1, 0
         end = 0
         while end < width:
             start, label = end, triangle[y, end]
@@ -152,7 +154,8 @@ def shade(
                 edge[1, 0], edge[1, 1], edge[1, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
                 edge[2, 0], edge[2, 1], edge[2, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
-            dye_red, dye_green, dye_blue = gains[0] * colors[t, 0], gains[1] * colors[t, 1], gains[2] * colors[t, 2]
+            dye_red, dye_green = np.float32(gains[0] * colors[t, 0]), np.float32(gains[1] * colors[t, 1])
+            dye_blue = np.float32(gains[2] * colors[t, 2])
             if is_smooth:
                 # The weights are negative where the triangle faces the camera, so this normal always does.
                 wa = -(edge[0, 0] * start + (edge[0, 1] * y + edge[0, 2]))
@@ -209,13 +212,19 @@ def shade(
             v_rise, v_first = across[1, 0], across[1, 1] * y + across[1, 2]
             sum_rise, sum_first = across[2, 0], across[2, 1] * y + across[2, 2]
             share = 1.0 / (255.0 * _STEPS * _STEPS)
-            dye_red, dye_green, dye_blue = share * dye_red, share * dye_green, share * dye_blue
-            for begin in range(start, end, _STRIDE):
-                level = _level(across, begin, y, pyramids[textured])
-                base = pyramids[textured, level, 0]
-                rows, columns = pyramids[textured, level, 1], pyramids[textured, level, 2]
-                stop, stride = min(begin + _STRIDE, end), columns + 2
-                wide, high, half = np.float64(_STEPS * columns), np.float64(_STEPS * rows), np.int32(_STEPS // 2)
+            dye_red, dye_green = np.float32(share * dye_red), np.float32(share * dye_green)
+            dye_blue = np.float32(share * dye_blue)
+            stop = start
+            while stop < end:
+                begin = stop
+                if textured != kept or begin >= kept_until:
+                    kept, kept_until = textured, begin + _STRIDE
+                    level = _level(across, begin, y, pyramids[textured])
+                    base = pyramids[textured, level, 0]
+                    rows, columns = pyramids[textured, level, 1], pyramids[textured, level, 2]
+                    stride = columns + 2
+                    wide, high = np.float64(_STEPS * columns), np.float64(_STEPS * rows)
+                stop = min(kept_until, end)
                 count = stop - begin
                 for n in range(count):
                     column = np.float64(begin + n)
@@ -224,18 +233,19 @@ def shade(
                     # In steps between the middles of texels; the pyramid has a texel more all around.
                     steps_x[n] = np.int32((u - np.floor(u)) * wide) + half
                     steps_y[n] = np.int32((v - np.floor(v)) * high) + half
-                reds, greens, blues = red[begin:stop], green[begin:stop], blue[begin:stop]
                 for n in range(count):
                     i, j = steps_x[n], steps_y[n]
                     one = np.uint64(base + (j >> _SHIFT) * stride + (i >> _SHIFT))
-                    weight_x, weight_y = np.uint64(i & (_STEPS - 1)), np.uint64(j & (_STEPS - 1))
                     two = one + np.uint64(stride)
+                    weight_x, weight_y = np.uint64(i & (_STEPS - 1)), np.uint64(j & (_STEPS - 1))
                     rest_x, rest_y = np.uint64(_STEPS) - weight_x, np.uint64(_STEPS) - weight_y
                     mix = rest_y * (rest_x * texels[one] + weight_x * texels[one + _ONE])
-                    mix += weight_y * (rest_x * texels[two] + weight_x * texels[two + _ONE])
-                    reds[n] = dye_red * np.int64(mix & np.uint64(_MASK))
-                    greens[n] = dye_green * np.int64((mix >> np.uint64(_LANE)) & np.uint64(_MASK))
-                    blues[n] = dye_blue * np.int64(mix >> np.uint64(2 * _LANE))
+                    mixed[n] = mix + weight_y * (rest_x * texels[two] + weight_x * texels[two + _ONE])
+                reds, greens, blues = red[begin:stop], green[begin:stop], blue[begin:stop]
+                for n in range(count):
+                    reds[n] = dye_red * np.float32(np.int32(mixed[n] & _MASK))
+                    greens[n] = dye_green * np.float32(np.int32((mixed[n] >> _LANE) & _MASK))
+                    blues[n] = dye_blue * np.float32(np.int32(mixed[n] >> _TWO_LANES))
 
         _darken(key_light, map_x, map_y, near, shadow, blocks)
         for x in range(width):
@@ -304,7 +314,7 @@ def _darken(
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def nearest_blocks(shadow: np.ndarray) -> np.ndarray:
-    """The nearest to the light, inverse depth, under all filters that begin in a block of 16 x 16 pixels of the map."""
+    """The nearest to the light, inverse depth, under all filters that begin in a block of 8 x 8 pixels of the map."""
     side = len(shadow)
     count = (side + _BLOCK - 1) // _BLOCK
     bands, blocks = np.zeros((count, side), np.float32), np.zeros((count, count), np.float32)
@@ -323,4 +333,4 @@ def nearest_blocks(shadow: np.ndarray) -> np.ndarray:
 def packed(picture: np.ndarray) -> np.ndarray:
     """Texels (m, 3) uint8 as numbers (m,) uint64: red, green and blue 20 bits apart, so that one product weighs all."""
     red, green, blue = picture.astype(np.uint64).T
-    return np.asarray(red | green << np.uint64(_LANE) | blue << np.uint64(2 * _LANE))
+    return np.asarray(red | green << _LANE | blue << _TWO_LANES)

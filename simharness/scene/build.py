@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from mvpose.camera import Rig
 from simharness.humans.body import Body, make_body
 from simharness.humans.looks import dress, paint
-from simharness.humans.model import person_spec
 from simharness.humans.population import draw_shape, is_child
 from simharness.humans.wardrobe import Look, draw_looks
 from simharness.motion.choreography import choreograph
@@ -112,7 +112,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys))
     solids = (*make_room(scenario.room, seed), *props, *decoys, *clutter)
     check_rig(scenario, solids, rig)
-    model = compile_model(bodies, solids)
+    model = compile_model(cast, solids)
     if people.playback == "dynamic":
         motions = track(model, bodies, motions, assist=people.assist, solids=solids)
     figures = tuple(_figure(body, look) for body, look in zip(bodies, looks, strict=True))
@@ -133,14 +133,14 @@ def _figure(body: Body, look: Look) -> Mesh:
     )
 
 
-def compile_model(bodies: tuple[Body, ...], solids: tuple[Solid, ...]) -> mujoco.MjModel:
-    """One MuJoCo model of everything."""
+def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco.MjModel:
+    """One MuJoCo model of everything: see :class:`Scene`."""
     spec = mujoco.MjSpec()
     spec.modelname = "scene"
     for solid in solids:
         solid.add_to(spec)
-    for i, body in enumerate(bodies):
-        spec.attach(person_spec(body, f"person{i}"), prefix=f"person{i}/", frame=spec.worldbody.add_frame())
+    for i, mover in enumerate(cast):
+        spec.attach(mover.spec.copy(), prefix=f"person{i}/", frame=spec.worldbody.add_frame())
     return spec.compile()
 
 

@@ -51,7 +51,7 @@ _HELP_RATE = 2 * np.pi * 2.0  # rad/s: how quickly the pelvis is brought back, w
 _REACH = (0.4, 1.0)  # metres from the planned pelvis: where help begins to fail, and where there is none; who is
 # further away has fallen or been carried off, and is not dragged along the floor
 _GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the helping torque
-_DEEPEST, _THINNEST = 0.04, 0.005  # metres: how far below the floor a sole's capsule may reach, its least radius
+_BAR = 0.018  # metres: radius of the bars that people stand on
 _CONTACT_TIME = 0.006  # s, in which contacts are resolved; MuJoCo wants at least two steps
 _CHUNK = 120  # planned instants that are read at a time: plans may be long
 
@@ -160,7 +160,7 @@ class Tracker:
         for solid in self._moving:
             if solid.kind == "prop" and _is_moved(solid):
                 _without_contact(self.model, solid.name)
-        _sole_to_the_floor(self.model)
+        _stand_on_soles(self.model)
         # Contact forces are scaled to the inertia at the contact, which is little at a foot that carries a body: at
         # MuJoCo's defaults it sinks in by a centimetre.
         self.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_OVERRIDE
@@ -344,19 +344,32 @@ def _joint(dof: str) -> str:
     return next(word for word in dof.split("_") if word in _MUSCLES)
 
 
-def _sole_to_the_floor(model: mujoco.MjModel) -> None:
-    """Slim the capsules that reach below the soles.
+def _stand_on_soles(model: mujoco.MjModel) -> None:
+    """Make the capsules of the feet bars that lead from beside the ankle down to the floor under the ball.
 
-    A capsule is round and a sole is flat, so those that fit a foot best come out under it, by up to 2 cm; a planned
-    foot would be pushed out of the floor at every step. In the initial configuration everyone stands on z = 0.
+    A capsule is round and a sole is flat: those that fit a foot best meet the floor elsewhere than the skin, of which
+    the plan is made, does, and whoever steps on them is pushed off the plan. The heel, over which a planned foot rolls
+    within a tenth of a stride, touches nothing: a bar there would roll otherwise than the skin, and trip. In the
+    initial configuration everyone stands on z = 0.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    for geom in np.flatnonzero((model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE) & (model.geom_bodyid > 0)):
-        radius, half = model.geom_size[geom, :2]
-        lowest = data.geom_xpos[geom, 2] - half * abs(data.geom_xmat[geom, 8]) - radius
-        if -_DEEPEST < lowest < 0:
-            model.geom_size[geom, 0] = max(radius + lowest, _THINNEST)
+    for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE):
+        body = int(model.geom_bodyid[geom])
+        if not model.body(body).name.endswith("Foot"):
+            continue
+        center, turn = data.geom_xpos[geom], data.xmat[body].reshape(3, 3)
+        reach = model.geom_size[geom, 1] * data.geom_xmat[geom].reshape(3, 3)[:, 2]
+        ends = np.stack([center - reach, center + reach])
+        ball = int(np.linalg.norm((ends - data.xpos[body])[:, :2], axis=1).argmax())
+        ends[ball, 2], ends[1 - ball, 2] = _BAR, data.xpos[body, 2]
+        way, half = ends[ball] - ends[1 - ball], float(np.linalg.norm(ends[ball] - ends[1 - ball])) / 2
+        model.geom_pos[geom] = turn.T @ (ends.mean(axis=0) - data.xpos[body])
+        mujoco.mju_quatZ2Vec(model.geom_quat[geom], turn.T @ (way / (2 * half)))
+        model.geom_size[geom, :2] = _BAR, half
+        model.geom_rbound[geom] = half + _BAR
+        model.geom_aabb[geom] = 0.0, 0.0, 0.0, _BAR, _BAR, half + _BAR
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the capsules as they were
 
 
 def _is_moved(solid: Solid) -> bool:
