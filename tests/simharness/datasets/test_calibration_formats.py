@@ -17,8 +17,9 @@ from simharness.datasets import easymocap, opencv, panoptic, pose2sim, voxelpose
 from simharness.datasets.storage import read_storage, write_storage
 
 NAMES = st.text("abcXYZ0189_-", min_size=1, max_size=8)
+# Spaces at the ends of a name are lost in OpenCV's YAML.
 ANY_NAME = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8).filter(
-    lambda name: name != "metadata"
+    lambda name: name != "metadata" and name == name.strip()
 )
 NUMBER = st.floats(-20, 20)
 
