@@ -119,6 +119,10 @@ def render(
         str,
         typer.Option(metavar="LAYERS", help="Draw in [cyan]truth[/], [cyan]detections[/], [cyan]estimates[/]: a list."),
     ] = "",
+    also: Annotated[
+        str,
+        typer.Option(metavar="CHANNELS", help="Write [cyan]depth[/], [cyan]ids[/], [cyan]parts[/] too: a list."),
+    ] = "",
     every: Annotated[int, typer.Option(metavar="N", help="Render one frame of N.")] = 1,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the folder NAME goes.", file_okay=False)] = Path(
         "results/renders"
@@ -136,9 +140,10 @@ def render(
         from simharness.experiment.footage import Footage
         from simharness.experiment.footage import render as render_scenario
 
-        layers = frozenset(name.strip() for name in overlay.split(",") if name.strip())
+        layers, channels = (frozenset(filter(None, map(str.strip, given.split(",")))) for given in (overlay, also))
+        footage = Footage(video=video, overlay=layers, channels=channels, every=every)
         with reporter() as bars:
-            folder = render_scenario(loaded, Footage(video, layers, every), out=out, reporter=bars)
+            folder = render_scenario(loaded, footage, out=out, reporter=bars)
     typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
 
 

@@ -20,6 +20,7 @@ from simharness.experiment.progress import Reporter, Silence
 from simharness.experiment.trial import Trial, prepare
 from simharness.experiment.work import Estimating, Filming, studio_of
 from simharness.rendering.mosaic import mosaic
+from simharness.rendering.picture import Studio
 from simharness.scenario.models import Scenario
 from simharness.scene.playback import Playback
 from simharness.scene.simulation import simulate
@@ -27,6 +28,7 @@ from simharness.scene.simulation import simulate
 Rgb = NDArray[np.uint8]
 
 LAYERS = ("truth", "detections", "estimates")
+CHANNELS = ("depth", "ids", "parts")
 _WIDEST = 1920  # pixels of a mosaic
 
 
@@ -37,19 +39,26 @@ class Footage:
     Attributes:
         video: one MP4 a camera instead of one PNG a picture.
         overlay: which of ``LAYERS`` are drawn in.
+        channels: which of ``CHANNELS`` are written beside every picture, as PNG: depth in millimetres in 16 bits, 0
+            where nothing is seen; ids in 8 bits, 1 and up the people, 255 things and the room, 0 nothing; parts in 8
+            bits, :class:`simharness.humans.segments.Segment` + 1, 0 where there is no body.
         every: frames from one that is rendered to the next.
         finer: samples a pixel each way.
     """
 
     video: bool = False
     overlay: frozenset[str] = frozenset()
+    channels: frozenset[str] = frozenset()
     every: int = 1
     finer: int = 2
 
     def __post_init__(self) -> None:
-        unknown = self.overlay - set(LAYERS)
-        if unknown:
-            raise ValueError(f"--overlay: {', '.join(sorted(unknown))} is no layer; there are {', '.join(LAYERS)}")
+        for option, asked, known in (("--overlay", self.overlay, LAYERS), ("--also", self.channels, CHANNELS)):
+            unknown = asked - set(known)
+            if unknown:
+                raise ValueError(f"{option}: {', '.join(sorted(unknown))} is not known; there are {', '.join(known)}")
+        if self.video and self.channels:
+            raise ValueError("--also goes with pictures, not with --video: depth and ids do not survive a film's codec")
         if self.every < 1:
             raise ValueError(f"--every must be 1 or more, got {self.every}")
 
@@ -64,7 +73,8 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
         reporter: is told of the stages.
 
     Returns:
-        The folder: ``<camera>/0000.png`` or ``<camera>.mp4`` for each camera, and ``mosaic`` like them.
+        The folder: ``<camera>/0000.png`` (and ``0000.depth.png``, ...) or ``<camera>.mp4`` for each camera, and
+        ``mosaic`` like them.
 
     Raises:
         ValueError: the scenario cannot be built, or a layer that does not exist.
@@ -73,6 +83,7 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
     with reporter.stage("build", 1):
         trial = prepare(scenario)
     layers = _layers(trial, footage, reporter)
+    studio = studio_of(scenario, Playback(trial.scene))
     frames = range(0, scenario.frames, footage.every)
     names = [*(camera.name for camera in trial.shots.believed), "mosaic"]
     folder = out / scenario.name
@@ -80,12 +91,15 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
         write: Callable[[str, int, Rgb], None] = _Stills(partial)
         if footage.video:
             write = stack.enter_context(_Films(partial, rate=scenario.rate / footage.every))
-        for frame, pictures in zip(frames, _pictures(trial, footage, layers, frames), strict=True):
+        for frame, pictures in zip(frames, _pictures(trial, studio, footage, layers, frames), strict=True):
             sheet = mosaic(pictures, names[:-1])
             shrink = min(1.0, _WIDEST / sheet.shape[1])
             small = cv2.resize(sheet, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA).astype(np.uint8)
             for name, picture in zip(names, [*pictures, small], strict=True):
                 write(name, frame, picture)
+            for view, name in enumerate(names[:-1]):
+                for channel in sorted(footage.channels):
+                    _write(partial / name / f"{frame:04d}.{channel}.png", _channel(studio, trial, frame, view, channel))
             advance(1)
     return folder
 
@@ -115,9 +129,10 @@ def _layers(trial: Trial, footage: Footage, reporter: Reporter) -> _Layers | Non
     return _Layers(truth, detections, estimates)
 
 
-def _pictures(trial: Trial, footage: Footage, layers: _Layers | None, frames: range) -> Iterator[list[Rgb]]:
+def _pictures(
+    trial: Trial, studio: Studio, footage: Footage, layers: _Layers | None, frames: range
+) -> Iterator[list[Rgb]]:
     """The pictures of all views of each frame, one frame after the other."""
-    studio = studio_of(trial.scenario, Playback(trial.scene))
     shown = footage.overlay
     for frame in frames:
         pictures = []
@@ -137,6 +152,27 @@ def _pictures(trial: Trial, footage: Footage, layers: _Layers | None, frames: ra
         yield pictures
 
 
+def _channel(studio: Studio, trial: Trial, frame: int, view: int, channel: str) -> NDArray[np.unsignedinteger]:
+    """What is known of every pixel of a picture, as integers that a PNG holds; zeros where no picture arrives."""
+    if trial.shots.source[frame, view] < 0:
+        width, height = trial.shots.believed[view].size
+        return np.zeros((height, width), np.uint16 if channel == "depth" else np.uint8)
+    image = studio.image(trial.shots, frame, view)
+    if channel == "depth":
+        millimetres = np.where(np.isfinite(image.depth), 1000.0 * image.depth, 0.0)
+        return np.clip(np.rint(millimetres), 0, 65535).astype(np.uint16)
+    if channel == "ids":
+        return np.where(image.ids >= len(trial.scene.bodies), 255, image.ids + 1).astype(np.uint8)
+    assert image.parts is not None  # which was asked for
+    return (image.parts + 1).astype(np.uint8)
+
+
+def _write(path: Path, picture: NDArray[np.unsignedinteger]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    if not cv2.imwrite(str(path), picture):
+        raise RuntimeError(f"OpenCV cannot write a picture of {picture.shape} to {path}")
+
+
 class _Stills:
     """A PNG for each picture, in a folder for each name."""
 
@@ -144,10 +180,7 @@ class _Stills:
         self._folder = folder
 
     def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
-        (self._folder / name).mkdir(exist_ok=True)
-        path = self._folder / name / f"{frame:04d}.png"
-        if not cv2.imwrite(str(path), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)):
-            raise RuntimeError(f"OpenCV cannot write a picture of {rgb.shape} to {path}")
+        _write(self._folder / name / f"{frame:04d}.png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR).astype(np.uint8))
 
 
 class _Films:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from simharness.motion.pairs import PAIRS
+from simharness.motion.alone.singles import SINGLES
 from simharness.motion.performance import Activity
-from simharness.motion.singles import SINGLES
+from simharness.motion.together.pairs import PAIRS
 
 ACTIVITIES: Mapping[str, Activity] = MappingProxyType({**SINGLES, **PAIRS})
 """By name; "mocap" is not among them, for it is recorded (``simharness.motion.mocap``)."""

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from simharness.motion.activities import ACTIVITIES
 from simharness.motion.contact import Crowd, Presence
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
 from simharness.motion.paths import Loop, Recorded, Spot, Track, turned
 from simharness.motion.performance import Activity, Performance, Prop, solo
 from simharness.motion.planning import Going, Replaying, Staying, Wish, plan_tracks
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import Trajectory
 from simharness.random import stream
 from simharness.scenario.models import People, Scenario

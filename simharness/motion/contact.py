@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.motion.kinematics import Addresses, Kinematics
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Addresses, Kinematics
 
 Floats = NDArray[np.float64]
 

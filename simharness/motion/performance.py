@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
 from simharness.motion.paths import Loop, Spot, Track
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import Trajectory
 
 PropKind = Literal["chair", "table", "box", "step", "bottle"]
@@ -19,7 +19,7 @@ PropKind = Literal["chair", "table", "box", "step", "bottle"]
 
 @dataclass(frozen=True)
 class Prop:
-    """A thing that an activity needs; ``simharness.scene.props`` gives it a shape.
+    """A thing that an activity needs; ``simharness.scene.things.props`` gives it a shape.
 
     Attributes:
         kind: what it is.

@@ -16,23 +16,23 @@ from simharness.humans.looks import dress, paint
 from simharness.humans.population import draw_shape, is_child
 from simharness.humans.wardrobe import Look, draw_looks
 from simharness.motion.choreography import choreograph
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import motion_clock
 from simharness.random import stream
 from simharness.rendering.lighting import Lighting
 from simharness.rendering.mesh import Mesh
 from simharness.rendering.mirrors import Mirror
 from simharness.scenario.models import Scenario
-from simharness.scene.clutter import place_clutter
-from simharness.scene.decoys import place_decoys
-from simharness.scene.dynamics import track
+from simharness.scene.dynamics.tracking import track
 from simharness.scene.hanging import check_rig
-from simharness.scene.lighting import room_lighting
-from simharness.scene.placement import BODY_HALF_WIDTH, FreeSpace
-from simharness.scene.props import make_prop
-from simharness.scene.room import make_room
-from simharness.scene.solids import Solid
+from simharness.scene.placing.clutter import place_clutter
+from simharness.scene.placing.decoys import place_decoys
+from simharness.scene.placing.placement import BODY_HALF_WIDTH, FreeSpace
+from simharness.scene.rooms.lighting import room_lighting
+from simharness.scene.rooms.room import make_room
+from simharness.scene.things.props import make_prop
+from simharness.scene.things.solids import Solid
 
 CLOCK_MARGIN = 1.0  # seconds that motions go on before and after: clocks of cameras are off by less
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from simharness.scenario.models import Scenario
-from simharness.scene.solids import Solid
+from simharness.scene.things.solids import Solid
 
 WALL_MARGIN = 0.1  # metres between a camera and a wall
 

@@ -13,7 +13,7 @@ from mvpose.skeleton import COCO17
 from simharness.humans.body import body_model
 from simharness.humans.landmarks import LANDMARKS
 from simharness.humans.model import bone_transforms
-from simharness.motion.kinematics import Addresses
+from simharness.motion.poses.kinematics import Addresses
 from simharness.scene.build import Scene
 
 Floats = NDArray[np.float64]

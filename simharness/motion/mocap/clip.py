@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.mocap.asf import read_amc, read_asf
 from simharness.motion.mocap.bvh import read_bvh
 from simharness.motion.mocap.retarget import Recorded, pelvis_path, retarget, understand
 from simharness.motion.mocap.skeleton import Recording
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import RATE, through_poses
 from simharness.scenario.people import Mocap
 

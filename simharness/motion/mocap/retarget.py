@@ -16,13 +16,13 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from simharness.humans.anatomy import DOFS, SIDES
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.mocap.footing import Steps, make_sole, plant, stands
 from simharness.motion.mocap.limbs import ARM, arm_angles, thigh_and_shank
 from simharness.motion.mocap.roles import Roles, find_roles
 from simharness.motion.mocap.skeleton import Recording
 from simharness.motion.motion import Motion
-from simharness.motion.posing import riding_height
+from simharness.motion.poses.kinematics import Kinematics
+from simharness.motion.poses.posing import riding_height
 
 Floats = NDArray[np.float64]
 

@@ -64,8 +64,26 @@ def test_a_dead_camera_is_black(tmp_path):
     assert cv2.imread(str(folder / "cam0" / "0000.png")).any()
 
 
+def test_channels_are_written_beside_the_pictures(tmp_path):
+    folder = render(tiny(), Footage(channels=frozenset({"depth", "ids", "parts"}), every=3), out=tmp_path)
+    depth, ids, parts = (
+        cv2.imread(str(folder / "cam0" / f"0000.{name}.png"), cv2.IMREAD_UNCHANGED)
+        for name in ("depth", "ids", "parts")
+    )
+    assert (depth.dtype, ids.dtype, parts.dtype) == (np.uint16, np.uint8, np.uint8)
+    assert depth.shape == ids.shape == parts.shape == (120, 160)
+    people = (ids > 0) & (ids < 255)
+    assert {1, 2} <= set(np.unique(ids)) <= {0, 1, 2, 255}
+    np.testing.assert_array_equal(parts > 0, people)
+    assert len(np.unique(parts[people])) > 8
+    assert 500 < np.median(depth[people]) < 8000  # millimetres, in a room
+    assert depth[ids == 255].max() < 12000
+
+
 def test_bad_requests_are_refused():
-    with pytest.raises(ValueError, match="--overlay: ghosts is no layer; there are truth, detections, estimates"):
+    with pytest.raises(ValueError, match="--overlay: ghosts is not known; there are truth, detections, estimates"):
         Footage(overlay=frozenset({"ghosts", "truth"}))
+    with pytest.raises(ValueError, match="--also goes with pictures, not with --video"):
+        Footage(video=True, channels=frozenset({"depth"}))
     with pytest.raises(ValueError, match="--every must be 1 or more, got 0"):
         Footage(every=0)

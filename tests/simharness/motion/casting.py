@@ -6,7 +6,7 @@ import numpy as np
 
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 

@@ -6,10 +6,10 @@ import pytest
 from mvpose.skeleton import COCO17
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.singles import SINGLES
 from simharness.motion.paths import Spot
-from simharness.motion.posing import palm
-from simharness.motion.singles import SINGLES
+from simharness.motion.poses.kinematics import Kinematics
+from simharness.motion.poses.posing import palm
 from simharness.motion.trajectory import motion_clock
 from simharness.random import stream
 

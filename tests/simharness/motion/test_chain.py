@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from simharness.humans.body import make_body
 from simharness.humans.model import person_spec
 from simharness.humans.population import draw_shape
-from simharness.motion.chain import Chain
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.poses.chain import Chain
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 

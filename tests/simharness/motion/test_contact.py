@@ -5,11 +5,11 @@ from casting import performer
 
 from simharness.humans.anatomy import DOFS
 from simharness.humans.model import person_spec
+from simharness.motion.alone.gestures import gesture
 from simharness.motion.contact import Crowd, penetration
-from simharness.motion.gestures import gesture
-from simharness.motion.kinematics import Addresses
 from simharness.motion.motion import Motion
 from simharness.motion.paths import Spot
+from simharness.motion.poses.kinematics import Addresses
 from simharness.random import stream
 
 TIME = np.arange(0.0, 3.0, 0.1)

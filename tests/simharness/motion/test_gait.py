@@ -3,9 +3,9 @@ import pytest
 
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.gait import FOOT_OFF, make_gait, normative
-from simharness.motion.kinematics import Kinematics
-from simharness.motion.rolling import roll
+from simharness.motion.alone.gait import FOOT_OFF, make_gait, normative
+from simharness.motion.poses.kinematics import Kinematics
+from simharness.motion.poses.rolling import roll
 from simharness.random import stream
 
 

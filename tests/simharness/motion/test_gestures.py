@@ -5,9 +5,9 @@ from mvpose.skeleton import COCO17
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.gestures import GESTURES, gesture
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.gestures import GESTURES, gesture
 from simharness.motion.paths import SWAY, Spot
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 TIME = np.arange(0.0, 8.0, 1 / 40)

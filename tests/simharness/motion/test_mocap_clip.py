@@ -8,10 +8,10 @@ import pytest
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.shape import Shape
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.mocap import Clip, load_clip
 from simharness.motion.mocap.roles import find_roles
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.scenario.people import Mocap
 
 TOUCHING = 0.0015  # metres over the floor

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.shape import Shape
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.mocap.bvh import read_bvh
 from simharness.motion.mocap.clip import Clip, back_and_forth
 from simharness.motion.mocap.limbs import ARM, arm_angles
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 FRAMES = 60

@@ -7,11 +7,11 @@ import pytest
 from casting import foot_vertices, performer
 
 from simharness.motion.contact import penetration
-from simharness.motion.kinematics import Kinematics
-from simharness.motion.pairs import PAIRS
 from simharness.motion.paths import SWAY, Spot
 from simharness.motion.performance import Performance
-from simharness.motion.posing import palm
+from simharness.motion.poses.kinematics import Kinematics
+from simharness.motion.poses.posing import palm
+from simharness.motion.together.pairs import PAIRS
 from simharness.motion.trajectory import RATE
 from simharness.random import stream
 

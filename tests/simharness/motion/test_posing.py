@@ -5,12 +5,12 @@ from scipy.spatial.transform import Rotation
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
-from simharness.motion.gestures import gesture
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.gestures import gesture
 from simharness.motion.paths import Spot
-from simharness.motion.posing import arm_angles, arm_columns, palm, plant, pose_angles, reach_with
-from simharness.motion.timing import ease
+from simharness.motion.poses.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.motion.poses.kinematics import Kinematics
+from simharness.motion.poses.posing import arm_angles, arm_columns, palm, plant, pose_angles, reach_with
+from simharness.motion.poses.timing import ease
 from simharness.random import stream
 
 TIME = np.arange(0.0, 2.0, 1 / 30)

@@ -4,9 +4,9 @@ import pytest
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.running import FOOT_OFF, make_stride, normative, run
 from simharness.motion.paths import make_loop
-from simharness.motion.running import FOOT_OFF, make_stride, normative, run
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 TIME = np.arange(0.0, 3.0, 1 / 60)

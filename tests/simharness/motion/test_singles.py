@@ -7,11 +7,11 @@ import pytest
 
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.singles import SINGLES
 from simharness.motion.motion import Motion
 from simharness.motion.paths import SWAY, Loop, Spot, make_loop
 from simharness.motion.performance import Performance
-from simharness.motion.singles import SINGLES
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import motion_clock
 from simharness.random import stream
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simharness.motion.timing import bump, ease, glide, rounds, strokes, wander
+from simharness.motion.poses.timing import bump, ease, glide, rounds, strokes, wander
 from simharness.random import stream
 
 TIME = np.arange(0.0, 8.0, 1 / 40)

@@ -8,12 +8,12 @@ import pytest
 from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.population import draw_shape
-from simharness.motion.gait import make_gait
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.gait import make_gait
+from simharness.motion.alone.walking import walk
 from simharness.motion.motion import Motion
 from simharness.motion.paths import SWAY, Loop, make_loop
 from simharness.motion.planning import Going, plan_tracks
-from simharness.motion.walking import walk
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 
 RATE = 80.0  # Hz

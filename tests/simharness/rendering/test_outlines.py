@@ -15,8 +15,8 @@ from simharness.humans.model import neutral_transforms
 from simharness.humans.population import draw_shape
 from simharness.humans.shape import Shape
 from simharness.humans.wardrobe import draw_looks
-from simharness.motion.kinematics import Kinematics
 from simharness.motion.motion import Motion
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.random import stream
 from simharness.rendering.optics import appear
 from simharness.rendering.outlines import Outline, framed, packed

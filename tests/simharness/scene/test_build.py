@@ -4,7 +4,7 @@ import pytest
 
 from mvpose import Rig
 from simharness.humans.anatomy import RANGES
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.rigs.layouts import build_rig, look_at
 from simharness.scenario.models import Scenario
 from simharness.scene.build import Scene

@@ -5,8 +5,8 @@ import pytest
 from walkers import space
 
 from simharness.scenario.room import Clutter
-from simharness.scene.clutter import place_clutter
-from simharness.scene.placement import BODY_HALF_WIDTH, LIMB
+from simharness.scene.placing.clutter import place_clutter
+from simharness.scene.placing.placement import BODY_HALF_WIDTH, LIMB
 
 
 @pytest.fixture(scope="module", params=[(seed, reach) for seed in range(4) for reach in (0.1, 3.0)])

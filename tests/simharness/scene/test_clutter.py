@@ -4,11 +4,11 @@ from walkers import Rays, ring, space
 
 from simharness.random import stream
 from simharness.scenario.room import Clutter, Room
-from simharness.scene.clutter import SPECIES, place_clutter
-from simharness.scene.fixtures import draw_cart
-from simharness.scene.placement import BODY_HALF_WIDTH, LENS, LIMB
-from simharness.scene.sight import Pictures, cuts
-from simharness.scene.storage import draw_box, draw_shelf
+from simharness.scene.placing.clutter import SPECIES, place_clutter
+from simharness.scene.placing.placement import BODY_HALF_WIDTH, LENS, LIMB
+from simharness.scene.placing.sight import Pictures, cuts
+from simharness.scene.things.fixtures import draw_cart
+from simharness.scene.things.storage import draw_box, draw_shelf
 
 ROOM = Room()
 DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in SPECIES} | {"cart": draw_cart}

@@ -3,8 +3,8 @@ import pytest
 from walkers import Rays, ring, space
 
 from simharness.scenario.room import Clutter
-from simharness.scene.clutter import place_clutter
-from simharness.scene.coverage import share_hidden
+from simharness.scene.placing.clutter import place_clutter
+from simharness.scene.placing.coverage import share_hidden
 
 
 def measured(free, solids) -> float:

@@ -6,9 +6,9 @@ from walkers import Rays, ring, space
 
 from simharness.random import stream
 from simharness.scenario.room import Clutter, Decoys, Room
-from simharness.scene.clutter import place_clutter
-from simharness.scene.decoys import draw_coat_stand, draw_mannequin, draw_mirror, draw_poster, place_decoys
-from simharness.scene.placement import BODY_HALF_WIDTH
+from simharness.scene.placing.clutter import place_clutter
+from simharness.scene.placing.decoys import draw_coat_stand, draw_mannequin, draw_mirror, draw_poster, place_decoys
+from simharness.scene.placing.placement import BODY_HALF_WIDTH
 
 ALL = Decoys(posters=2, mannequins=1, coat_stands=1, mirrors=2)
 NOSE, SHOULDERS, HIPS, ANKLES = 0, [5, 6], [11, 12], [15, 16]

@@ -10,15 +10,15 @@ from simharness.humans.anatomy import DOFS
 from simharness.humans.body import make_body
 from simharness.humans.model import person_spec
 from simharness.humans.shape import Shape
-from simharness.motion.kinematics import Kinematics
+from simharness.motion.alone.walking import walk
 from simharness.motion.motion import Motion
 from simharness.motion.paths import make_loop
+from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.trajectory import RATE, Trajectory, motion_clock
-from simharness.motion.walking import walk
 from simharness.random import stream
-from simharness.scene.assembly import Assembly
-from simharness.scene.dynamics import LEVER, Push, Tracker, track
-from simharness.scene.efforts import Efforts
+from simharness.scene.dynamics.efforts import Efforts
+from simharness.scene.dynamics.tracking import LEVER, Push, Tracker, track
+from simharness.scene.things.assembly import Assembly
 
 GRAVITY = 9.81
 MAN = Kinematics(make_body(Shape(gender=0.1, height=0.42)))

@@ -4,7 +4,7 @@ from walkers import Rays
 
 from simharness.motion.performance import Prop
 from simharness.motion.trajectory import Trajectory
-from simharness.scene.props import make_prop
+from simharness.scene.things.props import make_prop
 
 SIZES = {
     "chair": (0.45, 0.43, 0.46),

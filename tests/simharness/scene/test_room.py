@@ -4,9 +4,9 @@ from walkers import Rays
 
 from simharness.rendering.lighting import Lighting
 from simharness.scenario.room import Room
-from simharness.scene.lighting import LIGHTS, room_lighting
-from simharness.scene.room import make_room
-from simharness.scene.surfaces import FLOORS, WALLS
+from simharness.scene.rooms.lighting import LIGHTS, room_lighting
+from simharness.scene.rooms.room import make_room
+from simharness.scene.rooms.surfaces import FLOORS, WALLS
 
 SIZE = (6.0, 8.0, 3.0)
 ROOM = Room(size=SIZE)

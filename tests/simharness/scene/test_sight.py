@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 from walkers import ring
 
 from simharness.motion.trajectory import Trajectory
-from simharness.scene.assembly import Assembly
-from simharness.scene.geoms import Box
-from simharness.scene.shapes import box_mesh
-from simharness.scene.sight import Lines, Pictures, cuts, lines_of_sight
+from simharness.scene.placing.sight import Lines, Pictures, cuts, lines_of_sight
+from simharness.scene.things.assembly import Assembly
+from simharness.scene.things.geoms import Box
+from simharness.scene.things.shapes import box_mesh
 
 numbers = st.floats(-2, 2)
 

@@ -8,10 +8,10 @@ from walkers import Rays
 from simharness.motion.trajectory import Trajectory
 from simharness.random import stream
 from simharness.rendering.mirrors import Mirror
-from simharness.scene.assembly import Assembly
-from simharness.scene.geoms import Box, Cylinder, Surface, carried
-from simharness.scene.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
-from simharness.scene.sight import cuts
+from simharness.scene.placing.sight import cuts
+from simharness.scene.things.assembly import Assembly
+from simharness.scene.things.geoms import Box, Cylinder, Surface, carried
+from simharness.scene.things.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
 
 numbers = st.floats(-3, 3)
 

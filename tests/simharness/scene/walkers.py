@@ -6,7 +6,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from simharness.motion.trajectory import motion_clock
 from simharness.scenario.room import Room
-from simharness.scene.placement import FreeSpace
+from simharness.scene.placing.placement import FreeSpace
 
 # fmt: off
 STANDING = np.array(

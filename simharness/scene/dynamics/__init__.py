@@ -1,0 +1,1 @@
+"""Dynamic playback: plans carried out by actuators under gravity and contact."""

@@ -1,0 +1,1 @@
+"""The room itself: floor, walls and light."""
