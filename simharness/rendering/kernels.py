@@ -56,15 +56,19 @@ def rasterise(
     """
     height, width = triangle.shape
     q, seen = np.empty((len(vertices), 3)), np.empty((len(vertices), 3), np.float32)
+    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]  # else read anew for every vertex: q might be P
+    p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
+    p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
     for i in range(len(vertices)):
         x, y, z = np.float64(vertices[i, 0]), np.float64(vertices[i, 1]), np.float64(vertices[i, 2])
-        for k in range(3):
-            q[i, k] = P[k, 0] * x + P[k, 1] * y + P[k, 2] * z + P[k, 3]
-        # Pixel and inverse depth; of no use behind the near plane, and not used.
+        q[i, 0], q[i, 1] = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
+        q[i, 2] = p20 * x + p21 * y + p22 * z + p23
+        # Pixel and inverse depth, which is 0 behind the near plane: there the rest is of no use, and not used.
         scale = 1.0 / q[i, 2]
-        seen[i, 0], seen[i, 1], seen[i, 2] = q[i, 0] * scale, q[i, 1] * scale, scale
+        seen[i, 0], seen[i, 1] = q[i, 0] * scale, q[i, 1] * scale
+        seen[i, 2] = scale if q[i, 2] >= near else 0.0
 
-    lists, counts = _select(faces, q, seen, near, width, height)
+    lists, counts = _select(faces, seen, width, height)
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
     for averted in range(2):
@@ -79,9 +83,7 @@ def rasterise(
 
 
 @njit(cache=True, error_model="numpy")
-def _select(
-    faces: np.ndarray, q: np.ndarray, seen: np.ndarray, near: float, width: int, height: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _select(faces: np.ndarray, seen: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
     """Triangles that may cover a pixel's centre: lists (4, k) and how long they are.
 
     Small ones that face the camera; large ones, and all that the near plane cuts; and the same two of those seen from
@@ -89,22 +91,23 @@ def _select(
     """
     lists, counts = np.empty((4, len(faces) + 1), np.uint32), np.zeros(4, np.int64)
     facing_small, facing_large, averted_small, averted_large, slack = 0, 0, 0, 0, np.float32(_SLACK)
+    right, bottom, most = np.float32(width), np.float32(height), np.float32(_SMALL)
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        az, bz, cz = q[a, 2], q[b, 2], q[c, 2]
         ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
-        whole = (az >= near) & (bz >= near) & (cz >= near)
-        cut = ((az >= near) | (bz >= near) | (cz >= near)) & ~whole
+        ahead_a, ahead_b, ahead_c = seen[a, 2] > 0, seen[b, 2] > 0, seen[c, 2] > 0
+        whole = ahead_a & ahead_b & ahead_c
+        cut = (ahead_a | ahead_b | ahead_c) & ~whole
         low, high = (ax, bx) if ax < bx else (bx, ax)
         low, high = cx if cx < low else low, cx if cx > high else high
         first, last = np.ceil(low - slack), np.floor(high + slack)
-        whole = whole & (first <= last) & (last >= 0.0) & (first < width)
-        small = last - first < _SMALL
+        whole = whole & (first <= last) & (last >= 0) & (first < right)
+        small = last - first < most
         low, high = (ay, by) if ay < by else (by, ay)
         low, high = cy if cy < low else low, cy if cy > high else high
         first, last = np.ceil(low - slack), np.floor(high + slack)
-        whole = whole & (first <= last) & (last >= 0.0) & (first < height)
-        small = small & (last - first < _SMALL) & whole
+        whole = whole & (first <= last) & (last >= 0) & (first < bottom)
+        small = small & (last - first < most) & whole
         averted = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)  # y is down: clockwise
         lists[0, facing_small] = t
         lists[1, facing_large] = t
@@ -343,8 +346,10 @@ def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray)
     """Depth (h, w) float32, +inf where nothing is, and the label of the face seen (h, w); ``labels[-1]`` for none."""
     height, width = triangle.shape
     depth, seen = np.empty((height, width), np.float32), np.empty((height, width), labels.dtype)
+    last = np.uint32(len(labels) - 1)
     for y in range(height):
         for x in range(width):
             depth[y, x] = np.float32(1.0) / inverse_depth[y, x]
-            seen[y, x] = labels[triangle[y, x]]
+        for x in range(width):
+            seen[y, x] = labels[min(np.uint32(triangle[y, x]), last)]  # -1 is the greatest of all
     return depth, seen

@@ -6,6 +6,7 @@ outline from wherever it is seen; where the image's border cuts a person the edg
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from simharness.humans.skinning import skin
 from simharness.rendering.renderer import NEAR
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _DIRECTIONS = 24  # in which the extremes of a part are taken
 _SHARE = 0.2  # of a vertex's weight makes it the part's: neighbouring parts overlap, so that no gap is between them
@@ -84,6 +86,30 @@ def _hull(points: NDArray[np.float32]) -> NDArray[np.int64]:
     return np.column_stack(np.triu_indices(n, 1)).astype(np.int64)
 
 
+NO_EDGES = np.zeros((0, 2), np.int64)
+"""Of a skin so fine that its vertices tell where the border of an image cuts it."""
+
+
+def boxes(bands: Sequence[Sequence[NDArray]], edges: Sequence[Ints], cameras: Sequence[Camera]) -> Floats:
+    """Boxes x, y, width, height of the parts of people that fall on each image, (V, P, 4); zeros where nobody is.
+
+    Args:
+        bands: vertices of every person, (n, 3) metres, in the moments of the bands of rows from the top; one moment
+            where all rows are taken at once.
+        edges: of every person's outline, (e, 2).
+        cameras: V.
+    """
+    table = np.stack([packed(camera) for camera in cameras])
+    found = np.empty((len(bands), len(cameras), len(edges), 4))
+    for k, people in enumerate(bands):
+        rows = k / len(bands), (k + 1) / len(bands)
+        for person, (vertices, lines) in enumerate(zip(people, edges, strict=True)):
+            framed(vertices, lines, table, *rows, found[k, :, person])
+    low, high = found[..., :2].min(axis=0), found[..., 2:].max(axis=0)
+    there = (high >= low).all(axis=-1, keepdims=True)
+    return np.where(there, np.concatenate([low, np.where(there, high - low, 0.0)], axis=-1), 0.0)
+
+
 def packed(camera: Camera) -> Floats:
     """A camera for the kernel, (26,).
 
@@ -98,6 +124,8 @@ def packed(camera: Camera) -> Floats:
 def _end(camera: Camera) -> float:
     """Squared distance from the axis, at unit depth, at which the radial polynomial of a lens folds over."""
     k1, k2, _, _, k3 = camera.distortion
+    if k1 == k2 == k3 == 0:
+        return np.inf
     roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
     ends = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(ends.min(initial=np.inf))

@@ -19,7 +19,7 @@ from simharness.rendering.mesh import Mesh
 from simharness.rendering.mirrors import Mirror, with_mirrors
 from simharness.rendering.renderer import Image, Renderer
 from simharness.rendering.sensor import blur, develop
-from simharness.rendering.shutter import moments, stitched
+from simharness.rendering.shutter import moments, strips
 
 if TYPE_CHECKING:
     from simharness.rigs.shots import Shots
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Rgb = NDArray[np.uint8]
 
-_BLUR_STEPS = 6  # moments that make up the blur of one picture
+_BLUR_STEPS = 5  # moments that make up the blur of one picture
 
 
 def meshes_at(scene: Scene, state: State) -> list[Mesh]:
@@ -74,19 +74,40 @@ def antialiased(
         (h, w, 3) uint8.
     """
     lighting = lighting or Lighting()
-    large = enlarged(camera, finer)
+    large = scaled(camera, finer)
     image = renderer.render(large, meshes, lighting=lighting)
     rgb = with_mirrors(renderer, large, meshes, mirrors, image, lighting=lighting)
     return cv2.resize(rgb, camera.size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
-def enlarged(camera: Camera, finer: int) -> Camera:
-    """The same camera with ``finer`` x ``finer`` pixels for each of its own."""
+def scaled(camera: Camera, scale: float) -> Camera:
+    """The same camera with pixels of another size: 2 gives it 2 x 2 for each of its own."""
+    if scale == 1.0:
+        return camera
+    size = reduced_size(camera.size, scale)
+    share = np.array(size) / camera.size
     K = camera.K.copy()
-    K[:2] *= finer
-    K[:2, 2] += (finer - 1) / 2  # pixel centres are integers at either size
-    width, height = camera.size
-    return replace(camera, K=K, size=(finer * width, finer * height))
+    K[:2] *= share[:, None]
+    K[:2, 2] += (share - 1) / 2  # pixel centres are integers at any size
+    return replace(camera, K=K, size=size)
+
+
+def reduced_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Width and height of a picture of ``size`` at another scale, whole pixels."""
+    return max(1, round(scale * size[0])), max(1, round(scale * size[1]))
+
+
+def one_below_the_other(bands: Many[Image]) -> Image:
+    """One image of images of bands of rows, from the top."""
+    if len(bands) == 1:
+        return bands[0]
+    parts = [band.parts for band in bands if band.parts is not None]
+    return Image(
+        rgb=np.concatenate([band.rgb for band in bands]),
+        depth=np.concatenate([band.depth for band in bands]),
+        ids=np.concatenate([band.ids for band in bands]),
+        parts=np.concatenate(parts) if len(parts) == len(bands) else None,
+    )
 
 
 class Studio:
@@ -105,7 +126,7 @@ class Studio:
         self._sensor = sensor
         self._seed = seed
 
-    def picture(self, shots: Shots, frame: int, view: int, *, finer: int = 1) -> Rgb:
+    def picture(self, shots: Shots, frame: int, view: int, *, finer: int = 1, width: int | None = None) -> Rgb:
         """The colour picture that ``view`` delivers in ``frame``, (h, w, 3); black where none arrives.
 
         Args:
@@ -113,15 +134,18 @@ class Studio:
             frame: of the sequence.
             view: of the rig.
             finer: samples a pixel each way; 2 makes smooth outlines.
+            width: of the picture, pixels, where it is to be smaller than the camera's.
         """
+        size = shots.believed[view].size
+        scale = 1.0 if width is None else min(1.0, width / size[0])
         if shots.source[frame, view] < 0:
-            width, height = shots.believed[view].size
-            return np.zeros((height, width, 3), np.uint8)
-        camera = shots.camera(frame, view)
-        exposed = [
-            stitched([self._drawn(state, camera, finer) for state in self._playback.over(moments(time, shots.readout))])
-            for time in self._open(shots.time[frame, view])
-        ]
+            return np.zeros((*reduced_size(size, scale)[::-1], 3), np.uint8)
+        camera = scaled(shots.camera(frame, view), scale)
+        exposed = []
+        for middle in self._open(shots.time[frame, view]):
+            times = moments(middle, shots.readout)
+            bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
+            exposed.append(np.concatenate([self._drawn(state, strip, finer) for state, strip in bands]))
         taken = int(shots.source[frame, view])
         return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken)
 
@@ -134,12 +158,10 @@ class Studio:
         if shots.source[frame, view] < 0:
             raise ValueError(f"view {view} delivers no picture in frame {frame}")
         camera, scene = shots.camera(frame, view), self._playback.scene
-        bands = [
-            self._renderer.render(camera, meshes_at(scene, state), color=False, parts=True)
-            for state in self._playback.over(moments(shots.time[frame, view], shots.readout))
-        ]
-        return Image(
-            **{key: stitched([getattr(band, key) for band in bands]) for key in ("rgb", "depth", "ids", "parts")}
+        times = moments(shots.time[frame, view], shots.readout)
+        bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
+        return one_below_the_other(
+            [self._renderer.render(strip, meshes_at(scene, state), color=False, parts=True) for state, strip in bands]
         )
 
     def _open(self, middle: float) -> NDArray[np.float64]:

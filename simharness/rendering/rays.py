@@ -16,7 +16,7 @@ from mvpose.camera import Camera
 from simharness.rendering.casting import Caster
 from simharness.rendering.film import Seen
 from simharness.rendering.optics import appear
-from simharness.rendering.outlines import Outline, framed, packed
+from simharness.rendering.outlines import Outline, boxes
 from simharness.rendering.shutter import rolled
 from simharness.rendering.visibility import Visibility, decide
 
@@ -43,7 +43,6 @@ class RayEye:
         self._caster = Caster(playback.scene)
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
         self._outlines = [Outline.of(body) for body in bodies]
-        self._packed: dict[int, tuple[Camera, Floats]] = {}
 
     def see(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Seen]:
         """See :class:`simharness.rendering.film.Eye`."""
@@ -61,22 +60,11 @@ class RayEye:
                     mine = mine & (np.floor(np.where(mine, share, -1.0) * len(states)) == k)
                 owner[v, mine], in_front[v, mine] = self._caster.cast(camera, joints[v][mine])
         labels = decide(owner, in_front, inside, radii=self._radii)
-        boxes = self._boxes(states, cameras)
+        skins = [
+            [outline.at(bones) for outline, bones in zip(self._outlines, state.bones, strict=True)] for state in states
+        ]
+        framed = boxes(skins, [outline.edges for outline in self._outlines], cameras)
         seen = ((labels == Visibility.VISIBLE) | (labels == Visibility.SELF_OCCLUDED)).sum(axis=-1)
         share = seen / np.maximum(inside.sum(axis=-1), 1)
-        areas = np.rint(_FILLED * boxes[..., 2] * boxes[..., 3] * share).astype(np.int64)
-        return [Seen(*each) for each in zip(pixels, labels, boxes, areas, strict=True)]
-
-    def _boxes(self, states: Sequence[State], cameras: Sequence[Camera]) -> Floats:
-        """Boxes x, y, width, height of the people in each view, (V, P, 4); zeros where nobody is."""
-        kept = self._packed
-        self._packed = {id(camera): kept.get(id(camera)) or (camera, packed(camera)) for camera in cameras}
-        table = np.stack([self._packed[id(camera)][1] for camera in cameras])
-        found = np.empty((len(states), len(cameras), len(self._outlines), 4))
-        for k, state in enumerate(states):
-            rows = k / len(states), (k + 1) / len(states)
-            for person, outline in enumerate(self._outlines):
-                framed(outline.at(state.bones[person]), outline.edges, table, *rows, found[k, :, person])
-        low, high = found[..., :2].min(axis=0), found[..., 2:].max(axis=0)
-        there = (high >= low).all(axis=-1, keepdims=True)
-        return np.where(there, np.concatenate([low, np.where(there, high - low, 0.0)], axis=-1), 0.0)
+        areas = np.rint(_FILLED * framed[..., 2] * framed[..., 3] * share).astype(np.int64)
+        return [Seen(*each) for each in zip(pixels, labels, framed, areas, strict=True)]

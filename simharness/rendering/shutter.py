@@ -6,7 +6,8 @@ in a straight line.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from simharness.rendering.optics import appear
 
 Floats = NDArray[np.float64]
 
-BANDS = 12
+BANDS = 8
 _ITERATIONS = 6  # a joint moves a fraction of a band while its row is found: this converges at once
 
 
@@ -50,10 +51,15 @@ def rolled(joints: Floats, camera: Camera) -> Floats:
     return where
 
 
-def stitched(bands: Sequence[NDArray]) -> NDArray:
-    """One picture (h, w, ...) of which every one of ``bands`` gives its share of the rows, from the top."""
-    if len(bands) == 1:
-        return bands[0]
-    height = len(bands[0])
-    rows = np.arange(height)
-    return np.stack(bands)[((rows + 0.5) / height * len(bands)).astype(int), rows]
+def strips(camera: Camera, count: int) -> list[Camera]:
+    """The camera cut into ``count`` bands of rows, from the top: pictures of them, one below the other, are its own."""
+    if count == 1:
+        return [camera]
+    width, height = camera.size
+    edges = np.ceil(np.arange(count + 1) * height / count - 0.5).astype(int)
+    result = []
+    for top, bottom in pairwise(edges.tolist()):
+        K = camera.K.copy()
+        K[1, 2] -= top
+        result.append(replace(camera, K=K, size=(width, bottom - top)))
+    return result

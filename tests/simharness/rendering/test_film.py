@@ -11,8 +11,9 @@ from shapes import ball, box, disc, room
 from test_renderers import camera_at
 
 from mvpose.camera import Rig
-from simharness.rendering.film import PictureEye, film, silhouette_box
+from simharness.rendering.film import PictureEye, film
 from simharness.rendering.lighting import Lighting
+from simharness.rendering.outlines import NO_EDGES, boxes
 from simharness.rendering.picture import Studio, antialiased, meshes_at
 from simharness.rendering.raster import RasterRenderer
 from simharness.rendering.views import Views
@@ -196,7 +197,7 @@ def test_boxes_at_the_border_and_beyond():
     camera = camera_at((0, 0, 1), (1, 0, 1), size=(200, 150), fov=90.0)
 
     def framed(place):
-        return silhouette_box(camera, [ball(place, 0.5, rings=100).vertices])
+        return boxes([[ball(place, 0.5, rings=100).vertices]], [NO_EDGES], [camera])[0, 0]
 
     edge = camera.center + 2 * camera.R[2] - 2.0 * camera.R[0]  # its middle on the image's left edge
     x, _, w, h = framed(edge)
@@ -261,8 +262,14 @@ def test_previews_are_the_pictures_reduced_and_only_those_asked_for():
     views = Views.concatenate([filmed(frames=[t], studio=studio, previews={1, 3}) for t in range(FRAMES)])
     assert sorted(views.previews) == [1, 3]
     for v in range(len(RIG)):
-        assert views.previews[3][v].shape == (240, 320, 3)
-        full = studio.picture(shots, 3, v)
-        np.testing.assert_allclose(views.previews[3][v].mean(axis=(0, 1)), full.mean(axis=(0, 1)), atol=1.0)
+        np.testing.assert_array_equal(views.previews[3][v], studio.picture(shots, 3, v, finer=2))
     assert views.previews[3][0].std() > 10
     assert filmed().previews == {}
+
+
+def test_a_smaller_picture_shows_the_same():
+    shots, studio = Shots.ideal(RIG, TIME), TestStudio.studio()
+    small, full = studio.picture(shots, 3, 0, finer=2, width=100), studio.picture(shots, 3, 0, finer=2)
+    assert small.shape == (75, 100, 3)
+    halved = full.reshape(75, 2, 100, 2, 3).mean(axis=(1, 3))
+    assert np.abs(small - halved).mean() < 2.0

@@ -1,10 +1,12 @@
 """A rolling shutter against the closed form of a point that moves in a straight line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mvpose.camera import Camera
-from simharness.rendering.shutter import BANDS, moments, rolled, stitched
+from simharness.rendering.shutter import BANDS, moments, rolled, strips
 from simharness.rigs.layouts import intrinsics, look_at
 
 
@@ -43,7 +45,16 @@ def test_a_joint_behind_the_camera_stays_in_the_middle(camera):
     np.testing.assert_allclose(rolled(joints, camera)[0, 0], [6.0, 0.2, 1.0])
 
 
-def test_every_row_comes_from_its_band():
-    bands = [np.full((8, 4, 3), k, np.uint8) for k in range(4)]
-    assert stitched(bands)[:, 0, 0].tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert stitched(bands[:1]) is bands[0]
+@pytest.mark.parametrize(("height", "count"), [(240, 8), (241, 8), (100, 7), (16, 8), (240, 1)])
+def test_strips_see_what_the_camera_sees_row_by_row(camera, height, count):
+    whole = replace(camera, size=(320, height))
+    cut = strips(whole, count)
+    assert [strip.size[0] for strip in cut] == [320] * count
+    assert sum(strip.size[1] for strip in cut) == height
+    points = np.array([[0.0, y, z] for y in (-0.3, 0.2) for z in np.linspace(0.6, 1.4, 9)])
+    expected, top = whole.project(points), 0
+    for k, strip in enumerate(cut):
+        np.testing.assert_allclose(strip.project(points) + [0, top], expected, atol=1e-9)
+        rows = np.arange(top, top + strip.size[1])
+        assert (np.floor((rows + 0.5) / height * count) == k).all()
+        top += strip.size[1]
