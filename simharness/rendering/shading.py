@@ -20,16 +20,16 @@ from numba import njit
 
 BIAS = 2.5  # pixels of the map of shadows, over the cosine: what a surface must be nearer to throw a shadow
 LEAST_COSINE = 0.25
-_BRIGHTEST = np.float32(4.0)
+_BRIGHTEST = 4.0
 _STRIDE = 32  # pixels along a row over which a texture keeps its level of detail
 _BLOCK_SHIFT = np.uint32(3)
 _BLOCK = 1 << 3  # pixels of the map of shadows
 _LAST = np.uint32(3)
 _FILTER = 4  # pixels of the map under the filter that softens edges
-_STEPS = 1 << 6  # between two texels
-_SHIFT, _WIDE_SHIFT, _FRACTION, _ONE = np.uint32(6), np.uint64(6), np.uint32(_STEPS - 1), np.uint32(1)
-_HALF = np.int32(_STEPS // 2)
-_ZERO, _UNIT, _TINY, _WHITE = np.float32(0.0), np.float32(1.0), np.float32(1e-30), np.float32(255.0)
+_SHIFT = 6
+_STEPS = 1 << _SHIFT  # between two texels
+_ONE = np.uint64(1)
+_ZERO, _UNIT, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-30)
 _LANE = np.uint64(20)  # bits: 255 x 64 x 64 fits
 _TWO_LANES = np.uint64(40)
 _MASK = np.uint64((1 << 20) - 1)
@@ -96,9 +96,6 @@ def shade(
     sky_all, sky_up = np.float32(0.65 * strengths[1]), np.float32(0.35 * strengths[1])
     light_x, light_y, light_z = np.float32(light[0]), np.float32(light[1]), np.float32(light[2])
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
-    white = 255.0 * _STEPS * _STEPS  # a texel that was mixed out of four
-    gain_red, gain_green = np.float32(gains[0] / white), np.float32(gains[1] / white)
-    gain_blue, mixed = np.float32(gains[2] / white), np.empty(width, np.uint64)
     slope_bias, least_cosine = np.float32(bias), np.float32(LEAST_COSINE)
     # The light's view of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)
@@ -115,13 +112,11 @@ def shade(
     map_x, map_y, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     shade_light, key_light = np.empty(width, np.float32), np.empty(width, np.float32)
     red, green, blue = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    # The texel and the one below it; the steps to the next right and down, six bits each.
-    upper, lower, between = np.empty(width, np.uint32), np.empty(width, np.uint32), np.empty(width, np.uint32)
-    base, stride, wide, high = np.uint32(0), np.uint32(0), _ZERO, _ZERO
+    steps_x, steps_y = np.empty(_STRIDE, np.int32), np.empty(_STRIDE, np.int32)
+    mixed, half = np.empty(_STRIDE, np.uint64), np.int32(_STEPS // 2)
+    base, rows, columns, stride, wide, high = 0, 1, 1, 3, 1.0, 1.0
     edge, across = np.zeros((3, 3)), np.zeros((3, 3))
-    # Runs of the row, and of those with normals that turn what their pixels need.
-    starts = np.empty(width + 1, np.int64)
-    spans, slopes = np.empty((width, 4), np.uint32), np.empty((width, 16), np.float32)
+    normal, turning = np.zeros(3, np.float32), np.zeros(3, np.float32)
     for y in range(height):
         from_x = np.float32(seen[0, 1] * y + seen[0, 2])
         from_y = np.float32(seen[1, 1] * y + seen[1, 2])
@@ -136,21 +131,16 @@ def shade(
             map_y[x] = (away_y * w + (seen_y * place + from_y)) * scale - np.float32(1.0)
             near[x] = w * scale
 
-        # Where runs begin is found without a branch, and what has a loop of unknown length comes after what has none: a
-        # wrong guess would throw away the work on the runs ahead.
-        runs = 0
-        for x in range(width):
-            starts[runs] = x
-            runs += (x == 0) | (triangle[y, x] != triangle[y, max(x - 1, 0)])
-        starts[runs] = width
-        kept, kept_until, bends = -1, 0, 0
-        for run in range(runs):
-            start, end = starts[run], starts[run + 1]
-            label = triangle[y, start]
+        kept, kept_until = -1, 0
+        end = 0
+        while end < width:
+            start, label = end, triangle[y, end]
+            end += 1
             if label < 0:
+                while end < width and triangle[y, end] == label:
+                    end += 1
                 shade_light[start:end], key_light[start:end] = 1.0, 0.0
-                red[start:end], green[start:end], blue[start:end] = empty[0] / white, empty[1] / white, empty[2] / white
-                upper[start:end], lower[start:end], between[start:end] = 0, 0, 0
+                red[start:end], green[start:end], blue[start:end] = empty[0], empty[1], empty[2]
                 continue
             t = np.uint32(label)
 
@@ -164,33 +154,38 @@ def shade(
                 edge[1, 0], edge[1, 1], edge[1, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
                 edge[2, 0], edge[2, 1], edge[2, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
-            dye_red, dye_green, dye_blue = gain_red * colors[t, 0], gain_green * colors[t, 1], gain_blue * colors[t, 2]
-            if textured >= 0:
-                for k in range(3):
-                    across[0, k] = edge[0, k] * uv[t, 0, 0] + edge[1, k] * uv[t, 1, 0] + edge[2, k] * uv[t, 2, 0]
-                    across[1, k] = edge[0, k] * uv[t, 0, 1] + edge[1, k] * uv[t, 1, 1] + edge[2, k] * uv[t, 2, 1]
-                    across[2, k] = edge[0, k] + edge[1, k] + edge[2, k]
+            dye_red, dye_green = np.float32(gains[0] * colors[t, 0]), np.float32(gains[1] * colors[t, 1])
+            dye_blue = np.float32(gains[2] * colors[t, 2])
             if is_smooth:
-                to, at = spans[bends], slopes[bends]
-                bends += 1
-                to[0], to[1], to[2], to[3] = start, end, 0, 0
-                at[6], at[7], at[8] = dye_red, dye_green, dye_blue
-                at[9], at[10], at[11], at[12], at[13], at[14], at[15] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                if textured >= 0:
-                    if textured != kept or start >= kept_until:
-                        kept, kept_until = textured, start + _STRIDE
-                        base, stride, wide, high = _level(across, start, y, pyramids[textured])
-                    to[2], to[3], at[9], at[10] = base, stride, wide, high
-                    at[11], at[12], at[13], at[14], at[15] = _steps(across, start, y)
                 # The weights are negative where the triangle faces the camera, so this normal always does.
                 wa = -(edge[0, 0] * start + (edge[0, 1] * y + edge[0, 2]))
                 wb = -(edge[1, 0] * start + (edge[1, 1] * y + edge[1, 2]))
                 wc = -(edge[2, 0] * start + (edge[2, 1] * y + edge[2, 2]))
                 for k in range(3):
                     na, nb, nc = vertex_normals[a, k], vertex_normals[b, k], vertex_normals[c, k]
-                    at[k] = np.float32(wa * na + wb * nb + wc * nc)
-                    at[3 + k] = np.float32(-(edge[0, 0] * na + edge[1, 0] * nb + edge[2, 0] * nc))
+                    normal[k] = np.float32(wa * na + wb * nb + wc * nc)
+                    turning[k] = np.float32(-(edge[0, 0] * na + edge[1, 0] * nb + edge[2, 0] * nc))
+                nx, ny, nz = normal[0], normal[1], normal[2]
+                # Often a pixel or two: the end is found on the way, for the end of a loop of its own is one guess more.
+                end = start
+                while end < width and triangle[y, end] == label:
+                    x, place = end, np.float32(end)
+                    end += 1
+                    scale = _UNIT / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), _TINY)
+                    cosine = (nx * light_x + ny * light_y + nz * light_z) * scale
+                    # The ray to the pixel is a little longer than 1: near enough.
+                    glance = nx * (rise_x * place + ray_x) + ny * (rise_y * place + ray_y)
+                    glance += nz * (rise_z * place + ray_z)
+                    key_light[x] = key * max(cosine, _ZERO)
+                    shade_light[x] = sky_up * nz * scale + sky_all + fill * min(max(-glance * scale, _ZERO), _UNIT)
+                    near[x] += slope_bias / max(cosine, least_cosine)
+                    red[x], green[x], blue[x] = dye_red, dye_green, dye_blue
+                    nx, ny, nz = nx + turning[0], ny + turning[1], nz + turning[2]
+                if textured < 0:
+                    continue
             else:
+                while end < width and triangle[y, end] == label:
+                    end += 1
                 nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
                 more = nx * rise_x + ny * rise_y + nz * rise_z
                 first = nx * ray_x + ny * ray_y + nz * ray_z + more * np.float32(start)
@@ -199,107 +194,71 @@ def shade(
                 lit, nearer = key * max(cosine, _ZERO), slope_bias / max(cosine, least_cosine)
                 least = sky_all + sky_up * turn * nz
                 first, more = -fill * turn * first, -fill * turn * more
-                shades, keys, nears = shade_light[start:end], key_light[start:end], near[start:end]
-                for n in range(len(shades)):
-                    glance = first + more * np.float32(np.int32(n))
-                    shades[n] = least + (glance if glance < fill else fill)
-                    keys[n] = lit
-                    nears[n] += nearer
-                reds, greens, blues = red[start:end], green[start:end], blue[start:end]
-                for n in range(len(reds)):
-                    reds[n], greens[n], blues[n] = dye_red, dye_green, dye_blue
-                if textured < 0:
-                    upper[start:end], lower[start:end], between[start:end] = 0, 0, 0
-                    continue
-                stop = start
-                while stop < end:
-                    begin = stop
-                    if textured != kept or begin >= kept_until:
-                        kept, kept_until = textured, begin + _STRIDE
-                        base, stride, wide, high = _level(across, begin, y, pyramids[textured])
-                    stop = min(kept_until, end)
-                    from_u, from_v, step_u, step_v, bend = _steps(across, begin, y)
-                    uppers, lowers, betweens = upper[begin:stop], lower[begin:stop], between[begin:stop]
-                    for n in range(len(uppers)):
-                        place = np.float32(np.int32(n))
-                        place = place / (_UNIT + place * bend)
-                        here_u, here_v = from_u + place * step_u, from_v + place * step_v
-                        i = np.uint32(np.int32((here_u - np.floor(here_u)) * wide) + _HALF)
-                        j = np.uint32(np.int32((here_v - np.floor(here_v)) * high) + _HALF)
-                        texel = base + (j >> _SHIFT) * stride + (i >> _SHIFT)
-                        uppers[n], lowers[n] = texel, texel + stride
-                        betweens[n] = (i & _FRACTION) | ((j & _FRACTION) << _SHIFT)
+                run, nears = shade_light[start:end], near[start:end]
+                for x in range(len(run)):
+                    glance = first + more * np.float32(x)
+                    run[x] = least + (glance if glance < fill else fill)
+                    nears[x] += nearer
+                key_light[start:end] = lit
 
-        for run in range(bends):
-            to, at = spans[run], slopes[run]
-            start, end, first_texel, next_row = np.int64(to[0]), np.int64(to[1]), to[2], to[3]
-            nx, ny, nz, turn_x, turn_y, turn_z = at[0], at[1], at[2], at[3], at[4], at[5]
-            dye_red, dye_green, dye_blue, columns, rows = at[6], at[7], at[8], at[9], at[10]
-            from_u, from_v, step_u, step_v, bend = at[11], at[12], at[13], at[14], at[15]
-            for x in range(start, end):
-                place = np.float32(np.int32(x))
-                scale = _UNIT / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), _TINY)
-                cosine = (nx * light_x + ny * light_y + nz * light_z) * scale
-                # The ray to the pixel is a little longer than 1: near enough.
-                glance = nx * (rise_x * place + ray_x) + ny * (rise_y * place + ray_y)
-                glance += nz * (rise_z * place + ray_z)
-                key_light[x] = key * max(cosine, _ZERO)
-                shade_light[x] = sky_up * nz * scale + sky_all + fill * min(max(-glance * scale, _ZERO), _UNIT)
-                near[x] += slope_bias / max(cosine, least_cosine)
-                red[x], green[x], blue[x] = dye_red, dye_green, dye_blue
-                nx, ny, nz = nx + turn_x, ny + turn_y, nz + turn_z
-                n = place - np.float32(start)
-                n = n / (_UNIT + n * bend)
-                here_u, here_v = from_u + n * step_u, from_v + n * step_v
-                i = np.uint32(np.int32((here_u - np.floor(here_u)) * columns) + _HALF)
-                j = np.uint32(np.int32((here_v - np.floor(here_v)) * rows) + _HALF)
-                texel = first_texel + (j >> _SHIFT) * next_row + (i >> _SHIFT)
-                upper[x], lower[x] = texel, texel + next_row
-                between[x] = (i & _FRACTION) | ((j & _FRACTION) << _SHIFT)
+            if textured < 0:
+                red[start:end], green[start:end], blue[start:end] = dye_red, dye_green, dye_blue
+                continue
+            for k in range(3):
+                across[0, k] = edge[0, k] * uv[t, 0, 0] + edge[1, k] * uv[t, 1, 0] + edge[2, k] * uv[t, 2, 0]
+                across[1, k] = edge[0, k] * uv[t, 0, 1] + edge[1, k] * uv[t, 1, 1] + edge[2, k] * uv[t, 2, 1]
+                across[2, k] = edge[0, k] + edge[1, k] + edge[2, k]
+            u_rise, u_first = across[0, 0], across[0, 1] * y + across[0, 2]
+            v_rise, v_first = across[1, 0], across[1, 1] * y + across[1, 2]
+            sum_rise, sum_first = across[2, 0], across[2, 1] * y + across[2, 2]
+            share = 1.0 / (255.0 * _STEPS * _STEPS)
+            dye_red, dye_green = np.float32(share * dye_red), np.float32(share * dye_green)
+            dye_blue = np.float32(share * dye_blue)
+            stop = start
+            while stop < end:
+                begin = stop
+                if textured != kept or begin >= kept_until:
+                    kept, kept_until = textured, begin + _STRIDE
+                    level = _level(across, begin, y, pyramids[textured])
+                    base = pyramids[textured, level, 0]
+                    rows, columns = pyramids[textured, level, 1], pyramids[textured, level, 2]
+                    stride = columns + 2
+                    wide, high = np.float64(_STEPS * columns), np.float64(_STEPS * rows)
+                stop = min(kept_until, end)
+                count = stop - begin
+                for n in range(count):
+                    column = np.float64(begin + n)
+                    scale = 1.0 / (sum_rise * column + sum_first)
+                    u, v = (u_rise * column + u_first) * scale, (v_rise * column + v_first) * scale
+                    # In steps between the middles of texels; the pyramid has a texel more all around.
+                    steps_x[n] = np.int32((u - np.floor(u)) * wide) + half
+                    steps_y[n] = np.int32((v - np.floor(v)) * high) + half
+                for n in range(count):
+                    i, j = steps_x[n], steps_y[n]
+                    one = np.uint64(base + (j >> _SHIFT) * stride + (i >> _SHIFT))
+                    two = one + np.uint64(stride)
+                    weight_x, weight_y = np.uint64(i & (_STEPS - 1)), np.uint64(j & (_STEPS - 1))
+                    rest_x, rest_y = np.uint64(_STEPS) - weight_x, np.uint64(_STEPS) - weight_y
+                    mix = rest_y * (rest_x * texels[one] + weight_x * texels[one + _ONE])
+                    mixed[n] = mix + weight_y * (rest_x * texels[two] + weight_x * texels[two + _ONE])
+                reds, greens, blues = red[begin:stop], green[begin:stop], blue[begin:stop]
+                for n in range(count):
+                    reds[n] = dye_red * np.float32(np.int32(mixed[n] & _MASK))
+                    greens[n] = dye_green * np.float32(np.int32((mixed[n] >> _LANE) & _MASK))
+                    blues[n] = dye_blue * np.float32(np.int32(mixed[n] >> _TWO_LANES))
+
         _darken(key_light, map_x, map_y, near, shadow, blocks)
         for x in range(width):
-            weight_x, weight_y = np.uint64(between[x] & _FRACTION), np.uint64(between[x] >> _SHIFT)
-            # A difference may borrow from the next lane, and the sum gives it back.
-            one, two = texels[upper[x]], texels[lower[x]]
-            one = (one << _WIDE_SHIFT) + weight_x * (texels[upper[x] + _ONE] - one)
-            two = (two << _WIDE_SHIFT) + weight_x * (texels[lower[x] + _ONE] - two)
-            mixed[x] = (one << _WIDE_SHIFT) + weight_y * (two - one)
-        row = rgb[y]
-        for x in range(width):
-            gain = np.float32(math.sqrt(min(shade_light[x] + key_light[x], _BRIGHTEST)))
-            hue = gain * red[x] * np.float32(np.int32(mixed[x] & _MASK))
-            row[x, 0] = np.uint8(np.int32(min(hue + np.float32(0.5), _WHITE)))
-            hue = gain * green[x] * np.float32(np.int32((mixed[x] >> _LANE) & _MASK))
-            row[x, 1] = np.uint8(np.int32(min(hue + np.float32(0.5), _WHITE)))
-            hue = gain * blue[x] * np.float32(np.int32(mixed[x] >> _TWO_LANES))
-            row[x, 2] = np.uint8(np.int32(min(hue + np.float32(0.5), _WHITE)))
+            gain = np.float32(math.sqrt(min(shade_light[x] + key_light[x], np.float32(_BRIGHTEST))))
+            rgb[y, x, 0] = np.uint8(min(gain * red[x] + np.float32(0.5), np.float32(255.0)))
+            rgb[y, x, 1] = np.uint8(min(gain * green[x] + np.float32(0.5), np.float32(255.0)))
+            rgb[y, x, 2] = np.uint8(min(gain * blue[x] + np.float32(0.5), np.float32(255.0)))
     return rgb
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def _steps(across: np.ndarray, x: int, y: int) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """Place u, v in a texture at a pixel, from 0 to 1, and how it moves: n pixels on by ``n / (1 + n * bend)`` steps.
-
-    Returns:
-        Both places, both steps, and the bend.
-    """
-    scale = 1.0 / (across[2, 0] * x + (across[2, 1] * y + across[2, 2]))
-    u = (across[0, 0] * x + (across[0, 1] * y + across[0, 2])) * scale
-    v = (across[1, 0] * x + (across[1, 1] * y + across[1, 2])) * scale
-    step_u, step_v = (across[0, 0] - u * across[2, 0]) * scale, (across[1, 0] - v * across[2, 0]) * scale
-    u, v = u - np.floor(u), v - np.floor(v)
-    return np.float32(u), np.float32(v), np.float32(step_u), np.float32(step_v), np.float32(across[2, 0] * scale)
-
-
-@njit(cache=True, error_model="numpy", fastmath=True)
-def _level(
-    across: np.ndarray, x: int, y: int, pyramid: np.ndarray
-) -> tuple[np.uint32, np.uint32, np.float32, np.float32]:
-    """The level of detail of a texture whose texels are about as large as the pixel.
-
-    Returns:
-        Its first texel, texels in a row, and how many steps it is wide and high.
-    """
+def _level(across: np.ndarray, x: int, y: int, pyramid: np.ndarray) -> int:
+    """The level of detail of a texture whose texels are about as large as the pixel."""
     scale = 1.0 / (across[2, 0] * x + (across[2, 1] * y + across[2, 2]))
     u = (across[0, 0] * x + (across[0, 1] * y + across[0, 2])) * scale
     v = (across[1, 0] * x + (across[1, 1] * y + across[1, 2])) * scale
@@ -313,8 +272,7 @@ def _level(
     while area > 2.0 and level < len(pyramid) - 1:
         area *= 0.25
         level += 1
-    base, rows, columns = pyramid[level, 0], pyramid[level, 1], pyramid[level, 2]
-    return np.uint32(base), np.uint32(columns + 2), np.float32(_STEPS * columns), np.float32(_STEPS * rows)
+    return level
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)

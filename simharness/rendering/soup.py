@@ -87,12 +87,12 @@ class Fabric:
         """Texels of all textures at all sizes, packed, (m,), and of each its levels' first texel, height and width.
 
         The latter is (textures, levels, 3); small textures repeat their last level. Around every level there is
-        one texel more, that of the other side. The first two texels of all are white: what has no texture.
+        one texel more, that of the other side.
         """
         pyramids = [list(pyramid(texture)) for texture in self._textures] or [[np.full((1, 1, 3), 255, np.uint8)]]
         table = np.zeros((len(pyramids), max(map(len, pyramids)), 3), np.int64)
-        texels = [np.full((2, 3), 255, np.uint8)]
-        first = len(texels[0])
+        texels: list[NDArray[np.uint8]] = []
+        first = 0
         for k, pictures in enumerate(pyramids):
             for level, picture in enumerate(pictures):
                 table[k, level:] = first, *picture.shape[:2]
