@@ -203,3 +203,35 @@ def test_what_is_written_is_read_back(tmp_path_factory, scenario):
     path = tmp_path_factory.mktemp("scenario") / "x.toml"
     path.write_text(dumps(scenario), encoding="utf-8", newline="\n")
     assert load(path) == scenario
+
+
+class TestNamedFiles:
+    """Files that a scenario names: recorded motion and calibration."""
+
+    def test_those_of_a_file_are_relative_to_it_and_those_of_the_command_line_are_not(self, scenario_file):
+        text = 'name = "x"\n[people]\nmotion = { file = "clips/a.bvh" }\n[cameras]\nlayout = "file"\nfile = "rig.json"'
+        path = scenario_file(text)
+        loaded = load(path, overrides=["cameras.file=elsewhere/rig.toml"])
+        assert loaded.people.motion.file == str(path.parent / "clips/a.bvh")
+        assert loaded.cameras.file == "elsewhere/rig.toml"
+        assert load(path, folder=Path()).cameras.file == "rig.json"
+        assert [file.name for file in load(path).files] == ["a.bvh", "rig.json"]
+
+    def test_what_is_in_them_changes_the_fingerprint(self, scenario_file):
+        path = scenario_file('name = "x"\n[people]\nmotion = { file = "a.bvh" }')
+        clip = path.parent / "a.bvh"
+        missing = fingerprint(load(path))
+        clip.write_text("HIERARCHY")
+        first = fingerprint(load(path))
+        clip.write_text("HIERARCHY ROOT")
+        assert len({missing, first, fingerprint(load(path))}) == 3
+
+    def test_a_named_motion_is_played_by_everybody(self, scenario_file):
+        path = scenario_file('name = "x"\n[people]\nmotion = { file = "a.bvh" }')
+        assert load(path).people.activities == ("mocap",)
+        mixed = load(path, overrides=['people.activities=["walk", "mocap"]'])
+        assert mixed.people.activities == ("walk", "mocap")
+
+    @pytest.mark.parametrize("text", ['activities = ["mocap"]', 'activities = ["walk"]\nmotion = { file = "a.bvh" }'])
+    def test_a_motion_without_a_player_and_the_reverse_are_refused(self, scenario_file, text):
+        assert "go together: give both or neither" in refusal(scenario_file(f'name = "x"\n[people]\n{text}'))
