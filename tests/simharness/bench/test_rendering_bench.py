@@ -42,13 +42,13 @@ def test_sizes_and_targets_are_those_of_the_task():
 
 def test_an_unknown_section_is_refused(capsys):
     with pytest.raises(SystemExit):
-        main(["rendring"])
+        main(["--only", "rendring"])
     assert "rendering, simulation" in capsys.readouterr().err.replace("'", "")
 
 
 @pytest.mark.slow
 def test_the_command_prints_and_writes_its_figures(tmp_path, capsys):
-    assert main(["rendering", "--quick", "--json", str(tmp_path / "figures.json")]) == 0
+    assert main(["--only", "rendering", "--quick", "--json", str(tmp_path / "figures.json")]) == 0
     written = json.loads((tmp_path / "figures.json").read_text())
     figures = {row["name"]: row for row in written["rendering"]}
     assert written["quick"]
