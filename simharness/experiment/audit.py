@@ -65,7 +65,7 @@ def check_clocks(faults: Faults, shots: Shots, time: Floats) -> None:
     Raises:
         AuditError: a picture at another time, a dead camera that delivers, a frozen picture of a later time.
     """
-    taken = shots.source >= 0
+    taken = shots.delivered
     nominal = time[np.where(taken, shots.source, 0)]
     late = np.where(taken, shots.time - nominal, 0.0)
     allowed = _SIGMAS * (faults.clock_offset + faults.clock_jitter) + 1e-9
@@ -102,7 +102,7 @@ def check_calibration(faults: Faults, shots: Shots) -> None:
         if view in swapped:
             continue
         for frame in map(int, frames):
-            if shots.source[frame, view] < 0:
+            if not shots.delivered[frame, view]:
                 continue
             true = shots.camera(frame, view)
             for what, off, allowed in (
@@ -126,7 +126,7 @@ def _angle(turn: Floats) -> float:
 
 
 def _check_projection(playback: Playback, shots: Shots, views: Views, frame: int) -> None:
-    for view in np.flatnonzero(shots.source[frame] >= 0):
+    for view in np.flatnonzero(shots.delivered[frame]):
         camera, said = shots.camera(frame, int(view)), views.pixels[frame, view]
         if not said.size:
             continue
@@ -157,7 +157,7 @@ def _check_pictures(
     radii = [body.joint_radii for body in playback.scene.bodies]
     found, deep, count = 0, 0, 0
     for frame in map(int, frames):
-        for view in map(int, np.flatnonzero(shots.source[frame] >= 0)):
+        for view in map(int, np.flatnonzero(shots.delivered[frame])):
             persons, joints = np.nonzero(views.visibility[frame, view] == Visibility.VISIBLE)
             image, camera = studio.image(shots, frame, view), shots.camera(frame, view)
             where = playback.at(shots.time[frame, view]).joints

@@ -154,7 +154,7 @@ def _pictures(
 
 def _channel(studio: Studio, trial: Trial, frame: int, view: int, channel: str) -> NDArray[np.unsignedinteger]:
     """What is known of every pixel of a picture, as integers that a PNG holds; zeros where no picture arrives."""
-    if trial.shots.source[frame, view] < 0:
+    if not trial.shots.delivered[frame, view]:
         width, height = trial.shots.believed[view].size
         return np.zeros((height, width), np.uint16 if channel == "depth" else np.uint8)
     image = studio.image(trial.shots, frame, view)

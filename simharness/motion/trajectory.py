@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from mvpose.checks import as_array
 
@@ -85,6 +86,12 @@ def through_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
     result = through(time, steady, when)
     result[..., 3:] /= np.linalg.norm(result[..., 3:], axis=-1, keepdims=True)
     return result
+
+
+def posed(points: NDArray[np.floating], pose: Floats) -> Floats:
+    """Points (n, 3) of a thing's own frame in the world, where its pose (7,) puts them."""
+    turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+    return np.asarray(points @ turn.T + pose[:3])
 
 
 def check_times(time: Floats, what: str) -> None:

@@ -9,11 +9,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import cv2
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
+from simharness.motion.trajectory import posed
 from simharness.rendering.lighting import Lighting
 from simharness.rendering.mesh import Mesh
 from simharness.rendering.mirrors import Mirror, with_mirrors
@@ -40,15 +40,10 @@ def meshes_at(scene: Scene, state: State) -> list[Mesh]:
     ]
     placements = iter(state.placements)
     things = [
-        solid.mesh if solid.trajectory is None else _placed(solid.mesh, next(placements)) for solid in scene.solids
+        solid.mesh if solid.trajectory is None else solid.mesh.moved(posed(solid.mesh.vertices, next(placements)))
+        for solid in scene.solids
     ]
     return [*people, *things]
-
-
-def _placed(mesh: Mesh, pose: NDArray[np.float64]) -> Mesh:
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, pose[3:])
-    return mesh.moved((mesh.vertices @ turn.reshape(3, 3).T + pose[:3]).astype(np.float32))
 
 
 def antialiased(
@@ -138,7 +133,7 @@ class Studio:
         """
         size = shots.believed[view].size
         scale = 1.0 if width is None else min(1.0, width / size[0])
-        if shots.source[frame, view] < 0:
+        if not shots.delivered[frame, view]:
             return np.zeros((*reduced_size(size, scale)[::-1], 3), np.uint8)
         camera = scaled(shots.camera(frame, view), scale)
         exposed = []
@@ -155,7 +150,7 @@ class Studio:
         Raises:
             ValueError: a picture that never arrives.
         """
-        if shots.source[frame, view] < 0:
+        if not shots.delivered[frame, view]:
             raise ValueError(f"view {view} delivers no picture in frame {frame}")
         camera, scene = shots.camera(frame, view), self._playback.scene
         times = moments(shots.time[frame, view], shots.readout)

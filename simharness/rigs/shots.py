@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,7 +88,7 @@ class Shots:
         """T, the number of frames."""
         return len(self.time)
 
-    @property
+    @cached_property
     def delivered(self) -> NDArray[np.bool_]:
         """In which frames a picture arrives from which view, (T, V)."""
         return self.source >= 0

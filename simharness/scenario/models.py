@@ -59,7 +59,7 @@ class Rendering(Section):
         description="raster: numba, anywhere; gl: pyrender on EGL; auto: gl where a context can be made; "
         "rays: no pictures at all, visibility by rays: fast",
     )
-    color: bool = Field(True, description="shade every picture; without it there are depth and ids, and no film")
+    color: bool = Field(True, description="take the colour pictures of which the report's film is made")
 
 
 class Scenario(Section):

@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 
 from simharness.motion.poses.kinematics import Kinematics
 from simharness.motion.poses.rolling import Rolling
+from simharness.motion.poses.timing import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,7 @@ class Gait:
         swing = phase > self.foot_off
         pitch = pitch_at(phase)
         along = np.maximum(phase - self.foot_off, 0.0) / (1 - self.foot_off)
-        rounded = _ease(along / 0.25) * _ease((1 - along) / 0.3) * self.rolling.spare(pitch)
+        rounded = smoothstep(along / 0.25) * smoothstep((1 - along) / 0.3) * self.rolling.spare(pitch)
         return pitch, np.where(swing, rounded + lift_at(phase), 0.0), np.where(swing, progress_at(phase), 0.0)
 
     @cached_property
@@ -206,7 +207,7 @@ def flattened(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats
     """
     slope = (pitch[1] - pitch[0]) / phase[1]
     landing = CubicSpline([0.0, down], [pitch[0], 0.0], bc_type=((1, slope), (1, 0.0)))
-    rise = _ease((phase - down) / (up - down))
+    rise = smoothstep((phase - down) / (up - down))
     return np.where(phase < down, landing(np.minimum(phase, down)), rise * pitch)
 
 
@@ -215,9 +216,3 @@ def pinned(x: Floats, y: Floats, first: float, last: float) -> Floats:
     slope = np.gradient(y, x)
     fault = CubicSpline(x[[0, -1]], [y[0] - first, y[-1] - last], bc_type=((1, slope[0]), (1, slope[-1])))
     return y - fault(x)
-
-
-def _ease(x: Floats) -> Floats:
-    """0 to 1, clipped, with no velocity at either end."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3 - 2 * x)

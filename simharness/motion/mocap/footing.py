@@ -17,6 +17,8 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from simharness.motion.poses.timing import smoothstep
+
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -233,7 +235,7 @@ def _faded(correction: Floats, stances: list[tuple[int, int]], rate: float) -> F
         last = land < frames
         span = land - leave + 1  # steps from the last frame of a stand to the first of the next
         along = np.arange(1, span)
-        share = _ease(along / span)[:, None]
+        share = smoothstep(along / span)[:, None]
         before = correction[leave - 1] if first else correction[land]
         after = correction[land] if last else before
         between = before + share * (after - before)
@@ -270,14 +272,9 @@ def _lifted(clearance: Floats, stances: list[tuple[int, int]]) -> Floats:
     for start, stop in runs(floating):
         along = (np.arange(start, stop) - start + 1) / (stop - start + 1)
         # The power makes a foot that moves leave the floor at once.
-        up = _ease(along / 0.2) ** 0.7 if start > 0 else np.ones(len(along))
-        down = _ease((1 - along) / 0.2) ** 0.7 if stop < frames else np.ones(len(along))
+        up = smoothstep(along / 0.2) ** 0.7 if start > 0 else np.ones(len(along))
+        down = smoothstep((1 - along) / 0.2) ** 0.7 if stop < frames else np.ones(len(along))
         least = _CLEARANCE * up * down
         above = clearance[start:stop] - least
         result[start:stop] = least + up * down * (above + np.sqrt(above**2 + 0.005**2)) / 2  # a smooth maximum
     return result
-
-
-def _ease(x: Floats) -> Floats:
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3 - 2 * x)

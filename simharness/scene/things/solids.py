@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.motion.trajectory import Trajectory
+from simharness.motion.trajectory import Trajectory, posed
 from simharness.rendering.mesh import Mesh
 from simharness.rendering.mirrors import Mirror
 from simharness.scene.things.geoms import Box, Geom, carried
@@ -60,7 +60,7 @@ class Thing:
 
     def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> Solid:
         """The thing on its way."""
-        corners = np.concatenate([_posed(self.extent.corners, pose) for pose in trajectory.pose])
+        corners = np.concatenate([posed(self.extent.corners, pose) for pose in trajectory.pose])
         return Solid(kind, name, self.mesh, self.geoms, Box.around(corners), trajectory=trajectory)
 
 
@@ -96,7 +96,7 @@ class Solid:
         pose = self.trajectory.at(time)
         if np.abs(pose[4:6]).max() < 1e-6:  # upright
             return self._extent.moved(pose[:2], _yaw(pose)).raised(pose[2])
-        return Box.around(_posed(self._extent.corners, pose))
+        return Box.around(posed(self._extent.corners, pose))
 
     @cached_property
     def _extent(self) -> Box:
@@ -111,14 +111,6 @@ class Solid:
         body = spec.worldbody if self.trajectory is None else spec.worldbody.add_body(name=self.name, mocap=True)
         for k, geom in enumerate(self.geoms):
             geom.add_to(spec, body, self.name if len(self.geoms) == 1 else f"{self.name} {k}")
-
-
-def _posed(points: Floats, pose: Floats) -> Floats:
-    import mujoco
-
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, pose[3:])
-    return np.asarray(points @ turn.reshape(3, 3).T + pose[:3])
 
 
 def _yaw(pose: Floats) -> float:
