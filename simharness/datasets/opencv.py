@@ -65,9 +65,14 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     """Write a rig as a list ``cameras`` that OpenCV can read.
 
     Raises:
-        ValueError: cameras without names of their own.
+        ValueError: cameras without names of their own, or names that begin or end with a space, which OpenCV loses.
     """
     check_names(rig)
+    for each in rig:
+        if each.name != each.name.strip():
+            raise ValueError(
+                f"camera {each.name!r}: OpenCV's files lose spaces at the ends of a name; expected one without"
+            )
     entries = [
         {
             "name": each.name,

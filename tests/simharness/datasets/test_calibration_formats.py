@@ -20,7 +20,7 @@ NAMES = st.text("abcXYZ0189_-", min_size=1, max_size=8)
 ANY_NAME = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8).filter(
     lambda name: name != "metadata"
 )
-# OpenCV's own YAML loses spaces at the ends of a name.
+# OpenCV's own YAML loses spaces at the ends of a name, so the writer refuses them.
 OPENCV_NAME = st.text("abc0189_é .", min_size=1, max_size=6).filter(lambda name: name == name.strip())
 NUMBER = st.floats(-20, 20)
 
@@ -338,3 +338,12 @@ def test_panoptic_people_stand_on_the_floor(shared_data):
             assert 0.9 < ours[:, 2].max() < 2.1
             inside = [camera.inside(camera.project(ours)).mean() for camera in rig]
             assert np.mean(inside) > 0.7
+
+
+@pytest.mark.parametrize("name", ["left ", " left"])
+def test_a_name_that_opencv_would_change_is_refused(tmp_path, name):
+    other = Camera(K=np.diag([500.0, 500, 1]), R=np.eye(3), t=np.zeros(3), size=(640, 480), name="right")
+    rig = Rig([other, Camera(**{**vars_of(other), "name": name, "t": np.ones(3)})])
+    with pytest.raises(ValueError, match=f"camera '{name}': OpenCV's files lose spaces"):
+        opencv.write_calibration(tmp_path / "rig.yml", rig)
+    assert not list(tmp_path.iterdir())
