@@ -33,6 +33,9 @@ PRESETS: dict[str, str] = {
 NEED_DESCRIPTORS = frozenset({"appearance"})
 """The presets that have nothing to go by where detections carry no descriptors."""
 
+READ_HEATMAPS = frozenset({"full", "appearance", "geometry"})
+"""The presets that make use of heat maps where detections carry them; the others go by keypoints."""
+
 
 class Estimator(Protocol):
     """Anything that finds the people of a frame."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from simharness.scenario.models import Cameras, Clutter, People, Scenario
+from simharness.scenario.profiles import read_profile
 
 
 def scenario(
@@ -15,4 +16,5 @@ def scenario(
         people=People(count=people),
         clutter=Clutter(boxes=2, shelves=1, tables=1, chairs=3, plants=1),
         cameras=Cameras(count=cameras, size=size),
+        detector=read_profile("typical"),
     )

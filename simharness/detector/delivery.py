@@ -2,39 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import Detections
+from simharness.detector.found import Found
 
 
-def delivered(values: NDArray[Any], source: NDArray[np.int64]) -> NDArray[Any]:
-    """What is known of every picture (T, V, ...), as views deliver the pictures.
+def delivered(found: Found, source: NDArray[np.int64]) -> Found:
+    """What is found in every picture, as views deliver the pictures.
 
-    Args:
-        values: of the picture that each view takes in each frame.
-        source: the frame whose picture is delivered, (T, V); what stands where there is none (-1) means nothing.
-    """
-    return values[np.maximum(source, 0), np.arange(source.shape[1])]
-
-
-def arriving(frames: Sequence[Detections], source: NDArray[np.int64]) -> Detections:
-    """The detections of one frame, of which each view's are those of the frame that it delivers.
+    A detector finds the same in the same picture, and nothing in one that never arrives.
 
     Args:
-        frames: detections in the pictures of every frame, sorted by view.
-        source: the frame whose picture each view delivers, (V,); -1 where none arrives.
+        found: in the picture that each view takes in each frame.
+        source: the frame whose picture is delivered, (T, V); -1 where none is.
     """
-    if source[0] >= 0 and (source == source[0]).all():  # one frame, as it should be
-        return frames[source[0]]
-    views = [(frames[frame], view) for view, frame in enumerate(source) if frame >= 0]
-    if not views:
-        return Detections.empty(frames[0].skeleton)
-    fields = ("view", "keypoints", "scores", "boxes", "box_scores")
-    chosen: dict[str, Any] = {
-        field: np.concatenate([getattr(found, field)[found.view == view] for found, view in views]) for field in fields
-    }
-    return Detections(**chosen, skeleton=frames[0].skeleton)
+    if (source == np.arange(len(source))[:, None]).all():  # as it should be
+        return found
+    picture, view = np.maximum(source, 0), np.arange(source.shape[1])
+    changed = {field.name: getattr(found, field.name)[picture, view] for field in fields(found)}
+    changed["there"] = changed["there"] & (source >= 0)[..., None]
+    return Found(**changed)

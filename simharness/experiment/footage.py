@@ -120,12 +120,13 @@ def _layers(trial: Trial, footage: Footage, reporter: Reporter) -> _Layers | Non
     with reporter.stage("film", 1):
         views = Filming(scenario, trial.scene, trial.shots, frozenset())(frames)
     answers = detect(simulate(trial.scene), views, trial.shots.believed, scenario.detector, seed=scenario.seed)
-    detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
+    detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
     estimates = None
     if "estimates" in footage.overlay:
         with reporter.stage("estimate", 1):
             name, pipeline = next(iter(trial.pipelines.items()))
-            estimates = Estimating(trial.shots.believed, detections, {name: pipeline})(frames)[name]
+            peaks = tuple(each.peaks for each in answers)
+            estimates = Estimating(trial.shots.believed, detections, {name: pipeline}, peaks)(frames)[name]
     return _Layers(truth, detections, estimates)
 
 

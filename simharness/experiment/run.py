@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 
 from mvpose import Detections, Estimate
-from simharness.detector.detect import detect
+from simharness.detector.detect import Detected, detect
 from simharness.detector.truth import Truth
 from simharness.experiment.animation import animate, animated_frames
 from simharness.experiment.atomic import appearing
@@ -70,8 +70,8 @@ def run(
         audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
         answers = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed)
-        detections, truth = tuple(each[0] for each in answers), tuple(each[1] for each in answers)
-    estimates = _estimate(trial, detections, compilation, workers, clock)
+        detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
+    estimates = _estimate(trial, answers, compilation, workers, clock)
     with clock.stage("score", len(estimates)) as advance:
         scores = {}
         for variant, answered in estimates.items():
@@ -163,13 +163,14 @@ def _film(trial: Trial, workers: int, clock: _Clock) -> Views:
 
 
 def _estimate(
-    trial: Trial, detections: tuple[Detections, ...], compilation: Compilation, workers: int, clock: _Clock
+    trial: Trial, answers: Sequence[Detected], compilation: Compilation, workers: int, clock: _Clock
 ) -> dict[str, tuple[Estimate, ...]]:
     with clock.stage("compile", 1):
         compilation.wait()
-    with clock.stage("estimate", len(detections)) as advance:
-        estimating = Estimating(trial.shots.believed, detections, trial.pipelines)
-        parts = map_frames(estimating, range(len(detections)), workers=workers, progress=advance)
+    with clock.stage("estimate", len(answers)) as advance:
+        detections, peaks = tuple(each.detections for each in answers), tuple(each.peaks for each in answers)
+        estimating = Estimating(trial.shots.believed, detections, trial.pipelines, peaks)
+        parts = map_frames(estimating, range(len(answers)), workers=workers, progress=advance)
         return {name: tuple(each for part in parts for each in part[name]) for name in trial.pipelines}
 
 

@@ -6,14 +6,15 @@ Imported by every worker, so it imports little; what else a worker needs comes w
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.pipeline import Estimator
+from mvpose.pipeline import READ_HEATMAPS, Estimator
 
 if TYPE_CHECKING:
+    from simharness.detector.heatmaps import Peaks
     from simharness.rendering.film import Eye
     from simharness.rendering.picture import Studio
     from simharness.rendering.renderer import Renderer, RendererName
@@ -69,25 +70,44 @@ def studio_of(scenario: Scenario, playback: Playback) -> Studio:
 
 @dataclass(frozen=True)
 class Estimating:
-    """Run every variant of the method on some frames."""
+    """Run every variant of the method on some frames. Heat maps are made frame by frame, for those that read them.
+
+    Attributes:
+        rig: the cameras as believed.
+        detections: of all frames.
+        pipelines: the variants by name.
+        peaks: what the heat maps of each frame are made of, where there are any.
+    """
 
     rig: Rig
     detections: tuple[Detections, ...]
     pipelines: Mapping[str, Estimator]
+    peaks: tuple[Peaks | None, ...]
 
     def __call__(self, frames: range) -> dict[str, list[Estimate]]:
         """What each variant says of these frames."""
         self._warm_up()
-        return {
-            name: [pipeline.estimate(self.rig, self.detections[frame]) for frame in frames]
-            for name, pipeline in self.pipelines.items()
-        }
+        answers: dict[str, list[Estimate]] = {name: [] for name in self.pipelines}
+        for frame in frames:
+            for name, seen in self._seen(frame, self.pipelines):
+                answers[name].append(self.pipelines[name].estimate(self.rig, seen))
+        return answers
+
+    def _seen(self, frame: int, names: Iterable[str]) -> Iterator[tuple[str, Detections]]:
+        """What variants see of a frame."""
+        mapped = plain = self.detections[frame]
+        peaks = self.peaks[frame]
+        if peaks is not None and READ_HEATMAPS & set(names):
+            mapped = replace(plain, likelihoods=peaks.heatmaps())
+        for name in names:
+            yield name, mapped if name in READ_HEATMAPS else plain
 
     def _warm_up(self) -> None:
         """Compile and load what a process does once: it is no part of the time of a frame."""
         fresh = [name for name in self.pipelines if name not in _warm]
-        for name in fresh:
-            self.pipelines[name].estimate(self.rig, max(self.detections, key=len))
+        fullest = max(range(len(self.detections)), key=lambda frame: len(self.detections[frame]))
+        for name, seen in self._seen(fullest, fresh):
+            self.pipelines[name].estimate(self.rig, seen)
         _warm.update(fresh)
 
 

@@ -20,10 +20,11 @@ from mvpose.camera import Camera
 from simharness.rendering.optics import appear
 from simharness.rendering.outlines import NO_EDGES, boxes
 from simharness.rendering.picture import Studio, meshes_at, one_below_the_other
-from simharness.rendering.renderer import Renderer
+from simharness.rendering.renderer import Image, Renderer
 from simharness.rendering.shutter import moments, rolled, strips
-from simharness.rendering.views import Views
+from simharness.rendering.views import LookalikeViews, Views
 from simharness.rendering.visibility import Visibility, label
+from simharness.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
     from simharness.rigs.shots import Shots
@@ -34,12 +35,17 @@ PREVIEW = 320  # pixels: width of the reduced pictures
 
 @dataclass(frozen=True)
 class Seen:
-    """What one camera sees in one picture: as :class:`Views`, without T and V."""
+    """What one camera sees in one picture: as :class:`Views`, without T and V.
+
+    ``lookalike_pixels`` (D, J, 2) and ``lookalike_visible`` (D, J) are those of ``Lookalikes.of(scene)``.
+    """
 
     pixels: NDArray[np.float64]
     visibility: NDArray[np.int8]
     boxes: NDArray[np.float64]
     area_visible: NDArray[np.int64]
+    lookalike_pixels: NDArray[np.float64]
+    lookalike_visible: NDArray[np.bool_]
 
 
 class Eye(Protocol):
@@ -66,6 +72,7 @@ class PictureEye:
 
     def __init__(self, playback: Playback, renderer: Renderer) -> None:
         self._scene = playback.scene
+        self._lookalikes = Lookalikes.of(playback.scene)
         self._renderer = renderer
         people = len(self._scene.bodies)
         radii = [body.joint_radii for body in self._scene.bodies]
@@ -84,13 +91,17 @@ class PictureEye:
                     for strip, each in zip(strips(camera, len(meshes)), meshes, strict=True)
                 ]
             )
-            joints = rolled(np.stack([state.joints for state in states]), camera)
+            bands = np.stack([state.joints for state in states])
+            joints, seeming = rolled(bands, camera), rolled(self._lookalikes.joints(bands), camera)
+            seeming_at = appear(camera, seeming)
             result.append(
                 Seen(
                     pixels=appear(camera, joints),
                     visibility=label(image, camera, joints=joints, radii=self._radii),
                     boxes=framed[view],
                     area_visible=_areas(image.ids, people),
+                    lookalike_pixels=seeming_at,
+                    lookalike_visible=_seen(image, camera, self._lookalikes, seeming, seeming_at),
                 )
             )
         return result
@@ -122,11 +133,15 @@ def film(
     pixels = np.full((*shape, joints, 2), np.nan)
     visibility = np.full((*shape, joints), int(Visibility.OUTSIDE), np.int8)
     boxed, area = np.zeros((*shape, 4)), np.zeros(shape, np.int64)
+    names = Lookalikes.of(playback.scene).names
+    seeming = np.full((*shape[:2], len(names), joints, 2), np.nan)
+    seeming_visible = np.zeros(seeming.shape[:-1], bool)
     for f, view_group, states in _moments(playback, shots, frames):
         cameras = [shots.camera(frames[f], view) for view in view_group]
         for view, seen in zip(view_group, eye.see(states, cameras), strict=True):
             pixels[f, view], visibility[f, view] = seen.pixels, seen.visibility
             boxed[f, view], area[f, view] = seen.boxes, seen.area_visible
+            seeming[f, view], seeming_visible[f, view] = seen.lookalike_pixels, seen.lookalike_visible
     kept: dict[int, tuple[NDArray[np.uint8], ...]] = {}
     for frame in frames:
         if studio is not None and frame in previews:
@@ -138,6 +153,7 @@ def film(
         area_visible=area,
         source=shots.source[list(frames)],
         previews=kept,
+        lookalikes=LookalikeViews(names, seeming, seeming_visible),
     )
 
 
@@ -166,3 +182,17 @@ def _areas(ids: NDArray[np.int16], people: int) -> NDArray[np.int64]:
     # Several times as fast as np.bincount, which first makes 64 bits of everything.
     counts = cv2.calcHist([np.ascontiguousarray(ids).view(np.uint16)], [0], None, [people], [0, people])
     return counts.ravel().astype(np.int64)
+
+
+def _seen(
+    image: Image, camera: Camera, lookalikes: Lookalikes, joints: NDArray[np.float64], pixels: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which joints of lookalikes are seen, (D, J), from where they appear to be (D, J, 3) and in the picture (D, J, 2).
+
+    At their pixels their own surface is seen, be it a mirror's glass, or none that is in front of it.
+    """
+    targets, shown = lookalikes.targets(camera.center, joints)
+    shown &= camera.inside(pixels)
+    column, row = np.moveaxis(np.floor(np.where(shown[..., None], pixels, 0) + 0.5).astype(int), -1, 0)
+    own = image.ids[row, column] == lookalikes.mesh[:, None]
+    return shown & (own | (camera.depth(targets) <= image.depth[row, column]))

@@ -19,11 +19,14 @@ from simharness.rendering.optics import appear
 from simharness.rendering.outlines import Outline, boxes
 from simharness.rendering.shutter import rolled
 from simharness.rendering.visibility import Visibility, decide
+from simharness.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
     from simharness.scene.playback import Playback, State
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _FILLED = 0.47  # of a box is the person: median over simulated people who walk and wave (0.33 to 0.60 of 80 % of them)
 
@@ -43,23 +46,26 @@ class RayEye:
         self._caster = Caster(playback.scene)
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
         self._outlines = [Outline.of(body) for body in bodies]
+        self._lookalikes = Lookalikes.of(playback.scene)
+        self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
     def see(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Seen]:
         """See :class:`simharness.rendering.film.Eye`."""
+        people = len(self._radii)
         bands = np.stack([state.joints for state in states])
-        joints = [rolled(bands, camera) for camera in cameras]
-        pixels = [appear(camera, where) for camera, where in zip(cameras, joints, strict=True)]
-        inside = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
-        owner, in_front = np.full(inside.shape, -1), np.full(inside.shape, -np.inf)
-        for k, state in enumerate(states):
-            self._caster.place(state)
-            for v, camera in enumerate(cameras):
-                mine = inside[v]
-                if len(states) > 1:
-                    share = (pixels[v][..., 1] + 0.5) / camera.size[1]
-                    mine = mine & (np.floor(np.where(mine, share, -1.0) * len(states)) == k)
-                owner[v, mine], in_front[v, mine] = self._caster.cast(camera, joints[v][mine])
-        labels = decide(owner, in_front, inside, radii=self._radii)
+        bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
+        pixels, targets, there = [], [], []
+        for camera in cameras:
+            where = rolled(bands, camera)
+            pixels.append(appear(camera, where))
+            points, shown = self._lookalikes.targets(camera.center, where[people:])
+            targets.append(np.concatenate([where[:people], points]))
+            there.append(camera.inside(pixels[-1]) & np.concatenate([np.ones((people, 17), bool), shown]))
+        owner, in_front = self._meet(states, cameras, np.stack(pixels), np.stack(targets), np.stack(there))
+        own = (owner == people) & (in_front <= self._allowed[:, None])
+        found = np.stack(there) & ((owner < 0) | own)
+        inside = np.stack(there)[:, :people]
+        labels = decide(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
         skins = [
             [outline.at(bones) for outline, bones in zip(self._outlines, state.bones, strict=True)] for state in states
         ]
@@ -67,4 +73,22 @@ class RayEye:
         seen = ((labels == Visibility.VISIBLE) | (labels == Visibility.SELF_OCCLUDED)).sum(axis=-1)
         share = seen / np.maximum(inside.sum(axis=-1), 1)
         areas = np.rint(_FILLED * framed[..., 2] * framed[..., 3] * share).astype(np.int64)
-        return [Seen(*each) for each in zip(pixels, labels, framed, areas, strict=True)]
+        return [
+            Seen(at[:people], label, box, area, at[people:], visible[people:])
+            for at, label, box, area, visible in zip(pixels, labels, framed, areas, found, strict=True)
+        ]
+
+    def _meet(
+        self, states: Sequence[State], cameras: Sequence[Camera], pixels: Floats, targets: Floats, there: Bools
+    ) -> tuple[Ints, Floats]:
+        """What :meth:`Caster.cast` meets on the way to targets (V, n, 17, 3), each in the moment of its own row."""
+        owner, in_front = np.full(there.shape, -1), np.full(there.shape, -np.inf)
+        for k, state in enumerate(states):
+            self._caster.place(state)
+            for v, camera in enumerate(cameras):
+                mine = there[v]
+                if len(states) > 1:
+                    share = (pixels[v, ..., 1] + 0.5) / camera.size[1]
+                    mine = mine & (np.floor(np.where(mine, share, -1.0) * len(states)) == k)
+                owner[v, mine], in_front[v, mine] = self._caster.cast(camera, targets[v][mine])
+        return owner, in_front

@@ -11,9 +11,10 @@ from typing import Literal
 from pydantic import Field
 
 from simharness.scenario.cameras import Cameras, Faults, Sensor
+from simharness.scenario.detector import Detector
 from simharness.scenario.people import People
 from simharness.scenario.room import Clutter, Decoys, Room
-from simharness.scenario.section import Positive, Section, Share
+from simharness.scenario.section import Positive, Section
 
 __all__ = [
     "Cameras",
@@ -28,21 +29,6 @@ __all__ = [
     "Scenario",
     "Sensor",
 ]
-
-
-class Detector(Section):
-    """How the simulated 2D detector errs. All zero is a perfect detector of whatever is visible."""
-
-    jitter: float = Field(0.35, ge=0.0, description="keypoint noise as a multiple of OKS sigma x sqrt(area)")
-    miss_visible: Share = Field(0.01, description="chance that a visible joint is not detected")
-    miss_self: Share = Field(0.25, description="the same for a joint hidden by the person's own body")
-    miss_occluded: Share = Field(0.7, description="the same for a joint hidden by another person or a thing")
-    miss_person: Share = Field(0.02, description="chance that a person is missed in one view and frame")
-    least_visible: int = Field(
-        5, ge=1, le=17, description="a person with fewer visible joints in a view is never detected there"
-    )
-    phantoms: float = Field(0.1, ge=0.0, le=20.0, description="mean number of phantom people per view and frame")
-    box_jitter: float = Field(0.03, ge=0.0, le=0.5, description="box side noise as a share of the box's size")
 
 
 class Method(Section):

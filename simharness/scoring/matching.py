@@ -1,7 +1,8 @@
 """Scores of the matching alone, over pairs of detections in different views.
 
 A pair is positive where both detections show one true person; the method says so where both carry one label.
-Phantoms (person -1) and unmatched detections (label -1) are in no positive pair.
+Phantoms (person -1) and unmatched detections (label -1) are in no positive pair. A detector may find a person twice in one
+view; a matching takes one of the two, so what is lost is counted by people and views, not by detections.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ class PairCounts:
     Attributes:
         correct: pairs of one person that were matched.
         wrong: pairs that were matched and are not one person.
-        lost: pairs of one person that were not matched.
+        lost: pairs of views in which one person is found, with no pair of detections there matched.
     """
 
     correct: int
@@ -65,7 +66,9 @@ def count_pairs(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> PairCo
     across = view[first] != view[second]
     first, second = first[across], second[across]
     said, true = _same(labels, first, second), _same(person, first, second)
-    return PairCounts(int((said & true).sum()), int((said & ~true).sum()), int((~said & true).sum()))
+    places = np.column_stack([person[first], np.sort(np.column_stack([view[first], view[second]]), axis=1)])
+    lost = len(np.unique(places[true], axis=0)) - len(np.unique(places[true & said], axis=0))
+    return PairCounts(int((said & true).sum()), int((said & ~true).sum()), lost)
 
 
 def _same(group: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -17,6 +17,7 @@ from simharness.experiment.store import read_run
 from simharness.experiment.trial import prepare
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
+from simharness.scenario.profiles import read_profile
 from simharness.scoring.summary import VariantScores
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
@@ -28,6 +29,7 @@ def tiny(**sections) -> Scenario:
         "people": People(count=2, activities=("wave", "talk")),
         "cameras": Cameras(count=2, size=(160, 120)),
         "clutter": Clutter(boxes=1),
+        "detector": read_profile("typical"),
         "method": Method(variants=("full", "no-3dps")),
     }
     return Scenario(name="tiny", seed=5, duration=0.3, rate=10.0, **{**defaults, **sections})
@@ -103,8 +105,8 @@ def test_another_seed_gives_other_detections(done, tmp_path):
     ("sections", "people"),
     [
         ({"people": People(count=0)}, 0),
-        ({"people": People(count=0), "detector": Detector(phantoms=0.0), "clutter": Clutter()}, 0),
-        ({"detector": Detector(miss_person=1.0, phantoms=0.0)}, 2),
+        ({"people": People(count=0), "detector": Detector(), "clutter": Clutter()}, 0),
+        ({"detector": Detector.model_validate({"boxes": {"missed": 1.0}})}, 2),
     ],
     ids=["an empty room", "an empty room and no phantoms", "a detector that finds nothing"],
 )

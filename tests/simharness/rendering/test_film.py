@@ -16,7 +16,7 @@ from simharness.rendering.lighting import Lighting
 from simharness.rendering.outlines import NO_EDGES, boxes
 from simharness.rendering.picture import Studio, antialiased, meshes_at
 from simharness.rendering.raster import RasterRenderer
-from simharness.rendering.views import Views
+from simharness.rendering.views import LookalikeViews, Views
 from simharness.rendering.visibility import Visibility
 from simharness.rigs.faults import shoot
 from simharness.rigs.shots import Shots
@@ -26,6 +26,7 @@ from simharness.scene.playback import State
 RIG = Rig([camera_at(c, (0, 0, 1), size=(200, 150)) for c in ((3.5, 0, 1.8), (0, 3.5, 1.8), (-2.5, -2.5, 1.8))])
 FRAMES, PEOPLE, JOINTS = 4, 2, 17
 TIME = np.arange(FRAMES) / 10
+ARRAYS = ("pixels", "visibility", "boxes", "area_visible", "source")
 SPEED = np.array([4.0, 0.0, 0.0])  # metres a second
 
 
@@ -50,7 +51,7 @@ class BallPlayback:
         self.scene = SimpleNamespace(
             bodies=bodies,
             figures=tuple(body.mesh for body in bodies),
-            solids=tuple(SimpleNamespace(mesh=mesh, trajectory=None) for mesh in things),
+            solids=tuple(SimpleNamespace(mesh=mesh, trajectory=None, figure=None, mirror=None) for mesh in things),
             lighting=Lighting(),
             mirrors={},
         )
@@ -131,7 +132,7 @@ def test_a_person_behind_the_box_is_labelled_so(views):
 
 def test_frames_are_independent_of_each_other(views):
     joined = Views.concatenate([filmed(frames=frames) for frames in (range(1), range(1, 3), [3])])
-    for key in ("pixels", "visibility", "boxes", "area_visible", "source"):
+    for key in ARRAYS:
         assert getattr(joined, key).tobytes() == getattr(views, key).tobytes()
 
 
@@ -252,9 +253,24 @@ def test_views_are_checked(views):
     with pytest.raises(ValueError, match=r"boxes must be \(4, 3, 2, 4\)"):
         replace(views, boxes=views.boxes[..., :3])
     with pytest.raises(ValueError, match="must share views, people and joints"):
-        Views.concatenate([views, replace(views, **{k: a[:, :2] for k, a in vars(views).items() if k != "previews"})])
+        Views.concatenate([views, replace(views, **{k: getattr(views, k)[:, :2] for k in ARRAYS})])
     with pytest.raises(ValueError, match="got none"):
         Views.concatenate([])
+
+
+def test_lookalikes_are_none_by_default_and_checked(views):
+    assert views.lookalikes.pixels.shape == (FRAMES, len(RIG), 0, JOINTS, 2)
+    assert views.lookalikes.visible.shape == (FRAMES, len(RIG), 0, JOINTS)
+    poster = LookalikeViews.nothing(FRAMES, len(RIG), ("poster0",))
+    assert not poster.visible.any()
+    assert np.isnan(poster.pixels).all()
+    assert replace(views, lookalikes=poster).lookalikes is poster
+    with pytest.raises(ValueError, match=r"lookalikes must be of 4 frames and 3 views .* got \(2, 3\)"):
+        replace(views, lookalikes=LookalikeViews.nothing(2, len(RIG), ("poster0",)))
+    with pytest.raises(ValueError, match=r"lookalike pixels must be \(T, V, 2, J, 2\), got \(4, 3, 1, 17, 2\)"):
+        replace(poster, names=("poster0", "poster1"))
+    with pytest.raises(ValueError, match="films to join must share their lookalikes"):
+        Views.concatenate([views, replace(views, lookalikes=poster)])
 
 
 def test_previews_are_the_pictures_reduced_and_only_those_asked_for():

@@ -40,13 +40,22 @@ def test_shares_that_do_not_apply_are_none():
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(-1, 2), st.integers(-1, 2)), max_size=12), st.randoms())
 def test_agrees_with_counting_by_hand_in_any_order(detections, random):
-    kinds = {"correct": 0, "wrong": 0, "lost": 0}
+    correct, wrong, seen, joined = 0, 0, set(), set()
     for (view, label, person), (other_view, other_label, other_person) in combinations(detections, 2):
         said, true = label == other_label != -1, person == other_person != -1
-        if view != other_view and (said or true):
-            kinds["correct" if said and true else "wrong" if said else "lost"] += 1
+        if view != other_view:
+            correct, wrong = correct + (said and true), wrong + (said and not true)
+            place = (person, frozenset([view, other_view]))
+            seen |= {place} if true else set()
+            joined |= {place} if said and true else set()
     random.shuffle(detections)
-    assert count_pairs(*np.array(detections, int).reshape(-1, 3).T) == PairCounts(**kinds)
+    counts = count_pairs(*np.array(detections, int).reshape(-1, 3).T)
+    assert counts == PairCounts(correct, wrong, len(seen - joined))
+
+
+def test_one_of_two_detections_of_a_person_in_a_view_is_enough():
+    assert count_pairs([0, 0, 1], [5, -1, 5], [2, 2, 2]) == PairCounts(1, 0, 0)
+    assert count_pairs([0, 0, 1], [-1, -1, 5], [2, 2, 2]) == PairCounts(0, 0, 1)
 
 
 def test_lengths_must_agree():

@@ -1,0 +1,319 @@
+"""Keypoints and their errors: rates, places, independence of the dials."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi
+from worlds import within, world
+
+from mvpose import COCO17
+from simharness.detector.conditions import BOX_SHARE, Conditions, overlaps
+from simharness.detector.correlation import Chances
+from simharness.detector.keypoints import find_keypoints
+from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError
+from simharness.rendering.visibility import Visibility
+from simharness.scenario.detector import Correlation, Keypoints
+
+MIRROR = np.array(COCO17.mirror)
+
+
+def find(where, *, seed=3, correlation=None, **dials):
+    config = Keypoints.model_validate(dials)
+    chances = Chances(seed, where.sequence.time, len(where.rig))
+    tie = Correlation.model_validate(correlation or {})
+    return find_keypoints(where.views, Conditions.of(where.views), where.sequence, where.rig, config, tie, chances)
+
+
+def units(where, found):
+    """How far off keypoints are, in units of OKS sigma x sqrt(area)."""
+    unit = Conditions.of(where.views).unit
+    return np.linalg.norm(found.pixels - where.views.pixels, axis=-1) / unit
+
+
+def test_without_errors_keypoints_are_the_projections():
+    where = world()
+    found = find(where)
+    np.testing.assert_array_equal(found.pixels, where.views.pixels)
+    assert (found.error == KeypointError.GOOD).all()
+    assert np.isnan(found.rivals).all()
+
+
+CLASSES = {
+    "jitter": KeypointError.JITTER,
+    "miss": KeypointError.MISS,
+    "inversion": KeypointError.INVERSION,
+    "swap": KeypointError.SWAP,
+}
+
+
+@pytest.mark.parametrize("correlation", [{}, {"views": 0.5, "limb": 0.5}], ids=["independent", "tied"])
+@pytest.mark.parametrize("dial", CLASSES)
+def test_each_error_comes_at_the_asked_rate(dial, correlation):
+    where = world(frames=400, people=2, together=dial == "swap")
+    error = find(where, correlation=correlation, **{dial: 0.2}).error
+    true = where.views.pixels
+    conditions = Conditions.of(where.views)
+    possible = np.ones(error.shape, bool)
+    if dial == "inversion":  # one that leads nowhere is none
+        possible = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
+    if dial == "swap":
+        far = np.linalg.norm(true - true[:, :, ::-1], axis=-1) >= MISS_FROM * conditions.unit
+        possible = far & (conditions.neighbour >= 0)[..., None]
+    assert possible.sum() > 5000
+    taken = error == CLASSES[dial]
+    assert not taken[~possible].any()
+    # Joints of a limb and the views are tied: so many fewer draws are independent.
+    independent = 1 if not correlation else 18
+    assert within(taken[possible].sum() // independent, possible.sum() // independent, 0.2)
+
+
+def test_shares_are_of_the_joints_that_the_classes_before_left():
+    where = world(frames=1500, views=2, people=2, together=True)
+    asked = {"swap": 0.1, "inversion": 0.2, "miss": 0.15, "jitter": 0.3}
+    found = find(where, drop={"visible": 0.05}, **asked)
+    true, conditions = where.views.pixels, Conditions.of(where.views)
+    # Where all classes can be told apart.
+    apart = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
+    apart &= np.linalg.norm(true - true[:, :, ::-1], axis=-1) >= MISS_FROM * conditions.unit
+    apart &= (conditions.neighbour >= 0)[..., None]
+    error = found.error[apart]
+    left = len(error)
+    assert left > 20000
+    for kind, share in (
+        (KeypointError.ABSENT, 0.05),
+        (KeypointError.SWAP, 0.1),
+        (KeypointError.INVERSION, 0.2),
+        (KeypointError.MISS, 0.15),
+        (KeypointError.JITTER, 0.3),
+    ):
+        count = int((error == kind).sum())
+        assert within(count, left, share)
+        left -= count
+
+
+@pytest.mark.parametrize(
+    ("key", "visibility"),
+    [
+        ("visible", Visibility.VISIBLE),
+        ("self_occluded", Visibility.SELF_OCCLUDED),
+        ("occluded", Visibility.OCCLUDED_BY_PERSON),
+        ("occluded", Visibility.OCCLUDED_BY_CLUTTER),
+    ],
+)
+def test_joints_are_dropped_by_what_hides_them(key, visibility):
+    seen = np.full((60, 3, 2, 17), visibility)
+    seen[..., :4] = Visibility.VISIBLE if visibility != Visibility.VISIBLE else Visibility.SELF_OCCLUDED
+    absent = find(world(visibility=seen), drop={key: 0.3}).error == KeypointError.ABSENT
+    assert within(absent[..., 4:].sum(), absent[..., 4:].size, 0.3)
+    assert not absent[..., :4].any()
+
+
+def test_joints_outside_the_image_are_never_found_and_the_others_stay():
+    seen = np.full((60, 3, 2, 17), Visibility.VISIBLE)
+    seen[..., 15:] = Visibility.OUTSIDE
+    found = find(world(visibility=seen), scatter=0.5, inversion=0.3, miss=0.2)
+    assert np.isnan(found.pixels[..., 15:, :]).all()
+    assert (found.error[..., 15:] == KeypointError.ABSENT).all()
+    assert np.isfinite(found.pixels[..., :15, :]).all()
+
+
+@pytest.mark.parametrize("height", [80.0, 320.0])
+def test_scatter_grows_with_the_person_and_is_good(height):
+    where = world(frames=300, height=height)
+    found = find(where, scatter=0.35)
+    offset = found.pixels - where.views.pixels
+    # Rayleigh with 0.35, cut at 1.14: 0.5 % of it are redistributed.
+    expected = 0.35 * np.array(COCO17.sigmas) * np.sqrt(BOX_SHARE * 0.4 * height * height)
+    np.testing.assert_allclose(offset.std(axis=(0, 1, 2, 4)), expected, rtol=0.06)
+    assert (found.error == KeypointError.GOOD).all()
+    distance = units(where, found)
+    assert distance.max() < GOOD_BELOW
+    assert within((distance < 0.35).sum(), distance.size, chi(2).cdf(1.0) / chi(2).cdf(GOOD_BELOW / 0.35))
+
+
+def test_places_of_errors():
+    where = world(frames=200)
+    distance = units(where, find(where, jitter=1.0))
+    assert distance.min() >= GOOD_BELOW - 1e-9
+    assert distance.max() < MISS_FROM
+    distance = units(where, find(where, miss=1.0, reach=6.0))
+    assert distance.min() >= MISS_FROM - 1e-9
+    assert 5.5 < distance.max() < 6.0
+    found = find(where, inversion=1.0)
+    paired = np.arange(17) != MIRROR
+    np.testing.assert_allclose(found.pixels[..., paired, :], where.views.pixels[..., MIRROR[paired], :])
+    np.testing.assert_array_equal(found.pixels[..., 0, :], where.views.pixels[..., 0, :])
+    close = world(frames=200, together=True)
+    found = find(close, swap=1.0)
+    swapped = found.error == KeypointError.SWAP
+    assert swapped.mean() > 0.5
+    np.testing.assert_allclose(found.pixels[swapped], close.views.pixels[:, :, ::-1][swapped])
+
+
+def test_strays_land_on_the_box():
+    where = world(frames=200)
+    found = find(where, miss=1.0, stray=1.0)
+    low = where.views.boxes[..., None, :2]
+    share = (found.pixels - low) / where.views.boxes[..., None, 2:]
+    assert share.min() >= 0
+    assert share.max() <= 1
+    assert share.mean() == pytest.approx(0.5, abs=0.01)
+
+
+def test_hidden_joints_are_guessed_from_the_pose():
+    seen = np.full((200, 3, 2, 17), Visibility.OCCLUDED_BY_PERSON)
+    seen[..., :5] = Visibility.VISIBLE
+    where = world(frames=200, visibility=seen)
+    found = find(where, hallucinate=0.4)
+    assert not found.guessed[..., :5].any()
+    assert within(found.guessed[..., 5:].sum(), found.guessed[..., 5:].size, 0.4)
+    # A guessed joint hangs on its parent: right bone, wrong way.
+    parent = np.array(COCO17.parents)
+    for joint in (8, 10, 13, 16):
+        here = found.guessed[..., joint]
+        base = where.views.pixels[..., parent[joint], :]
+        got, true = (np.linalg.norm(p[..., joint, :] - base, axis=-1)[here] for p in (found.pixels, where.views.pixels))
+        assert np.log(got / true).std() == pytest.approx(0.25, rel=0.15)
+    np.testing.assert_array_equal(found.pixels[~found.guessed], where.views.pixels[~found.guessed])
+
+
+def test_quality_multiplies_all_errors_and_adds_to_those_of_better_detectors():
+    where = world(frames=300)
+    rates = {"jitter": 0.1, "miss": 0.2}
+    half, whole = (find(where, quality=quality, **rates).error for quality in (0.5, 1.0))
+    good = KeypointError.GOOD
+    assert ((half == good) | (whole != good)).all()
+    assert (half != good).mean() == pytest.approx(0.5 * (whole != good).mean(), rel=0.12)
+    assert (find(where, quality=0.0, **rates).error == good).all()
+
+
+@pytest.mark.parametrize(
+    ("dial", "make"),
+    [
+        ("self_occluded", lambda: world(frames=200, visibility=Visibility.SELF_OCCLUDED)),
+        ("occluded", lambda: world(frames=200, visibility=Visibility.OCCLUDED_BY_CLUTTER)),
+    ],
+)
+def test_hidden_joints_err_more(dial, make):
+    error = find(make(), miss=0.1, **{dial: 3.0}).error
+    assert within((error == KeypointError.MISS).sum(), error.size, 0.3)
+
+
+def test_the_truncated_and_the_small_err_more():
+    seen = np.full((200, 3, 2, 17), Visibility.VISIBLE)
+    seen[:, :, 0, 16] = Visibility.OUTSIDE
+    error = find(world(frames=200, visibility=seen), miss=0.1, truncated=2.0).error[..., :16]
+    for person, share in ((0, 0.2), (1, 0.1)):
+        assert within((error[:, :, person] == KeypointError.MISS).sum(), error[:, :, person].size, share)
+    height = 40.0
+    size = np.sqrt(BOX_SHARE * 0.4) * height  # 18 px: (64 / 18) ** 0.5 = 1.88
+    error = find(world(frames=200, height=height), miss=0.1, small=0.5).error
+    assert within((error == KeypointError.MISS).sum(), error.size, 0.1 * (64 / size) ** 0.5)
+    error = find(world(frames=200, height=300), miss=0.1, small=0.5).error
+    assert within((error == KeypointError.MISS).sum(), error.size, 0.1)
+
+
+def test_few_joints_and_crowds_have_rates_of_their_own():
+    seen = np.full((200, 3, 3, 17), Visibility.OCCLUDED_BY_CLUTTER)
+    for person, valid in enumerate((11, 10, 5)):
+        seen[:, :, person, :valid] = Visibility.VISIBLE
+    where = world(frames=200, people=3, visibility=seen)
+    error = find(where, miss=0.1, miss_some=0.2, miss_few=0.3).error
+    for person, share in enumerate((0.1, 0.2, 0.3)):
+        assert within((error[:, :, person] == KeypointError.MISS).sum(), error[:, :, person].size, share)
+    alone = find(where, miss=0.1, miss_some=0.2).error[:, :, 2] == KeypointError.MISS
+    assert within(alone.sum(), alone.size, 0.2)
+    # Two who overlap, of whom one shows 10 joints: a crowd for that one.
+    seen = np.full((200, 3, 2, 17), Visibility.VISIBLE)
+    seen[:, :, 0, 10:] = Visibility.OCCLUDED_BY_PERSON
+    where = world(frames=200, visibility=seen, together=True)
+    crowded = Conditions.of(where.views).crowded
+    assert crowded[:, :, 0].mean() > 0.5
+    assert not crowded[:, :, 1].any()
+    error = find(where, swap=0.0, swap_crowded=1.0).error
+    assert (error[:, :, 0][crowded[:, :, 0]] == KeypointError.SWAP).any()
+    assert not (error[:, :, 1] == KeypointError.SWAP).any()
+
+
+DIALS = {
+    "scatter": 0.4, "jitter": 0.2, "miss": 0.2, "inversion": 0.2, "swap": 0.2, "drop": {"visible": 0.2},
+    "hallucinate": 0.3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("dial", ["jitter", "miss", "inversion", "swap", "drop", "hallucinate"])
+def test_a_dial_takes_joints_and_moves_no_other(dial):
+    seen = np.full((80, 3, 2, 17), Visibility.VISIBLE)
+    seen[..., 9:11] = Visibility.OCCLUDED_BY_PERSON
+    where = world(frames=80, visibility=seen, together=True)
+    without = find(where, **{key: value for key, value in DIALS.items() if key != dial})
+    with_it = find(where, **DIALS)
+    changed = ~((with_it.pixels == without.pixels).all(axis=-1) | (with_it.error == without.error))
+    took = ~np.isclose(with_it.pixels, without.pixels, equal_nan=True).all(axis=-1)
+    assert 0.01 < took.mean() < 0.35
+    # Whatever it did not take is as it was, to the bit.
+    np.testing.assert_array_equal(with_it.pixels[~took], without.pixels[~took])
+    assert not (changed & ~took).any()
+    more = DIALS[dial]
+    more = {key: 0.5 for key in more} if isinstance(more, dict) else 0.6
+    still = find(where, **{**DIALS, dial: more})
+    takes = ~np.isclose(still.pixels, without.pixels, equal_nan=True).all(axis=-1)
+    assert (takes | ~took).all()  # more of it keeps what less of it took
+    np.testing.assert_array_equal(still.pixels[took], with_it.pixels[took])
+
+
+def test_scatter_that_views_share_is_a_displacement_in_space():
+    where = world(frames=400, views=2)
+    offsets = {}
+    for shared in (0.0, 0.5, 1.0):
+        found = find(where, scatter=0.3, correlation={"scatter_views": shared})
+        offsets[shared] = (found.pixels - where.views.pixels) / Conditions.of(where.views).unit[..., None]
+        assert offsets[shared].std() == pytest.approx(0.3, rel=0.03)
+    # The cameras stand side by side and look the same way: down is down in both, and right nearly right.
+    down = {shared: np.corrcoef(each[:, 0, ..., 1].ravel(), each[:, 1, ..., 1].ravel())[0, 1]
+            for shared, each in offsets.items()}  # fmt: skip
+    assert abs(down[0.0]) < 0.03
+    assert down[0.5] == pytest.approx(0.5, abs=0.05)
+    assert down[1.0] > 0.98
+
+
+def test_errors_last_and_views_err_together():
+    where = world(frames=2000, views=2, people=1)
+    errors = {
+        name: find(where, miss=0.2, correlation=tie).error[:, :, 0] == KeypointError.MISS
+        for name, tie in (("alone", {}), ("lasting", {"life": 1.0}), ("together", {"views": 1.0}))
+    }
+    stays = {name: (each[1:] & each[:-1]).sum() / each[:-1].sum() for name, each in errors.items()}
+    assert stays["alone"] == pytest.approx(0.2, abs=0.02)
+    # It ends with chance 1 - exp(-0.1 s / 1 s), and is drawn again with 0.2.
+    assert stays["lasting"] == pytest.approx(1 - 0.8 * -np.expm1(-0.1), abs=0.03)
+    both = {name: (each[:, 0] & each[:, 1]).mean() for name, each in errors.items()}
+    assert both["alone"] == pytest.approx(0.04, abs=0.006)
+    assert both["together"] == pytest.approx(0.2, abs=0.012)
+
+
+def test_one_more_person_view_or_frame_changes_nobody_else():
+    tie = {"life": 0.5, "views": 0.3, "limb": 0.3, "scatter_life": 0.2}
+    small, large = world(frames=20, views=2, people=1), world(frames=30, views=3, people=2)
+    one, more = (find(where, correlation=tie, scatter=0.4, miss=0.2, jitter=0.2) for where in (small, large))
+    off = [found.pixels - where.views.pixels for found, where in ((one, small), (more, large))]
+    np.testing.assert_allclose(off[0], off[1][:20, :2, :1], atol=1e-9)
+
+
+def test_seeds():
+    where = world(frames=5)
+    first, again, other = (find(where, seed=seed, scatter=0.4).pixels for seed in (0, 0, 1))
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() != other.tobytes()
+
+
+def test_overlap_of_boxes():
+    boxes = np.array([[0.0, 0, 10, 10], [5, 0, 10, 10], [100, 100, 4, 4], [0, 0, 0, 0]])
+    iou = overlaps(boxes)
+    assert iou[0, 1] == pytest.approx(50 / 150)
+    np.testing.assert_array_equal(iou, iou.T)
+    assert iou.sum() == pytest.approx(2 * 50 / 150)
+
+
+def test_nobody():
+    found = find(world(people=0), scatter=0.4, miss=0.5)
+    assert found.pixels.shape == (60, 3, 0, 17, 2)

@@ -1,0 +1,405 @@
+"""Phantoms: how many, how long, where, and what each dial leaves alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from mvpose import Camera, Rig
+from simharness.detector.correlation import Chances
+from simharness.detector.lives import Lives, alive, slots
+from simharness.detector.phantoms import focus, phantoms
+from simharness.detector.postures import DRAWS, postures, seen_from
+from simharness.detector.truth import KeypointError
+from simharness.rendering.views import Views
+from simharness.rendering.visibility import Visibility
+from simharness.rigs.layouts import build_rig
+from simharness.scenario.detector import Phantoms
+from simharness.scenario.models import Cameras
+
+STEP = 0.1  # seconds
+
+
+def ring(count=4, **more) -> Rig:
+    return build_rig(Cameras(count=count, radius=3.7, height=1.8, **more))
+
+
+def filmed(frames=400, views=4, people=2, seed=0) -> Views:
+    """People as pictures only, side by side, 60 pixels apart."""
+    rng = np.random.default_rng(seed)
+    size = np.array([80.0, 240.0])
+    corner = np.array([100.0, 100.0]) + rng.uniform(0, 60, (frames, views, people, 2))
+    corner[..., 0] += 60.0 * np.arange(people)
+    pixels = corner[..., None, :] + rng.random((frames, views, people, 17, 2)) * size
+    shape = pixels.shape[:3]
+    return Views(
+        pixels,
+        np.full((*shape, 17), Visibility.VISIBLE),
+        np.concatenate([corner, np.broadcast_to(size, corner.shape)], axis=-1),
+        np.zeros(shape, int),
+        np.broadcast_to(np.arange(frames)[:, None], (frames, views)),
+    )
+
+
+def drawn(rig=None, pictures=None, /, *, seed=3, **dials):
+    rig = rig or ring()
+    pictures = filmed(views=len(rig)) if pictures is None else pictures
+    chances = Chances(seed, STEP * np.arange(len(pictures)), len(rig))
+    return phantoms(pictures, rig, Phantoms(**dials), chances)
+
+
+def poses(found, frames=None) -> set[tuple[int, int, bytes]]:
+    """Where and when each one is, whatever its slot."""
+    places = np.argwhere(found.there[:frames]).tolist()
+    return {(t, v, found.keypoints[t, v, s].tobytes()) for t, v, s in places}
+
+
+def within(count, trials, chance):
+    low, high = binom.interval(1 - 1e-6, trials, chance)
+    return low <= count <= high
+
+
+MIXTURES = [
+    {},
+    {"life": 1.0},
+    {"views": 1.0},
+    {"views": 0.5, "life": 0.5},
+    {"parts": 1.0},
+    {"parts": 0.5, "views": 0.3, "plausible": 0.4, "life": 0.3},
+    {"life": 0.02},
+]
+
+
+class TestRates:
+    @pytest.mark.parametrize("dials", MIXTURES, ids=str)
+    @pytest.mark.parametrize("rate", [0.1, 1.3])
+    def test_the_mean_number_in_a_picture_is_the_rate(self, rate, dials):
+        """Whatever the mixture. A phantom that lasts, or that many views share, counts as often: so the bound grows."""
+        rig, frames = ring(), 1500
+        found = drawn(rig, filmed(frames), rate=rate, **dials)
+        expected = rate * frames * len(rig)
+        clump = (1 + 2 * dials.get("life", 0.0) / STEP) * (1 + dials.get("views", 0.0) * (len(rig) - 1))
+        assert abs(found.there.sum() - expected) < 4.5 * np.sqrt(clump * expected)
+
+    def test_the_number_in_a_picture_is_poisson_distributed_from_the_first_frame_on(self):
+        rig, rate = ring(8), 0.8
+        views = filmed(30, 8)
+        counts = np.stack([drawn(rig, views, rate=rate, life=2.0, seed=seed).there.sum(axis=2) for seed in range(60)])
+        for frame in (0, 29):
+            now = counts[:, frame]
+            assert abs(now.mean() - rate) < 5 * np.sqrt(rate / now.size)
+            assert 0.75 < now.var() / rate < 1.3
+        both = np.corrcoef(counts[:, 0].ravel(), counts[:, 10].ravel())[0, 1]
+        assert abs(both - np.exp(-1.0 / 2.0)) < 5 / np.sqrt(counts[:, 0].size)  # of M/M/infinity: exp(-lag / life)
+
+    def test_the_share_that_stands_in_the_room_is_the_asked_one(self):
+        """In one picture alone means alone: with the same seed, without the room, what is left."""
+        rig, views = ring(), filmed(1500)
+        both = drawn(rig, views, rate=1.0, views=0.4).there.sum()
+        alone = drawn(rig, views, rate=0.6).there.sum()
+        share = (both - alone) / both
+        assert abs(share - 0.4) < 0.05
+
+    def test_zero_means_none(self):
+        found = drawn(rate=0.0, life=1.0, views=0.5, parts=0.5)
+        assert found.there.shape == (400, 4, 0)
+
+    def test_more_only_adds(self):
+        for dials in MIXTURES:
+            few, many = (poses(drawn(rate=rate, **dials)) for rate in (0.2, 0.9))
+            assert 200 < len(few) < len(many)
+            assert few <= many
+
+    def test_a_rig_whose_axes_are_parallel(self):
+        rig = Rig([Camera(np.diag([800.0, 800, 1]), np.eye(3), [0.5 * v, 0, 5], size=(800, 600)) for v in range(3)])
+        found = drawn(rig, filmed(1000, 3), rate=0.5, views=1.0)
+        assert np.isfinite(focus(rig)[0]).all()
+        assert abs(found.there.sum() - 1500) < 5 * np.sqrt(3 * 1500)
+
+    def test_a_single_frame(self):
+        counts = [drawn(ring(), filmed(1), rate=2.0, life=1.0, views=0.2, seed=s).there.sum() for s in range(100)]
+        assert abs(np.mean(counts) - 8.0) < 5 * np.sqrt(8.0 * 2 / 100)
+
+
+class TestLives:
+    @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 8)), min_size=1, max_size=40))
+    def test_a_slot_holds_one_at_a_time_and_there_are_no_more_than_needed(self, spans):
+        born = np.array([b for b, _ in spans])
+        last = born + [n for _, n in spans]
+        slot = slots(born, last)
+        thing, frame = alive(born, last)
+        assert len(set(zip(slot[thing].tolist(), frame.tolist(), strict=True))) == len(thing)
+        assert slot.max() + 1 == np.bincount(frame).max()
+        for k in range(len(born)):
+            assert frame[thing == k].tolist() == list(range(born[k], last[k] + 1))
+
+    @pytest.mark.parametrize("life", [0.0, 0.05, 0.5, 3.0])
+    def test_lives_are_as_long_as_asked(self, life):
+        """At the frames' times an exponential life is geometric: it lasts another frame with exp(-step / life)."""
+        lives = Lives(Chances(1, STEP * np.arange(4000), 1), ("test",), life, most=2.0)
+        early = lives.born < 3500
+        frames = (lives.last - lives.born + 1)[early]
+        kept = np.exp(-STEP / life) if life else 0.0
+        assert abs(frames.mean() - 1 / (1 - kept)) <= 5 * np.sqrt(kept) / (1 - kept) / np.sqrt(len(frames))
+
+    def test_phantoms_sit_still_while_they_live(self):
+        life = 0.8
+        found = drawn(ring(), filmed(1500), rate=0.5, life=life)
+        before, after = found.there[:-1], found.there[1:]
+        apart = np.linalg.norm(found.keypoints[1:] - found.keypoints[:-1], axis=-1)
+        height = np.where(before, found.boxes[:-1, ..., 3], 1.0)
+        same = before & after & (np.nan_to_num(apart).max(axis=-1) < 0.05 * height)
+        assert within(same.sum(), before.sum(), np.exp(-STEP / life))
+        moved = apart[same]
+        assert np.nanmin(moved) > 0  # but not frozen
+
+    def test_without_a_life_every_frame_has_its_own(self):
+        found = drawn(rate=1.0)
+        both = found.there[:-1] & found.there[1:]
+        apart = np.linalg.norm(found.keypoints[1:] - found.keypoints[:-1], axis=-1)
+        assert np.nanmin(np.nanmedian(apart[both], axis=-1)) > 2.0
+
+
+def ray_gaps(rig, found):
+    """How far rays (metres) pass by the nearest point to all rays of the same slot, frame and joint."""
+    gaps = []
+    for t, s in np.ndindex(found.there.shape[0], found.there.shape[2]):
+        for joint in range(0, 17, 4):
+            seen = np.flatnonzero(found.scores[t, :, s, joint] > 0)
+            if len(seen) < 2:
+                continue
+            ways = np.stack([rig[v].rays(found.keypoints[t, v, s, joint]) for v in seen])
+            across = np.eye(3) - ways[:, :, None] * ways[:, None, :]
+            point = np.linalg.solve(across.sum(axis=0), (across @ rig.centers[seen][:, :, None]).sum(axis=0)[:, 0])
+            gaps.append(np.linalg.norm(across @ (point - rig.centers[seen])[:, :, None], axis=1).max())
+    return np.array(gaps)
+
+
+class TestInTheRoom:
+    @pytest.mark.parametrize("lens", [(0, 0, 0, 0, 0), (-0.2, 0.05, 0, 0, 0)])
+    @pytest.mark.parametrize("plausible", [1.0, 0.0])
+    def test_rays_of_figures_meet(self, lens, plausible):
+        rig = ring(distortion=lens)
+        found = drawn(rig, filmed(80), rate=0.5, views=1.0, life=0.5, plausible=plausible)
+        gaps = ray_gaps(rig, found)
+        assert len(gaps) > 100
+        assert gaps.max() < 1e-6
+
+    def test_rays_of_the_others_do_not(self):
+        rig = ring()
+        gaps = ray_gaps(rig, drawn(rig, filmed(80), rate=1.5, life=0.5))
+        assert len(gaps) > 100
+        assert np.median(gaps) > 0.05
+
+    def test_every_view_that_contains_a_figure_sees_it(self):
+        """Triangulated from two views and projected into a third: on the image there means detected there."""
+        rig = ring(5)
+        found = drawn(rig, filmed(200, 5), rate=0.5, views=1.0)
+        checked = 0
+        for t, s in zip(*np.nonzero(found.there.sum(axis=1) >= 2), strict=True):
+            one, two = np.flatnonzero(found.there[t, :, s])[:2]
+            joints = [j for j in range(17) if (found.scores[t, [one, two], s, j] > 0).all()]
+            points = np.array([meet(rig, (one, two), found.keypoints[t, [one, two], s, j]) for j in joints])
+            for view in range(5):
+                inside = rig[view].inside(rig[view].project(points))
+                np.testing.assert_array_equal(
+                    inside[: len(joints)] & found.there[t, view, s], found.scores[t, view, s, joints] > 0
+                )
+                if inside.sum() >= 7:  # of the 6 that make a figure one may lie at the very border
+                    assert found.there[t, view, s]
+                    checked += 1
+        assert checked > 100
+
+    def test_they_stand_where_the_cameras_look(self):
+        rig = ring()
+        middle, reach = focus(rig)
+        np.testing.assert_allclose(middle, 0.0, atol=0.05)
+        found = drawn(rig, filmed(300), rate=0.5, views=1.0)
+        ankles = []
+        for t, s in zip(*np.nonzero(found.there.sum(axis=1) >= 2), strict=True):
+            views = np.flatnonzero(found.scores[t, :, s, 15] > 0)[:2]
+            if len(views) == 2:
+                ankles.append(meet(rig, views, found.keypoints[t, views, s, 15]))
+        ankles = np.array(ankles)
+        assert len(ankles) > 50
+        assert np.linalg.norm(ankles[:, :2] - middle, axis=1).max() < reach + 0.8
+        assert np.linalg.norm(ankles[:, :2] - middle, axis=1).max() > 0.6 * reach
+        assert (np.abs(ankles[:, 2] - 0.1) < 0.25).mean() > 0.95
+
+    def test_a_view_more_leaves_those_in_one_picture_alone(self):
+        four = drawn(ring(4), rate=0.5)
+        three = drawn(Rig(ring(4).cameras[:3]), rate=0.5)
+        first = three.there.shape[2]
+        np.testing.assert_array_equal(four.there[:, :3, :first], three.there)
+        np.testing.assert_array_equal(four.keypoints[:, :3, :first][three.there], three.keypoints[three.there])
+
+
+def meet(rig, views, pixels):
+    ways = np.stack([rig[v].rays(pixel) for v, pixel in zip(views, pixels, strict=True)])
+    across = np.eye(3) - ways[:, :, None] * ways[:, None, :]
+    return np.linalg.solve(across.sum(axis=0), (across @ rig.centers[list(views)][:, :, None]).sum(axis=0)[:, 0])
+
+
+def lent(found, views):
+    """Which phantoms have the upper body of somebody real, (T, V, S), within their jitter."""
+    upper = found.keypoints[..., None, :11, :] - views.pixels[:, :, None, :, :11]
+    off = np.linalg.norm(upper, axis=-1).max(axis=-1).min(axis=-1)
+    return found.there & (off < 0.04 * 300)
+
+
+class TestParts:
+    def test_the_share_made_of_parts_is_the_asked_one(self):
+        views = filmed(1000)
+        found = drawn(ring(), views, rate=0.5, parts=0.3)
+        assert within(lent(found, views).sum(), found.there.sum(), 0.3)
+        assert lent(drawn(ring(), views, rate=0.5), views).sum() == 0
+
+    def test_the_legs_are_the_neighbours(self):
+        views = filmed(400)
+        found = drawn(ring(), views, rate=0.5, parts=1.0)
+        legs = found.keypoints[..., None, 11:, :] - views.pixels[:, :, None, :, 11:]
+        upper = found.keypoints[..., None, :11, :] - views.pixels[:, :, None, :, :11]
+        off = np.stack([np.linalg.norm(part, axis=-1).max(axis=-1) for part in (upper, legs)])[:, found.there]
+        assert (off.min(axis=-1) < 12).all()
+        first, second = off.argmin(axis=-1)
+        assert (first != second).all()
+        assert 0.3 < first.mean() < 0.7
+
+    def test_who_is_alone_gives_the_legs_too_displaced(self):
+        views = filmed(400, people=1)
+        found = drawn(ring(), views, rate=0.5, parts=1.0)
+        at = np.nonzero(found.there)
+        legs = found.keypoints[at][:, 11:] - views.pixels[at[0], at[1], 0, 11:]
+        assert lent(found, views)[at].all()
+        shift = np.linalg.norm(np.nanmean(legs, axis=1), axis=-1)
+        assert 5 < np.median(shift) < 60
+
+    def test_where_nobody_is_they_have_poses_of_their_own_at_the_same_rate(self):
+        empty = filmed(1000, people=0)
+        found, plain = (drawn(ring(), empty, rate=0.5, parts=parts) for parts in (1.0, 0.0))
+        assert found.there.sum() > 1500
+        assert poses(found) == poses(plain)
+
+    def test_they_go_along_with_the_people(self):
+        views = filmed(400)
+        found = drawn(ring(), views, rate=0.5, parts=1.0, life=1.0)
+        assert lent(found, views)[found.there].all()
+
+    def test_one_person_more_changes_only_those_made_of_that_one(self):
+        three = filmed(400, people=3)
+        keys = ("pixels", "visibility", "boxes", "area_visible")
+        two = Views(*(getattr(three, key)[:, :, :2] for key in keys), three.source)
+        more, fewer = (drawn(ring(), views, rate=0.5, parts=1.0) for views in (three, two))
+        np.testing.assert_array_equal(more.there, fewer.there)
+        upper = [np.nan_to_num(found.keypoints[..., :11, :]) for found in (more, fewer)]
+        same = (np.abs(upper[0] - upper[1]) < 12).all(axis=(-1, -2))  # jitter goes by the height, legs and all
+        changed = more.there & ~same
+        assert within(changed.sum(), more.there.sum(), 1 / 3)
+
+
+class TestPoses:
+    def test_postures_stand_on_the_floor_and_have_two_sides_alike(self):
+        joints = postures(np.random.default_rng(0).standard_normal((3000, DRAWS)))
+        length = lambda a, b: np.linalg.norm(joints[:, a] - joints[:, b], axis=-1)  # noqa: E731
+        for left, right in (((5, 7), (6, 8)), ((7, 9), (8, 10)), ((11, 13), (12, 14)), ((13, 15), (14, 16))):
+            np.testing.assert_allclose(length(*left), length(*right))
+        lowest = joints[:, 15:, 2].min(axis=1)
+        assert 0.05 < lowest.min() < lowest.max() < 0.09
+        assert joints[..., 2].max() < 2.4
+        assert (joints[:, 0, 0] > joints[:, 3:5, 0].mean(axis=1)).mean() > 0.99  # they face along x
+        assert (joints[:, 5, 1] > joints[:, 6, 1]).all()  # and their left is left
+        stature = joints[:, 1:3, 2].mean(axis=1)
+        assert 1.45 < np.median(stature) < 1.70
+
+    def test_views_of_postures_fill_boxes_of_height_one(self):
+        rng = np.random.default_rng(0)
+        joints = postures(rng.standard_normal((500, DRAWS)))
+        flat = seen_from(joints, rng.uniform(0, 6.3, 500), rng.uniform(0, 0.5, 500))
+        np.testing.assert_allclose(flat[..., 1].min(axis=1), -0.5)
+        np.testing.assert_allclose(flat[..., 1].max(axis=1), 0.5)
+        np.testing.assert_allclose(flat[..., 0].min(axis=1), -flat[..., 0].max(axis=1), atol=1e-12)
+
+    @pytest.mark.parametrize("room", [0.0, 1.0])
+    def test_the_share_of_upright_poses_is_the_asked_one(self, room):
+        """An upright one has its nose over its ankles; joints anywhere have it so in half of all cases or fewer."""
+
+        def topped(plausible):
+            found = drawn(ring(), filmed(2000), rate=0.5, views=room, plausible=plausible)
+            whole = (found.scores > 0).all(axis=-1)
+            y = found.keypoints[whole][..., 1]
+            return (y[:, 0] < y[:, 15:].min(axis=1)) & (y[:, 5] < y[:, 15]) & (y[:, 6] < y[:, 16])
+
+        upright, anywhere, half = (topped(p) for p in (1.0, 0.0, 0.5))
+        assert upright.mean() > 0.97
+        assert anywhere.mean() < 0.35
+        middle = (upright.mean() + anywhere.mean()) / 2
+        assert abs(half.mean() - middle) < 0.06
+
+    def test_joints_anywhere_are_uniform_in_the_box(self):
+        found = drawn(ring(), filmed(3000), rate=0.5, plausible=0.0)
+        whole = (found.scores > 0).all(axis=-1)
+        share = (found.keypoints[whole] - found.boxes[whole][:, None, :2]) / found.boxes[whole][:, None, 2:]
+        # Of 17 uniform draws, scaled to span 0..1, the extremes are 0 and 1 and the other 15 uniform between.
+        expected = (15 * 0.3 + 1) / 17
+        for axis in (0, 1):
+            below = (share[..., axis] < 0.3).mean()
+            assert abs(below - expected) < 0.02
+
+
+class TestReports:
+    def test_what_is_reported_holds_together(self):
+        rig = ring()
+        found = drawn(rig, rate=1.0, life=0.3, views=0.3, parts=0.3, plausible=0.7)
+        t, v, s = np.nonzero(found.there)
+        assert len(t) > 1000
+        keypoints, scores = found.keypoints[t, v, s], found.scores[t, v, s]
+        seen = scores > 0
+        np.testing.assert_array_equal(np.isfinite(keypoints).all(axis=-1), seen)
+        assert seen.any(axis=-1).all()
+        assert not seen.all()  # some are cut by the border
+        assert rig[0].inside(keypoints[seen]).all()
+        boxes = found.boxes[t, v, s]
+        np.testing.assert_allclose(np.nanmin(keypoints, axis=1), boxes[:, :2])
+        np.testing.assert_allclose(np.nanmax(keypoints, axis=1), boxes[:, :2] + boxes[:, 2:])
+        np.testing.assert_allclose(found.box_scores[t, v, s], scores.sum(axis=1) / seen.sum(axis=1))
+        assert (found.person == -1).all()
+        assert (found.error == KeypointError.MISS).all()
+
+    @pytest.mark.parametrize("room", [0.0, 1.0])
+    def test_scores_spread_as_asked_on_the_logit_scale(self, room):
+        found = drawn(ring(), filmed(2000), rate=0.5, views=room, score=0.3, deviation=0.8)
+        scores = found.scores[found.there & (found.scores > 0).all(axis=-1)]
+        logit = np.log(scores / (1 - scores))
+        many = np.sqrt(len(logit))
+        assert abs(logit.mean() - np.log(0.3 / 0.7)) < 5 * 0.8 / many
+        assert logit.std() == pytest.approx(0.8, abs=5 * 0.8 / many)
+        exact = drawn(rate=0.5, score=0.3, deviation=0.0)
+        np.testing.assert_allclose(exact.scores[exact.there & (exact.scores > 0).all(axis=-1)], 0.3)
+
+    @pytest.mark.parametrize("dial", [{"score": 0.8}, {"deviation": 0.1}])
+    def test_scores_move_no_keypoint(self, dial):
+        base = {"rate": 0.5, "views": 0.3, "parts": 0.3, "life": 0.5}
+        assert poses(drawn(**base)) == poses(drawn(**base, **dial))
+
+    def test_turning_a_dial_leaves_those_alone_that_it_does_not_take(self):
+        base = {"rate": 0.6, "life": 0.4}
+        plain = poses(drawn(**base))
+        for dial, share in (({"views": 0.4}, 0.6), ({"parts": 0.4}, 0.6), ({"plausible": 0.6}, 0.6)):
+            kept = len(plain & poses(drawn(**base, **dial))) / len(plain)
+            assert abs(kept - share) < 0.15
+
+    def test_frames_more_at_the_end_change_nothing_before(self):
+        whole = filmed(300)
+        part = Views(*(getattr(whole, k)[:120] for k in ("pixels", "visibility", "boxes", "area_visible", "source")))
+        dials = {"rate": 0.8, "life": 0.5, "views": 0.3, "parts": 0.3, "plausible": 0.8}
+        short, long = drawn(ring(), part, **dials), drawn(ring(), whole, **dials)
+        assert len(poses(short)) > 200
+        assert poses(short) == poses(long, 120)
+
+    def test_one_seed_is_one_result_and_another_is_another(self):
+        dials = {"rate": 0.5, "life": 0.5, "views": 0.3}
+        assert poses(drawn(**dials)) == poses(drawn(**dials))
+        assert not poses(drawn(**dials)) & poses(drawn(**dials, seed=4))
