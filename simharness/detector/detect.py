@@ -22,7 +22,7 @@ from simharness.detector.correlation import Chances
 from simharness.detector.decoys import decoy_hits
 from simharness.detector.delivery import delivered
 from simharness.detector.found import Found
-from simharness.detector.heatmaps import Peaks
+from simharness.detector.heatmaps import Peaks, in_crops
 from simharness.detector.keypoints import find_keypoints
 from simharness.detector.phantoms import phantoms
 from simharness.detector.scores import score_keypoints
@@ -65,7 +65,10 @@ def detect(sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed
         phantoms(views, rig, config.phantoms, chances),
         decoy_hits(views, rig, config.decoys, chances),
     ]
-    found = delivered(Found.joined([part for part in parts if part.there.shape[2]] or parts[:1]), views.source)
+    found = Found.joined([part for part in parts if part.there.shape[2]] or parts[:1])
+    if config.heatmaps.size != "none":
+        found = in_crops(found)
+    found = delivered(found, views.source)
     return _frames(found, sequence, views, config)
 
 

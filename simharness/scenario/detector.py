@@ -180,7 +180,8 @@ class Phantoms(Section):
         0.0, description="share of the others, each in one view, that are made of parts of the real people in it"
     )
     plausible: Share = Field(
-        1.0, description="share of those not made of parts with poses like a person's; the rest: joints anywhere in the box"
+        1.0,
+        description="share of those not made of parts with poses like a person's; the rest: joints anywhere in the box",
     )
     score: Share = Field(0.45, description="usual score of their keypoints")
     deviation: Amount = Field(0.6, description="of their scores, on the logit scale")
