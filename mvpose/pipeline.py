@@ -62,16 +62,20 @@ class Pipeline:
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
 
     @staticmethod
-    def preset(name: str) -> Estimator:
+    def preset(name: str, *, appearance: AppearanceAffinity = AppearanceAffinity()) -> Estimator:
         """One of the named variants, :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
+
+        Args:
+            name: of the variant.
+            appearance: what distances of descriptors mean; of a network ``ReId.affinity`` says it.
 
         Raises:
             ValueError: a name that is none of them.
         """
-        full = Pipeline()
+        full = Pipeline(affinity=FusedAffinity(appearance=appearance))
         variants: dict[str, Estimator] = {
             "full": full,
-            "appearance": replace(full, affinity=AppearanceAffinity()),
+            "appearance": replace(full, affinity=appearance),
             "geometry": replace(full, affinity=GeometricAffinity()),
             "no-3dps": replace(full, reconstruction=Triangulation()),
             "no-matching": UnmatchedPipeline(),

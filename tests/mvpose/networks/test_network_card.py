@@ -1,0 +1,59 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mvpose.networks import Card
+
+numbers = st.floats(0.01, 300, allow_nan=False)
+colours = st.tuples(numbers, numbers, numbers)
+
+
+@given(
+    st.text(), colours, colours, st.sampled_from(["rgb", "bgr"]), st.sampled_from(["stride", "span", "area"]),
+    st.none() | st.tuples(st.integers(1, 999), st.integers(1, 999)), st.lists(st.text(min_size=1)), numbers,
+)  # fmt: skip
+def test_a_card_survives_its_journey_in_a_file(name, mean, std, order, cells, size, outputs, number):
+    card = Card(
+        name=name, mean=mean, std=std, color_order=order, cells=cells, size=size, outputs=tuple(outputs),
+        midpoint=number, slope=number / 10, padding=number, peak=number,
+    )  # fmt: skip
+    assert Card.from_metadata({"stride": "32", "names": "{0: 'x'}", **card.to_metadata()}) == card
+
+
+def test_defaults_are_left_out_and_come_back():
+    assert Card().to_metadata() == {}
+    assert Card.from_metadata({"author": "somebody"}) == Card()
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [
+        ({"mean": (0.5, 0.5)}, r"mean must be three numbers, red green blue, got \(0.5, 0.5\)"),
+        ({"mean": 0.5}, "mean must be three numbers"),
+        ({"std": (0.2, 0, 0.2)}, "std must be three positive numbers"),
+        ({"size": (128, 0)}, "size must be width and height, two positive whole numbers of pixels"),
+        ({"size": 128}, "size must be width and height"),
+        ({"color_order": "gbr"}, "color_order must be one of rgb, bgr, got 'gbr'"),
+        ({"cells": "corner"}, "cells must be one of stride, span, area, got 'corner'"),
+        ({"midpoint": 1.0}, "midpoint and slope make one sigmoid: state both or neither"),
+        ({"peak": 0}, "peak must be a positive number, got 0"),
+        ({"padding": "1.25"}, "padding must be a positive number"),
+        ({"outputs": "features"}, "outputs must be names in a tuple, got 'features'"),
+    ],
+)
+def test_what_cannot_be_is_refused(stated, message):
+    with pytest.raises(ValueError, match=f"card: {message}"):
+        Card(**stated)
+
+
+@pytest.mark.parametrize(
+    ("metadata", "message"),
+    [
+        ({"mvpose.means": "[0, 0, 0]"}, r"no field 'means' \(metadata entry 'mvpose.means'\); there are name, size"),
+        ({"mvpose.mean": "0.4 0.4 0.4"}, "'mvpose.mean' must be JSON, got '0.4 0.4 0.4'"),
+        ({"mvpose.std": '["a", "b", "c"]'}, "std must be three numbers"),
+    ],
+)
+def test_a_bad_entry_of_a_file_is_refused(metadata, message):
+    with pytest.raises(ValueError, match=message):
+        Card.from_metadata(metadata)
