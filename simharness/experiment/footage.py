@@ -12,18 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
-from simharness.detector.detect import detect
 from simharness.detector.truth import Truth
 from simharness.experiment.atomic import appearing
+from simharness.experiment.looking import look
 from simharness.experiment.pictures import annotate
 from simharness.experiment.progress import Reporter, Silence
 from simharness.experiment.trial import Trial, prepare
-from simharness.experiment.work import Estimating, Filming, studio_of
+from simharness.experiment.work import Estimating, studio_of
 from simharness.rendering.mosaic import mosaic
 from simharness.rendering.picture import Studio
 from simharness.scenario.models import Scenario
 from simharness.scene.playback import Playback
-from simharness.scene.simulation import simulate
 
 Rgb = NDArray[np.uint8]
 
@@ -116,17 +115,15 @@ class _Layers:
 def _layers(trial: Trial, footage: Footage, reporter: Reporter) -> _Layers | None:
     if not footage.overlay:
         return None
-    scenario, frames = trial.scenario, range(trial.scenario.frames)
     with reporter.stage("film", 1):
-        views = Filming(scenario, trial.scene, trial.shots, frozenset())(frames)
-    answers = detect(simulate(trial.scene), views, trial.shots.believed, scenario.detector, seed=scenario.seed)
+        _, answers = look(trial)
     detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
     estimates = None
     if "estimates" in footage.overlay:
         with reporter.stage("estimate", 1):
             name, pipeline = next(iter(trial.pipelines.items()))
-            peaks = tuple(each.peaks for each in answers)
-            estimates = Estimating(trial.shots.believed, detections, {name: pipeline}, peaks)(frames)[name]
+            estimating = Estimating(trial.shots.believed, tuple(answers), {name: pipeline})
+            estimates = estimating(range(len(answers)))[name]
     return _Layers(truth, detections, estimates)
 
 

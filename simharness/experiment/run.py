@@ -22,7 +22,7 @@ from simharness.experiment.pictures import draw_pictures, outlines
 from simharness.experiment.progress import Advance, Reporter, Silence
 from simharness.experiment.store import Record, write_run
 from simharness.experiment.trial import Trial, prepare
-from simharness.experiment.work import Estimating, Filming
+from simharness.experiment.work import Estimating, Filming, Reading
 from simharness.rendering.views import Views
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Scenario
@@ -70,7 +70,9 @@ def run(
         audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
         answers = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed)
-        detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
+    if Reading.needed(scenario):
+        answers = _read(trial, answers, workers, clock)
+    detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
     estimates = _estimate(trial, answers, compilation, workers, clock)
     with clock.stage("score", len(estimates)) as advance:
         scores = {}
@@ -162,14 +164,20 @@ def _film(trial: Trial, workers: int, clock: _Clock) -> Views:
         return Views.concatenate(map_frames(filming, frames, workers=workers, progress=advance))
 
 
+def _read(trial: Trial, answers: Sequence[Detected], workers: int, clock: _Clock) -> list[Detected]:
+    frames = range(len(answers))
+    with clock.stage("read", len(frames)) as advance:
+        reading = Reading(trial.scenario, trial.scene, trial.shots, tuple(answers))
+        return [each for part in map_frames(reading, frames, workers=workers, progress=advance) for each in part]
+
+
 def _estimate(
     trial: Trial, answers: Sequence[Detected], compilation: Compilation, workers: int, clock: _Clock
 ) -> dict[str, tuple[Estimate, ...]]:
     with clock.stage("compile", 1):
         compilation.wait()
     with clock.stage("estimate", len(answers)) as advance:
-        detections, peaks = tuple(each.detections for each in answers), tuple(each.peaks for each in answers)
-        estimating = Estimating(trial.shots.believed, detections, trial.pipelines, peaks)
+        estimating = Estimating(trial.shots.believed, tuple(answers), trial.pipelines)
         parts = map_frames(estimating, range(len(answers)), workers=workers, progress=advance)
         return {name: tuple(each for part in parts for each in part[name]) for name in trial.pipelines}
 

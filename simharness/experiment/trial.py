@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mvpose import Pipeline, Rig
+from mvpose.affinity import AppearanceAffinity
 from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
-from simharness.experiment.work import renderer_of
+from simharness.experiment.work import pose_head, re_id, renderer_of
 from simharness.rendering.renderer import Unavailable
 from simharness.rigs.faults import shoot
 from simharness.rigs.layouts import build_rig
@@ -37,16 +38,20 @@ def prepare(scenario: Scenario) -> Trial:
     """Build what a scenario describes.
 
     Raises:
-        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant.
+        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant, no network.
     """
+    described = scenario.appearance.source != "none"
+    if scenario.detector.onnx:
+        pose_head(scenario)
+    appearance = re_id(scenario).affinity if described else AppearanceAffinity()
     try:
-        pipelines = {name: Pipeline.preset(name) for name in scenario.method.variants}
+        pipelines = {name: Pipeline.preset(name, appearance=appearance) for name in scenario.method.variants}
     except ValueError as error:
         raise ValueError(f"method.variants: {error}") from None
-    if blind := NEED_DESCRIPTORS & pipelines.keys():
+    if not described and (blind := NEED_DESCRIPTORS & pipelines.keys()):
         raise ValueError(
-            f"method.variants: {', '.join(blind)} goes by descriptors alone, and the simulated detector makes none; "
-            "choose another variant"
+            f"method.variants: {', '.join(blind)} goes by descriptors alone, and detections have none; choose "
+            'appearance.source = "pictures" or "drawn", or another variant'
         )
     if scenario.rendering.renderer != "rays":
         try:

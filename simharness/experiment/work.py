@@ -14,7 +14,8 @@ from mvpose import Detections, Estimate, Rig
 from mvpose.pipeline import READ_HEATMAPS, Estimator
 
 if TYPE_CHECKING:
-    from simharness.detector.heatmaps import Peaks
+    from mvpose.networks import PoseHead, ReId
+    from simharness.detector.detect import Detected
     from simharness.rendering.film import Eye
     from simharness.rendering.picture import Studio
     from simharness.rendering.renderer import Renderer, RendererName
@@ -69,20 +70,83 @@ def studio_of(scenario: Scenario, playback: Playback) -> Studio:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """Let the networks of a scenario read the pictures of some frames. Each process opens them for itself."""
+
+    scenario: Scenario
+    scene: Scene
+    shots: Shots
+    detected: tuple[Detected, ...]
+
+    @staticmethod
+    def needed(scenario: Scenario) -> bool:
+        """Whether a scenario has networks that look at pictures."""
+        return bool(scenario.detector.onnx) or scenario.appearance.source == "pictures"
+
+    def __call__(self, frames: range) -> list[Detected]:
+        """The detections of these frames with what the networks read."""
+        from simharness.detector.reading import read_descriptors, read_keypoints
+        from simharness.scene.playback import Playback
+
+        studio = studio_of(self.scenario, Playback(self.scene))
+        head = pose_head(self.scenario) if self.scenario.detector.onnx else None
+        network = re_id(self.scenario) if self.scenario.appearance.source == "pictures" else None
+        result = []
+        for frame in frames:
+            seen = self.detected[frame]
+            images = [
+                studio.picture(self.shots, frame, view) if arrived else None
+                for view, arrived in enumerate(self.shots.delivered[frame])
+            ]
+            if head is not None:
+                seen = read_keypoints(head, seen, images)
+            if network is not None:
+                seen = read_descriptors(network, seen, images)
+            result.append(seen)
+        return result
+
+
+def pose_head(scenario: Scenario) -> PoseHead:
+    """The pose head of a scenario.
+
+    Raises:
+        ValueError: its file is no pose head; the message names the key.
+    """
+    from mvpose.networks import PoseHead
+
+    try:
+        return PoseHead(scenario.detector.onnx, likelihoods=scenario.detector.heatmaps.size != "none")
+    except ValueError as error:
+        raise ValueError(f"detector.onnx: {error}") from None
+
+
+def re_id(scenario: Scenario) -> ReId:
+    """The re-ID network of a scenario.
+
+    Raises:
+        ValueError: its file is none; the message names the key.
+    """
+    from mvpose.networks import ReId
+
+    try:
+        return ReId(scenario.appearance.network) if scenario.appearance.network else ReId()
+    except ValueError as error:
+        raise ValueError(f"appearance.network: {error}") from None
+
+
+@dataclass(frozen=True)
 class Estimating:
     """Run every variant of the method on some frames. Heat maps are made frame by frame, for those that read them.
 
     Attributes:
         rig: the cameras as believed.
-        detections: of all frames.
+        detected: all frames.
         pipelines: the variants by name.
-        peaks: what the heat maps of each frame are made of, where there are any.
     """
 
     rig: Rig
-    detections: tuple[Detections, ...]
+    detected: tuple[Detected, ...]
     pipelines: Mapping[str, Estimator]
-    peaks: tuple[Peaks | None, ...]
 
     def __call__(self, frames: range) -> dict[str, list[Estimate]]:
         """What each variant says of these frames."""
@@ -95,9 +159,11 @@ class Estimating:
 
     def _seen(self, frame: int, names: Iterable[str]) -> Iterator[tuple[str, Detections]]:
         """What variants see of a frame."""
-        mapped = plain = self.detections[frame]
-        peaks = self.peaks[frame]
-        if peaks is not None and READ_HEATMAPS & set(names):
+        mapped = plain = self.detected[frame].detections
+        peaks = self.detected[frame].peaks
+        if plain.likelihoods is not None:
+            plain = replace(plain, likelihoods=None)
+        elif peaks is not None and READ_HEATMAPS & set(names):
             mapped = replace(plain, likelihoods=peaks.heatmaps())
         for name in names:
             yield name, mapped if name in READ_HEATMAPS else plain
@@ -105,7 +171,7 @@ class Estimating:
     def _warm_up(self) -> None:
         """Compile and load what a process does once: it is no part of the time of a frame."""
         fresh = [name for name in self.pipelines if name not in _warm]
-        fullest = max(range(len(self.detections)), key=lambda frame: len(self.detections[frame]))
+        fullest = max(range(len(self.detected)), key=lambda frame: len(self.detected[frame].detections))
         for name, seen in self._seen(fullest, fresh):
             self.pipelines[name].estimate(self.rig, seen)
         _warm.update(fresh)

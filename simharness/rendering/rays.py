@@ -54,18 +54,17 @@ class RayEye:
         people = len(self._radii)
         bands = np.stack([state.joints for state in states])
         bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
-        pixels, targets, there = [], [], []
-        for camera in cameras:
-            where = rolled(bands, camera)
-            pixels.append(appear(camera, where))
-            points, shown = self._lookalikes.targets(camera.center, where[people:])
-            targets.append(np.concatenate([where[:people], points]))
-            there.append(camera.inside(pixels[-1]) & np.concatenate([np.ones((people, 17), bool), shown]))
-        owner, in_front = self._meet(states, cameras, np.stack(pixels), np.stack(targets), np.stack(there))
-        own = (owner == people) & (in_front <= self._allowed[:, None])
-        found = np.stack(there) & ((owner < 0) | own)
-        inside = np.stack(there)[:, :people]
+        targets = np.stack([rolled(bands, camera) for camera in cameras])
+        pixels = np.stack([appear(camera, where) for camera, where in zip(cameras, targets, strict=True)])
+        there = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
+        for v, camera in enumerate(cameras):
+            targets[v, people:], shown = self._lookalikes.targets(camera.center, targets[v, people:])
+            there[v, people:] &= shown
+        owner, in_front = self._meet(states, cameras, pixels, targets, there)
+        inside = there[:, :people]
         labels = decide(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
+        own = (owner == people) & (in_front <= self._allowed[:, None])
+        found = there & ((owner < 0) | own)
         skins = [
             [outline.at(bones) for outline, bones in zip(self._outlines, state.bones, strict=True)] for state in states
         ]

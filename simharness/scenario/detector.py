@@ -218,6 +218,11 @@ class Detector(Section):
     """How the simulated 2D detector errs."""
 
     name: str = Field("perfect", description="what this detector is called")
+    onnx: str = Field(
+        "",
+        description="ONNX file of a top-down pose head, relative to the scenario file, that reads the keypoints in the "
+        "simulated boxes off the rendered pictures; empty: keypoints are simulated, too",
+    )
     keypoints: Keypoints = Keypoints()
     bias: Bias = Bias()
     correlation: Correlation = Correlation()

@@ -17,7 +17,13 @@ from simharness.scenario.models import Scenario
 from simharness.scenario.profiles import take_profile
 from simharness.scenario.reading import ScenarioError, read_toml, toml_place
 
-_FILES = (("people", "motion", "file"), ("people", "motion", "skeleton"), ("cameras", "file"))
+_FILES = (
+    ("people", "motion", "file"),
+    ("people", "motion", "skeleton"),
+    ("cameras", "file"),
+    ("detector", "onnx"),
+    ("appearance", "network"),
+)
 
 
 def load(

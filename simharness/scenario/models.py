@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from simharness.scenario.appearance import Appearance
 from simharness.scenario.cameras import Cameras, Faults, Sensor
 from simharness.scenario.detector import Detector
 from simharness.scenario.people import People
@@ -17,6 +18,7 @@ from simharness.scenario.room import Clutter, Decoys, Room
 from simharness.scenario.section import Positive, Section
 
 __all__ = [
+    "Appearance",
     "Cameras",
     "Clutter",
     "Decoys",
@@ -64,6 +66,7 @@ class Scenario(Section):
     faults: Faults = Faults()
     sensor: Sensor = Sensor()
     detector: Detector = Detector()
+    appearance: Appearance = Appearance()
     method: Method = Method()
     rendering: Rendering = Rendering()
 
@@ -74,6 +77,7 @@ class Scenario(Section):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that it names: recorded motion and calibration."""
-        named = (self.people.motion.file, self.people.motion.skeleton, self.cameras.file)
+        """The files that it names: recorded motion, calibration, networks."""
+        motion = self.people.motion
+        named = (motion.file, motion.skeleton, self.cameras.file, self.detector.onnx, self.appearance.network)
         return tuple(Path(name) for name in named if name)

@@ -75,6 +75,8 @@ class Lookalikes:
         Returns:
             (n, D, 17, 3) metres; of people in mirrors behind the glass.
         """
+        if not len(self):
+            return people[:, :0]
         still = np.broadcast_to(self.figures, (len(people), *self.figures.shape))
         turned = people[:, :, COCO17.mirror]
         return np.concatenate([still, *(mirror.reflect(turned) for mirror in self.mirrors)], axis=1)
@@ -94,6 +96,8 @@ class Lookalikes:
         """
         count = len(self.figures)
         points, shown = joints.copy(), np.ones(joints.shape[:2], bool)
+        if not len(self):
+            return points, shown
         flat = np.any(self.fronts, axis=-1)
         ahead = ((eye - self.figures) * self.fronts[:, None]).sum(axis=-1)
         shown[:count] = (ahead > 0) | ~flat[:, None]

@@ -276,6 +276,12 @@ class TestParts:
         assert lent(found, views)[at].all()
         shift = np.linalg.norm(np.nanmean(legs, axis=1), axis=-1)
         assert 5 < np.median(shift) < 60
+        kept, whole = (
+            np.ptp(part, axis=1) for part in (found.keypoints[at][:, 11:], views.pixels[at[0], at[1], 0, 11:])
+        )
+        inside = (found.scores[at] > 0).all(axis=-1)
+        assert np.median(kept[inside] / whole[inside]) == pytest.approx(1.0, abs=0.05)
+        assert 0.1 < np.std(np.log(kept[inside] / whole[inside])) < 0.2
 
     def test_where_nobody_is_they_have_poses_of_their_own_at_the_same_rate(self):
         empty = filmed(1000, people=0)
@@ -310,7 +316,9 @@ class TestPoses:
         assert 0.05 < lowest.min() < lowest.max() < 0.09
         assert joints[..., 2].max() < 2.4
         assert (joints[:, 0, 0] > joints[:, 3:5, 0].mean(axis=1)).mean() > 0.99  # they face along x
-        assert (joints[:, 5, 1] > joints[:, 6, 1]).all()  # and their left is left
+        for left in (5, 7, 11, 13):
+            assert (joints[:, left, 1] > joints[:, left + 1, 1]).mean() > 0.99  # and their left is left
+            assert abs((joints[:, left, 1] + joints[:, left + 1, 1]).mean()) < 0.01  # neither side leans
         stature = joints[:, 1:3, 2].mean(axis=1)
         assert 1.45 < np.median(stature) < 1.70
 

@@ -1,0 +1,39 @@
+"""Networks in the place of the simulated detector: keypoints and descriptors that are read off rendered pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mvpose import COCO17
+from mvpose.networks import PoseHead, ReId
+from mvpose.networks.crops import Images
+from simharness.detector.conditions import BOX_SHARE
+from simharness.detector.detect import Detected
+from simharness.detector.fitting.classes import classify
+
+
+def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:
+    """The same boxes with the keypoints that a pose head reads in them; their classes are by distance.
+
+    Args:
+        head: a top-down head for COCO-17.
+        detected: one frame: of the simulated detections only the boxes are used.
+        images: of each view (h, w, 3) uint8, or None where none arrives.
+    """
+    boxes = detected.detections
+    read = head.detect(images, boxes.view, boxes.boxes, box_scores=boxes.box_scores)
+    truth = detected.truth
+    real = truth.person >= 0
+    shown = truth.boxes[boxes.view, truth.person]
+    unit = np.sqrt(BOX_SHARE * shown[:, 2:].prod(axis=1))[:, None] * np.array(COCO17.sigmas)
+    target = np.where(real[:, None, None], truth.pixels[boxes.view, truth.person], np.nan)
+    error = classify(read.keypoints, target, unit)
+    error[~real] = np.where(read.scores[~real] > 0, truth.error[~real], error[~real])
+    return Detected(read, replace(truth, error=error))
+
+
+def read_descriptors(network: ReId, detected: Detected, images: Images) -> Detected:
+    """The same detections with the descriptors that a re-ID network reads in their boxes."""
+    return replace(detected, detections=network.describe(detected.detections, images))
