@@ -21,6 +21,7 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.correlation import Chances
 from simharness.detector.decoys import decoy_hits
 from simharness.detector.delivery import delivered
+from simharness.detector.describing import Describer, Looks
 from simharness.detector.found import Found
 from simharness.detector.heatmaps import Peaks, in_crops
 from simharness.detector.keypoints import find_keypoints
@@ -47,7 +48,9 @@ class Detected:
     peaks: Peaks | None = None
 
 
-def detect(sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed: int) -> list[Detected]:
+def detect(
+    sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed: int, looks: Looks | None = None
+) -> list[Detected]:
     """Detect the people of every frame in every view.
 
     A repeated picture gives the detections of the frame that it was taken in.
@@ -58,6 +61,7 @@ def detect(sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed
         rig: the cameras, as believed.
         config: how the detector errs.
         seed: of the scenario.
+        looks: how descriptors are drawn; None: detections carry none.
     """
     chances = Chances(seed, sequence.time, len(rig))
     parts = [
@@ -69,7 +73,12 @@ def detect(sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed
     if config.heatmaps.size != "none":
         found = in_crops(found)
     found = delivered(found, views.source)
-    return _frames(found, sequence, views, config)
+    describe = None
+    if looks is not None:
+        others = sum(part.there.shape[2] for part in parts[:2])
+        life = config.correlation.scatter_life
+        describe = Describer(sequence, views, rig, looks, chances, first_decoy=others, life=life)
+    return _frames(found, sequence, views, config, describe)
 
 
 def find_people(sequence: Sequence, views: Views, rig: Rig, config: Detector, chances: Chances) -> Found:
@@ -94,7 +103,9 @@ def find_people(sequence: Sequence, views: Views, rig: Rig, config: Detector, ch
     return in_boxes(people, views, rig, config.boxes, chances)
 
 
-def _frames(found: Found, sequence: Sequence, views: Views, config: Detector) -> list[Detected]:
+def _frames(
+    found: Found, sequence: Sequence, views: Views, config: Detector, describe: Describer | None
+) -> list[Detected]:
     """Blocks to frames."""
     frame, view, slot = np.nonzero(found.there)
     order = np.lexsort((slot, -found.box_scores[frame, view, slot], view, frame))
@@ -103,12 +114,19 @@ def _frames(found: Found, sequence: Sequence, views: Views, config: Detector) ->
         key: getattr(found, key)[frame, view, slot]
         for key in ("keypoints", "scores", "boxes", "box_scores", "person", "error", "rivals")
     }
+    descriptors = None if describe is None else describe(frame, view, slot, chosen["person"])
     heat = config.heatmaps.size != "none"
     result = []
     for t, (start, end) in enumerate(itertools.pairwise(np.searchsorted(frame, np.arange(len(sequence) + 1)))):
         mine = {key: values[start:end] for key, values in chosen.items()}
         detections = Detections(
-            view[start:end], mine["keypoints"], mine["scores"], mine["boxes"], mine["box_scores"], COCO17
+            view[start:end],
+            mine["keypoints"],
+            mine["scores"],
+            mine["boxes"],
+            mine["box_scores"],
+            COCO17,
+            None if descriptors is None else descriptors[start:end],
         )
         truth = Truth(
             joints=sequence.joints[t],

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mvpose import Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
-from simharness.experiment.work import pose_head, re_id, renderer_of
+from simharness.experiment.work import looks_of, pose_head, re_id, renderer_of
 from simharness.rendering.renderer import Unavailable
 from simharness.rigs.faults import shoot
 from simharness.rigs.layouts import build_rig
@@ -40,6 +40,7 @@ def prepare(scenario: Scenario) -> Trial:
     Raises:
         ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant, no network.
     """
+    looks_of(scenario)
     described = scenario.appearance.source != "none"
     if scenario.detector.onnx:
         pose_head(scenario)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
@@ -15,6 +16,7 @@ from mvpose.pipeline import READ_HEATMAPS, Estimator
 
 if TYPE_CHECKING:
     from mvpose.networks import PoseHead, ReId
+    from simharness.detector.describing import Looks
     from simharness.detector.detect import Detected
     from simharness.rendering.film import Eye
     from simharness.rendering.picture import Studio
@@ -132,6 +134,25 @@ def re_id(scenario: Scenario) -> ReId:
         return ReId(scenario.appearance.network) if scenario.appearance.network else ReId()
     except ValueError as error:
         raise ValueError(f"appearance.network: {error}") from None
+
+
+def looks_of(scenario: Scenario) -> Looks | None:
+    """How the descriptors of a scenario are drawn; None where they are not.
+
+    Raises:
+        ValueError: nobody measured the distances of its network; the message names the key.
+    """
+    if scenario.appearance.source != "drawn":
+        return None
+    from mvpose.networks.reid import DEFAULT
+    from simharness.detector.describing import Looks
+    from simharness.detector.descriptors import DescriptorModel
+
+    try:
+        model = DescriptorModel.of_network(Path(scenario.appearance.network or DEFAULT))
+    except ValueError as error:
+        raise ValueError(f"appearance.network: {error}") from None
+    return Looks(model, scenario.people.look_alike)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,199 @@
+"""Descriptors without pictures: drawn so that their distances are what a re-ID network's are.
+
+A descriptor is a unit vector in the direction of
+
+    who (as alike as the scene's people are)  +  from where (what front, side and back show)  +  noise
+
+How much of each there is, and in how many dimensions, follows from the distances that were measured when the network
+was trained and that its card states: of one person and of two, by the angle between the bearings from which the two
+crops see their people, by how much of the person is hidden, and by the ``look_alike`` dial.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from mvpose.camera import Rig
+from simharness.detector.bias import body_axes
+from simharness.random import stream
+from simharness.rendering.visibility import Visibility
+
+Floats = NDArray[np.float64]
+
+_HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
+_FEWEST, _MOST = 6, 256  # dimensions
+
+
+@dataclass(frozen=True)
+class Look:
+    """What descriptors are made of, at one value of the dial.
+
+    Attributes:
+        who: share of a clear crop's variance that says who it is; the rest says from where it is seen.
+        alike: how much of who they are the people of a scene have in common.
+        alike_sides: the same of what their sides look like.
+    """
+
+    who: float
+    alike: float
+    alike_sides: float
+
+
+@dataclass(frozen=True)
+class DescriptorModel:
+    """The distances of one network.
+
+    Attributes:
+        dimensions: of the descriptors that are drawn: as many as spread distances as much as the network's.
+        dials: values of ``look_alike`` at which it was measured, ascending, (d,).
+        looks: what was found at each.
+        covers: shares of hidden joints, ascending, (h,).
+        noise: variance of the noise there, in units of a clear crop's variance, (h,).
+    """
+
+    dimensions: int
+    dials: tuple[float, ...]
+    looks: tuple[Look, ...]
+    covers: tuple[float, ...]
+    noise: tuple[float, ...]
+
+    @classmethod
+    def of_network(cls, model: Path) -> Self:
+        """The model of a network, from the card beside its file.
+
+        Raises:
+            ValueError: there is no card, or it states no distances.
+        """
+        path = model.with_suffix(".json")
+        try:
+            card = json.loads(path.read_text(encoding="utf-8"))
+            return cls.fitted(card["distances"])
+        except (OSError, json.JSONDecodeError, KeyError) as error:
+            raise ValueError(
+                f"{path}: no card with the distances of {model.name} ({error}); they are measured by "
+                "python -m simharness.train.reid. For a network without them take descriptors from pictures"
+            ) from None
+
+    @classmethod
+    def fitted(cls, distances: Mapping[str, Any]) -> Self:
+        """Fit the model to measured distances: ``distances`` of a card (:mod:`simharness.train.reid.evaluation`).
+
+        Least squares over the mean cosines of all bins, each weighed by its pairs' share in its kind.
+        """
+        edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
+        turns = np.deg2rad(_middles(np.array(distances["view_difference_degrees"])))
+        measured = {float(dial): kinds for dial, kinds in distances["look_alike"].items()}
+        dials = sorted(measured)
+        covers = len(edges) - 1
+        cells = [
+            (d, kind == "same", v, h, bin_["cosine"], np.sqrt(bin_["pairs"] / measured[dial][kind]["all"]["pairs"]))
+            for d, dial in enumerate(dials)
+            for kind in ("same", "other")
+            for v, row in enumerate(measured[dial][kind]["bins"])
+            for h, bin_ in enumerate(row)
+            if bin_["pairs"]
+        ]
+        d, same, v, h, cosine, weight = (np.array(column) for column in zip(*cells, strict=True))
+        same, turn = same.astype(bool), np.cos(turns)[v]
+
+        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+            who, alike, sides = (1 / (1 + np.exp(-x[: 3 * len(dials)]))).reshape(3, -1)
+            return who, alike, sides, np.cumsum(np.exp(x[3 * len(dials) :]))
+
+        def misfit(x: Floats) -> Floats:
+            who, alike, sides, noise = parts(x)
+            signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * (1 - who[d]) * turn
+            return np.asarray(weight * (signal / np.sqrt((1 + noise[h]) * (1 + noise[0])) - cosine))
+
+        start = np.concatenate([np.full(len(dials), 1.5), np.linspace(-2, 2, len(dials)), np.zeros(len(dials))])
+        start = np.concatenate([start, np.log(np.full(covers, 0.1))])
+        who, alike, sides, noise = parts(least_squares(misfit, start).x)
+        looks = tuple(Look(*map(float, each)) for each in zip(who, alike, sides, strict=True))
+        # How the cosines of two people spread at the lowest setting tells in how many dimensions they live.
+        spread = _cosine_deviation(measured[dials[0]]["other"]["all"], distances["quantiles"])
+        clear = (1 + noise[0]) * (1 + noise[min(1, covers - 1)])
+        varied = np.sqrt(1 - looks[0].alike * looks[0].who) / np.sqrt(clear)
+        dimensions = int(np.clip(round((varied / spread) ** 2), _FEWEST, _MOST))
+        middles = _middles(edges)
+        return cls(dimensions, tuple(dials), looks, tuple(map(float, middles)), tuple(map(float, noise)))
+
+    def look(self, look_alike: float) -> Look:
+        """What descriptors are made of at a value of the dial, between those that were measured."""
+        table = np.array([[look.who, look.alike, look.alike_sides] for look in self.looks])
+        return Look(*(float(np.interp(look_alike, self.dials, column)) for column in table.T))
+
+    def draw(
+        self,
+        who: Sequence[tuple[str | int, ...]],
+        *,
+        bearing: ArrayLike,
+        hidden: ArrayLike,
+        noise: ArrayLike,
+        look_alike: float,
+        seed: int,
+    ) -> Floats:
+        """Draw descriptors of n crops.
+
+        Args:
+            who: whom each crop shows, a key of streams, (n,); equal keys are one person.
+            bearing: from where, radians about the person's vertical, (n,).
+            hidden: share of the joints hidden, (n,).
+            noise: each crop's own, standard normal, (n, D).
+            look_alike: the dial.
+            seed: of the scenario.
+
+        Returns:
+            Unit vectors, (n, D).
+        """
+        look, size = self.look(look_alike), self.dimensions
+        bearing, hidden = np.asarray(bearing, float), np.asarray(hidden, float)
+        shared = np.array([look.alike, look.alike_sides, look.alike_sides])[:, None]
+        common = np.sqrt(shared) * _drawn(seed, ("all",), size)
+        keys = {key: number for number, key in enumerate(dict.fromkeys(who))}
+        people = np.array([common + np.sqrt(1 - shared) * _drawn(seed, key, size) for key in keys]).reshape(-1, 3, size)
+        whom = np.array([keys[key] for key in who], int)
+        direction = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+        amount = np.sqrt([look.who, 1 - look.who, 1 - look.who]) * np.insert(direction, 0, 1.0, axis=-1)
+        strength = np.sqrt(np.interp(hidden, self.covers, self.noise) / size)[:, None]
+        result = np.einsum("nk,nkd->nd", amount, people[whom]) + strength * np.asarray(noise, float)
+        return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
+
+
+def bearings(joints: ArrayLike, rig: Rig) -> Floats:
+    """From where V cameras see people (T, P, 17, 3), radians from straight ahead, to the left, (T, V, P)."""
+    joints = np.asarray(joints, float)
+    forward = body_axes(joints)[..., 0, :2]
+    hips = joints[..., 11:13, :2].mean(axis=-2)
+    result = []
+    for camera in rig:
+        toward = camera.center[:2] - hips
+        result.append(np.arctan2(toward[..., 1], toward[..., 0]) - np.arctan2(forward[..., 1], forward[..., 0]))
+    return np.stack(result, axis=1)
+
+
+def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
+    """Share of the joints (..., J) that something else hides or the border cuts off, (...)."""
+    return np.isin(visibility, _HIDDEN).mean(axis=-1)
+
+
+def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
+    """Who, what front and back, and what left and right look like: vectors of about unit length, (3, D)."""
+    return stream(seed, "descriptor", *key).standard_normal((3, size)) / np.sqrt(size)
+
+
+def _middles(edges: Floats) -> Floats:
+    return 0.5 * (edges[1:] + edges[:-1])
+
+
+def _cosine_deviation(summary: Mapping[str, Any], quantiles: Sequence[float]) -> float:
+    """Deviation of the cosines whose distances have the quantiles of a summary."""
+    ranks = (np.arange(1000) + 0.5) / 1000
+    return float(np.std(1 - np.interp(ranks, quantiles, summary["quantiles"]) ** 2 / 2))
