@@ -1,4 +1,4 @@
-"""The command line: ``simharness run``, ``simharness render`` and ``simharness evaluate``.
+"""The command line: ``simharness run``, ``render``, ``evaluate`` and ``fit-detector``.
 
 Exit codes: 0 fine, 2 bad input (one message on stderr), 3 the run itself failed (with its traceback).
 Nothing heavy is imported before a command needs it.
@@ -46,6 +46,8 @@ app = typer.Typer(
 )
 evaluating = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
 app.add_typer(evaluating, name="evaluate")
+fitting = typer.Typer(no_args_is_help=True, help="Measure a real detector and write the profile that errs as it does.")
+app.add_typer(fitting, name="fit-detector")
 
 
 def main() -> None:
@@ -190,6 +192,74 @@ def shelf(
         if json_file is not None:
             _write_json(evaluation.summary(), json_file)
     print_evaluation(evaluation, Console())
+
+
+@evaluating.command()
+def twin(
+    folder: Annotated[Path, typer.Argument(help="The published files of Shelf.", metavar="FOLDER")],
+    scenario: Annotated[Path, typer.Option(metavar="SCENARIO", help="The simulated twin.", dir_okay=False)] = Path(
+        "scenarios/shelf.toml"
+    ),
+    twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
+    ] = None,
+) -> None:
+    """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
+    with _border():
+        from simharness.datasets.shelf import read_shelf
+        from simharness.experiment.progress import reporter
+        from simharness.experiment.twin import compare, print_comparison
+        from simharness.scenario.load import load
+
+        loaded, recorded = load(scenario), read_shelf(folder)
+        with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
+            comparison = compare(recorded, loaded, count=twins, progress=advance)
+        if json_file is not None:
+            _write_json(comparison.summary(), json_file)
+    print_comparison(comparison, Console())
+
+
+@fitting.command("shelf")
+def fit_shelf(
+    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the profile there, a TOML file.", dir_okay=False)
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a PNG there: measured beside its simulated twin.", dir_okay=False),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures there.", dir_okay=False)
+    ] = None,
+) -> None:
+    """Shelf: OpenPose on frames 300 to 599 against the published truth.
+
+    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
+    """
+    with _border():
+        from simharness.datasets.shelf import read_shelf
+        from simharness.detector.fitting.fit import fit, twin_of, write_profile
+        from simharness.detector.fitting.plot import plot_comparison
+        from simharness.detector.fitting.sample import of_shelf
+        from simharness.detector.fitting.table import print_agreement, print_measurement
+
+        sample = of_shelf(read_shelf(folder))
+        fitted = fit(sample, command="simharness fit-detector shelf FOLDER --out FILE")
+        if out is not None:
+            write_profile(fitted, out)
+        print_measurement(fitted.real, Console())
+        summary = {"real": fitted.real.summary()}
+        if figure is not None:
+            with _after_reading():
+                simulated = twin_of(fitted, sample)
+            plot_comparison([fitted.real, simulated], figure)
+            print_agreement(fitted.real, simulated, Console())
+            summary["simulated"] = simulated.summary()
+        if json_file is not None:
+            _write_json(summary, json_file)
 
 
 def _write_json(summary: dict[str, Any], path: Path) -> None:

@@ -81,6 +81,7 @@ def choreograph(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) ->
         stage.wishes,
         area=people.area,
         spacing=people.spacing,
+        around=people.around,
         span=(float(time[0]), float(time[-1])),
         people=[party.people[0] for party in parties],
         admit=stage.admit,

@@ -88,6 +88,7 @@ def plan_tracks(
     area: float,
     spacing: float,
     span: tuple[float, float],
+    around: float = 0.0,
     people: Sequence[int] | None = None,
     admit: Admit = lambda index, track, before: True,
 ) -> tuple[Track, ...]:
@@ -104,6 +105,7 @@ def plan_tracks(
         area: half the side of the square about the origin that pelvises stay in, metres.
         spacing: least distance between two pelvises, metres.
         span: the first and the last time that the plan must hold for, seconds.
+        around: radius about the origin that pelvises stay out of, metres.
         people: the index of the person whose stream draws for each wish; by default the index of the wish.
         admit: a further condition, asked for tracks that keep their distance.
 
@@ -117,7 +119,7 @@ def plan_tracks(
     people = range(len(wishes)) if people is None else people
     placed, refused = 0, 0
     for plan in range(_PLANS):
-        board = _Board(span, spacing)
+        board = _Board(span, spacing, around)
         order = list(range(len(wishes)))
         if plan:
             order.sort(key=lambda index: _urgency(wishes[index], movers_first=plan % 2 == 0))
@@ -167,10 +169,10 @@ def _place(
 class _Board:
     """The tracks so far, and where they are at the coarse checks."""
 
-    def __init__(self, span: tuple[float, float], spacing: float) -> None:
+    def __init__(self, span: tuple[float, float], spacing: float, around: float) -> None:
         self.tracks: dict[int, Track] = {}  # by the index of the wish, in the order in which they were found
         self._needs: list[float] = []
-        self._spacing = spacing
+        self._spacing, self._around = spacing, around
         self._time = np.linspace(*span, max(2, int(np.ceil((span[1] - span[0]) / _COARSE)) + 1))
         self._taken = np.empty((0, len(self._time), 2))
 
@@ -184,7 +186,9 @@ class _Board:
         self._taken = np.concatenate([self._taken, track.position(self._time)[None]])
 
     def apart(self, track: Track, wish: Wish) -> bool:
-        """Whether a track keeps its distance from all the others at the same times."""
+        """Whether a track keeps its distance from the middle, and from all the others at the same times."""
+        if self._around and not self._clear_of_middle(track, wish):
+            return False
         if not self.tracks:
             return True
         least = self._spacing + 2 * SWAY + _clearance(wish) + np.array(self._needs)[:, None]
@@ -204,6 +208,13 @@ class _Board:
             if (_distance(track.position(times), others[k].position(times)) < least[k]).any():
                 return False
         return True
+
+    def _clear_of_middle(self, track: Track, wish: Wish) -> bool:
+        least = self._around + SWAY + _clearance(wish)
+        if (np.hypot(*track.position(self._time).T) < least).any():
+            return False
+        fine = np.arange(self._time[0], self._time[-1], _FINE)
+        return track.fastest == 0 or bool((np.hypot(*track.position(fine).T) >= least).all())
 
     def elbow_room(self, spot: Track, wish: Wish, half: float) -> float:
         """How much further than it must be a spot is from the next track or from edges of the square, metres.

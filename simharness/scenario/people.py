@@ -51,6 +51,10 @@ class People(Section):
         description="handed out in turn, one to each person, those of pairs to two at a time",
     )
     area: Positive = Field(2.0, description="half the side of the square about the origin that they stay in, metres")
+    around: Amount = Field(
+        0.0,
+        description="radius about the origin that they keep free, metres; the first thing of the clutter stands there",
+    )
     spacing: Positive = Field(0.8, description="least distance between the pelvises of two people, metres")
     children: Share = Field(0.0, description="chance that a person is a child of 5 to 12 years")
     look_alike: Share = Field(0.0, description="0: everybody is dressed differently; 1: all wear one uniform")

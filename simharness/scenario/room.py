@@ -24,6 +24,7 @@ class Clutter(Section):
 
     boxes: Count = 0
     shelves: Count = 0
+    racks: Count = Field(0, description="bare frames as high as a chest, that hide little")
     tables: Count = 0
     chairs: Count = 0
     pillars: Count = 0

@@ -107,6 +107,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         joints=np.stack(joints, axis=1) if joints else np.zeros((len(clock), 0, 17, 3)),
         rig=rig,
         taken=props,
+        around=people.around,
     )
     decoys = place_decoys(seed, scenario.decoys, space)
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys))

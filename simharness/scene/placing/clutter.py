@@ -11,12 +11,12 @@ from simharness.random import stream
 from simharness.scenario.room import Clutter, Room
 from simharness.scene.placing.carts import place_cart
 from simharness.scene.placing.coverage import cover
-from simharness.scene.placing.placement import TRIES, FreeSpace, Site, Where, about, beside
+from simharness.scene.placing.placement import TRIES, FreeSpace, Site, Where, about, beside, middle
 from simharness.scene.things.fixtures import draw_partition, draw_pillar
 from simharness.scene.things.furniture import draw_chair, draw_table
 from simharness.scene.things.plants import draw_plant
 from simharness.scene.things.solids import Solid, Thing
-from simharness.scene.things.storage import draw_box, draw_shelf
+from simharness.scene.things.storage import draw_box, draw_rack, draw_shelf
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class Species:
 SPECIES = (
     Species("pillar", "pillars", lambda rng, room: draw_pillar(rng, room.size[2]), about),
     Species("shelf", "shelves", lambda rng, room: draw_shelf(rng), beside),
+    Species("rack", "racks", lambda rng, room: draw_rack(rng), beside, fills=False),
     Species("partition", "partitions", lambda rng, room: draw_partition(rng), beside),
     Species("table", "tables", lambda rng, room: draw_table(rng), beside, fills=False),
     Species("box", "boxes", lambda rng, room: draw_box(rng), about),
@@ -53,7 +54,8 @@ def place_clutter(seed: int, clutter: Clutter, space: FreeSpace) -> tuple[Solid,
     """Draw the clutter and find a place for each thing.
 
     Each thing is drawn and placed by a stream of its own: one more box moves nothing that stood before it. Nothing
-    comes within 0.5 m of a lens, and all things at rest fill at most 60 % of any one picture.
+    comes within 0.5 m of a lens, and all things at rest fill at most 60 % of any one picture. Where people keep the middle
+    free (``people.around``), the first thing stands there.
 
     Raises:
         ValueError: a thing finds no place, or ``clutter.coverage`` cannot be reached.
@@ -74,7 +76,8 @@ def _place(seed: int, species: Species, k: int, site: Site) -> Solid:
     thing = species.draw(stream(seed, "clutter", species.name, k), site.space.room)
     rng = stream(seed, "clutter", species.name, k, "place")
     name = f"{species.name}{k}"
-    solid = site.find(rng, thing, species.where, kind="clutter", name=name)
+    first = site.space.around > 0 and not any(solid.kind == "clutter" for solid in site.solids)
+    solid = site.find(rng, thing, middle if first else species.where, kind="clutter", name=name)
     if solid is None:
         raise ValueError(
             f"clutter.{species.plural}: {species.name} {k} finds no place in {TRIES} tries beside {len(site.solids)} "

@@ -46,6 +46,7 @@ class FreeSpace:
         joints: where joints are then, (N, P, J, 3) metres.
         rig: the cameras.
         taken: what stands there already.
+        around: radius about the origin that people keep free, metres.
     """
 
     room: Room
@@ -55,6 +56,7 @@ class FreeSpace:
     joints: Floats
     rig: Rig
     taken: tuple[Solid, ...] = ()
+    around: float = 0.0
 
     @cached_property
     def half(self) -> Floats:
@@ -169,6 +171,12 @@ def standing(solid: Solid) -> list[Box]:
     cells = np.round(solid.trajectory.at(moments) * [10, 10, 10, 20, 20, 20, 20]).astype(int)
     _, first = np.unique(cells, axis=0, return_index=True)
     return [solid.hull_at(moment) for moment in moments[first]]
+
+
+def middle(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+    """At the origin, or as near as may be: within the disc that people keep free."""
+    share, bearing, yaw = rng.uniform(), *rng.uniform(0.0, 2 * np.pi, 2)
+    return 0.5 * space.around * share * np.array([np.cos(bearing), np.sin(bearing)]), float(yaw)
 
 
 def about(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:

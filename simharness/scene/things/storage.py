@@ -1,4 +1,4 @@
-"""Storage that stands in the way: boxes, stacked or not, and open bookshelves with things on their boards."""
+"""Storage that stands in the way: boxes, stacked or not, open bookshelves with things on their boards, bare racks."""
 
 from __future__ import annotations
 
@@ -31,6 +31,9 @@ BOX_COLORS = np.array(
 _TAPE = 0.06  # metres
 _SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
 _BOARD = 0.025
+_RACK_WIDTH, _RACK_HEIGHT, _RACK_DEPTH = (0.6, 0.8), (1.0, 1.3), (0.30, 0.38)
+_POST, _SHEET = 0.03, 0.015
+_METAL = np.array([[0.72, 0.73, 0.75], [0.25, 0.26, 0.28], [0.88, 0.88, 0.86]])
 WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
 BOOK_COLORS = np.array(
     [
@@ -91,6 +94,21 @@ def draw_shelf(rng: np.random.Generator) -> Thing:
         parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
     boxes, colors = zip(*parts, strict=True)
     return Assembly().boxes(boxes, np.array(colors)).thing()
+
+
+def draw_rack(rng: np.random.Generator) -> Thing:
+    """A rack of thin posts and boards, bare and as high as a chest: it stands in the way, and hides little."""
+    width, height, depth = rng.uniform(*_RACK_WIDTH), rng.uniform(*_RACK_HEIGHT), rng.uniform(*_RACK_DEPTH)
+    levels = np.linspace(0.12, height - 0.06, int(rng.integers(3, 5)))
+    metal = _METAL[rng.integers(len(_METAL))]
+    posts = [
+        Box((x * (depth - _POST) / 2, y * (width - _POST) / 2, height / 2), (_POST / 2, _POST / 2, height / 2))
+        for x in (-1.0, 1.0)
+        for y in (-1.0, 1.0)
+    ]
+    boards = [Box((0.0, 0.0, float(z)), (depth / 2, width / 2, _SHEET / 2)) for z in levels]
+    boxes = posts + boards
+    return Assembly().boxes(boxes, np.array([metal] * len(posts) + [0.9 * metal] * len(boards))).thing()
 
 
 def _things(

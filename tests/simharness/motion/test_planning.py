@@ -145,3 +145,12 @@ def test_a_recorded_way_too_long_names_its_keys():
     wish = Replaying("mocap", times, np.column_stack([times, times]))
     with pytest.raises(ValueError, match=r"people.motion.*people.area = 1 m.*people.motion.start"):
         plan_tracks(0, [wish], area=1.0, spacing=0.5, span=SPAN)
+
+
+def test_people_keep_the_middle_free():
+    tracks = plan_tracks(3, [STAND, WALK, STAND], area=2.2, spacing=0.6, span=SPAN, around=0.9)
+    times = np.arange(*SPAN, 0.01)
+    for track in tracks:
+        assert np.hypot(*track.position(times).T).min() >= 0.9
+    free = plan_tracks(3, [STAND, WALK, STAND], area=2.2, spacing=0.6, span=SPAN)
+    assert min(np.hypot(*track.position(times).T).min() for track in free) < 0.9

@@ -3,7 +3,10 @@ import pytest
 from walkers import Rays, ring, space
 
 from simharness.random import stream
+from simharness.rigs.layouts import build_rig
+from simharness.scenario.models import Scenario
 from simharness.scenario.room import Clutter, Room
+from simharness.scene.build import build
 from simharness.scene.placing.clutter import SPECIES, place_clutter
 from simharness.scene.placing.placement import BODY_HALF_WIDTH, LENS, LIMB
 from simharness.scene.placing.sight import Pictures, cuts
@@ -12,7 +15,7 @@ from simharness.scene.things.storage import draw_box, draw_shelf
 
 ROOM = Room()
 DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in SPECIES} | {"cart": draw_cart}
-EVERYTHING = Clutter(boxes=2, shelves=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
+EVERYTHING = Clutter(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
 
 
 def extent(thing):
@@ -160,3 +163,19 @@ def test_what_finds_no_place_is_told():
         place_clutter(0, Clutter(tables=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
     with pytest.raises(ValueError, match=r"clutter.carts: no way is free for cart \d+.*lower clutter.carts"):
         place_clutter(0, Clutter(carts=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
+
+
+def test_where_people_keep_the_middle_free_the_first_thing_stands_there():
+    scenario = Scenario.model_validate(
+        {
+            "name": "about",
+            "duration": 1.0,
+            "people": {"count": 3, "activities": ["reach"], "area": 1.6, "around": 0.9},
+            "clutter": {"boxes": 1, "racks": 1},
+            "cameras": {"count": 3},
+        }
+    )
+    scene = build(scenario, build_rig(scenario.cameras))
+    places = {solid.name: np.hypot(*solid.hull.center[:2]) for solid in scene.solids if solid.kind == "clutter"}
+    assert places["rack0"] < 0.45
+    assert places["box0"] > 0.9

@@ -1,0 +1,81 @@
+"""How large people are in the pictures, from their joints alone: recordings come without silhouettes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose import COCO17, Rig
+from simharness.detector.conditions import BOX_SHARE
+from simharness.detector.fitting.sample import LIMBS
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FLESH = 0.085
+"""Metres about every joint of the limbs and the crown. With CROWN: widths and heights of the boxes are right to 1 % in
+the median for simulated, dressed people who walk, reach, point and turn; the root of the area is right to 10 % for 90 %
+of them."""
+
+CROWN = 0.6
+"""How far the crown is above the middle of the shoulders, as a share of the trunk's length."""
+
+_CHIN = 0.35
+"""Where the face is, on the same scale."""
+
+_SHOULDERS, _HIPS = [5, 6], [11, 12]
+
+
+def head(joints: Floats, *, height: float) -> Floats:
+    """A point of the head, (..., 3), above the shoulders of COCO-17 joints (..., 17, 3) by a share of the trunk."""
+    shoulders, hips = joints[..., _SHOULDERS, :].mean(axis=-2), joints[..., _HIPS, :].mean(axis=-2)
+    return shoulders + height * (shoulders - hips)
+
+
+def boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROWN) -> Floats:
+    """Boxes x, y, width, height of what the pictures show of people, (T, V, P, 4); zeros where they do not.
+
+    Args:
+        joints: COCO-17, (T, P, 17, 3) metres; only the limbs are looked at.
+        rig: the V cameras.
+        flesh: metres about every joint.
+        crown: above the shoulders, in lengths of the trunk.
+    """
+    points = np.concatenate([joints[..., LIMBS, :], head(joints, height=crown)[..., None, :]], axis=-2)
+    result = []
+    for camera in rig:
+        pixels = camera.project(points)
+        focal = np.sqrt(camera.K[0, 0] * camera.K[1, 1])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            around = (flesh * focal / camera.depth(points))[..., None]
+        limit = np.asarray(camera.size, float) - 1
+        whole = np.all(np.isfinite(pixels), axis=(-1, -2))  # nobody who is partly behind the camera
+        low = np.clip(np.where(whole[..., None], (pixels - around).min(axis=-2), 0.0), 0, limit)
+        high = np.clip(np.where(whole[..., None], (pixels + around).max(axis=-2), 0.0), 0, limit)
+        result.append(np.concatenate([low, high - low], axis=-1))
+    return np.stack(result, axis=1)
+
+
+def units(boxes: Floats) -> Floats:
+    """OKS sigma x sqrt(area) of each joint, (..., 17) pixels, of people in boxes (..., 4)."""
+    return np.sqrt(BOX_SHARE * boxes[..., 2] * boxes[..., 3])[..., None] * np.asarray(COCO17.sigmas)
+
+
+def image_axes(joints: Floats, rig: Rig) -> Floats:
+    """Directions right and down in the pictures, at right angles to where each person is, (T, V, P, 2, 3)."""
+    center = joints[:, :, LIMBS].mean(axis=2)
+    result = []
+    for camera in rig:
+        forward = center - camera.center
+        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+        right = np.cross(camera.R[1], forward)
+        right /= np.linalg.norm(right, axis=-1, keepdims=True)
+        result.append(np.stack([right, np.cross(forward, right)], axis=-2))
+    return np.stack(result, axis=1)
+
+
+def in_picture(joints: Floats, rig: Rig) -> Bools:
+    """Which joints fall on the pictures, (T, V, P, 17); of the face, whether the middle of the head does."""
+    points = joints.copy()
+    points[..., : LIMBS[0], :] = head(joints, height=_CHIN)[..., None, :]
+    return np.stack([camera.inside(camera.project(points)) for camera in rig], axis=1)
