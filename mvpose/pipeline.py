@@ -62,16 +62,18 @@ class Pipeline:
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
 
     @staticmethod
-    def preset(name: str, *, appearance: AppearanceAffinity = AppearanceAffinity()) -> Estimator:
+    def preset(name: str, *, appearance: AppearanceAffinity | None = None) -> Estimator:
         """One of the named variants, :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
 
         Args:
             name: of the variant.
-            appearance: what distances of descriptors mean; of a network ``ReId.affinity`` says it.
+            appearance: what distances of descriptors mean; of a network ``ReId.affinity`` says it. By default what they
+                mean in general.
 
         Raises:
             ValueError: a name that is none of them.
         """
+        appearance = appearance or AppearanceAffinity()
         full = Pipeline(affinity=FusedAffinity(appearance=appearance))
         variants: dict[str, Estimator] = {
             "full": full,

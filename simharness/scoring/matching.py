@@ -1,8 +1,8 @@
 """Scores of the matching alone, over pairs of detections in different views.
 
 A pair is positive where both detections show one true person; the method says so where both carry one label.
-Phantoms (person -1) and unmatched detections (label -1) are in no positive pair. A detector may find a person twice in one
-view; a matching takes one of the two, so what is lost is counted by people and views, not by detections.
+Phantoms (person -1) and unmatched detections (label -1) are in no positive pair. A detector may find a person twice in
+one view; a matching takes one of the two, so what is lost is counted by people and views, not by detections.
 """
 
 from __future__ import annotations

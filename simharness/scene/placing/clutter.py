@@ -54,8 +54,8 @@ def place_clutter(seed: int, clutter: Clutter, space: FreeSpace) -> tuple[Solid,
     """Draw the clutter and find a place for each thing.
 
     Each thing is drawn and placed by a stream of its own: one more box moves nothing that stood before it. Nothing
-    comes within 0.5 m of a lens, and all things at rest fill at most 60 % of any one picture. Where people keep the middle
-    free (``people.around``), the first thing stands there.
+    comes within 0.5 m of a lens, and all things at rest fill at most 60 % of any one picture. Where people keep the
+    middle free (``people.around``), the first thing stands there.
 
     Raises:
         ValueError: a thing finds no place, or ``clutter.coverage`` cannot be reached.
