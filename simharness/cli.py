@@ -221,6 +221,34 @@ def twin(
     print_comparison(comparison, Console())
 
 
+@evaluating.command("seeds")
+def evaluate_seeds(
+    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="How many seeds.")] = 10,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
+    ] = None,
+) -> None:
+    """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
+    with _border():
+        from simharness.experiment.progress import reporter
+        from simharness.experiment.seeds import evaluate_seeds as evaluate_at
+        from simharness.experiment.seeds import print_seeds
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or ())
+        with reporter() as bars, bars.stage("evaluate", seeds) as advance:
+            result = evaluate_at(loaded, seeds, progress=advance)
+        if json_file is not None:
+            _write_json(result.summary(), json_file)
+    print_seeds(result, Console())
+
+
 @fitting.command("shelf")
 def fit_shelf(
     folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],

@@ -30,23 +30,25 @@ _TRUTH = "Shelf's truth: a MATLAB 5 file with actor3D, 4 actors x 3200 frames of
 
 @dataclass(frozen=True)
 class Shelf:
-    """Frames of the Shelf data set.
+    """Frames of the Shelf data set, or of another recording in its form.
 
     Attributes:
-        rig: the five cameras.
-        truth: joints on SHELF14, (F, 4, 14, 3), metres; NaN where the actor is not annotated.
+        rig: the cameras, five of them.
+        truth: joints on SHELF14, (F, A, 14, 3), metres; NaN where the actor is not annotated.
         detections: what the 2D detector found in each of the F frames.
         frames: their indices in the published sequence, from 0, (F,).
+        people: A, how many actors there are.
     """
 
     rig: Rig
     truth: NDArray[np.float64]
     detections: tuple[Detections, ...]
     frames: NDArray[np.int64]
+    people: int = ACTORS
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", as_array(self.frames, ("F",), "frames", np.int64))
-        object.__setattr__(self, "truth", as_array(self.truth, (len(self.frames), ACTORS, 14, 3), "truth"))
+        object.__setattr__(self, "truth", as_array(self.truth, (len(self.frames), self.people, 14, 3), "truth"))
         object.__setattr__(self, "detections", tuple(self.detections))
         if len(self.detections) != len(self.frames):
             raise ValueError(f"expected detections of {len(self.frames)} frames, got {len(self.detections)}")

@@ -22,11 +22,12 @@ class Looks:
 
     Attributes:
         model: what they are made of.
-        look_alike: how alike people are dressed.
+        look_alike: how alike people are dressed, the first ``alike`` of them; 0: all.
     """
 
     model: DescriptorModel
     look_alike: float
+    alike: int = 0
 
 
 class Describer:
@@ -66,12 +67,13 @@ class Describer:
             noise[mine] = self._chances.wandering("descriptor", v, s, shape=noise.shape[1:], life=self._life)[
                 picture[mine]
             ]
+        alike = self._looks.alike or self._bearing.shape[2]
         return self._looks.model.draw(
             [self._who(*each) for each in zip(view.tolist(), slot.tolist(), person.tolist(), strict=True)],
             bearing=np.where(real, self._bearing[picture, view, person], 0.0),
             hidden=np.where(real, self._hidden[picture, view, person], 0.0),
             noise=noise,
-            look_alike=self._looks.look_alike,
+            look_alike=np.where(real & (person < alike), self._looks.look_alike, 0.0),
             seed=self._chances.seed,
         )
 

@@ -125,10 +125,11 @@ class DescriptorModel:
         middles = _middles(edges)
         return cls(dimensions, tuple(dials), looks, tuple(map(float, middles)), tuple(map(float, noise)))
 
-    def look(self, look_alike: float) -> Look:
-        """What descriptors are made of at a value of the dial, between those that were measured."""
+    def look(self, look_alike: ArrayLike) -> Floats:
+        """Who, alike and alike_sides (:class:`Look`) at values of the dial (...), between those measured, (..., 3)."""
         table = np.array([[look.who, look.alike, look.alike_sides] for look in self.looks])
-        return Look(*(float(np.interp(look_alike, self.dials, column)) for column in table.T))
+        dial = np.asarray(look_alike, float)
+        return np.stack([np.interp(dial, self.dials, column) for column in table.T], axis=-1)
 
     def draw(
         self,
@@ -137,7 +138,7 @@ class DescriptorModel:
         bearing: ArrayLike,
         hidden: ArrayLike,
         noise: ArrayLike,
-        look_alike: float,
+        look_alike: ArrayLike,
         seed: int,
     ) -> Floats:
         """Draw descriptors of n crops.
@@ -147,23 +148,25 @@ class DescriptorModel:
             bearing: from where, radians about the person's vertical, (n,).
             hidden: share of the joints hidden, (n,).
             noise: each crop's own, standard normal, (n, D).
-            look_alike: the dial.
+            look_alike: the dial of each crop's person, (n,), or of all.
             seed: of the scenario.
 
         Returns:
             Unit vectors, (n, D).
         """
-        look, size = self.look(look_alike), self.dimensions
+        size, count = self.dimensions, len(who)
         bearing, hidden = np.asarray(bearing, float), np.asarray(hidden, float)
-        shared = np.array([look.alike, look.alike_sides, look.alike_sides])[:, None]
-        common = np.sqrt(shared) * _drawn(seed, ("all",), size)
-        keys = {key: number for number, key in enumerate(dict.fromkeys(who))}
-        people = np.array([common + np.sqrt(1 - shared) * _drawn(seed, key, size) for key in keys]).reshape(-1, 3, size)
-        whom = np.array([keys[key] for key in who], int)
-        direction = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-        amount = np.sqrt([look.who, 1 - look.who, 1 - look.who]) * np.insert(direction, 0, 1.0, axis=-1)
+        looks = self.look(np.broadcast_to(np.asarray(look_alike, float), count))
+        common, keys = _drawn(seed, ("all",), size), dict.fromkeys(who)
+        drawn = np.array([_drawn(seed, key, size) for key in keys]).reshape(-1, 3, size)
+        place = {key: k for k, key in enumerate(keys)}
+        own = drawn[np.array([place[key] for key in who], int)]
+        shared = looks[:, [1, 2, 2], None]
+        people = np.sqrt(shared) * common + np.sqrt(1 - shared) * own
+        direction = np.stack([np.ones(count), np.cos(bearing), np.sin(bearing)], axis=-1)
+        amount = direction * np.sqrt(np.stack([looks[:, 0], 1 - looks[:, 0], 1 - looks[:, 0]], axis=-1))
         strength = np.sqrt(np.interp(hidden, self.covers, self.noise) / size)[:, None]
-        result = np.einsum("nk,nkd->nd", amount, people[whom]) + strength * np.asarray(noise, float)
+        result = np.einsum("nk,nkd->nd", amount, people) + strength * np.asarray(noise, float)
         return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
 
 

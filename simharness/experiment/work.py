@@ -152,7 +152,7 @@ def looks_of(scenario: Scenario) -> Looks | None:
         model = DescriptorModel.of_network(Path(scenario.appearance.network or DEFAULT))
     except ValueError as error:
         raise ValueError(f"appearance.network: {error}") from None
-    return Looks(model, scenario.people.look_alike)
+    return Looks(model, scenario.people.look_alike, scenario.people.alike)
 
 
 @dataclass(frozen=True)

@@ -136,14 +136,15 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | No
     )
 
 
-def draw_looks(seed: int, count: int, *, look_alike: float = 0.0) -> tuple[Look, ...]:
+def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0) -> tuple[Look, ...]:
     """Draw the looks of ``count`` people of one scene.
 
     At ``look_alike`` 0 they are easy to tell apart, by the hues of their tops above all: those step around the circle
     by the golden section, which spreads any number of them well, so one more person changes nobody else's look. At 1
     all wear the same uniform; skin, hair and body are still each one's own. Between, colours and widths are mixed in
     proportion, and of the cuts and patterns each changes at a value of its own, drawn once for the scene: so any two
-    people come the nearer to each other, the more the dial is turned up.
+    people come the nearer to each other, the more the dial is turned up. It is about the first ``alike`` people, or
+    about all where that is 0.
 
     Raises:
         ValueError: ``look_alike`` beyond 0 to 1.
@@ -157,7 +158,7 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0) -> tuple[Look,
     for i in range(count):
         female = draw_sex(stream(seed, "people", i, "shape")) == "female"
         own = draw_look(stream(seed, "people", i, "look"), female=female, hue=float(start + i * _GOLDEN))
-        looks.append(_toward(own, uniform, look_alike, changes.tolist()))
+        looks.append(_toward(own, uniform, look_alike, changes.tolist()) if i < (alike or count) else own)
     return tuple(looks)
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from simharness.scenario.section import Amount, Positive, Section, Share
+from simharness.scenario.section import Amount, Count, Positive, Section, Share
 
 Activity = Literal[
     "stand",
@@ -58,6 +58,7 @@ class People(Section):
     spacing: Positive = Field(0.8, description="least distance between the pelvises of two people, metres")
     children: Share = Field(0.0, description="chance that a person is a child of 5 to 12 years")
     look_alike: Share = Field(0.0, description="0: everybody is dressed differently; 1: all wear one uniform")
+    alike: Count = Field(0, description="how many people look_alike is about, from the first; 0: everybody")
     playback: Literal["kinematic", "dynamic"] = Field(
         "kinematic", description="kinematic: as planned; dynamic: tracked by actuators under gravity and contact"
     )

@@ -88,7 +88,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     seed, people = scenario.seed, scenario.people
     _check_area(scenario)
     clock = motion_clock(scenario.duration, margin=CLOCK_MARGIN)
-    looks = draw_looks(seed, people.count, look_alike=people.look_alike)
+    looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
     bodies = tuple(
         dress(make_body(draw_shape(stream(seed, "people", i, "shape"), child=is_child(seed, i, people.children))), look)
         for i, look in enumerate(looks)

@@ -124,3 +124,10 @@ def test_an_impossible_look_is_refused(key, value):
 def test_a_dial_beyond_its_range_is_refused(share):
     with pytest.raises(ValueError, match="look_alike must be from 0 to 1"):
         draw_looks(0, 2, look_alike=share)
+
+
+def test_only_so_many_may_look_alike():
+    free, some, all_ = (draw_looks(3, 4, look_alike=dial, alike=n) for dial, n in ((0.0, 0), (1.0, 2), (1.0, 0)))
+    assert some[:2] == all_[:2]
+    assert some[2:] == free[2:]
+    assert some[0].top == some[1].top != some[2].top

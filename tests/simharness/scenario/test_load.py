@@ -44,7 +44,7 @@ class TestKeys:
         message = refusal(path)
         assert message.startswith(f"{path}: people.cuont is not a key; did you mean people.count?")
         assert (
-            "[people] has activities, area, around, assist, children, count, look_alike, motion, playback, spacing"
+            "[people] has activities, alike, area, around, assist, children, count, look_alike, motion, playback, spacing"
             in message
         )
 
