@@ -18,7 +18,7 @@ from mvpose.reconstruction.bones import bones
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
-from mvpose.reconstruction.refinement import climb, judge, tree
+from mvpose.reconstruction.refinement import climb, fit_scale, judge, tree
 from mvpose.reconstruction.sampling import rescore
 from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
@@ -107,6 +107,12 @@ def _structures(  # type: ignore[no-untyped-def]
         climb(
             joints, mine, towards, weight, angle, own, floor,
             parents, order, neighbours, bones, own_length, precision,
+        )  # fmt: skip
+        # Where the keypoints agree to a pixel, the prior has no say about millimetres (empirical Bayes).
+        eased = precision * fit_scale(joints, mine, towards, weight, angle, own, floor)
+        climb(
+            joints, mine, towards, weight, angle, own, floor,
+            parents, order, neighbours, bones, own_length, eased,
         )  # fmt: skip
         judge(
             scores, covariance, joints, mine, towards, weight, angle, own, floor,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mvpose.rays import Rays
 from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
 from mvpose.reconstruction.poses import NOBODY, gather
-from mvpose.reconstruction.scatter import joint_scales
+from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -152,6 +152,26 @@ def climb(  # type: ignore[no-untyped-def]
             furthest = max(furthest, moved)
         if furthest < _STILL:
             break
+
+
+@njit(cache=True)
+def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):  # type: ignore[no-untyped-def]
+    """How much larger the person's squared errors are than the model's, at a pose (J, 3).
+
+    Likelihoods with errors so scaled, times the prior, have their maximum where the model's likelihoods have it with a
+    prior of so scaled precision. See :func:`mvpose.reconstruction.scatter.person_scale`.
+    """
+    count = len(joints)
+    misfit, rights = np.zeros(count), np.zeros(count)
+    A, b = np.empty((3, 3)), np.empty(3)
+    for j in range(count):
+        if not np.isnan(joints[j, 0]):
+            A[:] = 0.0
+            b[:] = 0.0
+            _, rights[j], misfit[j] = accumulate(
+                joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b
+            )
+    return person_scale(misfit, rights)
 
 
 @njit(cache=True)

@@ -1,0 +1,105 @@
+"""One training from nothing: crops, network, ONNX file, figures, card."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from mvpose.networks.session import Session
+from simharness.train.reid import assessment, card
+from simharness.train.reid.crops import Crops
+from simharness.train.reid.evaluation import Pairs, distributions
+from simharness.train.reid.network import DIMENSIONS, parameters
+from simharness.train.reid.plan import DIALS, Plan
+from simharness.train.reid.rendering import rendered
+from simharness.train.reid.training import Progress, export, train
+
+
+def run(
+    plan: Plan,
+    output: Path,
+    *,
+    cache: Path,
+    workers: int = 1,
+    threads: int = 1,
+    command: str = "",
+    say: Callable[[str], None] = print,
+) -> dict[str, object]:
+    """Train, write the ONNX file and its card, and return the card.
+
+    Args:
+        plan: how much of everything.
+        output: the ONNX file.
+        cache: folder of the rendered crops.
+        workers: processes that render.
+        threads: of PyTorch on a CPU.
+        command: that made it, for the card.
+        say: called with a line of progress now and then.
+    """
+    clock = time.perf_counter()
+    crops = rendered(plan.training_order, cache, workers=workers)
+    rendering = time.perf_counter() - clock
+    say(f"{len(crops)} crops of {plan.training} groups to learn from")
+
+    def report(at: Progress) -> None:
+        say(f"epoch {at.epoch} of {at.epochs}: identities {at.identities:.3f}, triplets {at.triplets:.3f}")
+
+    clock = time.perf_counter()
+    network = train(crops, seed=plan.seed, epochs=plan.epochs, threads=threads, report=report)
+    training = time.perf_counter() - clock
+    export(network, output)
+
+    session = Session(output)
+    validation = rendered(plan.validation_order, cache, workers=workers)
+    midpoint, slope = assessment.scale(session, validation)
+    card.stamp(output, midpoint=midpoint, slope=slope, plan=plan, command=command)
+    say(f"a distance of {midpoint:.3f} is as likely of one person as of two; slope {slope:.3f}")
+
+    session = Session(output)  # as anyone will read it
+    strangers = [rendered(plan.held_out_order(site), cache, workers=workers) for site in range(plan.sites)]
+    results = assessment.held_out(session, strangers)
+    say(f"held out: {results['network']}")
+    say(f"by colours alone: {results['histogram_balanced']}")
+    curve, met = {}, {}
+    for dial in DIALS:
+        alike = rendered(plan.curve_order(dial), cache, workers=workers)
+        curve[f"{dial:g}"], met[f"{dial:g}"] = assessment.in_scenes(session, alike)
+        say(f"look_alike {dial:g}: {curve[f'{dial:g}']}")
+    content: dict[str, object] = {
+        "name": card.NAME,
+        "command": command,
+        "sha256": card.digest(output),
+        "network": {
+            "parameters": parameters(network),
+            "bytes": output.stat().st_size,
+            "input_width_height": session.size,
+            "dimensions": DIMENSIONS,
+        },
+        "data": {
+            "plan": card.of_plan(plan),
+            "training": card.of_crops(crops),
+            "validation": card.of_crops(validation),
+            "held_out": card.of_crops(Crops.joined(strangers)),
+        },
+        "training": {
+            "rendering_seconds": round(rendering),
+            "training_seconds": round(training),
+            "workers": workers,
+            **card.machine(threads),
+        },
+        "affinity": {"midpoint": round(midpoint, 4), "slope": round(slope, 4), "from": "validation people"},
+        "results": {
+            "held_out": results,
+            "look_alike": curve,
+            "milliseconds_a_crop_in_batches_of_20_on_one_thread": round(assessment.milliseconds(session), 2),
+        },
+        "distances": {
+            **card.bins(),
+            "all": distributions(Pairs.joined(list(met.values()))),
+            "look_alike": {dial: distributions(pairs) for dial, pairs in met.items()},
+        },
+    }
+    card.write(output, content)
+    say(f"{output} and {card.card_path(output)} are written")
+    return content

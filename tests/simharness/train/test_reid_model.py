@@ -1,0 +1,203 @@
+"""The network that comes with mvpose, and the command that makes one."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mvpose.networks.reid import DEFAULT, ReId
+from mvpose.networks.session import Session
+from simharness.train.reid import assessment, card
+from simharness.train.reid.__main__ import main
+from simharness.train.reid.crops import SIZE, Recipe, picture_group
+from simharness.train.reid.crops import Crops as All
+from simharness.train.reid.identities import groups, split_of
+from simharness.train.reid.plan import Plan
+from simharness.train.reid.poses import plan_poses
+
+ELSEWHERE = 999  # seed of a run whose people nobody has trained on or judged by
+
+
+@pytest.fixture(scope="module")
+def content():
+    return card.read(DEFAULT)
+
+
+def test_the_file_is_small(content):
+    assert DEFAULT.stat().st_size < 6_000_000
+    assert DEFAULT.stat().st_size == content["network"]["bytes"]
+    onnx = pytest.importorskip("onnx")
+    numbers = sum(int(np.prod(each.dims)) for each in onnx.load(DEFAULT).graph.initializer)
+    assert 10_000 < numbers < 1_500_000
+
+
+def test_the_card_says_how_it_is_fed_and_what_distances_mean(content):
+    network = ReId()
+    assert network.session.size == SIZE[::-1] == tuple(content["network"]["input_width_height"])
+    assert network.dimensions == content["network"]["dimensions"]
+    assert network.session.card.name == card.NAME == content["name"]
+    assert network.affinity.midpoint == content["affinity"]["midpoint"]
+    assert network.affinity.slope == content["affinity"]["slope"]
+    assert 0.3 < network.affinity.midpoint < 1.4
+    assert 0.0 < network.affinity.slope < 0.4
+
+
+def test_the_card_is_of_this_file_and_of_people_kept_apart(content):
+    assert content["sha256"] == card.digest(DEFAULT)
+    assert content["command"].startswith("python -m simharness.train.reid --seed ")
+    data = content["data"]
+    for split, name in (("training", "training"), ("validation", "validation"), ("held-out", "held_out")):
+        assert {split_of(seed) for seed in data[name]["group_seeds"]} == {split}
+    assert data["training"]["identities"] > 2000
+    assert data["held_out"]["identities"] >= 290
+
+
+def test_strangers_of_a_scene_were_told_apart(content):
+    """The issue asks for rank-1 of 95 % and mAP of 90 % under casts and partial occlusion."""
+    curve = [content["results"]["look_alike"][f"{dial:g}"] for dial in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    distinct = curve[0]
+    assert distinct["identities"] >= 290
+    assert distinct["people_in_a_scene"] == 12  # as many as scenes have
+    assert distinct["hidden"]["0.3"]["rank1"] >= 95.0
+    assert distinct["network"]["rank1"] >= 94.0  # with up to half of the joints hidden
+    assert distinct["network"]["mAP"] >= 90.0
+    ours = [row["network"]["mAP"] for row in curve]
+    assert (np.diff(ours) < 0).all()  # the dial is felt
+    for row in curve:
+        assert all(row["network"]["mAP"] > row[name]["mAP"] + 20 for name in ("histogram", "histogram_balanced"))
+
+
+def test_strangers_among_three_hundred_were_told_apart_better_than_by_colours(content):
+    found = content["results"]["held_out"]
+    assert min(found["identities"]) >= 290
+    assert all(found["network"]["mAP"] > found[name]["mAP"] + 30 for name in ("histogram", "histogram_balanced"))
+    hidden = [found["hidden"][most]["rank1"] for most in ("0", "0.15", "0.3", "0.5")]
+    assert (np.diff(hidden) < 0).all()
+
+
+def test_a_crop_is_described_in_time(content):
+    assert content["results"]["milliseconds_a_crop_in_batches_of_20_on_one_thread"] < 4.0
+    assert assessment.milliseconds(Session(DEFAULT), rounds=3) < 20.0  # a busy machine
+
+
+def test_distances_grow_with_the_difference_of_views_and_with_what_is_hidden(content):
+    kept = content["distances"]["look_alike"]["0"]
+    bins = kept["same"]["bins"]
+    assert bins[0][0]["mean"] < bins[0][-1]["mean"]
+    assert bins[0][0]["mean"] < kept["other"]["all"]["mean"]
+    means = {dial: rows["other"]["all"]["mean"] for dial, rows in content["distances"]["look_alike"].items()}
+    assert means["0"] > means["0.5"] > means["1"]
+
+
+def test_the_card_of_another_file_is_refused(tmp_path, content):
+    model = tmp_path / "reid.onnx"
+    model.write_bytes(DEFAULT.read_bytes())
+    with pytest.raises(ValueError, match="no card at"):
+        card.read(model)
+    card.card_path(model).write_text(json.dumps({**content, "sha256": "0"}))
+    with pytest.raises(ValueError, match="card of another file"):
+        card.read(model)
+
+
+@pytest.mark.slow
+def test_strangers_are_told_apart_in_crops_rendered_anew():
+    poses, recipe = plan_poses(ELSEWHERE, frames=4, takes=1), Recipe(moments=1, views=4)
+    people = groups("held-out", ELSEWHERE, 10, size=4, at_a_site=10)
+    crops = All.joined([picture_group(group, recipe, poses=poses) for group in people])
+    assert len(crops) > 100
+    session = Session(DEFAULT)
+    found = assessment.held_out(session, [crops])
+    assert found["network"]["rank1"] >= 90.0  # of some 130 queries: 95 less two standard errors
+    assert found["network"]["mAP"] >= 85.0
+    assert found["network"]["mAP"] > found["histogram"]["mAP"] + 10
+    met = assessment.met(assessment.euclidean(assessment.describe(session, crops)), crops)
+    kept = session.card.midpoint
+    assert (met.distance[met.same] < kept).mean() > 0.85
+    assert (met.distance[~met.same] > kept).mean() > 0.85
+
+
+@pytest.mark.slow
+def test_one_command_trains_a_toy(tmp_path, capsys):
+    pytest.importorskip("torch")
+    pytest.importorskip("onnx")
+    model = tmp_path / "toy.onnx"
+    assert main(["--quick", "--seed", "3", "--output", str(model), "--cache", str(tmp_path / "cache")]) == 0
+    content = card.read(model)
+    assert content["data"]["plan"]["seed"] == 3
+    assert "--quick" in content["command"]
+    network = ReId(model)
+    rng = np.random.default_rng(0)
+    pictures = [rng.integers(0, 256, (120, 90, 3), np.uint8) for _ in range(2)]
+    found = network.descriptors(pictures, [0, 1], [[5, 5, 60, 100], [0, 0, 80, 110]])
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-6)
+    assert "epoch 4 of 4" in capsys.readouterr().out
+
+
+def test_training_twice_gives_the_same_network():
+    torch = pytest.importorskip("torch")
+    from simharness.train.reid.training import train
+
+    crops = toy_crops()
+    one, two, other = (train(crops, seed=seed, epochs=2).state_dict() for seed in (1, 1, 2))
+    assert all(torch.equal(one[key], two[key]) for key in one)
+    assert not all(torch.equal(one[key], other[key]) for key in one)
+
+
+def test_training_learns_colours_that_tell_people_apart():
+    pytest.importorskip("torch")
+    from simharness.train.reid.training import train
+
+    losses = []
+    train(toy_crops(), seed=0, epochs=6, report=lambda at: losses.append(at.identities))
+    assert losses[-1] < 0.7 * losses[0]
+
+
+def toy_crops():
+    """Sixteen people of plain colours, four crops each."""
+    rng = np.random.default_rng(0)
+    count = 64
+    person = np.arange(count) // 4
+    colors = rng.integers(0, 256, (16, 1, 1, 3))[person]
+    images = np.clip(colors + rng.integers(-20, 21, (count, *SIZE, 3)), 0, 255).astype(np.uint8)
+    zeros, none = np.zeros(count), np.zeros(count, int)
+    moment, site = np.arange(count) % 4, person // 4
+    return All(images, person // 2, person % 2, zeros, site, moment, none, zeros, zeros, zeros + 100)
+
+
+def test_batches_hold_several_people_of_a_group_and_several_crops_of_each():
+    pytest.importorskip("torch")
+    from simharness.train.reid.training import Batches
+
+    crops = toy_crops()
+    rows = [batch.numpy() for batch in Batches(crops, 0).epoch(0)]
+    assert len(rows) == 1
+    for batch in rows:
+        people = np.unique(crops.identity[batch], return_counts=True)
+        assert (people[1] == 4).all()
+        assert (np.unique(crops.seed[batch], return_counts=True)[1] == 8).all()
+        assert (np.unique(crops.site[batch], return_counts=True)[1] == 16).all()
+    again = [batch.numpy() for batch in Batches(crops, 0).epoch(0)]
+    np.testing.assert_array_equal(rows, again)
+
+
+def test_losses_of_descriptors_worked_by_hand():
+    torch = pytest.importorskip("torch")
+    from simharness.train.reid.training import triplet_loss
+
+    apart = torch.tensor([[1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [-1.0, 0.0]])
+    who = torch.tensor([0, 0, 1, 1])
+    assert float(triplet_loss(apart, who)) == pytest.approx(0.0, abs=1e-6)
+    mixed = torch.tensor([0, 1, 0, 1])  # one's own is 2 away, another's 0: 2 - 0 and the margin
+    assert float(triplet_loss(apart, mixed)) == pytest.approx(2.3, abs=2e-3)
+
+
+def test_a_plan_for_a_toy_is_less_of_everything():
+    toy, whole = Plan.quick(seed=2), Plan(seed=2)
+    assert toy.training < whole.training / 50
+    assert toy.epochs < whole.epochs
+
+
+def test_without_torch_the_command_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    assert main(["--quick"]) == 2
+    assert "simharness[train]" in capsys.readouterr().err
