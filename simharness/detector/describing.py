@@ -61,18 +61,19 @@ class Describer:
     def __call__(self, frame: Ints, view: Ints, slot: Ints, person: Ints) -> NDArray[np.float64]:
         """Descriptors of detections by frame, view, slot and person, (n,) each: (n, D)."""
         picture, real = self._source[frame, view], person >= 0
-        noise = np.empty((len(frame), self._looks.model.dimensions))
+        size = self._looks.model.dimensions
+        drawn = np.empty((len(frame), size + 1))
         for v, s in np.unique(np.column_stack([view, slot]), axis=0).tolist():
             mine = (view == v) & (slot == s)
-            noise[mine] = self._chances.wandering("descriptor", v, s, shape=noise.shape[1:], life=self._life)[
-                picture[mine]
-            ]
+            wandering = self._chances.wandering("descriptor", v, s, shape=(size + 1,), life=self._life)
+            drawn[mine] = wandering[picture[mine]]
         alike = self._looks.alike or self._bearing.shape[2]
         return self._looks.model.draw(
             [self._who(*each) for each in zip(view.tolist(), slot.tolist(), person.tolist(), strict=True)],
             bearing=np.where(real, self._bearing[picture, view, person], 0.0),
             hidden=np.where(real, self._hidden[picture, view, person], 0.0),
-            noise=noise,
+            noise=drawn[:, :size],
+            unease=drawn[:, size],
             look_alike=np.where(real & (person < alike), self._looks.look_alike, 0.0),
             seed=self._chances.seed,
         )

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
@@ -56,7 +57,8 @@ class DescriptorModel:
         dials: values of ``look_alike`` at which it was measured, ascending, (d,).
         looks: what was found at each.
         covers: shares of hidden joints, ascending, (h,).
-        noise: variance of the noise there, in units of a clear crop's variance, (h,).
+        noise: mean variance of the noise there, in units of a clear crop's variance, (h,).
+        uneven: how that differs from crop to crop: deviation of its logarithm.
     """
 
     dimensions: int
@@ -64,6 +66,7 @@ class DescriptorModel:
     looks: tuple[Look, ...]
     covers: tuple[float, ...]
     noise: tuple[float, ...]
+    uneven: float
 
     @classmethod
     def of_network(cls, model: Path) -> Self:
@@ -86,7 +89,8 @@ class DescriptorModel:
     def fitted(cls, distances: Mapping[str, Any]) -> Self:
         """Fit the model to measured distances: ``distances`` of a card (:mod:`simharness.train.reid.evaluation`).
 
-        Least squares over the mean cosines of all bins, each weighed by its pairs' share in its kind.
+        Least squares over the mean cosines of all bins, each weighed by its pairs' share in its kind, and over how the
+        cosines of one person's pairs spread.
         """
         edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
         turns = np.deg2rad(_middles(np.array(distances["view_difference_degrees"])))
@@ -94,7 +98,7 @@ class DescriptorModel:
         dials = sorted(measured)
         covers = len(edges) - 1
         cells = [
-            (d, kind == "same", v, h, bin_["cosine"], np.sqrt(bin_["pairs"] / measured[dial][kind]["all"]["pairs"]))
+            (d, kind == "same", v, h, bin_["cosine"], bin_["pairs"] / measured[dial][kind]["all"]["pairs"])
             for d, dial in enumerate(dials)
             for kind in ("same", "other")
             for v, row in enumerate(measured[dial][kind]["bins"])
@@ -103,27 +107,35 @@ class DescriptorModel:
         ]
         d, same, v, h, cosine, weight = (np.array(column) for column in zip(*cells, strict=True))
         same, turn = same.astype(bool), np.cos(turns)[v]
+        # Two people's cosines spread as those of random directions do: that tells in how many dimensions they live.
+        strangers = measured[dials[0]]["other"]["all"]
+        free = (1 - strangers["cosine"] ** 2) / _cosine_deviation(strangers, distances["quantiles"])
+        dimensions = int(np.clip(round(free**2), _FEWEST, _MOST))
+        spread = np.array([_cosine_deviation(measured[dial]["same"]["all"], distances["quantiles"]) for dial in dials])
 
-        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats, float]:
             who, alike, sides = (1 / (1 + np.exp(-x[: 3 * len(dials)]))).reshape(3, -1)
-            return who, alike, sides, np.cumsum(np.exp(x[3 * len(dials) :]))
+            return who, alike, sides, np.cumsum(np.exp(x[3 * len(dials) : -1])), float(abs(x[-1]))
 
         def misfit(x: Floats) -> Floats:
-            who, alike, sides, noise = parts(x)
+            who, alike, sides, noise, uneven = parts(x)
             signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * (1 - who[d]) * turn
-            return np.asarray(weight * (signal / np.sqrt((1 + noise[h]) * (1 + noise[0])) - cosine))
+            once, twice = _kept(noise, uneven)
+            mean = signal * once[h] * once[0]
+            # The law of total variance: within bins that of unlike noise and of few dimensions, and between them.
+            variance = signal**2 * (twice[h] * twice[0] - (once[h] * once[0]) ** 2) + (1 - mean**2) ** 2 / dimensions
+            share = weight * same / len(dials)
+            total = np.array([(share * (d == k)).sum() for k in range(len(dials))])
+            center = np.array([(share * (d == k) * mean).sum() for k in range(len(dials))]) / total
+            second = np.array([(share * (d == k) * (variance + mean**2)).sum() for k in range(len(dials))]) / total
+            return np.concatenate([np.sqrt(weight) * (mean - cosine), np.sqrt(second - center**2) - spread])
 
         start = np.concatenate([np.full(len(dials), 1.5), np.linspace(-2, 2, len(dials)), np.zeros(len(dials))])
-        start = np.concatenate([start, np.log(np.full(covers, 0.1))])
-        who, alike, sides, noise = parts(least_squares(misfit, start).x)
+        start = np.concatenate([start, np.log(np.full(covers, 0.1)), [0.5]])
+        who, alike, sides, noise, uneven = parts(least_squares(misfit, start).x)
         looks = tuple(Look(*map(float, each)) for each in zip(who, alike, sides, strict=True))
-        # How the cosines of two people spread at the lowest setting tells in how many dimensions they live.
-        spread = _cosine_deviation(measured[dials[0]]["other"]["all"], distances["quantiles"])
-        clear = (1 + noise[0]) * (1 + noise[min(1, covers - 1)])
-        varied = np.sqrt(1 - looks[0].alike * looks[0].who) / np.sqrt(clear)
-        dimensions = int(np.clip(round((varied / spread) ** 2), _FEWEST, _MOST))
-        middles = _middles(edges)
-        return cls(dimensions, tuple(dials), looks, tuple(map(float, middles)), tuple(map(float, noise)))
+        middles = tuple(map(float, _middles(edges)))
+        return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven)
 
     def look(self, look_alike: ArrayLike) -> Floats:
         """Who, alike and alike_sides (:class:`Look`) at values of the dial (...), between those measured, (..., 3)."""
@@ -138,6 +150,7 @@ class DescriptorModel:
         bearing: ArrayLike,
         hidden: ArrayLike,
         noise: ArrayLike,
+        unease: ArrayLike,
         look_alike: ArrayLike,
         seed: int,
     ) -> Floats:
@@ -148,6 +161,7 @@ class DescriptorModel:
             bearing: from where, radians about the person's vertical, (n,).
             hidden: share of the joints hidden, (n,).
             noise: each crop's own, standard normal, (n, D).
+            unease: how unusually much noise each crop has, standard normal, (n,).
             look_alike: the dial of each crop's person, (n,), or of all.
             seed: of the scenario.
 
@@ -165,7 +179,8 @@ class DescriptorModel:
         people = np.sqrt(shared) * common + np.sqrt(1 - shared) * own
         direction = np.stack([np.ones(count), np.cos(bearing), np.sin(bearing)], axis=-1)
         amount = direction * np.sqrt(np.stack([looks[:, 0], 1 - looks[:, 0], 1 - looks[:, 0]], axis=-1))
-        strength = np.sqrt(np.interp(hidden, self.covers, self.noise) / size)[:, None]
+        spoilt = np.interp(hidden, self.covers, self.noise) * _unevenly(np.asarray(unease, float), self.uneven)
+        strength = np.sqrt(spoilt / size)[:, None]
         result = np.einsum("nk,nkd->nd", amount, people) + strength * np.asarray(noise, float)
         return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
 
@@ -190,6 +205,19 @@ def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
 def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
     """Who, what front and back, and what left and right look like: vectors of about unit length, (3, D)."""
     return stream(seed, "descriptor", *key).standard_normal((3, size)) / np.sqrt(size)
+
+
+def _unevenly(normal: Floats, uneven: float) -> Floats:
+    """Factors about a mean of 1, log-normal, of standard normal numbers."""
+    return np.exp(uneven * normal - 0.5 * uneven**2)
+
+
+def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats]:
+    """Of a unit vector with noise of variances (h,): the mean share that is signal, and the mean of its square."""
+    nodes, weights = hermegauss(15)
+    variance = noise[:, None] * _unevenly(nodes, uneven)
+    weights = weights / weights.sum()
+    return (1 / np.sqrt(1 + variance)) @ weights, (1 / (1 + variance)) @ weights
 
 
 def _middles(edges: Floats) -> Floats:
