@@ -201,7 +201,8 @@ def print_seeds(result: Seeds, console: Console) -> None:
     """Print PCP by variant and person."""
     first, *others = result.scenario.method.variants
     table = Table(
-        title=f"{result.scenario.name}: PCP over {len(result.seeds)} seeds, with 95 % intervals",
+        title=f"{result.scenario.name}: PCP over {len(result.seeds)} seeds, with 95 % intervals; beside {first} on the "
+        "same detections; of each person",
         title_justify="left",
         title_style="bold",
         box=SIMPLE_HEAD,
@@ -210,7 +211,7 @@ def print_seeds(result: Seeds, console: Console) -> None:
     )
     table.add_column("variant", no_wrap=True)
     people = range(result.scenario.people.count)
-    for column in ("everybody", f"beside {first}", *(f"person {person}" for person in people)):
+    for column in ("everybody", f"beside {first}", *map(str, people)):
         table.add_column(column, justify="right", no_wrap=True)
     for name in (first, *others):
         ahead = "" if name == first else result.ahead(name, first)

@@ -71,7 +71,7 @@ def test_distances_are_distributed_as_the_networks(model, card, dial):
         assert drawn[kind].std() == pytest.approx(measured["deviation"], abs=0.025)
         ranks = [rank for rank in card["quantiles"] if 0.05 <= rank <= 0.95]
         asked = [value for rank, value in zip(card["quantiles"], measured["quantiles"], strict=True) if rank in ranks]
-        np.testing.assert_allclose(np.quantile(drawn[kind], ranks), asked, atol=0.06)
+        np.testing.assert_allclose(np.quantile(drawn[kind], ranks), asked, atol=0.08)
 
 
 def test_what_is_hidden_moves_one_person_apart_as_in_the_network(model, card):
