@@ -197,9 +197,12 @@ def shelf(
 @evaluating.command()
 def twin(
     folder: Annotated[Path, typer.Argument(help="The published files of Shelf.", metavar="FOLDER")],
-    scenario: Annotated[Path, typer.Option(metavar="SCENARIO", help="The simulated twin.", dir_okay=False)] = Path(
-        "scenarios/shelf.toml"
-    ),
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCENARIO", help="The simulated twin. [dim]\\[default: scenarios/shelf.toml][/]", dir_okay=False
+        ),
+    ] = None,
     twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
     json_file: Annotated[
         Path | None,
@@ -212,8 +215,9 @@ def twin(
         from simharness.experiment.progress import reporter
         from simharness.experiment.twin import compare, print_comparison
         from simharness.scenario.load import load
+        from simharness.scenario.profiles import SHIPPED
 
-        loaded, recorded = load(scenario), read_shelf(folder)
+        loaded, recorded = load(scenario or SHIPPED.parent / "shelf.toml"), read_shelf(folder)
         with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
             comparison = compare(recorded, loaded, count=twins, progress=advance)
         if json_file is not None:

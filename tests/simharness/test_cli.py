@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.experiment.execution import RunError
+from simharness.scenario.profiles import read_profile
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [
@@ -43,9 +44,20 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["evaluate"], ["evaluate", "shelf"]])
+COMMANDS = (
+    [],
+    ["run"],
+    ["evaluate"],
+    ["evaluate", "shelf"],
+    ["evaluate", "seeds"],
+    ["evaluate", "twin"],
+    ["fit-detector"],
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_help_is_there(simharness, command):
-    result = simharness(*command, "--help")
+    result = simharness(*command.split(), "--help")
     assert result.exit_code == 0
     assert "Usage" in result.stdout
 
@@ -132,3 +144,30 @@ def test_a_run_prints_the_numbers_and_where_the_report_is(simharness, tmp_path):
     for variant in ("full", "no-3dps"):
         assert variant in summary["variants"]
         assert variant in result.stdout
+
+
+def test_many_seeds_of_a_scenario(simharness, tmp_path):
+    file = tmp_path / "seeds.json"
+    quick = [*TINY, "--set", "rendering.renderer=rays", "--set", 'method.variants=["fast", "no-3dps"]']
+    result = simharness("evaluate", "seeds", QUICKSTART, *quick, "--seeds", "2", "--json", str(file))
+    assert result.exit_code == 0
+    assert "PCP over 2 seeds" in result.stdout
+    summary = json.loads(file.read_text())
+    assert summary["seeds"] == [7, 8]
+    for variant in ("fast", "no-3dps"):
+        scores = summary["pcp"][variant]
+        assert scores["low"] <= scores["pcp"] <= scores["high"]
+
+
+def test_a_detector_is_fitted_to_data_that_are_there(simharness, tmp_path):
+    assert_refused(simharness("fit-detector", "shelf", str(tmp_path / "none")), "none: no such folder")
+    assert_refused(simharness("evaluate", "twin", str(tmp_path / "none")), "none: no such folder")
+
+
+@pytest.mark.slow
+def test_fitting_prints_the_table_and_writes_a_profile_that_loads(simharness, tmp_path, shared_data):
+    out = tmp_path / "mine.toml"
+    result = simharness("fit-detector", "shelf", str(shared_data / "shelf"), "--out", str(out))
+    assert result.exit_code == 0
+    assert "Classes of errors" in result.stdout
+    assert read_profile(str(out)).keypoints.scatter.wrists > 0
