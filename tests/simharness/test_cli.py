@@ -44,15 +44,7 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-COMMANDS = (
-    [],
-    ["run"],
-    ["evaluate"],
-    ["evaluate", "shelf"],
-    ["evaluate", "seeds"],
-    ["evaluate", "twin"],
-    ["fit-detector"],
-)
+COMMANDS = ("", "run", "render", "evaluate", "evaluate shelf", "evaluate seeds", "evaluate twin", "fit-detector shelf")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
