@@ -69,9 +69,9 @@ def draw_shape(rng: np.random.Generator, *, child: bool = False) -> Shape:
     else:
         shape = replace(shape, age=2 / 3 + 0.25 * years, muscle=(0.31 if build > _ATHLETES else 0.77) + spare)
     # Measures are drawn apart, so for one draw in a hundred there is no such body, with hardly any trunk or flesh: all
-    # but stature is then drawn nearer to the mean.
-    for share in (1.0, 0.6, 0.3):
-        own = score * np.where(np.arange(len(score)) == 0, 1.0, share)
+    # but stature is then drawn nearer to the mean; and stature too for one in a thousand, smaller than bodies come.
+    for tall, share in ((1.0, 1.0), (1.0, 0.6), (1.0, 0.3), (0.6, 0.3), (0.3, 0.3)):
+        own = score * np.where(np.arange(len(score)) == 0, tall, share)
         try:
             return fitted(shape, _child_measures(sex, age, own) if child else _adult_measures(sex, own))
         except ValueError as error:

@@ -92,22 +92,14 @@ def split_of(seed: int) -> Split | None:
 
 
 def figures(group: Group, people: Iterable[int]) -> tuple[Figure, ...]:
-    """Some people of a group, as :func:`simharness.scene.build.build` makes them for a scenario of its seed.
-
-    One draw of measures in a thousand is no body's, and a scenario of that seed cannot be built: such a person is
-    left out.
-    """
+    """Some people of a group, as :func:`simharness.scene.build.build` makes them for a scenario of its seed."""
     wanted = list(people)
     looks = draw_looks(group.seed, max(wanted, default=-1) + 1, look_alike=group.look_alike)
-    made = (_figure(group.seed, person, looks[person]) for person in wanted)
-    return tuple(figure for figure in made if figure is not None)
+    return tuple(_figure(group.seed, person, looks[person]) for person in wanted)
 
 
-def _figure(seed: int, person: int, look: Look) -> Figure | None:
-    try:
-        shape = draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, CHILDREN))
-    except ValueError:
-        return None
+def _figure(seed: int, person: int, look: Look) -> Figure:
+    shape = draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, CHILDREN))
     body = dress(make_body(shape), look)
     coat = paint(body, look)
     mesh = Mesh(body.vertices, body.faces, coat.colors, smooth=True, texture=coat.texture, uv=coat.uv)

@@ -163,3 +163,8 @@ def test_a_longer_limb_is_longer_and_nothing_else(limb, bones):
     old = np.linalg.norm(np.diff(short.vertices[edges], axis=1), axis=2)
     assert (grown - old).max() < 0.012  # spread over the limb, not torn at a joint
     assert LIMITS[limb][0] < 1.2 < LIMITS[limb][1]
+
+
+def test_a_draw_that_no_body_has_is_drawn_nearer_to_the_mean():
+    smallest = draw_shape(stream(2000000000022, "people", 3, "shape"))  # 1.484 m at first, with a build that none has
+    assert 1.484 < measures(smallest)["stature"] < 1.60

@@ -58,12 +58,6 @@ def test_identities_are_the_people_of_a_scenario_of_that_seed():
             assert (figure.mesh.texture is None) == (shown.texture is None)
 
 
-def test_who_cannot_be_drawn_is_left_out():
-    # Person 3 of this group has measures that no body has: see simharness.humans.population.
-    made = figures(Group(2 * 10**12 + 22, 4), range(2, 4))
-    assert [figure.person for figure in made] in ([2], [2, 3])
-
-
 def test_poses_lent_to_the_body_that_they_were_planned_on_are_the_planned_ones():
     body = make_body(Shape())
     mover = Kinematics(body)
