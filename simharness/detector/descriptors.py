@@ -41,11 +41,13 @@ class Look:
         who: share of a clear crop's variance that says who it is; the rest says from where it is seen.
         alike: how much of who they are the people of a scene have in common.
         alike_sides: the same of what their sides look like.
+        noise: how much noise there is, beside that at other values of the dial.
     """
 
     who: float
     alike: float
     alike_sides: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class DescriptorModel:
         dials: values of ``look_alike`` at which it was measured, ascending, (d,).
         looks: what was found at each.
         covers: shares of hidden joints, ascending, (h,).
-        noise: mean variance of the noise there, in units of a clear crop's variance, (h,).
+        noise: mean variance of the noise there at the first dial, in units of a clear crop's variance, (h,).
         uneven: how that differs from crop to crop: deviation of its logarithm.
     """
 
@@ -113,17 +115,21 @@ class DescriptorModel:
         dimensions = int(np.clip(round(free**2), _FEWEST, _MOST))
         spread = np.array([_cosine_deviation(measured[dial]["same"]["all"], distances["quantiles"]) for dial in dials])
 
-        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats, float]:
+        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, float]:
             who, alike, sides = (1 / (1 + np.exp(-x[: 3 * len(dials)]))).reshape(3, -1)
-            return who, alike, sides, np.cumsum(np.exp(x[3 * len(dials) : -1])), float(abs(x[-1]))
+            louder = np.exp(np.append(0.0, x[3 * len(dials) : 4 * len(dials) - 1]))
+            return who, alike, sides, louder, np.cumsum(np.exp(x[4 * len(dials) - 1 : -1])), float(abs(x[-1]))
 
         def misfit(x: Floats) -> Floats:
-            who, alike, sides, noise, uneven = parts(x)
+            who, alike, sides, louder, noise, uneven = parts(x)
             signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * (1 - who[d]) * turn
-            once, twice = _kept(noise, uneven)
-            mean = signal * once[h] * once[0]
+            once, twice = _kept(louder[:, None] * noise, uneven)
+            mean = signal * once[d, h] * once[d, 0]
             # The law of total variance: within bins that of unlike noise and of few dimensions, and between them.
-            variance = signal**2 * (twice[h] * twice[0] - (once[h] * once[0]) ** 2) + (1 - mean**2) ** 2 / dimensions
+            variance = (
+                signal**2 * (twice[d, h] * twice[d, 0] - (once[d, h] * once[d, 0]) ** 2)
+                + (1 - mean**2) ** 2 / dimensions
+            )
             share = weight * same / len(dials)
             total = np.array([(share * (d == k)).sum() for k in range(len(dials))])
             center = np.array([(share * (d == k) * mean).sum() for k in range(len(dials))]) / total
@@ -131,15 +137,15 @@ class DescriptorModel:
             return np.concatenate([np.sqrt(weight) * (mean - cosine), np.sqrt(second - center**2) - spread])
 
         start = np.concatenate([np.full(len(dials), 1.5), np.linspace(-2, 2, len(dials)), np.zeros(len(dials))])
-        start = np.concatenate([start, np.log(np.full(covers, 0.1)), [0.5]])
-        who, alike, sides, noise, uneven = parts(least_squares(misfit, start).x)
-        looks = tuple(Look(*map(float, each)) for each in zip(who, alike, sides, strict=True))
+        start = np.concatenate([start, np.zeros(len(dials) - 1), np.log(np.full(covers, 0.1)), [0.5]])
+        who, alike, sides, louder, noise, uneven = parts(least_squares(misfit, start).x)
+        looks = tuple(Look(*map(float, each)) for each in zip(who, alike, sides, louder, strict=True))
         middles = tuple(map(float, _middles(edges)))
         return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven)
 
     def look(self, look_alike: ArrayLike) -> Floats:
-        """Who, alike and alike_sides (:class:`Look`) at values of the dial (...), between those measured, (..., 3)."""
-        table = np.array([[look.who, look.alike, look.alike_sides] for look in self.looks])
+        """Who, alike, alike_sides, noise (:class:`Look`) at values of the dial (...), between those measured, (..., 4)."""
+        table = np.array([[look.who, look.alike, look.alike_sides, look.noise] for look in self.looks])
         dial = np.asarray(look_alike, float)
         return np.stack([np.interp(dial, self.dials, column) for column in table.T], axis=-1)
 
@@ -179,7 +185,9 @@ class DescriptorModel:
         people = np.sqrt(shared) * common + np.sqrt(1 - shared) * own
         direction = np.stack([np.ones(count), np.cos(bearing), np.sin(bearing)], axis=-1)
         amount = direction * np.sqrt(np.stack([looks[:, 0], 1 - looks[:, 0], 1 - looks[:, 0]], axis=-1))
-        spoilt = np.interp(hidden, self.covers, self.noise) * _unevenly(np.asarray(unease, float), self.uneven)
+        spoilt = (
+            looks[:, 3] * np.interp(hidden, self.covers, self.noise) * _unevenly(np.asarray(unease, float), self.uneven)
+        )
         strength = np.sqrt(spoilt / size)[:, None]
         result = np.einsum("nk,nkd->nd", amount, people) + strength * np.asarray(noise, float)
         return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
@@ -213,9 +221,9 @@ def _unevenly(normal: Floats, uneven: float) -> Floats:
 
 
 def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats]:
-    """Of a unit vector with noise of variances (h,): the mean share that is signal, and the mean of its square."""
+    """Of a unit vector with noise of variances (...): the mean share that is signal, and the mean of its square."""
     nodes, weights = hermegauss(15)
-    variance = noise[:, None] * _unevenly(nodes, uneven)
+    variance = noise[..., None] * _unevenly(nodes, uneven)
     weights = weights / weights.sum()
     return (1 / np.sqrt(1 + variance)) @ weights, (1 / (1 + variance)) @ weights
 

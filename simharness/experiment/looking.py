@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simharness.detector.detect import Detected, detect
 from simharness.experiment.trial import Trial
-from simharness.experiment.work import Filming, Reading, looks_of
+from simharness.experiment.work import Filming, Reading
 from simharness.scene.sequence import Sequence
 from simharness.scene.simulation import simulate
 
@@ -14,9 +14,7 @@ def look(trial: Trial) -> tuple[Sequence, list[Detected]]:
     scenario, sequence = trial.scenario, simulate(trial.scene)
     frames = range(scenario.frames)
     views = Filming(scenario, trial.scene, trial.shots, frozenset())(frames)
-    detected = detect(
-        sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=looks_of(scenario)
-    )
+    detected = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=trial.looks)
     if Reading.needed(scenario):
         detected = Reading(scenario, trial.scene, trial.shots, tuple(detected))(frames)
     return sequence, detected

@@ -22,7 +22,7 @@ from simharness.experiment.pictures import draw_pictures, outlines
 from simharness.experiment.progress import Advance, Reporter, Silence
 from simharness.experiment.store import Record, write_run
 from simharness.experiment.trial import Trial, prepare
-from simharness.experiment.work import Estimating, Filming, Reading, looks_of
+from simharness.experiment.work import Estimating, Filming, Reading
 from simharness.rendering.views import Views
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Scenario
@@ -70,7 +70,7 @@ def run(
         audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
         answers = detect(
-            sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=looks_of(scenario)
+            sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=trial.looks
         )
     if Reading.needed(scenario):
         answers = _read(trial, answers, workers, clock)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from mvpose import Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
+from simharness.detector.describing import Looks
 from simharness.experiment.work import looks_of, pose_head, re_id, renderer_of
 from simharness.rendering.renderer import Unavailable
 from simharness.rigs.faults import shoot
@@ -26,12 +27,14 @@ class Trial:
         scene: the compiled room with its people, and how they move.
         shots: when and with which lens every picture is taken; also the calibration that the method is told.
         pipelines: the variants of the method, by name.
+        looks: how descriptors are drawn, where they are.
     """
 
     scenario: Scenario
     scene: Scene
     shots: Shots
     pipelines: Mapping[str, Estimator]
+    looks: Looks | None
 
 
 def prepare(scenario: Scenario) -> Trial:
@@ -40,7 +43,7 @@ def prepare(scenario: Scenario) -> Trial:
     Raises:
         ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant, no network.
     """
-    looks_of(scenario)
+    looks = looks_of(scenario)
     described = scenario.appearance.source != "none"
     if scenario.detector.onnx:
         pose_head(scenario)
@@ -62,7 +65,7 @@ def prepare(scenario: Scenario) -> Trial:
     rig = rig_of(scenario)
     scene = build(scenario, rig)
     shots = shoot(rig, scenario.faults, scene.time, seed=scenario.seed)
-    return Trial(scenario, scene, shots, pipelines)
+    return Trial(scenario, scene, shots, pipelines, looks)
 
 
 def rig_of(scenario: Scenario) -> Rig:
