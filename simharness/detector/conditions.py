@@ -22,7 +22,9 @@ VISIBLE, OWN, HIDDEN, OUTSIDE = range(4)
 """How a joint is seen, as far as a detector cares: what hides it, its own body or anything else."""
 
 _AS_SEEN = np.array([VISIBLE, OWN, HIDDEN, HIDDEN, OUTSIDE], np.int8)  # by Visibility
-_MEETS = 0.1  # intersection over union from which boxes overlap
+
+MEETS = 0.1
+"""Intersection over union from which boxes overlap, and people may be taken for each other."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,11 @@ class Conditions:
         outside = views.visibility == Visibility.OUTSIDE
         valid = (seen <= OWN).sum(axis=-1)
         overlap = overlaps(views.boxes)
-        near = (overlap > _MEETS).sum(axis=-1)
+        near = (overlap > MEETS).sum(axis=-1)
         some = near > 0
         nearest = overlap.argmax(axis=-1) if overlap.shape[-1] else np.zeros(area.shape, np.int64)
         return cls(
-            unit=np.sqrt(area)[..., None] * np.asarray(COCO17.sigmas),
+            unit=oks_units(views.boxes),
             area=area,
             seen=seen,
             valid=valid,
@@ -68,6 +70,11 @@ class Conditions:
             neighbour=np.where(some, nearest, -1),
             crowded=(some & (valid <= 10)) | ((near >= 3) & (valid <= 15)),
         )
+
+
+def oks_units(boxes: Floats) -> Floats:
+    """OKS sigma x sqrt(area) of each joint, (..., 17) pixels, of people in boxes x, y, width, height (..., 4)."""
+    return np.sqrt(BOX_SHARE * boxes[..., 2] * boxes[..., 3])[..., None] * np.asarray(COCO17.sigmas)
 
 
 def overlaps(boxes: Floats) -> Floats:

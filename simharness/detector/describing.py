@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from simharness.detector.correlation import Chances
-from simharness.detector.descriptors import DescriptorModel, bearings, hidden_shares
+from simharness.detector.descriptors import DescriptorModel
+from simharness.detector.viewing import bearings, hidden_shares
 from simharness.rendering.views import Views
 from simharness.scene.sequence import Sequence
 

@@ -22,14 +22,10 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
-from mvpose.camera import Rig
-from simharness.detector.bias import body_axes
 from simharness.random import stream
-from simharness.rendering.visibility import Visibility
 
 Floats = NDArray[np.float64]
 
-_HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 _FEWEST, _MOST = 6, 256  # dimensions
 
 
@@ -144,7 +140,7 @@ class DescriptorModel:
         return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven)
 
     def look(self, look_alike: ArrayLike) -> Floats:
-        """Who, alike, alike_sides, noise (:class:`Look`) at values of the dial (...), between those measured, (..., 4)."""
+        """Who, alike, alike_sides, noise (see :class:`Look`) at values of the dial (...), interpolated, (..., 4)."""
         table = np.array([[look.who, look.alike, look.alike_sides, look.noise] for look in self.looks])
         dial = np.asarray(look_alike, float)
         return np.stack([np.interp(dial, self.dials, column) for column in table.T], axis=-1)
@@ -191,23 +187,6 @@ class DescriptorModel:
         strength = np.sqrt(spoilt / size)[:, None]
         result = np.einsum("nk,nkd->nd", amount, people) + strength * np.asarray(noise, float)
         return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
-
-
-def bearings(joints: ArrayLike, rig: Rig) -> Floats:
-    """From where V cameras see people (T, P, 17, 3), radians from straight ahead, to the left, (T, V, P)."""
-    joints = np.asarray(joints, float)
-    forward = body_axes(joints)[..., 0, :2]
-    hips = joints[..., 11:13, :2].mean(axis=-2)
-    result = []
-    for camera in rig:
-        toward = camera.center[:2] - hips
-        result.append(np.arctan2(toward[..., 1], toward[..., 0]) - np.arctan2(forward[..., 1], forward[..., 0]))
-    return np.stack(result, axis=1)
-
-
-def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
-    """Share of the joints (..., J) that something else hides or the border cuts off, (...)."""
-    return np.isin(visibility, _HIDDEN).mean(axis=-1)
 
 
 def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:

@@ -18,9 +18,11 @@ from scipy.special import ndtr, ndtri
 
 from mvpose import COCO17
 from mvpose.camera import Rig
+from simharness.detector.classes import MIRROR, PAIRED
 from simharness.detector.conditions import HIDDEN, OUTSIDE, OWN, VISIBLE, Conditions
 from simharness.detector.correlation import Chances
 from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError
+from simharness.detector.viewing import image_axes
 from simharness.rendering.views import Views
 from simharness.scenario.detector import Correlation, Keypoints
 from simharness.scene.sequence import Sequence
@@ -31,8 +33,6 @@ Bools = NDArray[np.bool_]
 _SMALL = 64.0  # pixels, sqrt(area) of a person from which on `small` makes it harder
 _HARDEST = 4.0  # times as many errors that smallness makes at most
 
-_MIRROR = np.array(COCO17.mirror)
-_PAIRED = np.arange(len(COCO17)) != _MIRROR
 _PARENT = np.array([parent if parent >= 0 else COCO17.mirror[joint] for joint, parent in enumerate(COCO17.parents)])
 # A guessed joint hangs from its neighbour in the skeleton: right bone, wrong way. Degrees and logarithm of length.
 _GUESS_TURN, _GUESS_LENGTH = np.deg2rad(35.0), 0.25
@@ -80,7 +80,8 @@ def find_keypoints(
         shift: of the detector's joints from anatomy's, (T, V, P, J, 2) pixels.
     """
     target = views.pixels if shift is None else views.pixels + shift
-    finder = _Finder(views, target, conditions, sequence, rig, config, correlation, chances)
+    axes = image_axes(sequence.joints.mean(axis=2), rig)
+    finder = _Finder(target, views.boxes, conditions, axes, config, correlation, chances)
     parts = [finder.find(person) for person in range(target.shape[2])]
     if not parts:
         empty = target.copy()
@@ -93,18 +94,16 @@ class _Finder:
 
     def __init__(
         self,
-        views: Views,
         target: Floats,
+        boxes: Floats,
         conditions: Conditions,
-        sequence: Sequence,
-        rig: Rig,
+        axes: Floats,
         config: Keypoints,
         correlation: Correlation,
         chances: Chances,
     ) -> None:
-        self._views, self._target, self._conditions, self._chances = views, target, conditions, chances
-        self._joints, self._rig = sequence.joints, rig
-        self._config, self._correlation = config, correlation
+        self._target, self._boxes, self._conditions, self._axes = target, boxes, conditions, axes
+        self._config, self._correlation, self._chances = config, correlation, chances
         self._every = np.arange(len(COCO17))
         drop = (config.drop.visible, config.drop.self_occluded, config.drop.occluded)
         self._drop = np.array([shares.by_joint() for shares in drop])
@@ -112,7 +111,7 @@ class _Finder:
         self._jitter = np.array(config.jitter.by_joint())
         some = config.miss_some or config.miss
         self._miss = np.array([shares.by_joint() for shares in (config.miss, some, config.miss_few or some)])
-        self._inversion = np.where(_PAIRED, config.inversion.by_joint(), 0.0)
+        self._inversion = np.where(PAIRED, config.inversion.by_joint(), 0.0)
         self._swap = np.array([shares.by_joint() for shares in (config.swap, config.swap_crowded or config.swap)])
 
     def find(self, person: int) -> tuple[Floats, NDArray[np.int8], Bools, Floats]:
@@ -143,7 +142,7 @@ class _Finder:
         if guessed.any():
             found[guessed] = self._guesses(person)[guessed]
         inverted = self._happens("inversion", person, config.quality * self._inversion)
-        other = true[:, :, _MIRROR]
+        other = true[:, :, MIRROR]
         inverted &= np.isfinite(other[..., 0])
         swapped, neighbour = self._swaps(person)
         place = np.where(swapped[..., None], neighbour, other)
@@ -205,7 +204,7 @@ class _Finder:
                 normal[:, view] = np.sqrt(1 - tie.scatter_views) * own
         if tie.scatter_views > 0:
             space = chances.wandering("scatter", person, "all", shape=(joints, 3), life=tie.scatter_life)
-            axes = np.swapaxes(self._image_axes(person), -1, -2)
+            axes = np.swapaxes(self._axes[:, :, person], -1, -2)
             normal += np.sqrt(tie.scatter_views) * (space[:, None] @ axes)
         # The radius keeps its rank when its distribution is cut: radius² / 2 is exponential.
         square = (normal**2).sum(axis=-1)
@@ -214,18 +213,6 @@ class _Finder:
         radius = sigma * np.sqrt(-2 * np.log1p(np.expm1(-0.5 * square) * whole))
         return normal * np.divide(radius, np.sqrt(square), out=np.zeros_like(square), where=square > 0)[..., None]
 
-    def _image_axes(self, person: int) -> Floats:
-        """The directions right and down in the pictures, at right angles to where the person is, (T, V, 2, 3)."""
-        center = self._joints[:, person].mean(axis=1)
-        axes = np.empty((len(center), len(self._rig), 2, 3))
-        for view, camera in enumerate(self._rig):
-            forward = center - camera.center
-            forward /= np.linalg.norm(forward, axis=-1, keepdims=True)
-            right = np.cross(camera.R[1], forward)
-            right /= np.linalg.norm(right, axis=-1, keepdims=True)
-            axes[:, view, 0], axes[:, view, 1] = right, np.cross(forward, right)
-        return axes
-
     def _places(self, person: int, off: Bools) -> tuple[Floats, Floats]:
         """Where n joints go that are ``off``: directions (n, 2), and how far between least and most, (n,) 0 to 1."""
         turn = 2 * np.pi * ndtr(self._state("direction", person, shared=False)[off])
@@ -233,7 +220,7 @@ class _Finder:
 
     def _anywhere(self, person: int) -> Floats:
         """Places on the person's box, (T, V, J, 2)."""
-        box = self._views.boxes[:, :, person, None]
+        box = self._boxes[:, :, person, None]
         across, down = (ndtr(self._state(what, person, shared=False)) for what in ("across", "down"))
         return box[..., :2] + np.stack([across, down], axis=-1) * box[..., 2:]
 
@@ -275,5 +262,5 @@ class _Finder:
     def _rivals(true: Floats, other: Floats, error: NDArray[np.int8], seen: NDArray[np.int8]) -> Floats:
         """Second peaks (T, V, J, 2): the true place of what is found elsewhere, the counterpart of what is not seen."""
         elsewhere = (error == KeypointError.INVERSION) | (error == KeypointError.SWAP) | (error == KeypointError.MISS)
-        unsure = ~elsewhere & (error != KeypointError.ABSENT) & (seen != VISIBLE) & _PAIRED
+        unsure = ~elsewhere & (error != KeypointError.ABSENT) & (seen != VISIBLE) & PAIRED
         return np.where(elsewhere[..., None], true, np.where(unsure[..., None], other, np.nan))

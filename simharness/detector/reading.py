@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from mvpose import COCO17
 from mvpose.networks import PoseHead, ReId
 from mvpose.networks.crops import Images
-from simharness.detector.conditions import BOX_SHARE
+from simharness.detector.classes import classify
+from simharness.detector.conditions import oks_units
 from simharness.detector.detect import Detected
-from simharness.detector.fitting.classes import classify
 
 
 def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:
@@ -27,9 +26,8 @@ def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detect
     truth = detected.truth
     real = truth.person >= 0
     shown = truth.boxes[boxes.view, truth.person]
-    unit = np.sqrt(BOX_SHARE * shown[:, 2:].prod(axis=1))[:, None] * np.array(COCO17.sigmas)
     target = np.where(real[:, None, None], truth.pixels[boxes.view, truth.person], np.nan)
-    error = classify(read.keypoints, target, unit)
+    error = classify(read.keypoints, target, oks_units(shown))
     error[~real] = np.where(read.scores[~real] > 0, truth.error[~real], error[~real])
     return Detected(read, replace(truth, error=error))
 

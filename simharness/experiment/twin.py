@@ -135,7 +135,7 @@ def print_comparison(comparison: Comparison, console: Console) -> None:
         pad_edge=False,
     )
     table.add_column("variant", no_wrap=True)
-    for column in ("real", "simulated", "apart", "real, mm", "simulated, mm"):
+    for column in ("real", "simulated", "apart", "mm, real", "mm, sim."):
         table.add_column(column, justify="right", no_wrap=True)
     for name, real in comparison.real.items():
         simulated = comparison.simulated[name]

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Rig
-from simharness.detector.conditions import OUTSIDE, VISIBLE, overlaps
+from simharness.detector.classes import MIRROR, apart, by_chance, classify
+from simharness.detector.conditions import MEETS, OUTSIDE, VISIBLE, oks_units, overlaps
 from simharness.detector.fitting import sizes
 from simharness.detector.fitting.association import Association, associate
-from simharness.detector.fitting.classes import MIRROR, apart, by_chance, classify
 from simharness.detector.fitting.offsets import Linear, fit_offsets, moved
 from simharness.detector.fitting.sample import LIMBS, Sample
 from simharness.detector.fitting.sight import seen, with_face
 from simharness.detector.truth import KeypointError
+from simharness.detector.viewing import image_axes
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -24,7 +25,6 @@ Bools = NDArray[np.bool_]
 CLASSES = ("drop", "swap", "inversion", "miss", "jitter")
 """In the order in which they take joints."""
 
-_MEETS = 0.1  # intersection over union of boxes from which people may be mistaken for each other
 _HALF = len(LIMBS) // 2  # limb joints in the picture from which a person should be found
 
 
@@ -71,7 +71,7 @@ def judge(sample: Sample) -> Judged:
     """Judge the detections of a sample."""
     rig = sample.rig
     boxes = sizes.boxes(sample.reference, rig)
-    unit = sizes.units(boxes)
+    unit = oks_units(boxes)
     association = associate(sample, _pictured(sample.reference, rig), boxes)
     keypoints = association.keypoints
     linear = Linear.of(sample.reference, keypoints, unit, rig)
@@ -116,7 +116,7 @@ def judge(sample: Sample) -> Judged:
         taken={key: each & risk[key] for key, each in taken.items()},
         chance={key: each & risk[key] for key, each in chance.items()},
         residual=residual,
-        axes=sizes.image_axes(sample.reference, rig),
+        axes=image_axes(sample.reference[:, :, LIMBS].mean(axis=2), rig),
         offset=offset,
         normal=linear.normal_equations(offset),
     )
@@ -136,4 +136,4 @@ def _neighbours(boxes: Floats, target: Floats, strangers: Floats, rig: Rig) -> F
         return np.full(target.shape, np.nan)
     nearest = overlap.argmax(axis=-1)[..., None, None]
     chosen = np.take_along_axis(everyone, nearest, axis=2)
-    return np.where((overlap.max(axis=-1) > _MEETS)[..., None, None], chosen, np.nan)
+    return np.where((overlap.max(axis=-1) > MEETS)[..., None, None], chosen, np.nan)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import COCO17, Rig
-from simharness.detector.conditions import BOX_SHARE
+from mvpose import Rig
 from simharness.detector.fitting.sample import LIMBS
 
 Floats = NDArray[np.float64]
@@ -53,24 +52,6 @@ def boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROW
         low = np.clip(np.where(whole[..., None], (pixels - around).min(axis=-2), 0.0), 0, limit)
         high = np.clip(np.where(whole[..., None], (pixels + around).max(axis=-2), 0.0), 0, limit)
         result.append(np.concatenate([low, high - low], axis=-1))
-    return np.stack(result, axis=1)
-
-
-def units(boxes: Floats) -> Floats:
-    """OKS sigma x sqrt(area) of each joint, (..., 17) pixels, of people in boxes (..., 4)."""
-    return np.sqrt(BOX_SHARE * boxes[..., 2] * boxes[..., 3])[..., None] * np.asarray(COCO17.sigmas)
-
-
-def image_axes(joints: Floats, rig: Rig) -> Floats:
-    """Directions right and down in the pictures, at right angles to where each person is, (T, V, P, 2, 3)."""
-    center = joints[:, :, LIMBS].mean(axis=2)
-    result = []
-    for camera in rig:
-        forward = center - camera.center
-        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
-        right = np.cross(camera.R[1], forward)
-        right /= np.linalg.norm(right, axis=-1, keepdims=True)
-        result.append(np.stack([right, np.cross(forward, right)], axis=-2))
     return np.stack(result, axis=1)
 
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 from mvpose.networks.crops import cut, stretched
+from simharness.detector.viewing import hidden_shares
 from simharness.random import stream
 from simharness.rendering.outlines import NO_EDGES, boxes
 from simharness.rendering.raster import RasterRenderer
 from simharness.rendering.sensor import develop
-from simharness.rendering.visibility import Visibility, label
+from simharness.rendering.visibility import label
 from simharness.scenario.cameras import Sensor
 from simharness.train.reid.identities import Figure, Group, figures
 from simharness.train.reid.poses import Poses
@@ -29,7 +30,6 @@ Rgb = NDArray[np.uint8]
 SIZE = (128, 64)  # rows and columns of a crop
 CAST = 4  # people in one picture
 FILL = (124, 116, 104)  # beyond the picture: ImageNet's mean, so that a normalised crop is 0 there
-_HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class _Filming:
         image = self.renderer.render(camera, moment.meshes, lighting=self.site.lighting)
         radii = np.stack([figure.body.joint_radii for figure in self.cast])
         seen = label(image, camera, joints=moment.joints, radii=radii)
-        hidden = np.isin(seen, _HIDDEN).mean(axis=1)
+        hidden = hidden_shares(seen)
         framed = boxes([[mesh.vertices for mesh in moment.meshes[:people]]], [NO_EDGES] * people, [camera])[0]
         noisy = jittered(framed, rng, recipe)
         noise = rng.integers(2**31, size=people).tolist()

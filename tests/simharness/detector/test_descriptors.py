@@ -8,8 +8,9 @@ from worlds import world
 
 from mvpose.networks.reid import DEFAULT
 from simharness.detector.describing import Looks
-from simharness.detector.descriptors import DescriptorModel, bearings, hidden_shares
+from simharness.detector.descriptors import DescriptorModel
 from simharness.detector.detect import detect
+from simharness.detector.viewing import bearings, hidden_shares
 from simharness.rendering.visibility import Visibility
 from simharness.scenario.detector import Detector
 

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from mvpose import COCO17
 from simharness.detector.bias import shifts
+from simharness.detector.classes import MIRROR, by_chance, classify
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
-from simharness.detector.fitting.classes import MIRROR, by_chance, classify
 from simharness.detector.truth import KeypointError
 from simharness.scenario.detector import Detector
 

@@ -1,8 +1,9 @@
 import numpy as np
 
 from simharness.detector.bias import offsets
+from simharness.detector.conditions import oks_units
 from simharness.detector.fitting.offsets import Linear, fit_offsets, moved
-from simharness.detector.fitting.sizes import boxes, units
+from simharness.detector.fitting.sizes import boxes
 from simharness.scenario.detector import KIND_OF_JOINT, KINDS, Bias
 
 BIAS = Bias(hips=(0.01, 0.02, 0.04), wrists=(-0.02, 0.0, 0.03), shoulders=(0.0, -0.01, 0.02))
@@ -13,7 +14,7 @@ def seen(twin):
     joints = twin.sequence.joints[::10]
     biased = joints + offsets(joints, BIAS)
     keypoints = np.stack([camera.project(biased) for camera in twin.rig], axis=1)
-    return joints, keypoints, units(boxes(joints, twin.rig))
+    return joints, keypoints, oks_units(boxes(joints, twin.rig))
 
 
 def test_moved_is_what_the_detector_does(twin):

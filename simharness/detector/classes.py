@@ -16,10 +16,13 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 MIRROR = np.array(COCO17.mirror)
+"""The left-right counterpart of each of COCO-17, (17,)."""
+
+PAIRED = np.arange(len(COCO17)) != MIRROR
+"""Which have one, (17,)."""
+
 APART = GOOD_BELOW + MISS_FROM
 """Units from which two places can be told apart: what is good at one is a miss from the other."""
-
-_PAIRED = np.arange(len(COCO17)) != MIRROR
 
 
 def classify(keypoints: ArrayLike, target: ArrayLike, unit: ArrayLike, *, other: ArrayLike | None = None) -> NDArray:
@@ -36,7 +39,7 @@ def classify(keypoints: ArrayLike, target: ArrayLike, unit: ArrayLike, *, other:
     """
     keypoints, target, unit = (np.asarray(each, float) for each in (keypoints, target, unit))
     own = distance(keypoints, target, unit)
-    mirrored = np.where(_PAIRED, distance(keypoints, target[..., MIRROR, :], unit), np.inf)
+    mirrored = np.where(PAIRED, distance(keypoints, target[..., MIRROR, :], unit), np.inf)
     swapped = np.full(own.shape, np.inf) if other is None else distance(keypoints, np.asarray(other, float), unit)
     error = np.where(own < MISS_FROM, np.int8(KeypointError.JITTER), np.int8(KeypointError.MISS))
     error[own < GOOD_BELOW] = KeypointError.GOOD
