@@ -15,12 +15,12 @@ from mvpose import Detections, Estimate
 from simharness.detector.truth import Truth
 from simharness.experiment.atomic import appearing
 from simharness.experiment.looking import look
-from simharness.experiment.pictures import annotate
 from simharness.experiment.progress import Reporter, Silence
 from simharness.experiment.trial import Trial, prepare
 from simharness.experiment.work import Estimating, studio_of
 from simharness.rendering.mosaic import mosaic
 from simharness.rendering.picture import Studio
+from simharness.report.pictures import annotate
 from simharness.scenario.models import Scenario
 from simharness.scene.playback import Playback
 

@@ -13,17 +13,17 @@ import polars as pl
 from mvpose import Detections, Estimate
 from simharness.detector.detect import Detected, detect
 from simharness.detector.truth import Truth
-from simharness.experiment.animation import animate, animated_frames
 from simharness.experiment.atomic import appearing
 from simharness.experiment.audit import audit
 from simharness.experiment.compilation import Compilation
 from simharness.experiment.execution import RunError, map_frames
-from simharness.experiment.pictures import draw_pictures, outlines
 from simharness.experiment.progress import Advance, Reporter, Silence
 from simharness.experiment.store import Record, write_run
 from simharness.experiment.trial import Trial, prepare
 from simharness.experiment.work import Estimating, Filming, Reading
 from simharness.rendering.views import Views
+from simharness.report.animation import animate, animated_frames
+from simharness.report.pictures import draw_pictures, outlines
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Scenario
 from simharness.scene.simulation import simulate
@@ -101,7 +101,7 @@ def run(
         summary=summary,
     )
     with clock.stage("report", 3) as advance:
-        from simharness.experiment.report import render  # and with it matplotlib: late, for it loads slowly
+        from simharness.report.page import render  # and with it matplotlib: late, for it loads slowly
 
         pictures = [] if scenario.rendering.renderer == "rays" else draw_pictures(trial, record, progress=advance)
         animation = animate(views.previews, record) if views.previews else None

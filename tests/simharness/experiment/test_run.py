@@ -11,10 +11,10 @@ import pytest
 from simharness.experiment import run as running
 from simharness.experiment import trial
 from simharness.experiment.execution import RunError
-from simharness.experiment.pictures import frame_costs
 from simharness.experiment.run import run
 from simharness.experiment.store import read_run
 from simharness.experiment.trial import prepare
+from simharness.report.pictures import frame_costs
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
 from simharness.scenario.profiles import read_profile

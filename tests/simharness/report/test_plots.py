@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from simharness.experiment import plots
+from simharness.report import plots
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Cameras
 

@@ -13,14 +13,14 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mvpose.skeleton import COCO17
-from simharness.experiment import plots
-from simharness.experiment.animation import Animation
-from simharness.experiment.headline import COLUMNS, NOTHING
-from simharness.experiment.pictures import Picture
 from simharness.experiment.store import Record
 from simharness.motion.choreography import roles
 from simharness.rendering.palette import css, person_color
 from simharness.rendering.visibility import Visibility
+from simharness.report import plots
+from simharness.report.animation import Animation
+from simharness.report.headline import COLUMNS, NOTHING
+from simharness.report.pictures import Picture
 from simharness.scenario.dump import dumps
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.scoring.pose import pair
@@ -61,7 +61,7 @@ def render(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    source = resources.files("simharness.experiment").joinpath("templates/report.html").read_text(encoding="utf-8")
+    source = resources.files("simharness.report").joinpath("templates/run.html").read_text(encoding="utf-8")
     return environment.from_string(source).render(
         scenario=record.scenario,
         summary=summary,

@@ -5,9 +5,9 @@ import pytest
 
 from mvpose import Detections, Estimate, Matching
 from simharness.detector.truth import Truth
-from simharness.experiment.report import joint_errors, person_errors, render
 from simharness.experiment.run import score, score_table
 from simharness.experiment.store import Record
+from simharness.report.page import joint_errors, person_errors, render
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Cameras, People, Scenario
 from simharness.scoring.summary import summarize

@@ -1,0 +1,5 @@
+"""``python -m simharness.cli``."""
+
+from simharness.cli import main
+
+main()

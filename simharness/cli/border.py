@@ -1,0 +1,61 @@
+"""Where errors become exit codes, and files are written that a command was asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+REGRESSION = 1
+BAD_INPUT = 2
+FAILED = 3
+
+
+@contextlib.contextmanager
+def border() -> Iterator[None]:
+    """Where errors become exit codes.
+
+    A ValueError that gets here is the input's fault, for whatever works on checked input raises a RunError
+    instead: :func:`simharness.experiment.run.run` and :func:`after_reading` see to that.
+    """
+    console = Console(stderr=True)
+    try:
+        yield
+    except ValueError as error:
+        console.print(Text.assemble(("error: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(BAD_INPUT) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        console.print(Text.assemble(("the run failed: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(FAILED) from None
+
+
+@contextlib.contextmanager
+def after_reading() -> Iterator[None]:
+    """From here on, an error is not the input's fault."""
+    from simharness.experiment.execution import RunError
+
+    try:
+        yield
+    except Exception as error:
+        raise RunError(f"{type(error).__name__}: {error}") from error
+
+
+def write_json(summary: dict[str, Any], path: Path) -> None:
+    """By rename: a file that is there is whole."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        partial.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise ValueError(f"--json {path}: cannot be written: {error.strerror}") from None

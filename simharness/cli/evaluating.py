@@ -1,0 +1,126 @@
+"""``simharness evaluate``: the method on real data, and on what stands for it."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from simharness.cli.border import after_reading, border, write_json
+
+
+class HeadMapping(enum.StrEnum):
+    """The published rules of :func:`mvpose.skeleton.coco17_to_shelf14`."""
+
+    VOXELPOSE = "voxelpose"
+    Y2019 = "2019"
+
+
+app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
+
+
+@app.command()
+def shelf(
+    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write the summary there too.", dir_okay=False),
+    ] = None,
+    head: Annotated[
+        HeadMapping,
+        typer.Option(help="How the head of the 14 joints is made from COCO's: moves PCP by a point."),
+    ] = HeadMapping.VOXELPOSE,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline. Repeatable. [dim]\\[default: full][/]"),
+    ] = None,
+) -> None:
+    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.
+
+    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
+    """
+    with border():
+        from mvpose import Pipeline
+        from mvpose.pipeline import NEED_DESCRIPTORS
+        from simharness.datasets.evaluate import evaluate, print_evaluation
+        from simharness.datasets.shelf import read_shelf
+        from simharness.experiment.progress import reporter
+
+        pipelines = {name: Pipeline.preset(name) for name in method or ["full"]}
+        if blind := NEED_DESCRIPTORS & pipelines.keys():
+            raise ValueError(
+                f"--method {', '.join(blind)}: goes by descriptors alone, and the detections of Shelf carry none; "
+                "choose another variant"
+            )
+        data = read_shelf(folder)
+        with (
+            after_reading(),
+            reporter() as bars,
+            bars.stage("evaluate", len(data) * len(pipelines)) as advance,
+        ):
+            evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
+        if json_file is not None:
+            write_json(evaluation.summary(), json_file)
+    print_evaluation(evaluation, Console())
+
+
+@app.command()
+def twin(
+    folder: Annotated[Path, typer.Argument(help="The published files of Shelf.", metavar="FOLDER")],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCENARIO", help="The simulated twin. [dim]\\[default: scenarios/shelf.toml][/]", dir_okay=False
+        ),
+    ] = None,
+    twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
+    ] = None,
+) -> None:
+    """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
+    with border():
+        from simharness.datasets.shelf import read_shelf
+        from simharness.experiment.progress import reporter
+        from simharness.experiment.twin import compare, print_comparison
+        from simharness.scenario.load import load
+        from simharness.scenario.profiles import SHIPPED
+
+        loaded, recorded = load(scenario or SHIPPED.parent / "shelf.toml"), read_shelf(folder)
+        with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
+            comparison = compare(recorded, loaded, count=twins, progress=advance)
+        if json_file is not None:
+            write_json(comparison.summary(), json_file)
+    print_comparison(comparison, Console())
+
+
+@app.command("seeds")
+def evaluate_seeds(
+    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="How many seeds.")] = 10,
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
+    ] = None,
+) -> None:
+    """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
+    with border():
+        from simharness.experiment.progress import reporter
+        from simharness.experiment.seeds import evaluate_seeds as evaluate_at
+        from simharness.experiment.seeds import print_seeds
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or ())
+        with reporter() as bars, bars.stage("evaluate", seeds) as advance:
+            result = evaluate_at(loaded, seeds, progress=advance)
+        if json_file is not None:
+            write_json(result.summary(), json_file)
+    print_seeds(result, Console())
