@@ -16,7 +16,7 @@ from torch.nn import functional
 
 from simharness.random import stream
 from simharness.train.reid.crops import FILL, Crops
-from simharness.train.reid.network import DIMENSIONS, Network
+from simharness.train.reid.network import DIMENSIONS, Mirrored, Network
 
 Thing = TypeVar("Thing")
 
@@ -193,10 +193,10 @@ def changed(images: Tensor, generator: torch.Generator) -> Tensor:
 
 
 def export(network: Network, path: Path) -> None:
-    """Write the network as ONNX: input ``crops`` (n, 3, 128, 64), output ``descriptors`` (n, 192)."""
+    """Write the network, :class:`Mirrored`, as ONNX: ``crops`` (n, 3, 128, 64) to ``descriptors`` (n, 192)."""
     crop = torch.zeros(2, 3, 128, 64)
     torch.onnx.export(
-        network.eval(),
+        Mirrored(network).eval(),
         (crop,),
         str(path),
         input_names=["crops"],

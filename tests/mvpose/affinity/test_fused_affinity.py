@@ -79,15 +79,18 @@ def test_a_detection_without_a_descriptor_is_judged_by_geometry_alone(nothing, g
     pairs = without[:, None] | without
     by_geometry = geometry(rig, detections, rays)
     appearance = AppearanceAffinity()(rig, detections, rays)
-    fused = FusedAffinity(geometry=geometry)(rig, detections, rays)
+    mean = FusedAffinity(geometry=geometry, rule="mean")(rig, detections, rays)
+    evidence = FusedAffinity(geometry=geometry)(rig, detections, rays)
     assert (appearance[pairs] == 0).all()
-    np.testing.assert_array_equal(fused[pairs], by_geometry[pairs])
-    np.testing.assert_allclose(fused[~pairs], np.sqrt(by_geometry * appearance)[~pairs], atol=1e-12)
+    np.testing.assert_array_equal(mean[pairs], by_geometry[pairs])
+    np.testing.assert_array_equal(evidence[pairs], by_geometry[pairs])
+    np.testing.assert_allclose(mean[~pairs], np.sqrt(by_geometry * appearance)[~pairs], atol=1e-12)
     assert (appearance[~pairs] > 0).any()
-    assert (fused[pairs] > 0.5).any()
+    assert (mean[pairs] > 0.5).any()
+    assert (np.abs(evidence - by_geometry)[~pairs] > 1e-3).any()
 
 
-def test_geometry_has_a_veto_and_appearance_a_say():
+def test_in_the_mean_geometry_has_a_veto_and_appearance_half_the_say():
     """Everybody looks alike: nothing beyond the threshold is matched. Nobody does: near pairs lose affinity."""
     rig = rig_around(4)
     detections, person = noisy(rig, people_in_a_room(4))
@@ -95,13 +98,147 @@ def test_geometry_has_a_veto_and_appearance_a_say():
     geometry = GeometricAffinity()(rig, detections, rays)
     alike = replace(detections, descriptors=np.ones((len(person), 8)))
     strangers = replace(detections, descriptors=np.eye(len(person)))
-    same = FusedAffinity()(rig, alike, rays)
-    other = FusedAffinity()(rig, strangers, rays)
+    same = FusedAffinity(rule="mean")(rig, alike, rays)
+    other = FusedAffinity(rule="mean")(rig, strangers, rays)
     assert (same[geometry == 0] == 0).all()
     assert (geometry == 0).mean() > 0.3
     assert (same[geometry > 0] > geometry[geometry > 0] - 1e-4).all()  # sqrt raises what lies below 1
     assert other.max() < 0.2
-    np.testing.assert_array_equal(FusedAffinity()(rig, detections, rays), geometry)
+
+
+@pytest.mark.parametrize("rule", ["mean", "evidence"])
+@pytest.mark.parametrize("geometry", [GeometricAffinity(), EpipolarAffinity()])
+def test_without_descriptors_geometry_decides(rule, geometry):
+    rig = rig_around(4)
+    detections, _ = noisy(rig, people_in_a_room(4))
+    rays = viewing_rays(rig, detections)
+    fused = FusedAffinity(geometry=geometry, rule=rule)(rig, detections, rays)
+    np.testing.assert_array_equal(fused, geometry(rig, detections, rays))
+    assert fused.max() > 0.5
+
+
+def in_a_room(people=4, *, views=4, seed=0):
+    """Detections of people at random places with random looks, who they are, their rig and rays, and A_g."""
+    rig = rig_around(views, seed=seed)
+    detections, person = noisy(rig, people_in_a_room(people, seed=seed), seed=seed)
+    detections = replace(detections, descriptors=looks(person, seed=seed))
+    rays = viewing_rays(rig, detections)
+    return rig, detections, person, rays, GeometricAffinity()(rig, detections, rays)
+
+
+def some(detections, rows):
+    """Some of the detections, or all in another order."""
+    picked = Detections.from_keypoints(detections.view[rows], detections.keypoints[rows], detections.scores[rows])
+    return replace(picked, descriptors=detections.descriptors[rows])
+
+
+def log_odds(affinity):
+    return np.log(affinity) - np.log1p(-affinity)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_evidence_is_how_much_nearer_than_its_rivals_a_pair_is(seed):
+    """Against the words of the definition, with some who have no descriptor and some who stand alone in a view."""
+    rig, everyone, person, _, _ = in_a_room(seed=seed)
+    detections = some(everyone, (everyone.view != 0) | (person == 1))
+    descriptors = detections.descriptors.copy()
+    descriptors[3] = np.nan
+    detections = replace(detections, descriptors=descriptors)
+    rays = viewing_rays(rig, detections)
+    geometry, view, m = GeometricAffinity()(rig, detections, rays), detections.view, len(detections)
+    fusion = FusedAffinity(appearance=AppearanceAffinity(midpoint=0.9, slope=0.07), weight=0.4)
+    fused = fusion(rig, detections, rays)
+    unit = descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True)
+    distance = np.linalg.norm(unit[:, None] - unit, axis=-1)
+
+    def side(i, j):
+        rivals = [distance[k, j] for k in range(m) if view[k] == view[i] and k not in (i, 3)]
+        return 0.4 * (min(rivals) - distance[i, j]) / 0.07 if rivals else (0.9 - distance[i, j]) / 0.07
+
+    compared = 0
+    for i, j in zip(*np.nonzero(geometry), strict=True):
+        if 3 in (i, j):
+            assert fused[i, j] == geometry[i, j]
+            continue
+        evidence = 0.5 * (side(i, j) + side(j, i))
+        assert log_odds(fused[i, j]) == pytest.approx(log_odds(geometry[i, j]) + evidence, abs=1e-3)
+        compared += 1
+    assert compared > 20
+    assert (fused[geometry == 0] == 0).all()
+
+
+def test_appearance_is_silent_where_rivals_look_the_same():
+    """Persons 0 and 1 are twins: geometry alone decides between them, but appearance still tells them from others."""
+    rig, detections, person, rays, geometry = in_a_room(views=5)
+    twin = np.where(person == 1, 0, person)
+    detections = replace(detections, descriptors=np.eye(4)[twin] + 0.3)
+    fused = FusedAffinity()(rig, detections, rays)
+    allowed = geometry > 0
+    twins = (twin[:, None] == 0) & (twin == 0)
+    same = (person[:, None] == person) & ~twins & allowed
+    assert (twins & allowed).any()
+    np.testing.assert_allclose(fused[twins], geometry[twins], atol=1e-6)
+    assert same.any()
+    assert (fused[same] > geometry[same]).all()
+    others = (twin[:, None] != twin) & allowed
+    assert others.any()
+    assert (fused[others] < geometry[others]).all()
+
+
+@pytest.mark.parametrize("descriptors", [np.ones, np.eye])
+def test_a_scene_without_contrast_is_left_to_geometry(descriptors):
+    """All look alike, or each pair as unlike as any: nobody is nearer than a rival."""
+    rig, detections, person, rays, geometry = in_a_room()
+    m = len(person)
+    looking = descriptors((m, 8)) if descriptors is np.ones else descriptors(m)
+    fused = FusedAffinity()(rig, replace(detections, descriptors=looking), rays)
+    np.testing.assert_allclose(fused, geometry, atol=1e-6)
+    assert (geometry > 0.5).any()
+
+
+def test_who_looks_unlike_from_two_sides_is_kept():
+    """One's own distances are beyond the midpoint, and others yet farther: the mean loses nearly all, evidence none.
+
+    So it was with crops of half-hidden people: a tenth of all true pairs.
+    """
+    rig, detections, person, rays, geometry = in_a_room()
+    detections = replace(detections, descriptors=looks(person, cosine=0.25))
+    same = (person[:, None] == person) & (geometry > 0.6)
+    assert same.sum() > 20
+    assert (FusedAffinity(rule="mean")(rig, detections, rays)[same] < 0.5).mean() > 0.9
+    assert FusedAffinity()(rig, detections, rays)[same].min() > 0.6
+
+
+def test_no_weight_is_geometry_and_more_weight_parts_more():
+    rig, detections, person, rays, geometry = in_a_room()
+    detections = replace(detections, descriptors=looks(person))
+    np.testing.assert_allclose(FusedAffinity(weight=0.0)(rig, detections, rays), geometry, atol=1e-12)
+    same = (person[:, None] == person) & (geometry > 0)
+    other = (person[:, None] != person) & (geometry > 0)
+    light, heavy = (FusedAffinity(weight=weight)(rig, detections, rays) for weight in (0.2, 0.6))
+    assert same.any()
+    assert other.any()
+    assert (heavy[same] > light[same]).all()
+    assert (heavy[other] < light[other]).all()
+
+
+def test_the_order_of_detections_means_nothing():
+    rig, detections, person, rays, _ = in_a_room()
+    order = np.random.default_rng(1).permutation(len(person))
+    mixed = some(detections, order)
+    np.testing.assert_allclose(
+        FusedAffinity()(rig, mixed, viewing_rays(rig, mixed)),
+        FusedAffinity()(rig, detections, rays)[np.ix_(order, order)],
+        atol=1e-5,
+    )
+
+
+def test_a_rule_or_a_weight_that_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="rule must be 'evidence' or 'mean', got 'sum'"):
+        FusedAffinity(rule="sum")
+    for weight in (-0.1, np.nan, np.inf):
+        with pytest.raises(ValueError, match="weight must be a finite number, 0 or more"):
+            FusedAffinity(weight=weight)
 
 
 @given(st.integers(0, 100_000))
@@ -116,7 +253,12 @@ def test_anything_gives_an_affinity(seed):
         Detections.from_keypoints(view, rng.uniform(400, 700, (m, 17, 2)), np.ones((m, 17))), descriptors=descriptors
     )
     rays = viewing_rays(rig, detections)
-    for affinity in (AppearanceAffinity(), FusedAffinity(), FusedAffinity(geometry=EpipolarAffinity())):
+    for affinity in (
+        AppearanceAffinity(),
+        FusedAffinity(),
+        FusedAffinity(rule="mean"),
+        FusedAffinity(geometry=EpipolarAffinity()),
+    ):
         matrix = affinity(rig, detections, rays)
         assert matrix.shape == (m, m)
         assert ((matrix >= 0) & (matrix <= 1)).all()

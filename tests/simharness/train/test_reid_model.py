@@ -53,7 +53,7 @@ def test_the_card_is_of_this_file_and_of_people_kept_apart(content):
 
 
 def test_strangers_of_a_scene_were_told_apart(content):
-    """The issue asks for rank-1 of 95 % and mAP of 90 % under casts and partial occlusion."""
+    """Asked are rank-1 of 95 % and mAP of 90 % under casts and partial occlusion."""
     curve = [content["results"]["look_alike"][f"{dial:g}"] for dial in (0.0, 0.25, 0.5, 0.75, 1.0)]
     distinct = curve[0]
     assert distinct["identities"] >= 290
