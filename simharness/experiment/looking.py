@@ -14,7 +14,7 @@ def look(trial: Trial) -> tuple[Sequence, list[Detected]]:
     scenario, sequence = trial.scenario, simulate(trial.scene)
     frames = range(scenario.frames)
     views = Filming(scenario, trial.scene, trial.shots, frozenset())(frames)
-    detected = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=trial.looks)
+    detected = detect(sequence, views, trial.shots.taking, scenario.detector, seed=scenario.seed, looks=trial.looks)
     if Reading.needed(scenario):
         detected = Reading(scenario, trial.scene, trial.shots, tuple(detected))(frames)
     return sequence, detected

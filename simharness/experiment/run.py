@@ -10,9 +10,8 @@ from typing import Any
 
 import polars as pl
 
-from mvpose import Detections, Estimate
+from mvpose import Estimate
 from simharness.detector.detect import Detected, detect
-from simharness.detector.truth import Truth
 from simharness.experiment.atomic import appearing
 from simharness.experiment.audit import audit
 from simharness.experiment.compilation import Compilation
@@ -27,8 +26,8 @@ from simharness.report.pictures import draw_pictures, outlines
 from simharness.scenario.load import fingerprint
 from simharness.scenario.models import Scenario
 from simharness.scene.simulation import simulate
-from simharness.scoring.frame import score_frame
-from simharness.scoring.matching import count_pairs
+from simharness.scoring.assessment import score_variant
+from simharness.scoring.recording import Recording
 from simharness.scoring.summary import VariantScores, summarize
 
 
@@ -70,16 +69,17 @@ def run(
         audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
         answers = detect(
-            sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed, looks=trial.looks
+            sequence, views, trial.shots.taking, scenario.detector, seed=scenario.seed, looks=trial.looks
         )
     if Reading.needed(scenario):
         answers = _read(trial, answers, workers, clock)
     detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
     estimates = _estimate(trial, answers, compilation, workers, clock)
     with clock.stage("score", len(estimates)) as advance:
+        recording = Recording(sequence.time, trial.shots.believed, detections, truth)
         scores = {}
         for variant, answered in estimates.items():
-            scores[variant] = score(detections, truth, answered)
+            scores[variant] = score_variant(recording, answered)
             advance(1)
         summary = summarize(
             scenario.name,
@@ -92,10 +92,10 @@ def run(
         )
     record = Record(
         scenario=scenario,
-        rig=trial.shots.believed,
-        time=sequence.time,
-        detections=detections,
-        truth=truth,
+        rig=recording.rig,
+        time=recording.time,
+        detections=recording.detections,
+        truth=recording.truth,
         estimates=estimates,
         scores=score_table(scores),
         summary=summary,
@@ -116,19 +116,6 @@ def run(
         if animation:
             (partial / "film.webp").write_bytes(animation.webp)
     return folder
-
-
-def score(detections: Sequence[Detections], truth: Sequence[Truth], estimates: Sequence[Estimate]) -> VariantScores:
-    """Score one variant, frame by frame."""
-    frames = [
-        score_frame(
-            true.joints,
-            estimate.joints,
-            matching=count_pairs(detected.view, estimate.matching.labels, true.person),
-        )
-        for detected, true, estimate in zip(detections, truth, estimates, strict=True)
-    ]
-    return VariantScores(tuple(frames), tuple(estimate.timings for estimate in estimates))
 
 
 def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:

@@ -178,6 +178,10 @@ class Estimating:
                 answers[name].append(self.pipelines[name].estimate(self.rig, seen))
         return answers
 
+    def seen(self, frame: int, variant: str) -> Detections:
+        """What a variant sees of a frame."""
+        return dict(self._seen(frame, (variant,)))[variant]
+
     def _seen(self, frame: int, names: Iterable[str]) -> Iterator[tuple[str, Detections]]:
         """What variants see of a frame."""
         mapped = plain = self.detected[frame].detections

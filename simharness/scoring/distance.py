@@ -18,7 +18,11 @@ def mean_distances(truth: Floats, estimate: Floats) -> Floats:
     Returns:
         (P, n), metres; infinite where the two share no joint.
     """
-    distance = np.linalg.norm(truth[:, None] - estimate[None], axis=-1)
+    return mean_where_shared(np.linalg.norm(truth[:, None] - estimate[None], axis=-1))
+
+
+def mean_where_shared(distance: Floats) -> Floats:
+    """Mean over joints of distances (..., J) that are NaN where one of the two is missing; infinite where all are."""
     shared = np.isfinite(distance)
     count = shared.sum(axis=-1)
     total = np.where(shared, distance, 0.0).sum(axis=-1)

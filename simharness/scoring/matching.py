@@ -1,4 +1,4 @@
-"""Scores of the matching alone, over pairs of detections in different views.
+"""Scores of the matching alone: pairs of detections in different views, and groups of detections.
 
 A pair is positive where both detections show one true person; the method says so where both carry one label.
 Phantoms (person -1) and unmatched detections (label -1) are in no positive pair. A detector may find a person twice in
@@ -59,24 +59,42 @@ def count_pairs(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> PairCo
     Raises:
         ValueError: lengths that differ.
     """
-    view = as_array(view, ("m",), "view", np.int64)
-    labels = as_array(labels, view.shape, "labels", np.int64)
-    person = as_array(person, view.shape, "person", np.int64)
-    first, second = np.triu_indices(len(view), k=1)
-    across = view[first] != view[second]
-    first, second = first[across], second[across]
-    said, true = _same(labels, first, second), _same(person, first, second)
-    places = np.column_stack([person[first], np.sort(np.column_stack([view[first], view[second]]), axis=1)])
-    lost = len(np.unique(places[true], axis=0)) - len(np.unique(places[true & said], axis=0))
-    return PairCounts(int((said & true).sum()), int((said & ~true).sum()), lost)
+    table = _tabulate(view, labels, person)
+    known = table[1:, 1:]
+    correct = _across(known)
+    found = (table[:, 1:].sum(axis=0) > 0).astype(np.int64)  # (P, V)
+    in_one = (known > 0).astype(np.int64).transpose(1, 2, 0)  # (P, V, L)
+    joined = in_one @ in_one.transpose(0, 2, 1) > 0  # (P, V, V)
+    lost = _across(found) - int(np.triu(joined, k=1).sum())
+    return PairCounts(correct, _across(table[1:].sum(axis=1)) - correct, lost)
 
 
-def _same(group: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.bool_]:
-    return (group[first] == group[second]) & (group[first] >= 0)
+@dataclass(frozen=True)
+class GroupCounts:
+    """How the detections of a frame were grouped into people.
+
+    Attributes:
+        merged: groups with detections of two true people or more.
+        split: true people whose matched detections are in several groups, none of which holds one from every view that
+            has any. So a second detection of a person in one view makes no split.
+        phantoms: detections of nobody.
+        admitted: detections of nobody that are in a group.
+    """
+
+    merged: int
+    split: int
+    phantoms: int
+    admitted: int
 
 
-def _share(part: int, whole: int) -> float | None:
-    return part / whole if whole else None
+def count_groups(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> GroupCounts:
+    """Count what went wrong with whole groups and people; the arguments are those of :func:`count_pairs`."""
+    table = _tabulate(view, labels, person)
+    known = table[1:, 1:] > 0  # (L, P, V)
+    merged = known.any(axis=2).sum(axis=1) >= 2
+    views = known.sum(axis=2).max(axis=0, initial=0)
+    split = known.any(axis=0).sum(axis=1) > views
+    return GroupCounts(int(merged.sum()), int(split.sum()), int(table[:, 0].sum()), int(table[1:, 0].sum()))
 
 
 def count_violations(view: ArrayLike, labels: ArrayLike) -> int:
@@ -90,6 +108,24 @@ def count_violations(view: ArrayLike, labels: ArrayLike) -> int:
         ValueError: lengths that differ.
     """
     view = as_array(view, ("m",), "view", np.int64)
-    labels = as_array(labels, (len(view),), "labels", np.int64)
-    pairs = np.column_stack([view, labels])[labels >= 0]
-    return len(pairs) - len(np.unique(pairs, axis=0))
+    groups = _tabulate(view, labels, np.full(len(view), -1))[1:]
+    return int((groups - (groups > 0)).sum())
+
+
+def _tabulate(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> NDArray[np.int64]:
+    """Count the detections by label, person and view, (L + 1, P + 1, V); the first of both is for -1."""
+    view = as_array(view, ("m",), "view", np.int64)
+    labels = as_array(labels, view.shape, "labels", np.int64)
+    person = as_array(person, view.shape, "person", np.int64)
+    shape = tuple(int(index.max(initial=-1)) + extra for index, extra in ((labels, 2), (person, 2), (view, 1)))
+    places = ((labels + 1) * shape[1] + person + 1) * shape[2] + view
+    return np.bincount(places, minlength=shape[0] * shape[1] * shape[2]).reshape(shape)
+
+
+def _across(counts: NDArray[np.int64]) -> int:
+    """Pairs of detections in different views, of counts (..., V); those in different rows are no pair."""
+    return int((counts.sum(axis=-1) ** 2 - (counts**2).sum(axis=-1)).sum()) // 2
+
+
+def _share(part: int, whole: int) -> float | None:
+    return part / whole if whole else None

@@ -124,7 +124,7 @@ def test_nothing_found_is_a_valid_run(tmp_path, sections, people):
     assert "<svg" in (folder / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("stage", ["simulate", "Filming", "detect", "score", "write_run"])
+@pytest.mark.parametrize("stage", ["simulate", "Filming", "detect", "score_variant", "write_run"])
 def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     def broken(*_args, **_options):
         raise ValueError("of our own making")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scoring.matching import PairCounts, count_pairs
+from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 
 
 def test_a_perfect_matching():
@@ -61,3 +61,40 @@ def test_one_of_two_detections_of_a_person_in_a_view_is_enough():
 def test_lengths_must_agree():
     with pytest.raises(ValueError, match="labels"):
         count_pairs([0, 1], [0], [0, 0])
+
+
+def test_a_perfect_grouping():
+    assert count_groups([0, 0, 1, 1, 2], [0, 1, 0, 1, -1], [7, 3, 7, 3, -1]) == GroupCounts(0, 0, 1, 0)
+    assert count_groups([], [], []) == GroupCounts(0, 0, 0, 0)
+
+
+def test_a_group_of_two_people_is_merged_and_one_with_a_phantom_is_not():
+    assert count_groups([0, 1, 2], [0, 0, 0], [4, 4, 5]) == GroupCounts(1, 0, 0, 0)
+    assert count_groups([0, 1, 2], [0, 0, 0], [4, 4, -1]) == GroupCounts(0, 0, 1, 1)
+
+
+def test_a_person_in_two_groups_is_split_and_one_half_matched_is_not():
+    assert count_groups([0, 1, 2, 3], [0, 0, 1, 1], [4, 4, 4, 4]).split == 1
+    assert count_groups([0, 1, 2, 3], [0, 0, -1, -1], [4, 4, 4, 4]).split == 0
+
+
+def test_a_second_detection_in_a_view_makes_no_split():
+    assert count_groups([0, 1, 2, 2], [0, 0, 0, 1], [4, 4, 4, 4]).split == 0
+    assert count_groups([0, 1, 2, 2, 3], [0, 0, 0, 1, 1], [4, 4, 4, 4, 4]).split == 1  # view 3 is with the other one
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(-1, 2), st.integers(-1, 2)), max_size=12), st.randoms())
+def test_groups_agree_with_counting_by_hand_in_any_order(detections, random):
+    groups = {label: [each for each in detections if each[1] == label] for label in range(3)}
+    merged = sum(len({person for _, _, person in group if person >= 0}) >= 2 for group in groups.values())
+    split = 0
+    for someone in range(3):
+        views = [{view for view, _, person in group if person == someone} for group in groups.values()]
+        split += set.union(*views) not in views
+    phantoms = [label for _, label, person in detections if person < 0]
+    doubled = sum(len(group) - len({view for view, _, _ in group}) for group in groups.values())
+    random.shuffle(detections)
+    view, labels, person = np.array(detections, int).reshape(-1, 3).T
+    admitted = sum(label >= 0 for label in phantoms)
+    assert count_groups(view, labels, person) == GroupCounts(merged, split, len(phantoms), admitted)
+    assert count_violations(view, labels) == doubled

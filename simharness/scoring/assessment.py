@@ -1,0 +1,258 @@
+"""All that one variant's answers to one recording are worth: the scores, and the tables by frame and by person."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from mvpose import COCO17, Estimate
+from simharness.rendering.visibility import Visibility
+from simharness.scoring.average_precision import average_precision, nearest_people
+from simharness.scoring.bones import bone_errors
+from simharness.scoring.catalogue import AP_MM, PCK_MM
+from simharness.scoring.frame import FrameScore, score_frame
+from simharness.scoring.jitter import jitter
+from simharness.scoring.matching import GroupCounts, count_groups, count_pairs, count_violations
+from simharness.scoring.pck import joint_errors, pck, pck_area
+from simharness.scoring.pcp import Part
+from simharness.scoring.pose import Pairing
+from simharness.scoring.recording import Recording
+from simharness.scoring.reprojection import reprojection_errors
+from simharness.scoring.summary import STAGES, VariantScores
+
+Floats = NDArray[np.float64]
+Scores = dict[str, float | None]
+
+_IN_SIGHT = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What one variant's answers are worth.
+
+    Attributes:
+        scores: every one of :data:`simharness.scoring.catalogue.SCORES` but those of failures, in that order; None
+            where one does not apply.
+        frames: a row for each frame: ``frame``, ``time`` (s); ``people``, ``estimates``, ``found``, ``missed``,
+            ``ghosts``; ``pcp`` (percent), ``mpjpe_mm``; ``pairs_correct``, ``pairs_wrong``, ``pairs_lost``,
+            ``violations``, ``merged``, ``split``; ``phantoms`` and how many of them were ``admitted``; and
+            ``time_affinity_ms``, ``time_matching_ms``, ``time_reconstruction_ms``, ``time_ms``. Null, never NaN,
+            where something does not apply.
+        people: a row for each frame and true person who is there: ``frame``, ``person``; ``found``, ``error_mm`` (the
+            mean over joints), ``pcp`` (percent); ``worst_joint`` by name and its error ``worst_mm``, of the joints
+            that were placed; ``visible_views``, the views in which half of the joints or more are in sight, that is
+            hidden by nothing but the person. Errors are null where the person is missed.
+        errors: of every joint of every true person, (T, P, 17), metres: infinite where missed or not placed, NaN where
+            the truth does not say where it is. :func:`simharness.scoring.pck.pck` makes the curve of them.
+    """
+
+    scores: Scores
+    frames: pl.DataFrame
+    people: pl.DataFrame
+    errors: Floats
+
+
+def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
+    """Score one variant.
+
+    Args:
+        recording: what it was given, and the truth.
+        estimates: its answers, one for each frame.
+
+    Raises:
+        ValueError: not one answer a frame, or answers that do not fit the frame's detections.
+    """
+    if len(estimates) != len(recording):
+        raise ValueError(f"a recording of {len(recording)} frames needs as many estimates, got {len(estimates)}")
+    variant = score_variant(recording, estimates)
+    summary = variant.summary()
+    groups, violations = _group(recording, estimates)
+    truth = np.stack([true.joints for true in recording.truth])
+    placed = _placed(truth.shape, variant.frames, estimates)
+    errors = joint_errors(truth, placed)
+    scores = (
+        _of_people(summary)
+        | _of_joints(errors)
+        | _precisions(truth, estimates)
+        | _pck(errors)
+        | _of_shape(truth, placed)
+        | _in_pictures(recording, placed)
+        | _of_matching(summary, groups, violations)
+        | _times(summary)
+    )
+    return Assessment(
+        scores,
+        _frame_table(recording, variant, groups, violations),
+        _people_table(recording, variant, errors),
+        errors,
+    )
+
+
+def score_variant(recording: Recording, estimates: Sequence[Estimate]) -> VariantScores:
+    """The scores of every frame, as ``summary.json`` has them together."""
+    frames = [
+        score_frame(
+            true.joints, estimate.joints, matching=count_pairs(detected.view, estimate.matching.labels, true.person)
+        )
+        for detected, true, estimate in zip(recording.detections, recording.truth, estimates, strict=True)
+    ]
+    return VariantScores(tuple(frames), tuple(estimate.timings for estimate in estimates))
+
+
+def _group(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[GroupCounts], list[int]]:
+    """Groups and violations of every frame."""
+    views = [detections.view for detections in recording.detections]
+    labels = [estimate.matching.labels for estimate in estimates]
+    people = [true.person for true in recording.truth]
+    return list(map(count_groups, views, labels, people)), list(map(count_violations, views, labels))
+
+
+def _placed(shape: tuple[int, ...], frames: Sequence[FrameScore], estimates: Sequence[Estimate]) -> Floats:
+    """The estimate that is each true person's own, (T, P, J, 3), metres; NaN where missed."""
+    placed = np.full(shape, np.nan)
+    for row, frame, estimate in zip(placed, frames, estimates, strict=True):
+        own = frame.pairing.estimate
+        row[own >= 0] = estimate.joints[own[own >= 0]]
+    return placed
+
+
+def _of_people(summary: Mapping[str, Any]) -> Scores:
+    return {
+        "pcp": summary["pcp"],
+        **{f"pcp_{group}": value for group, value in summary["pcp_parts"].items()},
+        "recall": _percent(summary["recall"]),
+        "precision": _percent(summary["precision"]),
+        "ghosts": summary["ghosts_per_frame"],
+        "missed": summary["missed_per_frame"],
+        "mpjpe_mm": summary["mpjpe_mm"]["mean"],
+        "mpjpe_median_mm": summary["mpjpe_mm"]["median"],
+    }
+
+
+def _of_joints(errors: Floats) -> Scores:
+    return {
+        f"mpjpe_{joint}_mm": _statistic(np.mean, 1000.0 * errors[..., index])
+        for index, joint in enumerate(COCO17.joints)
+    }
+
+
+def _precisions(truth: Floats, estimates: Sequence[Estimate]) -> Scores:
+    frame = np.repeat(np.arange(len(estimates)), [len(estimate) for estimate in estimates])
+    joints = np.concatenate([estimate.joints for estimate in estimates])
+    score = np.concatenate([estimate.scores.mean(axis=1) for estimate in estimates])
+    person, distance = nearest_people(truth, joints, frame)
+    people = int(np.isfinite(truth).all(axis=-1).any(axis=-1).sum())
+    found = {
+        f"ap{limit}": average_precision(person, distance, score, people=people, threshold=limit / 1000.0)
+        for limit in AP_MM
+    }
+    return {**found, "map": _statistic(np.mean, np.array(list(found.values()), float))}
+
+
+def _pck(errors: Floats) -> Scores:
+    curve = pck(errors, np.array(PCK_MM) / 1000.0)
+    shares = {f"pck{limit}": _known(share) for limit, share in zip(PCK_MM, curve, strict=True)}
+    return {**shares, "pck_auc": _known(pck_area(errors, PCK_MM[-1] / 1000.0))}
+
+
+def _of_shape(truth: Floats, placed: Floats) -> Scores:
+    return {
+        "bone_mm": _statistic(np.mean, 1000.0 * np.abs(bone_errors(truth, placed))),
+        "jitter_mm": _statistic(np.mean, 1000.0 * jitter(truth, placed)),
+    }
+
+
+def _in_pictures(recording: Recording, placed: Floats) -> Scores:
+    # Medians: what a single joint just before a lens does to a mean says nothing of all others.
+    estimate, detection = reprojection_errors(recording, placed)
+    return {"reprojection_px": _statistic(np.median, estimate), "detection_px": _statistic(np.median, detection)}
+
+
+def _of_matching(summary: Mapping[str, Any], groups: Sequence[GroupCounts], violations: Sequence[int]) -> Scores:
+    phantoms, admitted = (sum(getattr(each, key) for each in groups) for key in ("phantoms", "admitted"))
+    return {
+        **{f"match_{key}": _percent(share) for key, share in summary["matching"].items()},
+        "violations": sum(violations) / len(groups),
+        "merged": sum(each.merged for each in groups) / len(groups),
+        "split": sum(each.split for each in groups) / len(groups),
+        "phantoms_admitted": 100.0 * admitted / phantoms if phantoms else None,
+        "phantoms_pruned": 100.0 - 100.0 * admitted / phantoms if phantoms else None,
+    }
+
+
+def _times(summary: Mapping[str, Any]) -> Scores:
+    timings = summary["timings_ms"]
+    medians = {_time_column(stage): timings[stage]["median"] for stage in STAGES}
+    return {**medians, "time_p99_ms": timings["total"]["p99"]}
+
+
+def _time_column(stage: str) -> str:
+    return "time_ms" if stage == "total" else f"time_{stage}_ms"
+
+
+def _frame_table(
+    recording: Recording, variant: VariantScores, groups: Sequence[GroupCounts], violations: Sequence[int]
+) -> pl.DataFrame:
+    rows = []
+    for index, (frame, timing) in enumerate(zip(variant.frames, variant.timings, strict=True)):
+        row = frame.row()
+        del row["errors_mm"], row["parts"]  # which are in the table of people
+        group = groups[index]
+        rows.append(
+            {"frame": index, "time": float(recording.time[index]), **row}
+            | {"violations": violations[index], "merged": group.merged, "split": group.split}
+            | {"phantoms": group.phantoms, "admitted": group.admitted}
+            | {_time_column(stage): 1000.0 * timing[stage] if stage in timing else None for stage in STAGES}
+        )
+    floats = ("pcp", "mpjpe_mm", *map(_time_column, STAGES))
+    return pl.DataFrame(rows, schema_overrides=dict.fromkeys(floats, pl.Float64), infer_schema_length=None)
+
+
+def _people_table(recording: Recording, variant: VariantScores, errors: Floats) -> pl.DataFrame:
+    pairings = [frame.pairing for frame in variant.frames]
+    frame, person = np.nonzero(np.stack([pairing.present for pairing in pairings]))
+    parts = np.stack([each.parts for each in variant.frames])[frame, person]
+    counted = (parts != Part.UNDEFINED).sum(axis=1)
+    own = errors[frame, person]
+    placed = np.where(np.isfinite(own), own, -1.0)
+    worst = placed.argmax(axis=1)
+    known = placed.max(axis=1) >= 0
+    in_sight = np.isin(np.stack([true.visibility for true in recording.truth]), _IN_SIGHT).mean(axis=-1) >= 0.5
+    columns: dict[str, Any] = {
+        "frame": frame,
+        "person": person,
+        "found": _of_pairings(pairings, "estimate")[frame, person] >= 0,
+        "error_mm": 1000.0 * _of_pairings(pairings, "error")[frame, person],
+        "pcp": np.where(counted > 0, 100.0 * (parts == Part.CORRECT).sum(axis=1) / np.maximum(counted, 1), np.nan),
+        "worst_joint": np.where(known, worst, -1),
+        "worst_mm": np.where(known, 1000.0 * placed.max(axis=1), np.nan),
+        "visible_views": in_sight.sum(axis=1)[frame, person],
+    }
+    names: Mapping[int, str] = dict(enumerate(COCO17.joints))
+    return pl.DataFrame(columns).with_columns(
+        pl.col("error_mm", "pcp", "worst_mm").fill_nan(None),
+        pl.col("worst_joint").replace_strict(names, default=None, return_dtype=pl.String),
+    )
+
+
+def _of_pairings(pairings: Sequence[Pairing], key: str) -> NDArray[Any]:
+    return np.stack([getattr(pairing, key) for pairing in pairings])
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100.0 * share
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _statistic(function: Callable[[Floats], np.floating], values: Floats) -> float | None:
+    """Of the finite values; None without any."""
+    values = values[np.isfinite(values)]
+    return float(function(values)) if len(values) else None

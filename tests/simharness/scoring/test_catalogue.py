@@ -1,0 +1,40 @@
+from simharness.scoring.catalogue import AP_MM, HEADLINE, PCK_MM, SCORES
+from simharness.scoring.failures import FailureKind
+
+
+def test_every_score_says_what_it_is():
+    for key, info in SCORES.items():
+        assert info.key == key
+        assert info.title
+        assert 10 < len(info.about) < 120, key
+        assert info.better in ("higher", "lower")
+        assert 0 <= info.digits <= 3
+    titles = [info.title for info in SCORES.values()]
+    assert len(set(titles)) == len(titles)
+
+
+def test_names_tell_the_unit():
+    for key, info in SCORES.items():
+        assert key.endswith("_mm") == (info.unit == "mm"), key
+        assert key.endswith("_ms") == (info.unit == "ms"), key
+        assert key.endswith("_px") == (info.unit == "px"), key
+
+
+def test_only_shares_of_what_is_right_should_be_high():
+    low_shares = {"phantoms_admitted", "blame_detection", "blame_matching", "blame_reconstruction"}
+    for key, info in SCORES.items():
+        assert (info.better == "higher") == (info.unit == "%" and key not in low_shares), key
+
+
+def test_the_headline_is_among_the_scores():
+    assert set(HEADLINE) < set(SCORES)
+
+
+def test_failures_are_those_that_there_are():
+    kinds = [key.removeprefix("failures_") for key in SCORES if key.startswith("failures_")]
+    assert kinds == [kind.value for kind in FailureKind]
+
+
+def test_limits_have_a_score_each():
+    assert [key for key in SCORES if key.startswith("ap")] == [f"ap{limit}" for limit in AP_MM]
+    assert {f"pck{limit}" for limit in PCK_MM} < set(SCORES)
