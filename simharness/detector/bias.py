@@ -38,7 +38,7 @@ def offsets(joints: ArrayLike, bias: Bias) -> Floats:
 def shifts(joints: Floats, bias: Bias, rig: Rig) -> Floats:
     """The same in the pictures of V cameras: (T, P, 17, 3) metres to (T, V, P, 17, 2) pixels.
 
-    Through the believed cameras at the frames' times, which is a small error of a small offset.
+    Through the cameras as they hang at the beginning: where they drift, a small error of a small offset.
     """
     moved = joints + offsets(joints, bias)
     return np.stack([camera.project(moved) - camera.project(joints) for camera in rig], axis=1)

@@ -32,7 +32,7 @@ def decoy_hits(views: Views, rig: Rig, config: DecoyHits, chances: Chances) -> F
 
     Args:
         views: the truth in the pictures, T frames of V cameras.
-        rig: the believed cameras, for their images' sizes.
+        rig: the cameras that take the pictures, for their images' sizes.
         config: the dials.
         chances: of the sequence.
     """

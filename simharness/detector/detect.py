@@ -58,7 +58,7 @@ def detect(
     Args:
         sequence: where everyone is, T frames.
         views: the same in the V pictures.
-        rig: the cameras, as believed.
+        rig: the cameras that take the pictures, not what is believed of them.
         config: how the detector errs.
         seed: of the scenario.
         looks: how descriptors are drawn; None: detections carry none.

@@ -41,12 +41,12 @@ def phantoms(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Foun
     space. The number of those in one picture alone is Poisson distributed. More of a rate adds phantoms and changes
     none; each keeps its slot, which a figure has in all views alike.
 
-    Figures are projected by ``rig`` into the pictures: where faults bend the true cameras away from it, they stand a
-    little beside where they would.
+    Figures are projected by ``rig`` into the pictures: where cameras drift away from it, they stand a little beside
+    where they would.
 
     Args:
         views: the truth in the pictures, T frames of V cameras.
-        rig: the believed cameras.
+        rig: the cameras that take the pictures.
         config: the dials.
         chances: of the sequence.
     """

@@ -93,6 +93,11 @@ class Shots:
         """In which frames a picture arrives from which view, (T, V)."""
         return self.source >= 0
 
+    @cached_property
+    def taking(self) -> Rig:
+        """Whose pictures the views deliver: the true cameras as they hang at time 0, V in the order of the views."""
+        return Rig([self.true[int(taker)] for taker in self.taker])
+
     def camera(self, frame: int, view: int) -> Camera:
         """The true camera, as it hung when it took the picture that ``view`` delivers in ``frame``."""
         taker = self.taker[view]

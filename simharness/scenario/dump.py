@@ -24,7 +24,7 @@ def _lines(section: BaseModel, name: str = "") -> list[str]:
             nested += ["", *_lines(value, f"{name}.{key}" if name else key)]
         elif value is not None:
             assignment = f"{key} = {_written(value)}"
-            lines.append(f"{assignment:<32}# {field.description}" if field.description else assignment)
+            lines.append(f"{assignment:<31} # {field.description}" if field.description else assignment)
     return lines + nested
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from simharness.scenario.models import Scenario
+from simharness.scenario.document import ScenarioFile
 
 _SHOWN = 60  # characters of a refused value that a message repeats
 
@@ -22,23 +22,18 @@ def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file
     """One of pydantic's errors as "place: key: what was expected, what was got".
 
     Args:
-        mistake: the error; its location is that in a :class:`Scenario`.
+        mistake: the error; its location is that in a :class:`ScenarioFile`.
         places: who set a key where the file did not: ``--set people.count=6`` for ("people", "count").
         file: the file that is at fault where nobody else is.
     """
     location = tuple(mistake["loc"])
-    setters = (  # the last word counts
-        place
-        for key, place in reversed(places.items())
-        if location[: len(key)] == key or key[: len(location)] == location
-    )
-    place = next(setters, file)
+    place = place_of(location, places, file)
     key = _dotted(location)
     if mistake["type"] == "extra_forbidden":
         return f"{place}: {_unknown(location)}"
     if mistake["type"] == "missing":
         return f"{place}: {key} is missing and has no default; give it a value"
-    section = _section(location)
+    section = section_at(location)
     if mistake["type"] in ("model_type", "model_attributes_type") and section is not None:
         expected = f"a section [{key}] with keys {', '.join(sorted(section.model_fields))}"
     else:
@@ -51,6 +46,31 @@ def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file
     return f"{place}: {key}{about}: expected {expected}, got {got}"
 
 
+def place_of(location: Sequence[str | int], places: dict[tuple[str, ...], str], file: str) -> str:
+    """Who set a key last, or something in it, or the section that it is in; the file where nobody else did."""
+    location = tuple(location)
+    setters = (
+        place
+        for key, place in reversed(places.items())
+        if location[: len(key)] == key or key[: len(location)] == location
+    )
+    return next(setters, file)
+
+
+def is_key(location: Sequence[str]) -> bool:
+    """Whether a scenario file has a key, or a section."""
+    section = section_at(location[:-1])
+    return section is not None and location[-1] in section.model_fields
+
+
+def section_at(location: Sequence[str | int]) -> type[BaseModel] | None:
+    """The section that a location names, the file for none; None where it names a value or nothing."""
+    section: type[BaseModel] | None = ScenarioFile
+    for part in location:
+        section = None if section is None else _nested(section.model_fields.get(str(part)))
+    return section
+
+
 def _dotted(location: Sequence[str | int]) -> str:
     """``("cameras", "size", 1)`` as ``cameras.size[1]``."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
@@ -59,11 +79,11 @@ def _dotted(location: Sequence[str | int]) -> str:
 def _unknown(location: Sequence[str | int]) -> str:
     """What to say of a key that does not exist."""
     *parents, wrong = map(str, location)
-    section = _section(parents) or Scenario
+    section = section_at(parents) or ScenarioFile
     valid = sorted(section.model_fields)
     candidates = [".".join([*parents, key]) for key in difflib.get_close_matches(wrong, valid, n=1)]
     # A key of another section, most often one written above its [section] or below the wrong one.
-    candidates = candidates or [key for key in _keys(Scenario) if key.rsplit(".", 1)[-1] == wrong]
+    candidates = candidates or [key for key in _keys(ScenarioFile) if key.rsplit(".", 1)[-1] == wrong]
     hint = f"; did you mean {' or '.join(candidates)}?" if candidates else ";"
     where = f"[{'.'.join(parents)}]" if parents else "a scenario"
     return f"{_dotted(location)} is not a key{hint} {where} has {', '.join(valid)}"
@@ -80,7 +100,7 @@ def _keys(section: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 def _field(location: Sequence[str | int]) -> FieldInfo | None:
     """The field that a location, or the beginning of it, names."""
-    section: type[BaseModel] | None = Scenario
+    section: type[BaseModel] | None = ScenarioFile
     field = None
     for part in location:
         if section is None:
@@ -88,14 +108,6 @@ def _field(location: Sequence[str | int]) -> FieldInfo | None:
         field = section.model_fields.get(str(part))
         section = _nested(field)
     return field
-
-
-def _section(location: Sequence[str | int]) -> type[BaseModel] | None:
-    """The section that a location names; None where it names a value or nothing."""
-    section: type[BaseModel] | None = Scenario
-    for part in location:
-        section = None if section is None else _nested(section.model_fields.get(str(part)))
-    return section
 
 
 def _nested(field: FieldInfo | None) -> type[BaseModel] | None:

@@ -30,7 +30,7 @@ def sample(coat):
     return coat.colors * coat.texture[row, column] / 255
 
 
-@pytest.mark.parametrize("pattern", set(PATTERNS) - {"plain"})
+@pytest.mark.parametrize("pattern", sorted(set(PATTERNS) - {"plain"}))
 def test_patterned_cloth_shows_both_colours_about_alike(body, pattern):
     look = look_with(top_pattern=pattern)
     shown = sample(paint(body, look))[garments(body, look) == Garment.TOP]

@@ -1,0 +1,95 @@
+"""What a scenario file amounts to, for people: the resolved base as TOML, and what is varied above it."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from simharness.scenario.dump import dumps
+from simharness.scenario.layers import leaves
+from simharness.scenario.planning import Plan
+from simharness.scenario.sweeping import Axis
+
+_WIDTH = 96  # of a line of values
+_MOST = 12  # values of one factor
+
+
+def outline(plan: Plan, note: str = "") -> str:
+    """The base as TOML that :func:`simharness.scenario.load.load` reads back; of a study with what is varied.
+
+    Args:
+        plan: of the file.
+        note: of a study, a line more.
+    """
+    lines = _lines(plan, note) if plan.is_study else []
+    comments = "".join(f"# {line}".rstrip() + "\n" for line in lines)
+    return f"{comments}\n{dumps(plan.base)}" if comments else dumps(plan.base)
+
+
+def _lines(plan: Plan, note: str) -> list[str]:
+    variants = plan.base.method.variants
+    lines = [
+        f"{plan.base.name}: {_count(plan.settings, 'setting')} x {_count(len(plan.seeds), 'seed')} = "
+        f"{_count(plan.trials, 'trial')}, each by {_count(len(variants), 'variant')}",
+        *([note] if note else []),
+        "",
+    ]
+    rows = [("variants", ", ".join(variants)), ("seeds", _seeds(plan.seeds))]
+    lines += _table(rows)
+    if plan.sweep.axes:
+        how = "the base, and one at a time" if plan.sweep.one_at_a_time else "every combination of"
+        lines += ["", f"sweep: {how}", *_table([row for axis in plan.sweep.axes for row in _axis(axis)])]
+    if plan.cases[0].name:
+        lines += ["", "cases", *_table([(case.name, _changes(case.changes)) for case in plan.cases])]
+    return [*lines, "", "The base:"]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    if isinstance(seeds, range) and len(seeds) > 2:
+        return f"{seeds[0]} to {seeds[-1]}"
+    return _some([str(seed) for seed in seeds])
+
+
+def _axis(axis: Axis) -> list[tuple[str, str]]:
+    """A row for every key; those that go together with the first follow it."""
+    first, *others = axis.keys
+    values = [_some(list(map(_shown, column))) for column in zip(*axis.values, strict=True)]
+    return list(zip([first, *(f"with {key}" for key in others)], values, strict=True))
+
+
+def _changes(changes: Mapping[str, Any]) -> str:
+    said = []
+    for key in leaves(changes):
+        value: Any = changes
+        for part in key:
+            value = value[part]
+        said.append(f"{'.'.join(key)} = {_shown(value)}")
+    return ", ".join(said) or "the base"
+
+
+def _some(values: Sequence[str]) -> str:
+    if len(values) <= _MOST:
+        return ", ".join(values)
+    return f"{', '.join(values[: _MOST - 2])}, ..., {values[-1]} ({len(values):,} values)"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> list[str]:
+    """Names in a column, what belongs to them beside it, wrapped."""
+    width = 2 + max(len(name) for name, _ in rows) + 2
+    lines = []
+    for name, text in rows:
+        wrapped = textwrap.wrap(text, max(_WIDTH - width, 30), break_long_words=False) or [""]
+        lines += [f"  {name}".ljust(width) + wrapped[0], *(" " * width + line for line in wrapped[1:])]
+    return lines
