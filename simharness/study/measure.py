@@ -1,0 +1,84 @@
+"""One trial: a scenario built, filmed, detected once, estimated by every variant, and scored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import threadpoolctl
+
+from mvpose import Estimate
+from simharness.experiment.execution import RunError
+from simharness.experiment.looking import look
+from simharness.experiment.trial import Trial, prepare
+from simharness.experiment.work import Estimating
+from simharness.scenario.models import Scenario
+from simharness.scoring.assessment import assess
+from simharness.scoring.catalogue import SCORES
+from simharness.scoring.failures import Failure, failures_of_frame, find_failures
+from simharness.scoring.recording import Recording
+from simharness.study.blame import Blamed, failure_scores, failure_table
+from simharness.study.blame import blame as find_stages
+from simharness.study.measured import Measured
+
+__all__ = ["Measured", "measure"]
+
+
+def measure(scenario: Scenario, variants: Sequence[str] | None = None, *, blame: bool = True) -> dict[str, Measured]:
+    """Measure variants of the method in one trial, all on the same detections, in this process.
+
+    Args:
+        scenario: resolved, with its seed.
+        variants: of the method; the scenario's if not given.
+        blame: find the stage of every failure.
+
+    Returns:
+        What each variant did.
+
+    Raises:
+        ValueError: the scenario cannot be built at this seed.
+        RunError: anything that went wrong after that, which is its cause.
+    """
+    if variants is not None:
+        scenario = scenario.model_copy(
+            update={"method": scenario.method.model_copy(update={"variants": tuple(variants)})}
+        )
+    with threadpoolctl.threadpool_limits(1):
+        trial = prepare(scenario)
+        try:
+            return _measure(trial, blame)
+        except Exception as error:
+            raise RunError(f"{type(error).__name__}: {error}") from error
+
+
+def _measure(trial: Trial, blame: bool) -> dict[str, Measured]:
+    sequence, detected = look(trial)
+    estimating = Estimating(trial.shots.believed, tuple(detected), trial.pipelines)
+    recording = Recording(
+        sequence.time,
+        trial.shots.believed,
+        tuple(each.detections for each in detected),
+        tuple(each.truth for each in detected),
+    )
+    measured = {}
+    for variant, estimates in estimating(range(len(detected))).items():
+        assessment = assess(recording, estimates)
+        failures: Iterable[Failure | Blamed] = (
+            _stages(recording, estimating, variant, estimates) if blame else find_failures(recording, estimates)
+        )
+        table = failure_table(failures)
+        scores = {**assessment.scores, **failure_scores(table, len(recording))}
+        measured[variant] = Measured({key: scores[key] for key in SCORES}, assessment.frames, assessment.people, table)
+    return measured
+
+
+def _stages(
+    recording: Recording, estimating: Estimating, variant: str, estimates: Sequence[Estimate]
+) -> Iterator[Blamed]:
+    """The failures of a variant and their stages. A frame at a time, for the heat maps of all of them are large."""
+    for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
+        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
+            seen = estimating.seen(frame, variant)
+            moment = Recording(recording.time[[frame]], recording.rig, (seen,), (truth,))
+            for blamed in find_stages(moment, estimating.pipelines[variant], [estimate], failures):
+                yield replace(blamed, failure=replace(blamed.failure, frame=frame))

@@ -1,0 +1,33 @@
+"""What measuring a trial gives. Apart from how it is done, for stores and pages need no simulator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import polars as pl
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a variant of the method did in a trial.
+
+    Attributes:
+        scores: by the keys of :data:`simharness.scoring.catalogue.SCORES`; None where one does not apply.
+        frames: a row for each frame.
+        people: a row for each frame and true person.
+        failures: a row for each failure, by kind and stage.
+
+    Raises:
+        ValueError: a score that is not finite.
+    """
+
+    scores: Mapping[str, float | None]
+    frames: pl.DataFrame
+    people: pl.DataFrame
+    failures: pl.DataFrame
+
+    def __post_init__(self) -> None:
+        if wrong := [key for key, score in self.scores.items() if score is not None and not math.isfinite(score)]:
+            raise ValueError(f"a score is a finite number or None, got {wrong[0]} = {self.scores[wrong[0]]}")

@@ -1,0 +1,42 @@
+"""Which trials a study is made of, and where a store keeps them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from simharness.scenario.models import Scenario
+from simharness.scenario.study import Setting, Study
+from simharness.study.identity import entry_identity, trial_identity
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A trial of a study.
+
+    Attributes:
+        setting: of the study.
+        seed: that the setting is run at.
+        scenario: resolved, at that seed.
+        trial: its identity. Two settings may amount to the same trial.
+        entries: the identity of each variant's entry.
+    """
+
+    setting: Setting
+    seed: int
+    scenario: Scenario
+    trial: str
+    entries: Mapping[str, str]
+
+
+def plan(study: Study) -> list[Planned]:
+    """All trials of a study: every setting at the first seed, then at the second, for half a study is of use then."""
+    return [_planned(study, setting, seed) for seed in study.seeds for setting in study.settings]
+
+
+def _planned(study: Study, setting: Setting, seed: int) -> Planned:
+    scenario = study.at(setting, seed)
+    trial = trial_identity(scenario)
+    return Planned(
+        setting, seed, scenario, trial, {variant: entry_identity(trial, variant) for variant in study.variants}
+    )

@@ -1,0 +1,123 @@
+"""Studies that cost nothing: trials that are not measured but made up, and that do harm where a test asks for it.
+
+Run as a program by tests that kill it.
+"""
+
+import json
+import os
+import secrets
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from simharness.scenario.study import Study, load_study
+from simharness.scoring.catalogue import SCORES
+from simharness.study.measured import Measured
+
+ALWAYS = 99
+
+
+@dataclass(frozen=True)
+class Fake:
+    """In the place of ``measure``. Leaves a file for each call, so calls are counted across processes.
+
+    Attributes:
+        calls: the folder of those files.
+        harm: what happens at a seed, and how often: "raise", "refuse" (the scenario's fault), "kill".
+        seconds: that each call takes.
+        large: the seed from which tables are of a megabyte.
+    """
+
+    calls: Path
+    harm: Mapping[int, tuple[str, int]] = field(default_factory=dict)
+    seconds: float = 0.0
+    large: int = ALWAYS
+
+    def __call__(self, scenario, variants):
+        self.calls.mkdir(exist_ok=True)
+        call = f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}"
+        (self.calls / f"{time.time_ns()} {secrets.token_hex(4)}").write_text(call)
+        what, times = self.harm.get(scenario.seed, ("", 0))
+        if sum(each.startswith(f"{scenario.seed} ") for each in called(self.calls)) <= times:
+            if what == "kill":
+                time.sleep(0.3)  # whatever else this process has to do has begun by then
+                os.kill(os.getpid(), signal.SIGKILL)
+            raise ValueError("nobody fits") if what == "refuse" else ZeroDivisionError("by zero")
+        time.sleep(self.seconds)
+        return {
+            variant: made_up(scenario, variant, rows=3 if scenario.seed < self.large else 130_000)
+            for variant in variants
+        }
+
+
+def made_up(scenario, variant, *, rows=3):
+    """A result that is known beforehand: the same for the same trial and variant, another for any other."""
+    number = 1000.0 * scenario.seed + scenario.cameras.count + len(variant) / 100
+    frames = pl.DataFrame({"frame": np.arange(rows), "noise": np.random.default_rng(int(number)).random(rows)})
+    people = pl.DataFrame({"frame": [0], "person": [0], "error_mm": [number]})
+    failures = pl.DataFrame({"frame": [0], "kind": ["ghost"], "joints": [["nose"]]})
+    return Measured({key: number + place for place, key in enumerate(SCORES)}, frames, people, failures)
+
+
+def called(folder: Path) -> list[str]:
+    """The calls so far, "SEED CAMERAS VARIANTS", in their order."""
+    return [file.read_text() for file in sorted(folder.iterdir())] if folder.is_dir() else []
+
+
+def times(folder: Path) -> Counter:
+    """How often each seed was called."""
+    return Counter(int(call.split()[0]) for call in called(folder))
+
+
+def study_of(folder: Path, *, cameras=(3,), seeds=2, variants=("full", "fast"), name="views", more="") -> Study:
+    """A study of some numbers of cameras."""
+    path = folder / "fake.toml"
+    swept = f"[sweep]\ncameras.count = {list(cameras)}\n" if len(cameras) > 1 else ""
+    count = f"[cameras]\ncount = {cameras[0]}\n"
+    path.write_text(
+        f'name = "{name}"\nseeds = {seeds}\nvariants = {json.dumps(list(variants))}\n{more}\n{count}{swept}'
+    )
+    return load_study(path)
+
+
+def program(folder: Path, **options) -> list[str]:
+    """The command that runs a study of 2 x 3 trials in a process of its own: options of :func:`main`."""
+    text = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import fakes; fakes.main()"
+    return [sys.executable, "-c", text, json.dumps({"folder": str(folder), **options})]
+
+
+def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
+    """Run it to its end."""
+    return subprocess.run(program(folder, **options), capture_output=True, text=True, timeout=120, check=False)
+
+
+def main():
+    """``simharness study`` of a made-up study."""
+    from simharness.cli import studying
+    from simharness.study import running
+
+    options = json.loads(sys.argv[1])
+    folder = Path(options["folder"])
+    harm = {int(seed): tuple(what) for seed, what in options.get("harm", {}).items()}
+    fake = Fake(folder / "calls", harm, options.get("seconds", 0.0), options.get("large", ALWAYS))
+    study_of(folder, cameras=(3, 4), seeds=3)
+    run_study = running.run_study
+    running.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)
+    studying._report = lambda results: None
+    if limit := options.get("file_size"):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    sys.argv = ["simharness", "study", str(folder / "fake.toml"), "--out", str(folder / "out")]
+    sys.argv += ["--workers", str(options.get("workers", 1))]
+    from simharness.cli import main as simharness
+
+    simharness()

@@ -1,0 +1,123 @@
+"""Trials shared out, and those that fail."""
+
+import pytest
+from fakes import ALWAYS, Fake, called, made_up, study_of, times
+
+from simharness.study import scheduling
+from simharness.study.plan import plan
+from simharness.study.scheduling import Failure, Success, Unit, work_off
+
+
+def units_of(folder, seeds):
+    return [Unit(each.trial, each.scenario, ("full", "fast")) for each in plan(study_of(folder, seeds=seeds))]
+
+
+def by_seed(results):
+    return {result.unit.scenario.seed: result for result in results}
+
+
+class TestHere:
+    def test_results_come_in_order(self, tmp_path):
+        units = units_of(tmp_path, 4)
+        results = list(work_off(units, Fake(tmp_path / "calls")))
+        assert [result.unit for result in results] == units
+        for result in results:
+            assert isinstance(result, Success)
+            assert set(result.measured) == {"full", "fast"}
+            assert result.measured["fast"].scores == made_up(result.unit.scenario, "fast").scores
+
+    @pytest.mark.parametrize(("times_raised", "calls"), [(1, 2), (2, 3)])
+    def test_what_fails_now_and_then_is_done(self, tmp_path, times_raised, calls):
+        fake = Fake(tmp_path / "calls", {1: ("raise", times_raised)})
+        assert all(isinstance(result, Success) for result in work_off(units_of(tmp_path, 3), fake))
+        assert times(fake.calls) == {0: 1, 1: calls, 2: 1}
+
+    def test_what_always_fails_is_given_up(self, tmp_path):
+        fake = Fake(tmp_path / "calls", {1: ("raise", ALWAYS), 2: ("refuse", ALWAYS)})
+        results = by_seed(work_off(units_of(tmp_path, 4), fake))
+        assert {seed for seed, result in results.items() if isinstance(result, Failure)} == {1, 2}
+        assert results[1].error == "ZeroDivisionError: by zero"
+        assert "ZeroDivisionError" in results[1].traceback
+        assert results[2].error == "nobody fits"
+        assert times(fake.calls) == {0: 1, 1: 3, 2: 1, 3: 1}
+
+    def test_work_is_begun_when_it_is_asked_for(self, tmp_path):
+        fake = Fake(tmp_path / "calls")
+        results = work_off(units_of(tmp_path, 4), fake)
+        assert called(fake.calls) == []
+        next(results)
+        results.close()
+        assert len(called(fake.calls)) == 1
+
+    def test_fewer_than_one_worker_is_refused(self, tmp_path):
+        with pytest.raises(ValueError, match="at least 1, got 0"):
+            next(work_off([], Fake(tmp_path / "calls"), workers=0))
+
+
+@pytest.mark.slow
+def test_workers_that_die_cost_a_retry(tmp_path):
+    harm = {1: ("kill", 1), 3: ("raise", ALWAYS), 4: ("raise", 1), 5: ("refuse", ALWAYS)}
+    fake = Fake(tmp_path / "calls", harm, seconds=0.05)
+    results = by_seed(work_off(units_of(tmp_path, 10), fake, workers=2))
+    assert set(results) == set(range(10))
+    failed = {seed: result for seed, result in results.items() if isinstance(result, Failure)}
+    assert set(failed) == {3, 5}
+    assert failed[3].error == "ZeroDivisionError: by zero"
+    assert "fakes.py" in failed[3].traceback
+    calls = times(fake.calls)
+    for seed, least in {0: 1, 1: 2, 3: 3, 4: 2, 5: 1}.items():
+        assert least <= calls[seed] <= least + 3  # with a worker may die a result that is on its way
+    for seed in set(results) - set(failed):
+        assert results[seed].measured["full"].scores == made_up(results[seed].unit.scenario, "full").scores
+
+
+class TestClusters:
+    @pytest.mark.slow
+    def test_whoever_is_killed_along_is_not_to_blame(self, tmp_path):
+        import dask
+        from distributed import LocalCluster
+
+        # One process of two threads: the trial that kills it takes along whatever runs beside.
+        units, fake = units_of(tmp_path, 2), Fake(tmp_path / "calls", {0: ("kill", ALWAYS)}, seconds=1.0)
+        with (
+            dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+            LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster,
+        ):
+            results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
+        assert isinstance(results[0], Failure)
+        assert "worker process died" in results[0].error
+        assert isinstance(results[1], Success)
+        assert times(fake.calls) == {0: 3, 1: 2}
+
+    @pytest.mark.slow
+    def test_one_that_is_there_does_the_same(self, tmp_path):
+        from distributed import LocalCluster
+
+        units, fake = units_of(tmp_path, 5), Fake(tmp_path / "calls", {1: ("raise", 1), 2: ("raise", ALWAYS)})
+        with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster:
+            results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
+            assert {seed for seed, result in results.items() if isinstance(result, Failure)} == {2}
+            again = list(work_off(units[:1], fake, scheduler=cluster.scheduler_address))
+        assert len(again) == 1
+        assert times(fake.calls) == {0: 2, 1: 2, 2: 3, 3: 1, 4: 1}
+
+    @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
+    def test_one_that_is_not_there_is_said(self, tmp_path, monkeypatch, address):
+        monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)
+        with pytest.raises(ValueError, match=f"--scheduler {address}: no Dask scheduler"):
+            next(work_off(units_of(tmp_path, 1), Fake(tmp_path / "calls"), scheduler=address))
+
+    def test_one_without_workers_or_with_others_is_said(self, tmp_path, monkeypatch):
+        from distributed import LocalCluster
+
+        monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)
+        unit, fake = units_of(tmp_path, 1), Fake(tmp_path / "calls")
+        with LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster:
+            with pytest.raises(ValueError, match="it has no workers"):
+                next(work_off(unit, fake, scheduler=cluster.scheduler_address))
+            cluster.scale(1)
+            monkeypatch.setattr(scheduling, "_PATIENCE", 10)
+            monkeypatch.setattr(scheduling, "code", object)  # of which no two are equal
+            with pytest.raises(ValueError, match="another version of simharness"):
+                next(work_off(unit, fake, scheduler=cluster.scheduler_address))
+        assert called(fake.calls) == []

@@ -1,0 +1,95 @@
+"""Studies that are killed, interrupted, or run out of disk: nothing finished is lost, and the store is clean."""
+
+import os
+import signal
+import subprocess
+import time
+
+import psutil
+import pytest
+from fakes import Fake, called, made_up, program, run_program, study_of
+
+from simharness.study.plan import plan
+from simharness.study.running import run_study
+from simharness.study.store import Store
+
+
+def store_is_clean(folder):
+    """Every file of the store is a whole entry with the right numbers; returns how many trials it has."""
+    store, trials = Store(folder / "out" / "store"), set()
+    for each in plan(study_of(folder, cameras=(3, 4), seeds=3)):
+        for variant, identity in each.entries.items():
+            if store.file_of(identity).exists():
+                assert store.read(identity).measured.scores == made_up(each.scenario, variant).scores
+                trials.add(each.trial)
+    assert not store.damaged
+    return len(trials)
+
+
+def wait_for(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.02)
+
+
+def started(folder, **options):
+    """The program, in a process group of its own, as a shell starts it."""
+    return subprocess.Popen(
+        program(folder, **options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def goes_on(folder, finished):
+    """The same study once more runs the rest, and is whole."""
+    fake = Fake(folder / "calls again")
+    results = run_study(study_of(folder, cameras=(3, 4), seeds=3), out=folder / "out", measure=fake)
+    assert (results.info["kept"], results.info["run"], results.info["failed"]) == (finished, 6 - finished, [])
+    assert len(called(fake.calls)) == 6 - finished
+    assert len(results.trials) == 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_interrupted_study_keeps_what_is_finished(tmp_path, workers):
+    process = started(tmp_path, seconds=0.6, workers=workers)
+    wait_for(lambda: len(list(tmp_path.glob("out/store/??/*.trial"))) >= 4)
+    os.killpg(process.pid, signal.SIGINT)
+    output, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    finished = store_is_clean(tmp_path)
+    assert 2 <= finished < 6
+    assert said.splitlines()[-1] == f"interrupted: {finished} of 6 trials are kept; the same command goes on"
+    assert "Traceback" not in said
+    assert output == ""
+    assert not (tmp_path / "out" / "views").exists()
+    assert list(tmp_path.rglob("*.partial")) == []
+    goes_on(tmp_path, finished)
+
+
+@pytest.mark.slow
+def test_a_killed_parent_leaves_neither_workers_nor_a_broken_store(tmp_path):
+    process = started(tmp_path, seconds=0.6, workers=2)
+    wait_for(lambda: len(list(tmp_path.glob("out/store/??/*.trial"))) >= 2)
+    workers = psutil.Process(process.pid).children(recursive=True)
+    assert len(workers) >= 2
+    process.kill()
+    process.communicate(timeout=30)
+    wait_for(lambda: not any(each.is_running() and each.status() != psutil.STATUS_ZOMBIE for each in workers), 20)
+    finished = store_is_clean(tmp_path)
+    assert not (tmp_path / "out" / "views").exists()
+    goes_on(tmp_path, finished)
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_said_once_and_what_is_finished_is_kept(tmp_path):
+    done = run_program(tmp_path, file_size=200_000, large=1)  # from seed 1 on there is no room
+    assert done.returncode == 3
+    said = done.stderr.splitlines()[-1]
+    assert said.startswith("the study stopped: store ")
+    assert "cannot be written to: File too large" in said
+    assert "the same command goes on" in said
+    assert "Traceback" not in done.stderr
+    assert store_is_clean(tmp_path) == 2
+    assert list(tmp_path.rglob("*.partial")) == []
+    goes_on(tmp_path, 2)
