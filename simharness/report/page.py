@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import Any
 
-import jinja2
 import numpy as np
 import polars as pl
 from markupsafe import Markup
@@ -21,6 +19,7 @@ from simharness.report import plots
 from simharness.report.animation import Animation
 from simharness.report.headline import COLUMNS, NOTHING
 from simharness.report.pictures import Picture
+from simharness.report.templating import fill
 from simharness.scenario.dump import dumps
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.scoring.pose import pair
@@ -58,11 +57,8 @@ def render(
     """
     summary = record.summary
     main, scores = next(iter(summary["variants"].items()))
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    source = resources.files("simharness.report").joinpath("templates/run.html").read_text(encoding="utf-8")
-    return environment.from_string(source).render(
+    return fill(
+        "run.html",
         scenario=record.scenario,
         summary=summary,
         main=main,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -23,6 +22,7 @@ from simharness.rendering.optics import appear
 from simharness.rendering.overlay import COCO17_BODY, Overlay
 from simharness.rendering.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.rendering.picture import Studio
+from simharness.scenario.people import People
 from simharness.scene.build import Scene
 from simharness.scene.playback import Playback
 from simharness.scoring.pose import LIMIT, pair
@@ -83,7 +83,14 @@ def draw_pictures(
     studio = studio_of(trial.scenario, Playback(trial.scene))
     pictures = []
     for title, frame in frames.items():
-        rgb = draw_frame(trial, record, studio, frame, variant=variant)
+        rgb = draw_frame(
+            trial,
+            studio,
+            frame,
+            truth=record.truth[frame],
+            detections=record.detections[frame],
+            estimate=record.estimates[variant][frame],
+        )
         pictures.append(Picture(title, _caption(record, variant, frame), rgb))
         progress(1)
     return pictures
@@ -106,18 +113,29 @@ def _caption(record: Record, variant: str, frame: int) -> str:
     return f"{where}: {found}, {ghosts}{error}{views}."
 
 
-def draw_frame(trial: Trial, record: Record, studio: Studio, frame: int, *, variant: str) -> Rgb:
-    """Draw every view of a frame into one picture, with a legend: see :func:`annotate`."""
-    truth, detections, estimate = record.truth[frame], record.detections[frame], record.estimates[variant][frame]
-    views = np.unique(np.linspace(0, len(record.rig) - 1, min(len(record.rig), MOST_VIEWS)).astype(int))
+def draw_frame(
+    trial: Trial,
+    studio: Studio,
+    frame: int,
+    *,
+    truth: Truth,
+    detections: Detections,
+    estimate: Estimate,
+    explained: bool = True,
+) -> Rgb:
+    """Draw every view of a frame into one picture, with a legend where it is to be explained: see :func:`annotate`."""
+    rig = trial.shots.believed
+    views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MOST_VIEWS)).astype(int))
     tiles = []
     for view in map(int, views):
         rgb = studio.picture(trial.shots, frame, view, finer=2)
         camera = trial.shots.camera(frame, view)
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
-    titles = [record.rig[view].name for view in views]
-    explained = legend(_legend_entries(record), size=record.rig[0].size, title="What is drawn")
-    return mosaic([*tiles, explained], [*titles, ""], columns=math.ceil(math.sqrt(len(tiles) + 1)))
+    titles = [rig[view].name for view in views]
+    if explained:
+        tiles.append(legend(_legend_entries(trial.scenario.people), size=rig[0].size, title="What is drawn"))
+        titles.append("")
+    return mosaic(tiles, titles)
 
 
 def annotate(
@@ -178,14 +196,14 @@ def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, sai
     overlay.skeleton(detections.keypoints[index], color=color, edges=(), dots=2.6, outline=0.9)
 
 
-def _legend_entries(record: Record) -> list[tuple[Mark, Color, str]]:
-    people: Sequence[tuple[Mark, Color, str]] = [
+def _legend_entries(people: People) -> list[tuple[Mark, Color, str]]:
+    named: Sequence[tuple[Mark, Color, str]] = [
         ("limbs", person_color(person), f"person {person} as estimated ({role})")
-        for person, role in enumerate(roles(record.scenario.people)[:MOST_NAMED])
+        for person, role in enumerate(roles(people)[:MOST_NAMED])
     ]
     return [
         ("skeleton", TRUTH, "true skeleton"),
-        *people,
+        *named,
         ("box", person_color(0), "detection, in the colour of who it is taken for"),
         ("box", UNMATCHED, "detection taken for nobody"),
         ("limbs", UNMATCHED, "estimate of nobody: a ghost"),

@@ -5,11 +5,13 @@ import pytest
 
 from mvpose import Detections, Estimate, Matching
 from simharness.detector.truth import Truth
-from simharness.experiment.run import score, score_table
+from simharness.experiment.run import score_table
 from simharness.experiment.store import Record
 from simharness.report.page import joint_errors, person_errors, render
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Cameras, People, Scenario
+from simharness.scoring.assessment import score_variant
+from simharness.scoring.recording import Recording
 from simharness.scoring.summary import summarize
 
 FRAMES = 4
@@ -39,12 +41,13 @@ def make_record(*, people: int = 3, lost: bool = True, **scenario) -> Record:
         )
         answer = (joints + offset)[found].reshape(-1, 17, 3)
         estimates.append(Estimate(answer, np.ones(answer.shape[:2]), Matching(np.zeros(0, np.int64))))
-    scores = {"full": score(detections, truth, estimates)}
+    time = np.arange(FRAMES) / 10
+    scores = {"full": score_variant(Recording(time, rig, tuple(detections), tuple(truth)), estimates)}
     settings = Scenario(name="made", people=People(count=people), **scenario)
     return Record(
         scenario=settings,
         rig=rig,
-        time=np.arange(FRAMES) / 10,
+        time=time,
         detections=tuple(detections),
         truth=tuple(truth),
         estimates={"full": tuple(estimates)},

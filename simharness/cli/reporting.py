@@ -1,0 +1,109 @@
+"""``simharness report``: the page of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simharness.cli.border import after_reading, border
+
+if TYPE_CHECKING:
+    from simharness.report.worst import Frame
+    from simharness.study.results import Results
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(report)
+
+
+def report(
+    study: Annotated[Path, typer.Argument(help="The folder of a study.", metavar="STUDY")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page. [dim]\\[default: STUDY/report.html][/]", dir_okay=False),
+    ] = None,
+    threshold: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SCORE=VALUE",
+            help="Tell where a score passes a value. Repeatable. [dim]\\[default: pcp=90][/]",
+        ),
+    ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Instead of the page, write the worst trial for the viewer of rerun: an .rrd file.",
+            dir_okay=False,
+        ),
+    ] = None,
+    trial: Annotated[
+        str | None, typer.Option(metavar="ID", help="With --rerun: this trial, not the worst; its first digits do.")
+    ] = None,
+) -> None:
+    """Write the page of a study: scores, curves, failures, the worst frames in pictures and in 3D.
+
+    The trials of the worst frames are run again for their pictures.
+    """
+    with border():
+        if trial is not None and rerun is None:
+            raise ValueError("--trial: says which trial --rerun writes; without --rerun it has no meaning")
+        thresholds = _thresholds(threshold or [])
+        from simharness.study.results import read_study
+
+        results = read_study(study)
+        if rerun is not None:
+            _write_rerun(results, trial, rerun)
+            typer.echo(f"recording: {rerun}")
+            return
+        from simharness.experiment.progress import reporter
+        from simharness.report.study import THRESHOLDS, check_thresholds, write_report
+        from simharness.report.worst import SHOWN
+
+        check_thresholds(thresholds)
+        with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:
+            page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance)
+    typer.echo(f"report: {page}")
+
+
+def _thresholds(given: list[str]) -> dict[str, float]:
+    """The values of ``--threshold`` by score."""
+    thresholds = {}
+    for each in given:
+        score, sign, value = each.partition("=")
+        try:
+            if not sign:
+                raise ValueError
+            thresholds[score.strip()] = float(value)
+        except ValueError:
+            raise ValueError(f"--threshold {each}: expected SCORE=NUMBER, for example --threshold pcp=90") from None
+    return thresholds
+
+
+def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
+    from simharness.report.replay import replay
+    from simharness.report.rerun import require_sdk, write_rerun
+
+    require_sdk()
+    frame = _chosen(results, trial)
+    scenario = results.scenario_of(frame.trial)
+    with after_reading():
+        again = replay(scenario, frame.variant)
+    write_rerun(again, path)
+
+
+def _chosen(results: Results, trial: str | None) -> Frame:
+    """The worst frame of a trial, or of all."""
+    from simharness.report.worst import worst_frames
+
+    frames = worst_frames(results, count=results.trials["trial"].n_unique())
+    chosen = [frame for frame in frames if frame.trial.startswith(trial or "")]
+    if len({frame.trial for frame in chosen}) > 1 and trial is not None:
+        raise ValueError(f"--trial {trial}: {len(chosen)} trials begin so; give more digits")
+    if not chosen:
+        what = "the study has no trial that finished" if trial is None else f"--trial {trial}: no such trial"
+        raise ValueError(f"{what}; the column trial of {results.folder / 'trials.parquet'} lists them")
+    return chosen[0]

@@ -1,0 +1,142 @@
+"use strict";
+// People in 3D that turn: drag or arrow keys; wheel, pinch, + and - bring them nearer; space plays.
+for (const place of document.querySelectorAll(".turnable")) makeTurnable(place);
+
+function makeTurnable(place) {
+  const data = JSON.parse(place.querySelector("script").textContent);
+  const canvas = place.querySelector("canvas"), pen = canvas.getContext("2d");
+  const slider = place.querySelector("input"), told = place.querySelector("output"), button = place.querySelector("button");
+  let yaw = data.yaw, pitch = data.pitch, zoom = 1, frame = data.start, timer = 0;
+  let axes, scale, width, height;
+  place.classList.add("alive");
+  slider.max = data.time.length - 1;
+  slider.value = frame;
+
+  function aim() {
+    const [sy, cy, sp, cp] = [Math.sin(yaw), Math.cos(yaw), Math.sin(pitch), Math.cos(pitch)];
+    axes = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
+    const across = width / 2 / (1.2 * data.radius);
+    const upright = height / 2 / (1.1 * data.radius * Math.sin(Math.abs(data.pitch)) + 1100);
+    scale = zoom * data.far * data.radius * Math.min(across, upright);
+  }
+
+  // A point of the world on the canvas: x, y, pixels a millimetre there, nearness; null behind the eye.
+  function seen(point) {
+    const offset = point.map((value, axis) => value - data.center[axis]);
+    const [right, up, near] = axes.map((axis) => axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2]);
+    const away = data.far * data.radius - near;
+    if (away < 0.05 * data.radius) return null;
+    return [width / 2 + scale / away * right, data.middle * height - scale / away * up, scale / away, near];
+  }
+
+  function line(from, to, color, thick, millimetres) {
+    const a = seen(from), b = seen(to);
+    if (!a || !b) return;
+    pen.strokeStyle = color;
+    pen.lineWidth = millimetres ? Math.max(2, millimetres * (a[2] + b[2]) / 2) : thick;
+    pen.beginPath();
+    pen.moveTo(a[0], a[1]);
+    pen.lineTo(b[0], b[1]);
+    pen.stroke();
+  }
+
+  function limbs(joints) {
+    return data.edges.filter(([a, b]) => joints[a] && joints[b]).map(([a, b]) => [joints[a], joints[b]]);
+  }
+
+  function draw() {
+    const ratio = window.devicePixelRatio || 1, style = getComputedStyle(place);
+    [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.lineCap = "round";
+    const [ink, faint, rule, card] = ["--ink", "--faint", "--line", "--card"].map((name) => style.getPropertyValue(name).trim());
+    aim();
+    for (const axis of [0, 1]) {
+      const half = data.room[axis] / 2, side = data.room[1 - axis] / 2, steps = [-half, half];
+      for (let step = Math.ceil(-half / 1000) * 1000; step <= half; step += 1000) steps.push(step);
+      for (const step of steps) {
+        const ends = [[0, 0, 0], [0, 0, 0]];
+        [ends[0][axis], ends[0][1 - axis], ends[1][axis], ends[1][1 - axis]] = [step, -side, step, side];
+        line(ends[0], ends[1], rule, 1);
+      }
+    }
+    for (const box of data.boxes) for (const [a, b] of data.corners) line(box[a], box[b], faint, 0.7);
+    for (const [apex, ...base] of data.cameras) {
+      base.forEach((corner, k) => { line(apex, corner, faint, 1); line(corner, base[(k + 1) % 4], faint, 1); });
+    }
+    const thick = [], found = new Set();
+    for (const [owner, ...joints] of data.estimates[frame]) {
+      found.add(owner);
+      const color = mixed(owner < 0 ? data.ghost : data.colors[owner], card, 0.35);
+      for (const ends of limbs(joints)) thick.push([...ends, color]);
+    }
+    const nearness = ([a, b]) => (seen(a)?.[3] ?? 0) + (seen(b)?.[3] ?? 0);
+    thick.sort((one, other) => nearness(one) - nearness(other));
+    for (const [a, b, color] of thick) line(a, b, color, 0, data.limb);
+    data.truth[frame].forEach((joints, person) => {
+      pen.setLineDash(found.has(person) ? [] : [4, 3]);
+      for (const [a, b] of limbs(joints)) line(a, b, ink, 1.5);
+    });
+    pen.setLineDash([]);
+    told.textContent = `frame ${data.first + frame}, ${data.time[frame].toFixed(1)} s`;
+    slider.setAttribute("aria-valuetext", told.textContent);
+  }
+
+  function turn(right, up) {
+    yaw -= right;
+    pitch = Math.min(1.55, Math.max(-0.1, pitch + up));
+    draw();
+  }
+  function nearer(factor) { zoom = Math.min(12, Math.max(0.4, zoom * factor)); draw(); }
+  function go(to) { frame = (to + data.time.length) % data.time.length; slider.value = frame; draw(); }
+  function play() {
+    if (timer) { clearInterval(timer); timer = 0; }
+    else {
+      const step = data.time.length > 1 ? data.time[1] - data.time[0] : 1;
+      timer = setInterval(() => go(frame + 1), Math.max(30, 1000 * step));
+    }
+    button.textContent = timer ? "Pause" : "Play";
+  }
+
+  const fingers = new Map();
+  canvas.addEventListener("pointerdown", (event) => {
+    fingers.set(event.pointerId, event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = fingers.get(event.pointerId);
+    if (!before) return;
+    fingers.set(event.pointerId, event);
+    const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
+    if (!other) return turn((event.clientX - before.clientX) / 130, (event.clientY - before.clientY) / 130);
+    const apart = (finger) => Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY);
+    if (apart(before) > 0) nearer(apart(event) / apart(before));
+  });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  canvas.addEventListener("wheel", (event) => {
+    if (document.activeElement !== canvas && !event.ctrlKey) return; // a page that scrolls goes on scrolling
+    event.preventDefault();
+    nearer(Math.exp(-event.deltaY / 500));
+  }, { passive: false });
+  const keys = {
+    ArrowLeft: () => turn(-0.12, 0), ArrowRight: () => turn(0.12, 0), ArrowUp: () => turn(0, 0.08), ArrowDown: () => turn(0, -0.08),
+    "+": () => nearer(1.2), "=": () => nearer(1.2), "-": () => nearer(1 / 1.2), " ": play,
+  };
+  canvas.addEventListener("keydown", (event) => {
+    if (!keys[event.key]) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+  slider.addEventListener("input", () => go(Number(slider.value)));
+  button.addEventListener("click", play);
+  new ResizeObserver(draw).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+}
+
+// One colour with a share of another in it; both "#rrggbb".
+function mixed(color, other, share) {
+  const parts = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+  const [one, two] = [parts(color), parts(other)];
+  return `rgb(${one.map((value, k) => Math.round((1 - share) * value + share * two[k])).join(" ")})`;
+}

@@ -1,0 +1,77 @@
+"""A recording for the viewer of rerun, written and read back."""
+
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from simharness.cli import app
+from simharness.report.rerun import write_rerun
+
+MAGIC = b"RRF2"
+
+
+def test_without_the_sdk_it_says_what_to_install(ran, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)  # as if it were not there
+    file = tmp_path / "worst.rrd"
+    result = CliRunner().invoke(app, ["report", str(ran.folder), "--rerun", str(file)], catch_exceptions=False)
+    assert result.exit_code == 2
+    assert "pip install -e '.[viewer]'" in result.stderr
+    assert not file.exists()
+
+
+class TestWithTheSdk:
+    @pytest.fixture(autouse=True)
+    def sdk(self):
+        pytest.importorskip("rerun", reason="the rerun SDK is not installed: pip install -e '.[viewer]'")
+
+    def read(self, file):
+        """The rows of every entity: its path, and for each of its chunks a table."""
+        assert file.read_bytes()[:4] == MAGIC
+        chunk = pytest.importorskip("rerun.chunk", reason="this version of the SDK cannot read recordings")
+        entities = {}
+        for each in chunk.RrdReader(file).stream().to_chunks():
+            entities.setdefault(each.entity_path.lstrip("/"), []).append(each.to_record_batch())
+        return entities
+
+    def test_everything_is_in_it_at_its_time(self, shown, tmp_path):
+        _, again = shown[0]
+        write_rerun(again, tmp_path / "worst.rrd")
+        entities = self.read(tmp_path / "worst.rrd")
+        names = [camera.name for camera in again.trial.shots.believed]
+        assert {f"world/cameras/{name}" for name in names} <= set(entities)
+        assert {f"world/cameras/{name}/detections" for name in names} <= set(entities)
+        for entity in ("world/truth/person0", "world/truth/person1", "world/estimates"):
+            times = [time for batch in entities[entity] for time in batch.column("time").to_pylist()]
+            seconds = sorted(time.total_seconds() for time in times)
+            np.testing.assert_allclose(seconds, again.time, atol=1e-6)
+
+    def test_true_limbs_end_at_true_joints(self, shown, tmp_path):
+        _, again = shown[0]
+        write_rerun(again, tmp_path / "worst.rrd")
+        seen = {}
+        for batch in self.read(tmp_path / "worst.rrd")["world/truth/person0"]:
+            (column,) = (name for name in batch.schema.names if name.endswith("strips"))
+            seen |= dict(zip(batch.column("frame").to_pylist(), batch.column(column).to_pylist(), strict=True))
+        assert sorted(seen) == list(range(len(again.time)))
+        for frame, strips in seen.items():
+            assert strips
+            joints = again.truth[frame].joints[0]
+            for end in np.array(strips).reshape(-1, 3):
+                assert np.linalg.norm(joints - end, axis=1).min() < 1e-5
+
+    def test_the_command_writes_the_worst_trial_or_the_one_that_is_named(self, ran, tmp_path):
+        sizes = []
+        for number, options in enumerate(([], ["--trial", ran.trials["trial"][0][:12]])):
+            file = tmp_path / f"{number}.rrd"
+            arguments = ["report", str(ran.folder), "--rerun", str(file), *options]
+            assert CliRunner().invoke(app, arguments, catch_exceptions=False).exit_code == 0
+            sizes.append(file.stat().st_size)
+        assert min(sizes) > 10_000
+
+    def test_a_trial_that_does_not_exist(self, ran, tmp_path):
+        arguments = ["report", str(ran.folder), "--rerun", str(tmp_path / "a.rrd"), "--trial", "zz"]
+        result = CliRunner().invoke(app, arguments, catch_exceptions=False)
+        assert result.exit_code == 2
+        assert "--trial zz: no such trial" in result.stderr

@@ -1,0 +1,233 @@
+"""The page of a study: its numbers, its structure, and what it says where things went wrong."""
+
+import dataclasses
+import re
+import shlex
+from html.parser import HTMLParser
+
+import numpy as np
+import polars as pl
+import pytest
+from made_study import make_study, pcp_of
+from typer.testing import CliRunner
+
+from simharness.cli import app
+from simharness.report.study import render_study, write_report
+from simharness.report.worst import worst_frames
+
+GRID = {"cameras.count": [2, 3, 5], "detector.profile": ["poor", "good"]}
+_VOID = {"meta", "input", "img", "br"}
+
+
+class Reader(HTMLParser):
+    """Tags with their attributes, and that all are closed in their order."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self._open = [], []
+        self.feed(page)
+        assert not self._open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in _VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture
+def page(tmp_path):
+    return render_study(make_study(tmp_path, factors=GRID, cases=("crowd", "empty")))
+
+
+def cells_of(page, row):
+    """The first line of every cell of the first table row with this heading."""
+    found = re.search(rf'<tr[^>]*><th scope="row">{row}</th>(.*?)</tr>', page, re.DOTALL)
+    return re.findall(r"<td[^>]*>([^<]*)", found.group(1))
+
+
+def test_the_headline_is_the_mean_over_everything(tmp_path):
+    page = render_study(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
+    for variant in ("full", "fast"):
+        expected = np.mean([pcp_of(variant, {"cameras.count": n}, seed) for n in (2, 3, 5) for seed in range(4)])
+        assert cells_of(page, variant)[0] == f"{expected:.1f}"
+
+
+def test_every_value_of_a_factor_has_its_number(tmp_path):
+    page = render_study(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
+    for value in (2, 3, 5):
+        expected = np.mean([pcp_of("full", {"cameras.count": value}, seed) for seed in range(4)])
+        assert cells_of(page, value)[0] == f"{expected:.1f}"
+
+
+def test_it_is_one_whole_document(page):
+    reader = Reader(page)
+    headings = [tag for tag, _ in reader.tags if tag in ("h1", "h2", "h3")]
+    assert headings[0] == "h1"
+    assert headings.count("h1") == 1
+    assert all("scope" in cell for cell in reader.all("th"))
+    identities = [attributes["id"] for _, attributes in reader.tags if attributes.get("id")]
+    assert len(identities) == len(set(identities))
+    labels = {attributes["for"] for attributes in reader.all("label") if "for" in attributes}
+    assert labels
+    assert labels <= set(identities)
+    assert "nan" not in re.sub(r"<[^>]*>", " ", page.split("</head>")[1]).lower().split()
+
+
+def test_it_needs_nothing_from_elsewhere(page, shown, ran):
+    for text in (page, render_study(ran, shown=[picture for picture, _ in shown])):
+        for tag, attributes in Reader(text).tags:
+            for name in ("src", "href", "xlink:href", "srcset", "action"):
+                assert not attributes.get(name) or attributes[name].startswith(("data:", "#")), (tag, attributes[name])
+        assert not re.search(r"@import|url\((?!#)", text)
+        assert set(re.findall(r"https?://[^\s\"'<)]*", text)) <= {
+            "http://www.w3.org/2000/svg",
+            "http://www.w3.org/1999/xlink",
+            "http://www.w3.org/1998/Math/MathML",
+        }
+
+
+def test_failed_trials_are_told_before_any_number(tmp_path):
+    failed = ({"case": "", "factors": {"cameras.count": 2}, "seed": 9, "error": "RunError: <b>out of memory"},) * 30
+    page = render_study(make_study(tmp_path, failed=failed))
+    assert page.index('role="alert"') < page.index("<table")
+    assert "30 trials failed" in page
+    assert page.count("RunError: &lt;b&gt;out of memory") == 20
+    assert "and 10 more" in page
+    assert "12 of 42" in page
+    assert 'role="alert"' not in render_study(make_study(tmp_path))
+
+
+def test_a_study_of_which_nothing_finished_says_so(tmp_path):
+    made = make_study(tmp_path)
+    nothing = dataclasses.replace(made, **{name: getattr(made, name).clear() for name in ("trials", "people")})
+    empty = pl.DataFrame(schema={"trial": pl.String, "variant": pl.String})  # as the engine has it
+    nothing = dataclasses.replace(nothing, frames=empty, people=empty, failures=empty)
+    page = write_report(nothing).read_text(encoding="utf-8")
+    assert "Nothing finished" in page
+    Reader(page)
+
+
+def test_one_seed_has_no_intervals_and_no_tests(tmp_path):
+    page = render_study(make_study(tmp_path, seeds=1))
+    assert "of one seed there is no interval" in page
+    assert "<small>" not in page
+    assert "Holm" not in page
+
+
+def test_a_variant_that_is_surely_worse_is_bold(tmp_path):
+    page = render_study(make_study(tmp_path, seeds=12))  # 2^-12 withstands Holm's correction
+    row = re.search(r'<th scope="row">fast<small class="note"> − full</small></th>(<td[^>]*>[^<]*)', page).group(1)
+    assert row == '<td class="strong">−4.0'
+
+
+def test_breaking_points_are_told_for_the_thresholds_that_are_asked_for(tmp_path):
+    results = make_study(tmp_path)
+    assert "PCP under 90 %" in render_study(results)
+    page = render_study(results, thresholds={"pcp": 80.0, "ghosts": 1.0})
+    assert "PCP under 80 %" in page
+    assert "Ghosts over 1 a frame" in page
+    assert "below 3.92" in page  # (80 - 60.375) / 5 = 3.925
+
+
+def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page):
+    assert page.count("Both together") == 2
+    assert "Both together" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
+
+
+def test_every_case_has_a_row_for_each_variant(page, tmp_path):
+    for case in ("crowd", "empty"):
+        rows = re.search(rf'<th scope="rowgroup" colspan="9">{case}</th></tr>(.*?)</tbody>', page, re.DOTALL).group(1)
+        assert re.findall(r'<th scope="row">([^<]*)</th>', rows) == ["full", "fast"]
+    assert "<h2>Cases</h2>" not in render_study(make_study(tmp_path))
+
+
+def test_what_people_write_is_text(tmp_path):
+    page = render_study(make_study(tmp_path, description="<script>alert(1)</script>", command="a <b> & c"))
+    assert "<script>alert" not in page
+    assert "a &lt;b&gt; &amp; c" in page
+
+
+def test_the_worst_frames_are_the_dearest_one_of_a_setting(tmp_path):
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3, 4, 5, 6]})
+    errors = results.people.filter(pl.col("variant") == "full").group_by("trial", "frame").agg(pl.col("error_mm").sum())
+    costs = {}
+    for row in (
+        results.frames.filter(pl.col("variant") == "full").join(errors, on=["trial", "frame"]).iter_rows(named=True)
+    ):
+        setting = int(row["trial"], 16) // 4  # four seeds each
+        cost = row["error_mm"] + 500 * (row["missed"] + row["ghosts"])
+        costs[setting] = max(costs.get(setting, 0.0), cost)
+    assert [frame.cost for frame in worst_frames(results)] == pytest.approx(sorted(costs.values(), reverse=True)[:4])
+
+
+def test_a_study_of_one_setting_shows_the_worst_of_its_trials(tmp_path):
+    frames = worst_frames(make_study(tmp_path, factors={}, seeds=6))
+    assert len({frame.trial for frame in frames}) == len(frames) == 4
+    assert [frame.cost for frame in frames] == sorted((frame.cost for frame in frames), reverse=True)
+
+
+def test_the_frames_shown_are_those_that_were_scored(ran, shown):
+    """The trials are run again: everybody's error must come out as the tables have it."""
+    assert len(shown) == 4
+    for picture, again in shown:
+        rows = ran.people.filter((pl.col("trial") == picture.trial) & (pl.col("variant") == "full"))
+        assert len(rows) == len(again.time) * 2
+        for row in rows.iter_rows(named=True):
+            frame, owners = row["frame"], again.owners(row["frame"])
+            estimate = np.flatnonzero(owners == row["person"])
+            assert row["found"] == bool(len(estimate))
+            if len(estimate):
+                offset = again.estimates[frame].joints[estimate[0]] - again.truth[frame].joints[row["person"]]
+                assert 1000 * np.nanmean(np.linalg.norm(offset, axis=-1)) == pytest.approx(row["error_mm"], rel=1e-6)
+
+
+def test_the_command_of_a_worst_frame_is_its_trial(ran, shown):
+    from simharness.scenario.load import load
+
+    for picture, again in shown:
+        words = shlex.split(picture.command)
+        sets = [words[k + 1] for k, word in enumerate(words) if word == "--set"]
+        scenario = load(ran.folder / "study.toml", overrides=sets, seed=int(words[words.index("--seed") + 1]))
+        assert scenario == ran.scenario_of(picture.trial)
+        assert again.trial.scenario.cameras.count == scenario.cameras.count
+
+
+class TestCommand:
+    def call(self, *arguments):
+        return CliRunner().invoke(app, ["report", *map(str, arguments)], catch_exceptions=False)
+
+    def refused(self, *arguments):
+        result = self.call(*arguments)
+        assert result.exit_code == 2
+        assert "Traceback" not in result.stderr
+        return result.stderr
+
+    @pytest.mark.slow
+    def test_it_writes_the_page(self, ran):
+        result = self.call(ran.folder)
+        assert result.exit_code == 0
+        page = (ran.folder / "report.html").read_text(encoding="utf-8")
+        assert page.count('class="turnable"') == 4
+        assert not list(ran.folder.glob(".*partial"))
+
+    def test_a_folder_that_is_no_study(self, tmp_path):
+        assert "not the folder of a study" in self.refused(tmp_path)
+
+    def test_a_threshold_that_is_none(self, ran):
+        assert "expected SCORE=NUMBER" in self.refused(ran.folder, "--threshold", "pcp")
+        assert "there is no such score" in self.refused(ran.folder, "--threshold", "pxp=90")
+
+    def test_a_place_that_cannot_be_written_to(self, ran, tmp_path):
+        assert "there is no folder" in self.refused(ran.folder, "--out", tmp_path / "no" / "page.html")
+
+    def test_a_trial_without_a_recording(self, ran):
+        assert "without --rerun" in self.refused(ran.folder, "--trial", "0")
