@@ -6,12 +6,16 @@ traceback), 130 interrupted. Nothing heavy is imported before a command needs it
 
 from __future__ import annotations
 
-from simharness.cli import evaluating, fitting, running
+from simharness.cli import evaluating, fitting, gating, reporting, running, scenarios, studying
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
 
 running.add_to(app)
+scenarios.add_to(app)
+gating.add_to(app)
+reporting.add_to(app)
+studying.add_to(app)
 app.add_typer(evaluating.app, name="evaluate")
 app.add_typer(fitting.app, name="fit-detector")
 

@@ -1,0 +1,138 @@
+"""What a suite scored, and the file that a team commits of it: a line for each trial and variant, in order."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from simharness.gate.trials import Trial
+from simharness.scoring.catalogue import HEADLINE
+
+TIME = "time_ratio"
+"""Beside the headline scores: time of a frame by that of the reference kernel."""
+
+KEPT = (*HEADLINE, TIME)
+
+_DIGITS = 4  # after the point: finer than any tolerance, short enough to read in a diff
+_WHAT = ("suite", "fingerprint", "code")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a suite scored.
+
+    Attributes:
+        suite: its name.
+        fingerprint: of its settings, seeds and variants.
+        code: the version of the code that was measured.
+        scores: of each trial; all of ``KEPT``, rounded, None where a score does not apply.
+    """
+
+    suite: str
+    fingerprint: str
+    code: str
+    scores: Mapping[Trial, Mapping[str, float | None]]
+
+    def __post_init__(self) -> None:
+        rounded = {
+            trial: {key: _round(scores.get(key)) for key in KEPT} for trial, scores in sorted(self.scores.items())
+        }
+        object.__setattr__(self, "scores", rounded)
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Names of its cases, in order."""
+        return tuple(dict.fromkeys(trial.case for trial in self.scores))
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """Names of its variants, in order."""
+        return tuple(sorted({trial.variant for trial in self.scores}))
+
+
+def write_baseline(measurement: Measurement, path: Path) -> None:
+    """Write a baseline, by rename: a file that is there is whole.
+
+    Raises:
+        ValueError: it cannot be written there.
+    """
+    head = [f"  {json.dumps(key)}: {json.dumps(getattr(measurement, key))}," for key in _WHAT]
+    rows = [f"    {json.dumps(trial._asdict() | dict(scores))}" for trial, scores in measurement.scores.items()]
+    text = "\n".join(["{", *head, '  "trials": [', ",\n".join(rows), "  ]", "}"])
+    write_text(text + "\n", path, option="--baseline")
+
+
+def write_text(text: str, path: Path, *, option: str) -> None:
+    """Write a text file by rename, its folder too; ``option`` is who named it.
+
+    Raises:
+        ValueError: it cannot be written there.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
+
+
+def read_baseline(path: Path) -> Measurement:
+    """Read a baseline.
+
+    Raises:
+        ValueError: there is none, or it is not a whole one.
+    """
+    mend = "write one with --update-baseline"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ValueError(f"--baseline {path}: no such file; {mend}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"--baseline {path}: cannot be read: {error}; {mend}") from None
+    try:
+        data = json.loads(text)
+        head = {key: _text(data, key) for key in _WHAT}
+        return Measurement(**head, scores=dict(map(_row, data["trials"])))
+    except json.JSONDecodeError as error:
+        raise ValueError(
+            f"--baseline {path}, line {error.lineno}: not valid JSON: {error.msg}; restore it, or {mend}"
+        ) from None
+    except (KeyError, TypeError, ValueError) as error:
+        what = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"--baseline {path}: not a baseline: {what}; restore it, or {mend}") from None
+
+
+def _text(data: Any, key: str) -> str:
+    if not isinstance(data, dict):
+        raise TypeError(f"expected an object with {', '.join(_WHAT)} and trials, got {type(data).__name__}")
+    if not isinstance(data[key], str):
+        raise TypeError(f"{key}: expected text, got {json.dumps(data[key])}")
+    return str(data[key])
+
+
+def _row(row: Any) -> tuple[Trial, dict[str, float | None]]:
+    """One line, checked."""
+    if not isinstance(row, dict):
+        raise TypeError(f"trials: expected objects, got {json.dumps(row)}")
+    trial = Trial(row["case"], row["seed"], row["variant"])
+    if not (isinstance(trial.case, str) and isinstance(trial.seed, int) and isinstance(trial.variant, str)):
+        raise TypeError(f"trials: expected case, seed and variant, got {json.dumps(list(trial))}")
+    scores = {key: row[key] for key in KEPT}
+    for key, value in scores.items():
+        number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+        if value is not None and not number:
+            raise TypeError(f"{trial}: {key}: expected a number or null, got {json.dumps(value)}")
+    return trial, scores
+
+
+def _round(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(float(value), _DIGITS)

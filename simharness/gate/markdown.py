@@ -1,0 +1,67 @@
+"""The check as Markdown, which GitHub shows on the page of a workflow's run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from simharness.gate.check import Check
+from simharness.gate.comparing import Change
+from simharness.gate.wording import allowed, difference, number, sentence, title
+
+_LISTED = 20  # of each kind: a bug that breaks everything breaks a hundred scores
+
+
+def markdown(check: Check) -> str:
+    """The summary: the verdict, what got worse, what got better, the headline scores, how to run the worst trial."""
+    return "\n".join(_lines(check)) + "\n"
+
+
+def _lines(check: Check) -> Iterator[str]:
+    yield f"## {check.suite}: {check.verdict}"
+    yield ""
+    yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline pair by pair."
+    yield from _list("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed])
+    for heading, verdict in (("Worse", "worse"), ("Better", "better")):
+        changes = check.comparison.that_are(verdict)  # type: ignore[arg-type]
+        yield from _list(heading, [sentence(change, check.gate) for change in changes])
+    for variant in check.variants:
+        yield from _table(check, variant)
+    yield ""
+    yield f"{check.pointer[0].upper()}{check.pointer[1:]}"
+    yield ""
+    yield "```sh"
+    yield check.command
+    yield "```"
+
+
+def _list(heading: str, lines: list[str]) -> Iterator[str]:
+    if not lines:
+        return
+    yield ""
+    yield f"### {heading}"
+    yield ""
+    for line in lines[:_LISTED]:
+        yield f"- {_escaped(line)}"
+    if len(lines) > _LISTED:
+        yield f"- and {len(lines) - _LISTED} more"
+
+
+def _table(check: Check, variant: str) -> Iterator[str]:
+    yield ""
+    yield f"### {_escaped(variant)}"
+    yield ""
+    yield "| score | now | baseline | difference (95 %) | allowed | |"
+    yield "|:--|--:|--:|--:|--:|:--|"
+    for change in check.comparison.of(variant):
+        yield f"| {' | '.join(_escaped(cell) for cell in _cells(change, check))} |"
+
+
+def _cells(change: Change, check: Check) -> tuple[str, ...]:
+    after, before = (number(change.score, value) for value in (change.after, change.before))
+    verdict = "" if change.verdict == "same" else f"**{change.verdict}**"
+    return title(change.score), after, before, difference(change), allowed(change, check.gate), verdict
+
+
+def _escaped(text: str) -> str:
+    """On one line, and without what Markdown would read as a cell or as HTML."""
+    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")

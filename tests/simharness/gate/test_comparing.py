@@ -1,0 +1,181 @@
+import math
+
+import numpy as np
+import pytest
+
+from simharness.gate.baseline import TIME, Measurement
+from simharness.gate.comparing import compare
+from simharness.gate.trials import Trial
+from simharness.scenario.gate import Gate
+from simharness.scoring.catalogue import HEADLINE, SCORES
+
+GATE = Gate()
+USUAL = {"pcp": 92.0, "recall": 97.0, "precision": 96.0, "mpjpe_mm": 45.0, "match_f1": 95.0, "ghosts": 0.2, TIME: 1.2}
+CASES = tuple(f"case{index:02}" for index in range(11))
+
+
+def measured(change=lambda trial: {}, *, cases=CASES, seeds=12, variants=("fast", "full")):
+    """A suite with scores of its own in every trial, and what ``change`` adds to them; to the logarithm, of time."""
+    scores = {}
+    for case in cases:
+        for seed in range(seeds):
+            for variant in variants:
+                trial = Trial(case, seed, variant)
+                own = np.random.default_rng([len(case), cases.index(case), seed, len(variant)]).normal(0, 1)
+                added = change(trial)
+                scores[trial] = {
+                    key: usual * math.exp(0.2 * own + added.get(key, 0))
+                    if key == TIME
+                    else usual + (own if usual > 1 else 0.01 * own) + added.get(key, 0)
+                    for key, usual in USUAL.items()
+                }
+    return Measurement("suite", "0123456789", "1.0", scores)
+
+
+def regressions(change, gate=GATE, **size):
+    return compare(measured(**size), measured(change, **size), gate).that_are("worse")
+
+
+def named(changes):
+    return {(change.score, change.variant, change.case) for change in changes}
+
+
+def test_nothing_changed():
+    comparison = compare(measured(), measured(), GATE)
+    assert len(comparison.changes) == 2 * (6 * (1 + 11) + 1)
+    assert {change.verdict for change in comparison.changes} == {"same"}
+    assert {change.difference for change in comparison.changes if change.score != TIME} == {0.0}
+    assert {change.p for change in comparison.changes} == {1.0}
+
+
+@pytest.mark.parametrize("score", HEADLINE)
+@pytest.mark.parametrize("variant", ["fast", "full"])
+def test_every_score_is_guarded_in_its_own_direction(score, variant):
+    bad = -1 if SCORES[score].better == "higher" else 1
+    step = 1.5 * getattr(GATE.tolerance, score)
+    worse = compare(measured(), measured(lambda t: {score: bad * step} if t.variant == variant else {}), GATE)
+    assert (score, variant, None) in named(worse.that_are("worse"))
+    assert {change.score for change in worse.that_are("worse")} == {score}
+    assert {change.variant for change in worse.that_are("worse")} == {variant}
+    assert not worse.that_are("better")
+    better = compare(measured(), measured(lambda t: {score: -bad * step} if t.variant == variant else {}), GATE)
+    assert named(better.that_are("better")) == named(worse.that_are("worse"))
+    assert not better.that_are("worse")
+
+
+def test_within_its_tolerance_nothing_is_a_regression_however_certain():
+    assert not regressions(lambda trial: {"pcp": -0.9, "mpjpe_mm": 1.9, "ghosts": 0.045})
+    assert regressions(lambda trial: {"pcp": -1.1})
+    assert not regressions(lambda trial: {"pcp": -1.1}, Gate.model_validate({"tolerance": {"pcp": 1.5}}))
+
+
+def test_a_small_mean_of_large_changes_is_within_its_tolerance():
+    def change(trial):
+        return {"pcp": -0.9 + (3.0 if trial.seed % 2 else -3.0)}
+
+    comparison = compare(measured(), measured(change), GATE)
+    assert not comparison.that_are("worse")
+    assert comparison.of("full")[0].p < GATE.level  # which it is in spite of, over the whole suite
+
+
+def test_a_large_change_of_few_trials_is_not_significant():
+    hit = {0, 1, 2}
+    assert not regressions(lambda trial: {"pcp": -80.0 if trial.seed in hit and trial.case == "case03" else 0.0})
+
+
+def test_one_case_alone_is_seen():
+    """Eleven others drown it: the whole suite loses less than its tolerance."""
+    worse = regressions(lambda trial: {"pcp": -6.0 - 0.1 * trial.seed} if trial[::2] == ("case07", "full") else {})
+    assert named(worse) == {("pcp", "full", "case07")}
+    assert worse[0].worst == Trial("case07", 11, "full")
+    assert worse[0].difference == pytest.approx(-6.55, abs=1e-3)
+    assert worse[0].p < 0.01
+
+
+def test_trials_that_did_not_change_make_no_tests():
+    """One seed of twelve gained a little: p = 2 / 4096, which is too much for 146 tests, and little for one."""
+
+    def change(trial):
+        return {"pcp": 0.01 if trial.seed == 4 else -3.0} if trial[::2] == ("case07", "full") else {}
+
+    assert named(regressions(change)) == {("pcp", "full", "case07")}
+
+
+def test_one_case_alone_is_seen_where_all_others_changed_at_random():
+    """The most tests that are ever made, 146: one in 4096 is still below the level."""
+
+    def change(trial):
+        if trial[::2] == ("case07", "full"):
+            return {"pcp": -4.0}
+        rng = np.random.default_rng([5, CASES.index(trial.case), trial.seed, len(trial.variant)])
+        return {key: rng.normal(0, 5 * getattr(GATE.tolerance, key)) for key in HEADLINE} | {TIME: rng.normal(0, 1)}
+
+    assert named(regressions(change)) == {("pcp", "full", "case07")}
+
+
+def test_what_changes_at_random_is_called_a_regression_no_more_often_than_the_level():
+    """Small suites whose every score moves by ten tolerances, up or down: one in twenty may fail."""
+
+    def fails(run):
+        def change(trial):
+            rng = np.random.default_rng([trial.seed, ord(trial.case), run])
+            sizes = {key: 10 * getattr(GATE.tolerance, key) for key in HEADLINE} | {TIME: 2.0}
+            return {key: rng.normal(0, size) for key, size in sizes.items()}
+
+        return bool(regressions(change, cases=("a", "b"), seeds=10, variants=("fast",)))
+
+    assert sum(map(fails, range(40))) <= 6  # 2 expected; more than 6 one time in 200
+
+
+def test_a_study_of_one_case_is_not_compared_twice():
+    comparison = compare(measured(cases=("only",)), measured(cases=("only",)), GATE)
+    assert comparison.cases == ()
+    assert {change.case for change in comparison.changes} == {None}
+
+
+def test_time_is_compared_by_the_middle_of_its_ratios():
+    slower = regressions(lambda trial: {TIME: math.log(2.0)} if trial.variant == "full" else {})
+    assert named(slower) == {(TIME, "full", None)}
+    assert slower[0].difference == pytest.approx(2.0, rel=1e-3)
+    assert slower[0].after / slower[0].before == pytest.approx(2.0, rel=1e-3)
+    assert not regressions(lambda trial: {TIME: math.log(1.4)})
+    held_up = np.random.default_rng(0).permutation(11 * 12) < 25  # the machine was busy, a fifth of the time
+    busy = {(case, seed): held_up[12 * index + seed] for index, case in enumerate(CASES) for seed in range(12)}
+    assert not regressions(lambda trial: {TIME: math.log(20.0) if busy[trial[:2]] else 0.0})
+    assert not regressions(lambda trial: {TIME: math.log(2.0)}, Gate(slowdown=2.5))
+
+
+def test_the_interval_of_time_holds_the_ratio():
+    def holds(run):
+        def change(trial):
+            return {TIME: math.log(1.2) + np.random.default_rng([trial.seed, run]).normal(0, 0.3)}
+
+        size = {"cases": ("only",), "variants": ("fast",), "seeds": 24}
+        timed = compare(measured(**size), measured(change, **size), GATE).changes[-1]
+        assert timed.score == TIME
+        return timed.low <= 1.2 <= timed.high
+
+    assert np.mean([holds(run) for run in range(50)]) > 0.84  # 0.95 expected, less three deviations
+
+
+def test_trials_and_scores_that_only_one_side_has_are_left_out():
+    before = measured(cases=("a", "b"))
+    after = measured(lambda trial: {"pcp": -3.0}, cases=("a", "b"))
+    scores = {trial: {**each, "mpjpe_mm": None} for trial, each in after.scores.items() if trial.seed != 5}
+    comparison = compare(before, Measurement("suite", "0123456789", "1.0", scores), GATE)
+    assert {change.n for change in comparison.changes} == {11, 22}
+    assert "mpjpe_mm" not in {change.score for change in comparison.changes}
+    assert ("pcp", "full", None) in named(comparison.that_are("worse"))
+
+
+def test_regressions_come_whole_suite_first_and_worst_first():
+    worse = regressions(lambda trial: {"pcp": -2.0, "recall": -9.0} if trial.case < "case06" else {})
+    assert [change.case is None for change in worse] == sorted((c.case is None for c in worse), reverse=True)
+    assert worse[0].score == "recall"
+    assert worse[0].loss > worse[-1].loss > 1
+
+
+def test_a_tolerance_of_nothing_is_one():
+    strict = Gate.model_validate({"tolerance": {"pcp": 0.0}})
+    assert not regressions(lambda trial: {}, strict)
+    assert named(regressions(lambda trial: {"pcp": -0.01}, strict)) >= {("pcp", "full", None)}

@@ -1,0 +1,146 @@
+"""What a check says: JUnit, Markdown."""
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from simharness.gate.baseline import TIME, Measurement
+from simharness.gate.check import Check, Failed
+from simharness.gate.comparing import compare
+from simharness.gate.junit import SPEED, WHOLE, junit
+from simharness.gate.markdown import markdown
+from simharness.gate.trials import Trial
+from simharness.scenario.gate import Gate
+from simharness.scoring.catalogue import HEADLINE, SCORES
+
+COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"
+
+
+def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")):
+    """A check of three cases whose scores changed by what ``change`` says."""
+    usual = {
+        "pcp": 90.0,
+        "recall": 95.0,
+        "precision": 96.0,
+        "mpjpe_mm": 40.0,
+        "match_f1": 97.0,
+        "ghosts": 0.3,
+        TIME: 1.0,
+    }
+    trials = [Trial(case, seed, variant) for case in cases for seed in range(12) for variant in ("full", "fast")]
+    before = Measurement("ci", "0" * 10, "1", {trial: dict(usual) for trial in trials})
+    after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
+    comparison = compare(before, Measurement("ci", "0" * 10, "1", after), Gate())
+    return Check("ci", ("full", "fast"), Gate(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
+
+
+def crowded(trial):
+    return {"pcp": -7.0, "ghosts": 0.2} if trial[::2] == ("crowd", "full") else {}
+
+
+def slower(trial):
+    return {TIME: 1.0} if trial.variant == "fast" else {}
+
+
+def better(trial):
+    return {"mpjpe_mm": -5.0}
+
+
+def cases_of(check):
+    root = ElementTree.fromstring(junit(check))
+    assert root.tag == "testsuites"
+    (suite,) = root
+    return suite, {case.get("name"): case for case in suite}
+
+
+class TestJUnit:
+    def test_a_case_for_each_case_and_none_fails(self):
+        suite, cases = cases_of(made())
+        assert list(cases) == [WHOLE, "a<b|c", "base", "crowd", SPEED]
+        assert [suite.get(key) for key in ("name", "tests", "failures", "errors", "time")] == [
+            *("ci", "5", "0", "0", "61.2"),
+        ]
+        assert not [child for case in cases.values() for child in case]
+
+    def test_a_regression_fails_its_case(self):
+        check = made(crowded)
+        suite, cases = cases_of(check)
+        assert (suite.get("failures"), suite.get("errors")) == ("2", "0")  # the whole suite lost 2.3 points, too
+        assert [name for name, case in cases.items() if len(case)] == [WHOLE, "crowd"]
+        failure = cases["crowd"].find("failure")
+        assert "PCP" in failure.text
+        assert "Ghosts" in failure.text
+        assert len(failure.text.splitlines()) == 2
+        assert "90.0 before, 83.0 now: -7.0" in failure.text
+
+    def test_time_fails_its_own_case(self):
+        _, cases = cases_of(made(slower))
+        assert [name for name, case in cases.items() if len(case)] == [SPEED]
+        assert "×2.00" in cases[SPEED].find("failure").get("message")
+
+    def test_what_could_not_be_run_is_an_error(self):
+        failed = [Failed("crowd", 3, "no \x00 room & <more>\nin two lines")]
+        suite, cases = cases_of(made(failed=failed))
+        assert suite.get("errors") == "1"
+        assert "no ? room & <more>" in cases["crowd"].find("error").text
+
+    def test_a_suite_without_cases_is_one_case(self):
+        _, cases = cases_of(made(lambda trial: {"pcp": -5}, cases=("only",), failed=[Failed("only", 1, "no")]))
+        assert list(cases) == [WHOLE, SPEED]
+        assert cases[WHOLE].find("error") is not None
+
+    def test_what_improved_fails_nothing(self):
+        suite, _ = cases_of(made(better))
+        assert suite.get("failures") == "0"
+
+
+class TestMarkdown:
+    def test_tables_are_whole(self):
+        text = markdown(made(crowded))
+        rows = [line for line in text.splitlines() if line.startswith("|")]
+        assert len(rows) == 2 * (2 + 6 + 1)
+        assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {7}
+        for key in HEADLINE:
+            assert sum(row.startswith(f"| {SCORES[key].title}") for row in rows) == 2
+
+    def test_the_verdict_comes_first_then_what_got_worse_then_what_got_better(self):
+        text = markdown(made(lambda trial: crowded(trial) | better(trial)))
+        assert text.startswith("## ci: 4 regressions\n")
+        places = [text.index(each) for each in ("### Worse", "### Better", "### full", "### fast", COMMAND)]
+        assert places == sorted(places)
+        assert markdown(made()).startswith("## ci: no regression\n")
+
+    def test_the_command_can_be_copied(self):
+        assert f"\n```sh\n{COMMAND}\n```\n" in markdown(made())
+
+    def test_names_cannot_break_it(self):
+        text = markdown(made(lambda trial: {"pcp": -5} if trial.case == "a<b|c" else {}))
+        assert "a&lt;b\\|c" in text
+        assert "a<b|c" not in text
+
+    def test_a_hundred_regressions_are_not_all_listed(self):
+        text = markdown(made(lambda trial: {key: -30 if SCORES[key].better == "higher" else 30 for key in HEADLINE}))
+        assert text.startswith("## ci: 48 regressions")
+        assert "- and 28 more" in text
+
+
+@pytest.mark.parametrize(
+    ("check", "passed", "verdict"),
+    [
+        (made(), True, "no regression"),
+        (made(better), True, "no regression"),
+        (made(slower), False, "1 regression"),
+        (made(failed=[Failed("base", 0, "no")]), False, "1 of 36 trials could not be run"),
+        (made(slower, failed=[Failed("base", 0, "no")]), False, "1 regression, 1 of 36 trials could not be run"),
+    ],
+)
+def test_the_verdict(check, passed, verdict):
+    assert (check.passed, check.verdict) == (passed, verdict)
+
+
+def test_what_the_command_is_of():
+    assert made().pointer == "the trial that has the lowest PCP: base, seed 0, full"
+    assert made(crowded).pointer.startswith("the trial that lost most")
+    assert replace(made(), failed=(Failed("base", 0, "no"),)).pointer.startswith("the trial that could not be run")

@@ -1,0 +1,122 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from suites import SMALL, remember_scenes
+
+from simharness.experiment.execution import RunError
+from simharness.gate import suite
+from simharness.gate.baseline import KEPT, TIME
+from simharness.gate.reference import time_reference
+from simharness.gate.suite import fingerprint, run_suite
+from simharness.scenario.study import load_study
+from simharness.scoring.catalogue import SCORES
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return load_study(path, seeds=2)
+
+
+def test_the_suite_that_is_committed_is_well_within_its_limits():
+    ci = load_study(Path(__file__).parents[3] / "scenarios" / "ci.toml")
+    assert len(ci.seeds) >= 12  # fewer, and no case alone could be significant
+    assert ci.trials * len(ci.variants) <= 300
+    assert max(setting.scenario.frames for setting in ci.settings) <= 15
+    assert {setting.scenario.rendering.renderer for setting in ci.settings} == {"rays"}
+    tests = len(ci.variants) * (6 * (1 + len(ci.settings)) + 1)
+    assert tests / 2 ** len(ci.seeds) < ci.gate.level
+
+
+def test_the_reference_does_the_same_work_in_every_call():
+    times = time_reference(15)
+    assert len(times) == 15
+    assert 0.05 < times.min() < 50
+    assert np.median(times) < 20 * times.min()
+
+
+class TestFingerprint:
+    def test_is_of_what_is_run(self, study):
+        path, one = study.path, fingerprint(study)
+        assert fingerprint(load_study(path, seeds=2)) == one
+        for line in ("people.area = 1.9", "[cases.more]", 'detector.profile = "poor"', 'appearance.source = "drawn"'):
+            path.write_text(f"{SMALL}\n{line}\n")  # of the last case, or one more
+            assert fingerprint(load_study(path, seeds=2)) != one, line
+        path.write_text(SMALL)
+        assert fingerprint(load_study(path, seeds=3)) != one
+        assert fingerprint(replace(study, variants=("full",))) != one
+
+    def test_is_not_of_names_folders_and_tolerances(self, study, tmp_path):
+        other = tmp_path / "elsewhere" / "other.toml"
+        other.parent.mkdir()
+        text = SMALL.replace('name = "small"', 'name = "other"\ndescription = "the same"')
+        other.write_text(text + "\n[gate]\nslowdown = 3.0\n")
+        assert fingerprint(load_study(other, seeds=2)) == fingerprint(study)
+
+    def test_is_of_the_content_of_files_and_not_of_where_they_lie(self, study, tmp_path):
+        prints = []
+        for folder, content in (("a", b"one"), ("b", b"one"), ("c", b"two")):
+            file = tmp_path / folder / "net.onnx"
+            file.parent.mkdir()
+            file.write_bytes(content)
+            setting = study.settings[0]
+            detector = setting.scenario.detector.model_copy(update={"onnx": str(file)})
+            changed = replace(setting, scenario=setting.scenario.model_copy(update={"detector": detector}))
+            prints.append(fingerprint(replace(study, settings=(changed,))))
+        assert prints[0] == prints[1] != prints[2]
+
+
+@pytest.mark.slow
+def test_every_trial_is_measured_once_beside_the_reference(study, monkeypatch):
+    remember_scenes(monkeypatch)
+    told = []
+    done = run_suite(study, progress=told.append)
+    assert done.failed == ()
+    assert {(trial.case, trial.seed, trial.variant) for trial in done.scores} == {
+        (case, seed, "fast") for case in ("phantoms", "crowd") for seed in (0, 1)
+    }
+    assert sum(told) == 4
+    for scores in done.scores.values():
+        assert set(scores) == {*SCORES, TIME}
+        assert 0.005 < scores[TIME] < 50
+        assert scores[TIME] <= scores["time_ms"] / 0.05
+    kept = done.measurement(study)
+    assert (kept.suite, kept.fingerprint) == ("small", fingerprint(study))
+    assert all(set(scores) == set(KEPT) for scores in kept.scores.values())
+    json.dumps([dict(scores) for scores in kept.scores.values()], allow_nan=False)
+
+
+def test_a_trial_that_cannot_be_run_is_said_and_the_others_go_on(study, monkeypatch):
+    def sometimes(scenario, variants, *, blame):
+        if scenario.seed == 1:
+            raise RunError("the ceiling came down")
+        raise ValueError("nobody fits") if scenario.people.count == 5 else RunError("and again")
+
+    monkeypatch.setattr(suite, "measure", sometimes)
+    done = run_suite(study)
+    assert done.scores == {}
+    assert {(each.case, each.seed, each.error) for each in done.failed} == {
+        ("phantoms", 0, "and again"),
+        ("crowd", 0, "nobody fits"),
+        ("phantoms", 1, "the ceiling came down"),
+        ("crowd", 1, "the ceiling came down"),
+    }
+
+
+def test_two_settings_of_one_scenario_both_have_its_scores(study, monkeypatch):
+    def measure(scenario, variants, *, blame):
+        measured.append(scenario.seed)
+        raise RunError("enough")
+
+    measured = []
+    monkeypatch.setattr(suite, "measure", measure)
+    twice = replace(study, settings=(study.settings[0], replace(study.settings[0], case="again")))
+    done = run_suite(twice)
+    assert {(each.case, each.seed) for each in done.failed} == {
+        (case, seed) for case in ("phantoms", "again") for seed in (0, 1)
+    }
+    assert set(measured) == {0, 1}

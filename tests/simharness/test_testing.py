@@ -1,0 +1,78 @@
+"""A scenario file as an assertion."""
+
+import re
+
+import pytest
+from suites import SMALL, remember_scenes
+
+from simharness.experiment.execution import RunError
+from simharness.gate import suite
+from simharness.scenario.reading import ScenarioError
+from simharness.testing import assert_robust
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    remember_scenes(monkeypatch)
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.mark.slow
+def test_what_is_good_enough_passes(small):
+    assert_robust(small, variant="fast", seeds=2, pcp=60, recall=80, mpjpe_mm=90, ghosts=2.0)
+
+
+@pytest.mark.slow
+def test_what_is_not_says_where_and_how_to_see_it(small):
+    with pytest.raises(AssertionError) as caught:
+        assert_robust(str(small), variant="fast", seeds=2, pcp=99.9, recall=10, mpjpe_mm=1.5)
+    title, pcp, command, mpjpe, _ = str(caught.value).splitlines()
+    assert title == f"{small}, fast, 4 trials"
+    said = re.fullmatch(
+        r"PCP is [\d.]+ %, expected at least 99.9; worst case (\w+): [\d.]+ %, there seed (\d): [\d.]+ %", pcp
+    )
+    people = {"crowd": 5, "phantoms": 3}[said[1]]
+    assert re.fullmatch(rf"  simharness run \S+small.toml .*--set people.count={people}\b.* --seed {said[2]}", command)
+    assert mpjpe.startswith("MPJPE is ")
+    assert "expected at most 1.5" in mpjpe
+    mean, worst, single = map(float, re.findall(r"([\d.]+) %", pcp))
+    assert single <= worst <= mean < 99.9
+
+
+def test_a_score_that_does_not_exist(small):
+    with pytest.raises(ValueError, match=r"no score 'pcpp'; did you mean pcp\?"):
+        assert_robust(small, pcpp=90)
+    with pytest.raises(ValueError, match="needs a threshold"):
+        assert_robust(small)
+
+
+def test_a_file_or_a_variant_that_does_not_exist(small, tmp_path):
+    with pytest.raises(ScenarioError, match="no such file"):
+        assert_robust(tmp_path / "none.toml", pcp=90)
+    with pytest.raises(ScenarioError, match="did you mean fast"):
+        assert_robust(small, variant="fats", pcp=90)
+
+
+def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
+    def fail(scenario, variants, *, blame):
+        raise RunError("the ceiling came down")
+
+    monkeypatch.setattr(suite, "measure", fail)
+    with pytest.raises(RunError, match="2 of 2 trials could not be run, the first phantoms, seed 0: the ceiling"):
+        assert_robust(small, seeds=1, variant="fast", pcp=0)
+
+
+def test_a_score_that_applies_to_nothing_does_not_pass(small, monkeypatch):
+    class Nothing:
+        def __init__(self, variant):
+            from simharness.gate.trials import Trial
+            from simharness.scoring.catalogue import SCORES
+
+            self.failed = ()
+            self.scores = {Trial("crowd", 0, variant): dict.fromkeys(SCORES)}
+
+    monkeypatch.setattr(suite, "run_suite", lambda study, workers: Nothing(*study.variants))
+    with pytest.raises(AssertionError, match="MPJPE applies to none of the trials"):
+        assert_robust(small, seeds=1, variant="fast", mpjpe_mm=1000)

@@ -1,0 +1,60 @@
+"""A small suite for tests of the gate, whose scenes are made once in a session."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from simharness.experiment import trial
+from simharness.study import measure
+
+QUICKSTART = Path(__file__).parents[1] / "scenarios" / "quickstart.toml"
+
+SMALL = f"""
+extends = {json.dumps(str(QUICKSTART))}
+name = "small"
+seed = 0
+seeds = 8
+variants = ["fast"]
+duration = 0.8
+rate = 5.0
+rendering.renderer = "rays"
+
+[cameras]
+count = 4
+
+[clutter]
+boxes = 2
+shelves = 0
+
+[cases.phantoms]
+people.count = 3
+detector.phantoms.rate = 1.0
+
+[cases.crowd]
+people.count = 5
+"""
+
+_made: dict = {}
+
+
+def remember_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Build, simulate, film and detect a scene once: the gate measures the method, which works anew every time."""
+    build, look = trial.build, measure.look
+
+    def built(scenario, rig):
+        key = "built", scenario.model_dump_json()
+        if key not in _made:
+            _made[key] = build(scenario, rig)
+        return _made[key]
+
+    def looked(prepared):
+        key = "looked", prepared.scenario.model_dump_json()
+        if key not in _made:
+            _made[key] = look(prepared)
+        return _made[key]
+
+    monkeypatch.setattr(trial, "build", built)
+    monkeypatch.setattr(measure, "look", looked)
