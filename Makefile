@@ -11,7 +11,7 @@ demo: $(RUN)
 	$(BIN)/simharness run scenarios/quickstart.toml
 
 test: $(DEV)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -68,9 +68,7 @@ def run(
     with clock.stage("audit", 1):
         audit(trial.scenario, trial.scene, trial.shots, sequence, views)
     with clock.stage("detect", scenario.frames):
-        answers = detect(
-            sequence, views, trial.shots.taking, scenario.detector, seed=scenario.seed, looks=trial.looks
-        )
+        answers = detect(sequence, views, trial.shots.taking, scenario.detector, seed=scenario.seed, looks=trial.looks)
     if Reading.needed(scenario):
         answers = _read(trial, answers, workers, clock)
     detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)

@@ -64,7 +64,8 @@ class Network(nn.Module):
 class Mirrored(nn.Module):
     """What a network says of a crop and of its mirror image, the mean of both: people look much alike mirrored.
 
-    Twice the work, for better descriptors: of the clearest crops of people never seen a quarter fewer are taken for others.
+    Twice the work, for better descriptors: of the clearest crops of people never seen a quarter fewer are taken for
+    somebody else.
     """
 
     def __init__(self, network: Network) -> None:
