@@ -25,6 +25,7 @@ PRESETS: dict[str, str] = {
     "full": "every cue there is (geometry; appearance where descriptors are given), ADMM matching, 3DPS",
     "appearance": "as full, with appearance as the only affinity: detections must carry descriptors",
     "geometry": "as full, with geometry as the only affinity",
+    "hungarian": "as full, with matching of two views at a time: nothing makes the pairs agree",
     "no-3dps": "as full, with robust triangulation in place of the pictorial structure",
     "no-matching": "3DPS straight from all detections",
     "fast": "as full, with matching by clustering and robust triangulation",
@@ -33,7 +34,7 @@ PRESETS: dict[str, str] = {
 NEED_DESCRIPTORS = frozenset({"appearance"})
 """The presets that have nothing to go by where detections carry no descriptors."""
 
-READ_HEATMAPS = frozenset({"full", "appearance", "geometry"})
+READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian"})
 """The presets that make use of heat maps where detections carry them; the others go by keypoints."""
 
 
@@ -79,6 +80,7 @@ class Pipeline:
             "full": full,
             "appearance": replace(full, affinity=appearance),
             "geometry": replace(full, affinity=GeometricAffinity()),
+            "hungarian": replace(full, matching=Matcher(method="hungarian")),
             "no-3dps": replace(full, reconstruction=Triangulation()),
             "no-matching": UnmatchedPipeline(),
             "fast": replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation()),

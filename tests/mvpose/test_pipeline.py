@@ -122,7 +122,7 @@ def test_timings_add_up_and_the_estimate_is_whole():
 
 
 def test_an_unknown_preset_names_the_known_ones():
-    with pytest.raises(ValueError, match="full, appearance, geometry, no-3dps, no-matching, fast"):
+    with pytest.raises(ValueError, match="full, appearance, geometry, hungarian, no-3dps, no-matching, fast"):
         Pipeline.preset("best")
 
 

@@ -180,6 +180,13 @@ def test_two_workers_say_what_one_says(check, tmp_path):
     assert result.stdout.count("none") == 6
 
 
+def test_help_is_there():
+    result = CliRunner(env={"COLUMNS": "120"}).invoke(app, ["check", "--help"])
+    assert result.exit_code == 0
+    for option in ("--baseline", "--junit", "--summary", "--update-baseline", "--workers", "section [gate]"):
+        assert option in result.stdout
+
+
 def refused(result, *said):
     assert result.exit_code == 2
     assert result.stdout == ""

@@ -79,7 +79,7 @@ def test_scores_are_means_over_people_and_intervals_widen_with_doubt():
 
 
 def test_people_who_never_fit_are_an_error(recorded, scenario):
-    crowded = scenario.model_copy(update={"people": scenario.people.model_copy(update={"count": 30})})
+    crowded = scenario.model_copy(update={"people": scenario.people.model_copy(update={"area": 0.72})})
     with pytest.raises(ValueError, match="do not fit"):
         compare(recorded, crowded, count=2)
 
