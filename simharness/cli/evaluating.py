@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from simharness.cli.border import after_reading, border, write_json
+from simharness.cli.options import JsonFile, Overrides, ScenarioFile
 
 
 class HeadMapping(enum.StrEnum):
@@ -77,10 +78,7 @@ def twin(
         ),
     ] = None,
     twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
-    ] = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
     with border():
@@ -100,16 +98,10 @@ def twin(
 
 @app.command("seeds")
 def evaluate_seeds(
-    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
-    ] = None,
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
     seeds: Annotated[int, typer.Option(metavar="N", min=2, help="How many seeds.")] = 10,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
-    ] = None,
+    json_file: JsonFile = None,
 ) -> None:
     """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
     with border():

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 
 from simharness.cli.border import border
+from simharness.cli.options import Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,12 +25,9 @@ def add_to(app: typer.Typer) -> None:
 
 
 def run(
-    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
     workers: Annotated[
         int,
         typer.Option(metavar="N", min=1, help="Processes that share the frames. The results are the same."),
@@ -59,12 +57,9 @@ def run(
 
 
 def render(
-    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]room.floor=wood[/]. Repeatable."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
     video: Annotated[bool, typer.Option("--video", help="MP4 films instead of PNG pictures.")] = False,
     overlay: Annotated[
         str,

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from simharness.cli.border import border
+from simharness.cli.options import Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -47,12 +48,9 @@ def scenarios() -> None:
 
 
 def show(
-    scenario: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")] = None,
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
 ) -> None:
     """Print a scenario with all that it leaves unsaid, as TOML; of a study how many trials it makes, and its base."""
     with border():

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.text import Text
 
 from simharness.cli.border import FAILED, after_reading, border
+from simharness.cli.options import Overrides, ScenarioFile
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,11 +33,8 @@ def add_to(app: typer.Typer) -> None:
 
 
 def study(
-    file: Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="FILE")],
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
-    ] = None,
+    file: ScenarioFile,
+    overrides: Overrides = None,
     seeds: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="How many seeds, instead of the file's.")
     ] = None,
