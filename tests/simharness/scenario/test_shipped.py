@@ -18,6 +18,7 @@ from simharness.study.measure import measure
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 STUDIES = [
+    "angle",
     "calibration",
     "clutter",
     "crowd",
