@@ -99,6 +99,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         columns=tables.COLUMNS,
         headline=tables.headline(trials, variants),
         compared=tables.compared(trials, variants) if len(variants) > 1 and seeds > 1 else {},
+        every=tables.every(trials, variants),
         cases=tables.cases(trials, variants),
         tabs=[SCORES[key] for key in CURVES],
         curves=[_curve(index, factor, variants, thresholds) for index, factor in enumerate(swept)],

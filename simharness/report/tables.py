@@ -72,6 +72,19 @@ def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
     return rows
 
 
+def every(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
+    """Every score that applies to any variant: a row each, a cell for each variant."""
+    rows = []
+    for info in SCORES.values():
+        means = [
+            mean_interval(list(by_seed(trials.filter(pl.col("variant") == variant), info.key).values()))
+            for variant in variants
+        ]
+        if any(mean.n for mean in means):
+            rows.append((info, [cell(mean, info) for mean in means]))
+    return rows
+
+
 def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, list[Cell]]]:
     """A headline table for each case; none where the study has no cases."""
     names = [name for name in dict.fromkeys(trials["case"]) if name]

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from simharness.cli import app
 from simharness.report.study import render_study, write_report
 from simharness.report.worst import worst_frames
+from simharness.scoring.catalogue import SCORES
 
 GRID = {"cameras.count": [2, 3, 5], "detector.profile": ["poor", "good"]}
 _VOID = {"meta", "input", "img", "br"}
@@ -59,6 +60,24 @@ def test_the_headline_is_the_mean_over_everything(tmp_path):
     for variant in ("full", "fast"):
         expected = np.mean([pcp_of(variant, {"cameras.count": n}, seed) for n in (2, 3, 5) for seed in range(4)])
         assert cells_of(page, variant)[0] == f"{expected:.1f}"
+
+
+def test_every_score_that_applies_has_its_mean(tmp_path):
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3]})
+    trials = results.trials.with_columns(pl.lit(None, pl.Float64).alias("phantoms_pruned"))
+    results = dataclasses.replace(results, trials=trials)
+    page = render_study(results)
+    table = page[page.index('class="panel every"') :]
+    told = 0
+    for key, info in SCORES.items():
+        values = results.trials.filter(pl.col("variant") == "fast")[key].drop_nulls()
+        title = f"{info.title}, {info.unit}" if info.unit else info.title
+        row = re.search(rf'<th scope="row">{re.escape(title)}<span.*?</tr>', table, re.DOTALL)
+        assert (row is not None) == bool(len(values))
+        if row is not None:
+            told += 1
+            assert re.findall(r"<td>([^<]*)", row[0])[1] == f"{values.mean():.{info.digits}f}"
+    assert told == len(SCORES) - 1
 
 
 def test_every_value_of_a_factor_has_its_number(tmp_path):
