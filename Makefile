@@ -1,11 +1,13 @@
-# make demo | test | lint : each makes .venv on first use and installs what it needs.
+# make demo | test | lint | results : each makes .venv on first use and installs what it needs.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run
 DEV    := $(VENV)/.dev
+WORKERS ?= 2
+STUDIES := angle calibration clutter crowd detector look_alike panoptic phantoms stress sync views
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint results clean
 
 demo: $(RUN)
 	$(BIN)/simharness run scenarios/quickstart.toml
@@ -17,6 +19,13 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# An hour on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
+results: $(STUDIES:%=results-%)
+
+results-%: $(RUN)
+	$(BIN)/simharness study scenarios/$*.toml --workers $(WORKERS)
+	$(BIN)/simharness report results/studies/$* --digest results/$*
 
 $(VENV):
 	$(PYTHON) -m venv $(VENV)

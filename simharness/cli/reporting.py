@@ -40,6 +40,14 @@ def report(
             dir_okay=False,
         ),
     ] = None,
+    digest: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Instead of the page, write what is kept beside the code: numbers, a table, the curves.",
+            file_okay=False,
+        ),
+    ] = None,
     trial: Annotated[
         str | None, typer.Option(metavar="ID", help="With --rerun: this trial, not the worst; its first digits do.")
     ] = None,
@@ -51,6 +59,8 @@ def report(
     with border():
         if trial is not None and rerun is None:
             raise ValueError("--trial: says which trial --rerun writes; without --rerun it has no meaning")
+        if rerun is not None and digest is not None:
+            raise ValueError("--rerun and --digest: each is written instead of the page; give one of them")
         thresholds = _thresholds(threshold or [])
         from simharness.study.results import read_study
 
@@ -64,6 +74,12 @@ def report(
         from simharness.report.worst import SHOWN
 
         check_thresholds(thresholds)
+        if digest is not None:
+            from simharness.report.digest import write_digest
+
+            write_digest(results, digest, thresholds=thresholds or THRESHOLDS)
+            typer.echo(f"digest: {digest}")
+            return
         with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:
             page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance)
     typer.echo(f"report: {page}")

@@ -94,6 +94,7 @@ def make_study(
         "seconds": 100.0,
         "kept": 0,
         "versions": {"numpy": np.__version__},
+        "digests": {"simulation": "0" * 32, "method": "1" * 32},
         "failed": list(failed),
         "trials": len(settings) * len(cases) * seeds + len(failed),
         "settings": len(settings) * len(cases),
