@@ -2,8 +2,9 @@
 
 from simharness.testing import assert_robust
 
+
 def test_people_are_found_whatever_happens():
-assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
+    assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
 """
 
 from __future__ import annotations
