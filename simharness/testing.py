@@ -1,10 +1,12 @@
 """A scenario file as an assertion, for test suites::
 
-from simharness.testing import assert_robust
+    from simharness.testing import assert_robust
 
 
-def test_people_are_found_whatever_happens():
-    assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
+    def test_people_are_found_whatever_happens():
+        assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
+
+Any score of :data:`simharness.scoring.catalogue.SCORES` can be asserted.
 """
 
 from __future__ import annotations
