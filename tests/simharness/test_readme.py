@@ -1,0 +1,353 @@
+"""The README: every command in it works, and every example in it runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from simharness.cli import app
+from simharness.scenario.study import load_study
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_INDENTED = re.compile(r"(?<=\n\n)(?: {4}.*\n)+")  # after an empty line: else it goes on with an item of a list
+_PROGRAM = re.compile(r"(simharness|make|(\S*/)?python3? -m) \S")
+_COMMENT = re.compile(r"\s+# .*")
+
+# What each simharness command gets in addition, to be cheap; the last of an option given twice counts.
+SMALL_SCENE = "--set people.count=2 --set duration=0.4 --set rate=5"
+RAYS = f"{SMALL_SCENE} --set cameras.count=3 --set cameras.size=[160,120] --set rendering.renderer=rays"
+PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --set clutter.shelves=0"
+HEIGHTS = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
+ALONE = {
+    "simharness run scenarios/quickstart.toml --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": (
+        f"{RAYS} --workers 1"
+    ),
+    "simharness render scenarios/gathering.toml": f"{PICTURES} --every 2",
+    "simharness render scenarios/gathering.toml --video --overlay truth,detections,estimates": PICTURES,
+    "simharness study scenarios/views.toml --workers 2": (
+        f"{RAYS} --set sweep.cameras.count=[3] --seeds 1 --variant fast --workers 1"
+    ),
+    "simharness scenarios": "",
+    "simharness show FILE": "",
+}
+NAMES = ("simharness check", "simharness fit-detector")  # how the text calls them
+CHECKS = (
+    "simharness check scenarios/ci.toml --baseline results/baselines/ci.json --workers 2",
+    "simharness check scenarios/ci.toml --baseline results/baselines/ci.json --workers 2 --junit junit.xml "
+    "--summary summary.md",
+)
+SHELF = (
+    "simharness evaluate shelf path/to/shelf --json shelf.json",
+    "simharness evaluate shelf FOLDER",
+    "simharness fit-detector shelf path/to/shelf --out my-detector.toml",
+    "simharness fit-detector shelf FOLDER",
+    "simharness evaluate twin path/to/shelf",
+    "simharness evaluate twin FOLDER",
+)
+OWN_STUDY = {
+    "simharness study heights.toml --workers 4": f"{HEIGHTS} --seeds 1",
+    "simharness study heights.toml --seeds 40": f"{HEIGHTS} --seeds 2",
+    "simharness report results/studies/heights --rerun heights.rrd": "",
+    "simharness report STUDY --digest FOLDER": "",
+}
+IN_PARTS = {
+    "simharness study heights.toml --shard 1/3 --store part1": f"{HEIGHTS} --seeds 2",
+    "simharness merge part1 part2 part3 --into results/studies/store": "",
+    "simharness study heights.toml": f"{HEIGHTS} --seeds 2",
+}
+MAKE = ("make demo", "make test", "make lint", "make results")
+HELPFUL = ("python -m mvpose.bench", "python -m simharness.bench", "python -m simharness.train.reid")
+BAKE = "python -m simharness.humans.bake"  # takes no arguments: it would go and bake
+PYTEST = '.venv/bin/python -m pytest -m "not slow"'
+KNOWN = {*ALONE, *NAMES, *CHECKS, *SHELF, *OWN_STUDY, *IN_PARTS, *MAKE, *HELPFUL, BAKE, PYTEST}
+
+# Stands for scenarios/ci.toml, which takes minutes: nothing here is hard for the method.
+EASY = f"""
+extends = {json.dumps(str(ROOT / "scenarios" / "quickstart.toml"))}
+name = "easy"
+seeds = 1
+variants = ["fast"]
+duration = 0.4
+rate = 5.0
+rendering.renderer = "rays"
+people.count = 2
+detector.profile = "perfect"
+
+[clutter]
+boxes = 0
+shelves = 0
+"""
+
+
+def commands(text: str) -> Iterator[str]:
+    """The shell commands of a Markdown text: indented lines, those of shell blocks, and inline code that is one."""
+    for language, block in _FENCE.findall(text):
+        if language in ("", "sh", "bash", "shell", "console"):
+            yield from (_COMMENT.sub("", line).strip() for line in block.splitlines() if line.strip())
+    prose = _FENCE.sub("", text)
+    for block in _INDENTED.findall(prose):
+        yield from (_COMMENT.sub("", line).strip() for line in block.splitlines())
+    for span in re.findall(r"`([^`]+)`", _INDENTED.sub("", prose)):
+        if _PROGRAM.match(one_line := " ".join(span.split())):
+            yield one_line
+
+
+def blocks(language: str) -> list[str]:
+    return [block for name, block in _FENCE.findall(README) if name == language]
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """A folder like that of a checkout, with the study that the README writes."""
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    (heights,) = blocks("toml")
+    (tmp_path / "heights.toml").write_text(heights, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def easy_workplace(tmp_path, monkeypatch):
+    """A folder like that of a checkout, with an easy suite."""
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios" / "ci.toml").write_text(EASY)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(command: str, more: str = ""):
+    """Run a command of simharness with more options."""
+    program, *words = shlex.split(command)
+    assert program == "simharness"
+    return CliRunner().invoke(app, [*words, *shlex.split(more)], catch_exceptions=False)
+
+
+def done(command: str, more: str = "") -> str:
+    result = call(command, more)
+    assert result.exit_code == 0, f"{command} {more}\n{result.stderr}"
+    return result.stdout
+
+
+def test_commands_are_found_wherever_they_are_written():
+    text = """`simharness` and `make` are names, `simharness/gate` is a folder; `simharness show
+FILE` and `python -m json.tool` stand in prose.
+10. An item
+    that goes on
+
+    make demo   # says what
+    pip install .
+
+```sh
+simharness run a#b.toml
+```
+
+```toml
+    a = 1
+```
+"""
+    found = ["simharness run a#b.toml", "make demo", "pip install .", "simharness show FILE", "python -m json.tool"]
+    assert list(commands(text)) == found
+
+
+def test_every_command_is_run_here():
+    there = set(commands(README))
+    new, gone = sorted(there - KNOWN), sorted(KNOWN - there)
+    assert not new, f"commands in README.md that no test here runs: {new}"
+    assert not gone, f"commands that are no longer in README.md: {gone}"
+
+
+def test_every_block_is_looked_at_here():
+    assert sorted(language for language, _ in _FENCE.findall(README)) == ["python", "python", "toml", "yaml"]
+
+
+MADE = {
+    "run": "results/runs/*/report.html",
+    "render": "results/renders/gathering/mosaic*",
+    "study": "results/*/*/report.html",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ALONE)
+def test_commands_that_stand_alone(workplace, command):
+    said = done(command.replace("FILE", "heights.toml"), ALONE[command])
+    assert said
+    if made := MADE.get(command.split()[1]):
+        assert list(workplace.glob(made))
+
+
+@pytest.mark.parametrize("command", NAMES)
+def test_commands_that_are_only_named(command):
+    assert "Usage" in done(command, "--help")
+
+
+def test_the_check(easy_workplace):
+    plain, full = CHECKS
+    done(plain, "--update-baseline --workers 1")
+    assert "no regression" in done(plain, "--workers 1")
+    assert "no regression" in done(full, "--workers 1")
+    assert (easy_workplace / "junit.xml").read_text().startswith("<?xml")
+    assert (easy_workplace / "summary.md").read_text().startswith("## easy: no regression")
+
+
+@pytest.mark.parametrize("command", SHELF)
+def test_commands_on_shelf_say_that_there_are_no_data(workplace, command):
+    result = call(command)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")  # and no usage: the options are right
+    assert "no such folder" in result.stderr
+
+
+@pytest.mark.slow
+def test_shelf_is_evaluated(workplace, shared_data):
+    (workplace / "path" / "to").mkdir(parents=True)
+    (workplace / "path" / "to" / "shelf").symlink_to(shared_data / "shelf")
+    assert "PCP" in done(SHELF[0], "--method fast")
+    assert json.loads((workplace / "shelf.json").read_text())["variants"]
+
+
+def test_the_study_of_your_own_makes_what_it_says(workplace):
+    study = load_study("heights.toml")
+    (block,) = blocks("toml")
+    said = tomllib.loads(block)
+    heights, people = said["sweep"]["cameras"]["height"], said["sweep"]["people"]["count"]
+    assert (people["from"], people["to"], people["steps"]) == (4, 8, 2)
+    assert len(study.seeds) == said["seeds"]
+    assert list(study.variants) == said["variants"]
+    settings = {(each.case, *map(each.factors.get, ("cameras.height", "people.count"))) for each in study.settings}
+    assert settings == set(product(said["cases"], heights, (4, 8)))
+
+
+@pytest.mark.slow
+def test_the_study_of_your_own(workplace):
+    first, more, recording, digest = OWN_STUDY
+    assert "2 trials: 0 kept from before, 2 run, 0 failed" in done(first, OWN_STUDY[first])
+    assert "4 trials: 2 kept from before, 2 run, 0 failed" in done(more, OWN_STUDY[more])
+    assert (workplace / "results/studies/heights/report.html").is_file()
+    done(digest.replace("STUDY", "results/studies/heights").replace("FOLDER", "kept"))
+    assert {"digest.json", "table.md"} <= {path.name for path in (workplace / "kept").iterdir()}
+    if importlib.util.find_spec("rerun"):
+        done(recording)
+        assert (workplace / "heights.rrd").stat().st_size
+    else:
+        result = call(recording)
+        assert (result.exit_code, "needs the rerun SDK" in result.stderr) == (2, True)
+
+
+@pytest.mark.slow
+def test_the_study_in_parts(workplace):
+    first, merge, whole = IN_PARTS
+    for k in (1, 2, 3):
+        done(first.replace("1/3", f"{k}/3").replace("part1", f"part{k}"), IN_PARTS[first])
+    assert "4 entries copied" in done(merge)
+    assert "4 trials: 4 kept from before, 0 run, 0 failed" in done(whole, IN_PARTS[whole])
+
+
+@pytest.mark.parametrize("command", MAKE)
+def test_make_knows_its_targets(command):
+    program, target = command.split()
+    dry = subprocess.run([program, "-n", target], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert dry.returncode == 0, dry.stderr
+    assert dry.stdout.strip()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", HELPFUL)
+def test_modules_have_a_command_line(command):
+    _, *words = command.split()
+    said = subprocess.run([sys.executable, *words, "--help"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.startswith(f"usage: {command} ")
+
+
+def test_the_bakery_is_a_program():
+    spec = importlib.util.find_spec(BAKE.rsplit(maxsplit=1)[-1])
+    assert '\nif __name__ == "__main__":\n' in Path(spec.origin).read_text(encoding="utf-8")
+
+
+def test_pytest_leaves_out_what_is_slow():
+    _, *words = shlex.split(PYTEST)
+    one = [str(Path(__file__).with_name("test_cli.py")), "--collect-only"]
+    said = subprocess.run([sys.executable, *words, *one], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stdout
+    assert "test_unknown_key" in said.stdout
+    assert "deselected" in said.stdout
+
+
+def test_the_example_of_mvpose():
+    example = next(block for block in blocks("python") if "mvpose" in block)
+    made = runpy.run_path(str(ROOT / "tests" / "mvpose" / "people.py"))  # rigs and people, without the simulator
+    rig, true = made["ring"](4), made["crowd"](2)
+    seen, person = made["detect"](rig, true)
+    names = {"cameras": rig.cameras, "view": seen.view, "keypoints": seen.keypoints, "scores": seen.scores}
+    exec(example, names)
+    people = names["people"]
+    assert people.joints.shape == (2, 17, 3)
+    assert people.covariance.shape == (2, 17, 3, 3)
+    labels = people.matching.labels
+    assert labels.shape == person.shape == (8,)
+    for k in range(2):
+        (label,) = set(labels[person == k])
+        np.testing.assert_allclose(people.joints[label], true[k], atol=0.05)
+
+
+class TestAssertRobust:
+    """The assertion for test suites."""
+
+    @staticmethod
+    def example():
+        names: dict = {}
+        exec(next(block for block in blocks("python") if "assert_robust" in block), names)
+        (test,) = (each for name, each in names.items() if name.startswith("test_"))
+        return test
+
+    def test_it_passes_where_all_is_easy(self, easy_workplace):
+        self.example()()
+
+    def test_it_fails_where_nobody_can_be_seen(self, easy_workplace):
+        (easy_workplace / "scenarios" / "ci.toml").write_text(EASY + "[cameras]\ncount = 2\nfov = 25.0\n")
+        with pytest.raises(AssertionError, match="expected at least 90"):
+            self.example()()
+
+    def test_its_numbers_are_right_for_the_suite_that_ships(self):
+        trials = json.loads((ROOT / "results" / "baselines" / "ci.json").read_text())["trials"]
+        (said,) = re.findall(r'assert_robust\("scenarios/ci.toml", seeds=(\d+), (.*)\)', "".join(blocks("python")))
+        first = sorted({trial["seed"] for trial in trials})[: int(said[0])]
+        mine = [trial for trial in trials if trial["variant"] == "full" and trial["seed"] in first]
+        for key, limit in re.findall(r"(\w+)=([\d.]+)", said[1]):
+            mean = fmean(trial[key] for trial in mine if trial[key] is not None)
+            assert mean <= float(limit) if key == "ghosts" else mean >= float(limit)
+
+
+def test_the_workflow_runs_the_check():
+    (workflow,) = blocks("yaml")
+    folded = " ".join(re.search(r"run: >\n((?: {10}.*\n)+)", workflow)[1].split())
+    assert folded in CHECKS
+
+
+def test_the_workflow_is_valid():
+    yaml = pytest.importorskip("yaml")
+    (workflow,) = map(yaml.safe_load, blocks("yaml"))
+    runs = [step["run"].strip() for step in workflow["jobs"]["check"]["steps"] if "run" in step]
+    assert len(runs) == 3
+    assert runs[0] == "pip install -e ."
+    assert runs[1] in CHECKS
+    (written,) = re.findall(r"--summary (\S+)", runs[1])
+    assert f"cat {written} " in runs[2]
