@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,10 +51,10 @@ def after_reading() -> Iterator[None]:
 
 
 def write_json(summary: dict[str, Any], path: Path) -> None:
-    """By rename: a file that is there is whole."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    """A file that is there is whole."""
+    from simharness.experiment.atomic import write_whole
+
     try:
-        partial.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        partial.replace(path)
+        write_whole(path, (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
     except OSError as error:
         raise ValueError(f"--json {path}: cannot be written: {error.strerror}") from None

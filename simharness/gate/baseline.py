@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simharness.experiment.atomic import write_whole
 from simharness.gate.trials import Trial
 from simharness.scoring.catalogue import HEADLINE
 
@@ -74,14 +73,10 @@ def write_text(text: str, path: Path, *, option: str) -> None:
     Raises:
         ValueError: it cannot be written there.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        write_whole(path, text.encode())
     except OSError as error:
-        with contextlib.suppress(OSError):
-            partial.unlink()
         raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import polars as pl
 from markupsafe import Markup
 
+from simharness.experiment.atomic import write_whole
 from simharness.report import plots, study_plots, tables
 from simharness.report.curves import Factor, breaking, factors, grid
 from simharness.report.templating import fill
@@ -57,10 +57,8 @@ def write_report(
         raise ValueError(f"{out}: cannot be written: there is no folder {out.parent}")
     shown = [picture for picture, _ in show(results, worst_frames(results), progress=progress)]
     page = render_study(results, shown=shown, thresholds=thresholds)
-    partial = out.with_name(f".{out.name}.{os.getpid()}.partial")
     try:
-        partial.write_text(page, encoding="utf-8")
-        partial.replace(out)
+        write_whole(out, page.encode())
     except OSError as error:
         raise ValueError(f"{out}: cannot be written: {error.strerror}") from None
     return out

@@ -15,9 +15,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import re
-import secrets
 import time
 import zipfile
 from collections.abc import Iterator
@@ -27,6 +25,7 @@ from typing import Any
 
 import polars as pl
 
+from simharness.experiment.atomic import write_whole
 from simharness.experiment.execution import RunError
 from simharness.study.measured import Measured
 
@@ -210,18 +209,6 @@ class Store:
 def is_store(folder: Path) -> bool:
     """Whether a folder is a store, of whatever format."""
     return (folder / "store.json").is_file()
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file by renaming: it is there whole or not at all."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.partial")
-    try:
-        partial.write_bytes(content)
-        partial.replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            partial.unlink()
-        raise
 
 
 def parquet(table: pl.DataFrame) -> bytes:
