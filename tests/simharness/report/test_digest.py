@@ -50,6 +50,9 @@ def test_every_failure_has_a_kind_and_a_stage(study):
         assert len(mine) > 0
         for column in ("kinds", "stages"):
             assert sum(failed[column].values()) == pytest.approx(100 * len(mine) / frames, abs=0.01)
+        alone = [each for each in mine["matching_alone"].to_list() if each is not None]
+        assert failed["matching_alone"] == pytest.approx(100 * sum(alone) / len(alone), abs=0.05)
+        assert 0 < failed["matching_alone"] < 100
         assert failed["kinds"].keys() <= KIND_COLORS.keys()
         assert failed["stages"].keys() <= BLAME_COLORS.keys()
 
