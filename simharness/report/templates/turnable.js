@@ -130,6 +130,7 @@ function makeTurnable(place) {
   });
   slider.addEventListener("input", () => go(Number(slider.value)));
   button.addEventListener("click", play);
+  draw(); // at once: an observer is called with the next picture of the page only, which a busy machine takes late
   new ResizeObserver(draw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
