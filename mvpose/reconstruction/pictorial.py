@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import bones
+from mvpose.reconstruction.hanging import down_the_trunk, hang, parts
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
@@ -72,6 +73,8 @@ class PictorialStructure:
             *tree(skeleton),
             length,
             definition,
+            hang(skeleton),
+            parts(skeleton),
             self.personal,
             self.most_pairs,
             self.most_states,
@@ -82,8 +85,9 @@ class PictorialStructure:
 @njit(cache=True)
 def _structures(  # type: ignore[no-untyped-def]
     poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
-    parents, order, neighbours, bones, length, definition, personal, most_pairs, most_states,
+    parents, order, neighbours, bones, length, definition, hang, parts, personal, most_pairs, most_states,
 ):  # fmt: skip
+    down = np.empty(3)
     for person in range(len(poses.joints)):
         joints, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
         clear(joints, scores, covariance)
@@ -94,8 +98,9 @@ def _structures(  # type: ignore[no-untyped-def]
         if maps is not None:
             rescore(states, unary, count, labels, person, weight, maps, floor)
         own_length, precision = personal_prior(states, count, weight, sigmas, parents, length, definition, personal)
+        down_the_trunk(states, count, parts, down)
         propose_single_views(
-            states, unary, count, mine, towards, weight, floor, neighbours, bones, own_length, precision
+            states, unary, count, mine, towards, weight, floor, neighbours, bones, own_length, precision, hang, down
         )
         chosen = max_product(states, unary, count, parents, order, own_length, precision)
         own = np.empty(len(sigmas))
@@ -116,7 +121,7 @@ def _structures(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         judge(
             scores, covariance, joints, mine, towards, weight, angle, own, floor,
-            parents, order, neighbours, bones, own_length, precision,
+            parents, order, neighbours, bones, own_length, precision, hang, down,
         )  # fmt: skip
 
 

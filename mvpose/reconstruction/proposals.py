@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mvpose.reconstruction.hanging import how_it_hangs
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.scatter import person_scale
 from mvpose.reconstruction.triangulation import consensus, pair_point
@@ -125,13 +126,14 @@ def _agreement(point, origins, directions, first, mode, second, other, sigma):  
 
 @njit(cache=True)
 def propose_single_views(  # type: ignore[no-untyped-def]
-    states, unary, count, origins, directions, weights, floor, neighbours, bones, length, precision
+    states, unary, count, origins, directions, weights, floor, neighbours, bones, length, precision, hang, down
 ):
     """Propose, in place, for joints that a single view sees: where its ray is a bone's length from a neighbour.
 
     Such a joint has no pair of views, but its direction is known and the prior knows the depth, up to which of two
-    points it is. The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their
-    own neighbours in the next round.
+    points it is: the one where the limb hangs down the trunk (:mod:`mvpose.reconstruction.hanging`) as limbs do.
+    The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their own neighbours
+    in the next round.
     """
     joints, n, _ = weights.shape
     only = np.empty(joints, np.int64)
@@ -142,7 +144,7 @@ def propose_single_views(  # type: ignore[no-untyped-def]
                 views, only[j] = views + 1, v
         if views != 1 or count[j] > 0:
             only[j] = -1
-    placed = np.empty(joints, np.int64)
+    placed, point = np.empty(joints, np.int64), np.empty(3)
     for j in range(joints):
         placed[j] = count[j]
     while True:
@@ -152,20 +154,22 @@ def propose_single_views(  # type: ignore[no-untyped-def]
                 continue
             v = only[j]
             for slot in range(neighbours.shape[1]):
-                other = neighbours[j, slot]
-                if other < 0 or count[other] == 0 or precision[bones[j, slot]] == 0.0:
+                other, bone = neighbours[j, slot], bones[j, slot]
+                if other < 0 or count[other] == 0 or precision[bone] == 0.0:
                     continue
                 along, square = 0.0, 0.0
                 for r in range(3):
                     offset = states[other, 0, r] - origins[v, r]
                     along += offset * directions[j, v, 0, r]
                     square += offset * offset
-                reach = np.sqrt(max(length[bones[j, slot]] ** 2 - (square - along * along), 0.0))
+                reach = np.sqrt(max(length[bone] ** 2 - (square - along * along), 0.0))
                 for depth in (along - reach, along + reach):
                     if depth > 0.0 and placed[j] < states.shape[1]:
                         for r in range(3):
-                            states[j, placed[j], r] = origins[v, r] + depth * directions[j, v, 0, r]
-                        unary[j, placed[j]] = np.log(weights[j, v, 0] + floor)
+                            point[r] = origins[v, r] + depth * directions[j, v, 0, r]
+                        value = np.log(weights[j, v, 0] + floor)
+                        value += how_it_hangs(point, states[other, 0], bone == j, hang[bone], down)
+                        insert(states[j], unary[j], placed[j], value, point[0], point[1], point[2])
                         placed[j] += 1
             changed = changed or placed[j] > 0
         for j in range(joints):

@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
+from mvpose.reconstruction.hanging import how_it_hangs
 from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
 from mvpose.reconstruction.poses import NOBODY, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
@@ -95,7 +96,17 @@ def refine(
     covariance = np.full((len(joints), 3, 3), np.nan)
     skeletal = (*tree(skeleton), length, 1.0 / deviation**2)
     climb(refined, *mine, noise.sigmas(skeleton), noise.floor, *skeletal)
-    judge(scores, covariance, refined, *mine, noise.sigmas(skeleton), noise.floor, *skeletal)
+    judge(
+        scores,
+        covariance,
+        refined,
+        *mine,
+        noise.sigmas(skeleton),
+        noise.floor,
+        *skeletal,
+        np.zeros(len(joints)),
+        np.zeros(3),
+    )
     return refined, scores, covariance
 
 
@@ -221,7 +232,7 @@ def _distance(a, b):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def judge(  # type: ignore[no-untyped-def]
     scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones,
-    length, precision,
+    length, precision, hang, down,
 ):  # fmt: skip
     """Write scores (J,) and covariances (J, 3, 3) of a pose at its maximum.
 
@@ -247,7 +258,7 @@ def judge(  # type: ignore[no-untyped-def]
                 information[j, r, c] /= scale[j]
             information[j, r, r] += LEASH
     _marginalize(joints, information, covariance, parents, order, precision)
-    _add_ambiguity(covariance, joints, origins, directions, weights, parents, order, neighbours, precision)
+    _add_ambiguity(covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down)
 
 
 @njit(cache=True)
@@ -303,14 +314,16 @@ def _add_outer(matrix, vector, weight):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _add_ambiguity(  # type: ignore[no-untyped-def]
-    covariance, joints, origins, directions, weights, parents, order, neighbours, precision
+    covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down
 ):
     """Count in that a joint which one view alone sees may as well be at the other depth where its bone fits.
 
-    The second moment about the chosen depth grows by half the squared distance of the two. Joints that hang on such
-    a joint inherit its doubt; one that holds a better seen joint at its other end has none.
+    The second moment about the chosen depth grows by the squared distance of the two times how likely the other is
+    (:mod:`mvpose.reconstruction.hanging`). Joints that hang on such a joint inherit its doubt; one that holds a better
+    seen joint at its other end has none.
     """
     count = len(joints)
+    mirrored = np.empty(3)
     view, doubt = np.full(count, -1), np.zeros(count)  # the only view of a joint
     for j in range(count):
         views = 0
@@ -335,5 +348,11 @@ def _add_ambiguity(  # type: ignore[no-untyped-def]
             anchor += (joints[parent, r] - origins[only, r]) * directions[j, only, 0, r]
         doubt[j] = doubt[parent]
         if 2.0 * anchor - here > 0.0:  # the other depth, in front of the camera
-            doubt[j] += 2.0 * (anchor - here) ** 2
+            for r in range(3):
+                mirrored[r] = joints[j, r] + 2.0 * (anchor - here) * directions[j, only, 0, r]
+            odds = np.exp(
+                how_it_hangs(joints[j], joints[parent], True, hang[j], down)
+                - how_it_hangs(mirrored, joints[parent], True, hang[j], down)
+            )
+            doubt[j] += 4.0 * (anchor - here) ** 2 / (1.0 + odds)
         _add_outer(covariance[j], directions[j, only, 0], doubt[j])

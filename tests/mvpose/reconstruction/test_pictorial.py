@@ -6,13 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from people import STANDING, detect, ring
 
-from mvpose import COCO17, SHELF14, Detections, Rig
+from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bones import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.hanging import hang, how_it_hangs, parts
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
-from mvpose.reconstruction.refinement import _marginalize, climb, leaves_first, refine, tree
+from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb, leaves_first, refine, tree
 
 
 def reconstruct(rays, method=None):
@@ -82,13 +83,24 @@ def test_a_joint_without_evidence_is_missing_and_does_not_disturb_the_rest():
     assert np.linalg.norm(joints[others] - STANDING[others], axis=1).max() < 0.03
 
 
-def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_the_ray():
+LYING = STANDING[:, [2, 1, 0]] * [1, 1, -1] + [-0.8, 0, 1.0]  # on the back
+HEADLONG = STANDING * [1, -1, -1] + [0, 0, 1.7]
+
+
+def seen_by_one(rig, body, joints, view=0):
+    """A body whose named joints one view alone sees."""
+    scores = np.full((len(rig), 17), 0.9)
+    for joint in joints:
+        scores[np.arange(len(rig)) != view, joint] = 0
+    return viewing_rays(rig, Detections.from_keypoints(np.arange(len(rig)), rig.project(body), scores))
+
+
+@pytest.mark.parametrize("body", [STANDING, LYING, HEADLONG], ids=["standing", "lying", "headlong"])
+def test_a_joint_of_one_view_lies_on_its_ray_where_its_limb_hangs_down_the_trunk(body):
     rig = ring(4)
-    scores = np.full((4, 17), 0.9)
-    scores[1:, 9] = 0  # the left wrist, seen by camera 0 alone
-    scores[1:, 13], scores[1:, 15] = 0, 0  # a whole lower leg: knee and ankle hang on each other
-    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
+    rays = seen_by_one(rig, body, (9, 13, 15))  # a wrist; knee and ankle, which hang on each other
     joints, scores, covariance = reconstruct(rays)
+    down = joints[11:13].mean(axis=0) - joints[5:7].mean(axis=0)
     for joint in (9, 13, 15):
         sight = rays.directions[0, joint]
         offset = joints[joint] - rig.centers[0]
@@ -96,18 +108,64 @@ def test_a_joint_of_one_view_lies_on_its_ray_a_bone_away_with_its_doubt_along_th
         assert np.linalg.norm(joints[joint] - joints[COCO17.parents[joint]]) == pytest.approx(
             bone_lengths(COCO17)[0][joint], abs=0.05
         )
-        anchor = joints[COCO17.parents[joint]] - rig.centers[0]
-        assert offset @ sight < anchor @ sight + 0.01  # of the two points a bone away, the nearer
+        anchor = joints[COCO17.parents[joint]]
+        other = joints[joint] + 2 * ((anchor - rig.centers[0]) @ sight - offset @ sight) * sight
+        assert (joints[joint] - anchor) @ down > (other - anchor) @ down - 0.01
+        assert np.linalg.norm(joints[joint] - body[joint]) < 0.3
         assert 0 < scores[joint] < 0.3 * scores[0]
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
 
 
+def test_of_two_depths_the_nearer_is_taken_where_the_trunk_is_unknown():
+    """Neither hips nor head are seen: a wrist is at the nearer point a bone away."""
+    rig = ring(4)
+    scores = np.full((4, 17), 0.9)
+    scores[:, :5], scores[:, 11:] = 0, 0
+    scores[1:, 9] = 0
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(STANDING), scores))
+    joints, _, _ = reconstruct(rays)
+    sight = rays.directions[0, 9]
+    assert (joints[9] - joints[7]) @ sight < -0.05
+
+
+def test_the_neck_tells_where_hips_of_one_view_are():
+    """Lying or standing, the hips are beyond the shoulders as seen from the head."""
+    for body in (STANDING, LYING, HEADLONG):
+        joints, _, _ = reconstruct(seen_by_one(ring(4), body, range(11, 17)))
+        assert np.linalg.norm(joints[11:13] - body[11:13], axis=1).max() < 0.25
+
+
+@pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19], ids=lambda skeleton: skeleton.name)
+def test_limbs_hang_in_every_skeleton(skeleton):
+    limbs = {joint for joint in skeleton.joints if joint.split("_")[-1] in ("elbow", "wrist", "knee", "ankle")}
+    hanging = {joint for joint, concentration in zip(skeleton.joints, hang(skeleton), strict=True) if concentration}
+    assert limbs <= hanging <= limbs | {"left_hip", "right_hip"}
+    told = dict(zip(skeleton.joints, parts(skeleton), strict=True))
+    assert (told["left_shoulder"], told["right_hip"], told["left_wrist"]) == (1, 2, 0)
+    assert 3 in told.values()
+
+
+def test_how_a_bone_hangs_is_von_mises_fisher():
+    """Whichever end asks; the integral over the sphere of the density with its constant is 1."""
+    rng = np.random.default_rng(3)
+    directions = rng.standard_normal((200_000, 3))
+    down = np.array([0.6, 0.0, -0.8])
+    for concentration in (0.5, 3.0):
+        value = [how_it_hangs(each, np.zeros(3), True, concentration, down) for each in directions]
+        constant = 2 * concentration / (1 - np.exp(-2 * concentration))  # over the uniform density, at most 0
+        assert np.mean(constant * np.exp(value)) == pytest.approx(1.0, abs=0.01)
+    assert how_it_hangs(np.zeros(3), directions[0], False, 3.0, down) == how_it_hangs(
+        directions[0], np.zeros(3), True, 3.0, down
+    )
+    assert how_it_hangs(directions[0], np.zeros(3), True, 3.0, np.zeros(3)) == 0.0
+
+
 def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():
-    """The forearm points away from the one camera that sees the wrist: the nearer depth is the wrong one."""
+    """The forearm is raised towards the one camera that sees the wrist, and hanging arms are likelier."""
     rig, body = ring(4), STANDING.copy()
     away = (body[7] - rig.centers[0]) / np.linalg.norm(body[7] - rig.centers[0])
     across = np.cross(away, [0.0, 0.0, 1.0])
-    body[9] = body[7] + 0.25 * (0.9 * away + np.sqrt(1 - 0.9**2) * across)
+    body[9] = body[7] + 0.25 * (-0.9 * away + np.sqrt(1 - 0.9**2) * across)
     scores = np.full((4, 17), 0.9)
     scores[1:, 9] = 0
     rays = viewing_rays(rig, Detections.from_keypoints(np.arange(4), rig.project(body), scores))
@@ -118,6 +176,23 @@ def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():
     known = joints[7] - body[7]
     assert np.trace(covariance[9]) > 10 * np.trace(covariance[7])  # and the elbow's is its own
     assert np.linalg.norm(known) < 0.03
+
+
+@pytest.mark.parametrize("concentration", [0.0, 2.0])
+def test_the_doubt_is_the_squared_distance_of_the_other_depth_times_how_likely_that_is(concentration):
+    """A shoulder and, hanging from it at 45 degrees, an elbow that only a camera 4 m along y has."""
+    joints = np.array([[0.0, 0.0, 1.4], [0.0, 0.2, 1.2]])
+    origin, sight = np.array([[0.0, -4.0, 1.2]]), np.array([0.0, 1.0, 0.0])
+    directions = np.array([[[[0.0, 4.0, 0.2]]], [[sight]]])
+    weights = np.array([[[0.0]], [[1.0]]])
+    covariance, down = np.zeros((2, 3, 3)), np.array([0.0, 0.6, -0.8])
+    prior = np.array([1.0, 1.0]), np.array([0.0, concentration]), down
+    parents, order, neighbours = np.array([-1, 0]), np.array([1, 0]), np.array([[1], [0]])
+    _add_ambiguity(covariance, joints, origin, directions, weights, parents, order, neighbours, *prior)
+    here, there = (np.array([0, y, -0.2]) @ down / np.hypot(0.2, 0.2) for y in (0.2, -0.2))
+    likely = np.exp(concentration * there) / (np.exp(concentration * here) + np.exp(concentration * there))
+    assert covariance[1] == pytest.approx(0.4**2 * likely * np.outer(sight, sight))
+    assert not covariance[0].any()
 
 
 def log_posterior(joints, rays):
