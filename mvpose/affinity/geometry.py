@@ -18,6 +18,9 @@ from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays
 
+_SURE = 0.35  # quantile: more than a third of the nearest are one person, whatever phantoms there are
+_ENOUGH = 12  # nearest pairs, below which a frame says too little
+_EXPLAINED = 0.05  # metres: what keypoints alone make of that quantile, whose scatter is 0.06 m (OKS)
 _PARALLEL = 1e-9  # squared sine: rays this near to parallel differ by 0.3 mm at 10 m
 
 
@@ -38,6 +41,9 @@ class GeometricAffinity:
         nearest: where a viewing ray starts, metres from the optical centre; a body that is nearer does not fit
             in the picture. Without it, all rays of two cameras side by side would pass each other closely in
             front of the lenses, whoever they show.
+        widest: how far midpoint, slope and threshold may grow together in a frame whose rays all meet badly, because
+            the calibration is off or the clocks are: the factor by which :func:`misfit` exceeds what keypoints
+            explain, at least 1. 1 keeps them as they are. Beyond 2 two people who do not touch would match.
     """
 
     midpoint: float = 0.15
@@ -46,13 +52,21 @@ class GeometricAffinity:
     saturation: float = 0.5
     least_joints: int = 3
     nearest: float = 0.5
+    widest: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.widest < math.inf:
+            raise ValueError(f"widest of the geometric affinity must be at least 1 and finite, got {self.widest}")
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
         """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
-        return _compare_rays(
+        distance, _ = _compare_rays(
             rays.view, rays.origins, rays.directions, rays.weights, self.nearest, self.saturation,
-            self.midpoint, self.slope, self.threshold, max(self.least_joints, 1), False,
-        )[0]  # fmt: skip
+            self.widest * self.threshold, max(self.least_joints, 1), False,
+        )  # fmt: skip
+        factor = min(max(misfit(rays.view, distance) / _EXPLAINED, 1.0), self.widest) if self.widest > 1.0 else 1.0
+        _fall(distance, factor * self.midpoint, factor * self.slope, factor * self.threshold)
+        return distance
 
 
 def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0) -> tuple[Floats, NDArray[np.int64]]:
@@ -71,21 +85,62 @@ def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0
         of joints that both poses have, (m, m), 0 for two poses of one view.
     """
     distance, shared = _compare_rays(
-        rays.view, rays.origins, rays.directions, rays.weights, nearest, saturation, 0.0, 1.0, 0.0, 1, True
+        rays.view, rays.origins, rays.directions, rays.weights, nearest, saturation, np.inf, 1, True
     )
     return distance, shared
 
 
+@njit(cache=True)
+def misfit(view, distance):  # type: ignore[no-untyped-def]
+    """How far from each other the rays pass of those who are surely one person, metres; 0 if too few are.
+
+    Surely one person are, in two views, those who are nearer to each other than to anybody else there. Some of them
+    are phantoms, which are far from each other, so it is a lower quantile.
+
+    Args:
+        view: of each detection, (m,).
+        distance: between detections, (m, m), metres; infinite where they are not compared.
+    """
+    order, start = by_view(view)
+    found, count = np.empty(len(view) * len(start)), 0
+    for p in range(len(start) - 2):
+        for q in range(p + 1, len(start) - 1):
+            for a in range(start[p], start[p + 1]):
+                i, near = order[a], -1
+                for b in range(start[q], start[q + 1]):
+                    if distance[i, order[b]] < (distance[i, near] if near >= 0 else np.inf):
+                        near = order[b]
+                mutual = near >= 0
+                for c in range(start[p], start[p + 1]):
+                    mutual = mutual and (c == a or distance[near, order[c]] >= distance[near, i])
+                if mutual:
+                    found[count] = distance[i, near]
+                    count += 1
+    return np.sort(found[:count])[int(_SURE * count)] if count >= _ENOUGH else 0.0
+
+
+@njit(cache=True)
+def _fall(distance, midpoint, slope, threshold):  # type: ignore[no-untyped-def]
+    """Turn distances into affinities, in place."""
+    m = len(distance)
+    for i in range(m):
+        distance[i, i] = 0.0
+        for k in range(i + 1, m):
+            d = distance[i, k]
+            distance[i, k] = distance[k, i] = falling(d, midpoint, slope) if d <= threshold else 0.0
+
+
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
 def _compare_rays(  # type: ignore[no-untyped-def]
-    view, origins, directions, weights, nearest, saturation, midpoint, slope, threshold, least, distances
+    view, origins, directions, weights, nearest, saturation, reach, least, counted
 ):
-    """Affinities; or, with ``distances``, the mean distances and the numbers of common joints."""
+    """Mean distances up to ``reach``, else infinite; and, if they are to be counted, the numbers of common joints."""
     order, start = by_view(view)
     pose = lay_out(directions, weights, order, 4)
     m, _, padded = pose.shape
-    result = np.full((m, m), np.inf) if distances else np.zeros((m, m))
-    shared = np.zeros((m, m) if distances else (0, 0), np.int64)
+    result = np.full((m, m), np.inf)
+    shared = np.zeros((m, m) if counted else (0, 0), np.int64)
+    level = min(reach, 1.0)  # any finite number if there is no reach
     normal, first, second = np.empty((3, padded)), np.empty(padded), np.empty((m, padded))
     excess = np.empty(m)
     for p in range(len(start) - 2):
@@ -121,19 +176,16 @@ def _compare_rays(  # type: ignore[no-untyped-def]
                         edge = max(s, t, 0.0)
                         starts = baseline2 - 2.0 * nearest * (s + t + shift)
                         square = lines if (ahead >= 0.0) & (sine2 > _PARALLEL) else max(starts - edge * edge, 0.0)
-                        total += weight_a[j] * weight_b[j] * (min(math.sqrt(square), saturation) - threshold)
+                        total += weight_a[j] * weight_b[j] * (min(math.sqrt(square), saturation) - level)
                     excess[b] = total
                 for b in range(start[q], start[q + 1]):
-                    if excess[b] > 0.0 and not distances:  # on average beyond the threshold
+                    if excess[b] > 0.0 and level == reach:  # on average beyond it
                         continue
                     mass, count = in_common(weight_a, pose[b, 3])
                     if count < least:
                         continue
                     i, k = order[a], order[b]
-                    distance = threshold + excess[b] / mass
-                    if distances:
-                        result[i, k] = result[k, i] = distance
+                    result[i, k] = result[k, i] = level + excess[b] / mass
+                    if counted:
                         shared[i, k] = shared[k, i] = count
-                    else:
-                        result[i, k] = result[k, i] = falling(distance, midpoint, slope)
     return result, shared

@@ -8,6 +8,8 @@ from scipy.optimize import minimize
 
 from mvpose import Camera, Detections, Rig
 from mvpose.affinity import GeometricAffinity, ray_distance, sigmoid
+from mvpose.affinity.geometry import misfit
+from mvpose.matching import match
 from mvpose.rays import Rays, viewing_rays
 
 
@@ -98,10 +100,10 @@ def test_missing_joints_are_left_out_and_sure_joints_weigh_more():
     assert shared[0, 1] == 16
 
 
-def by_hand(rays, *, midpoint, slope, threshold, saturation, least_joints, nearest):
+def by_hand(rays, *, midpoint, slope, threshold, saturation, least_joints, nearest, widest):
     """The affinity matrix joint by joint: the least distance of two half-lines is inside or on an edge."""
     m, joints = rays.weights.shape
-    result = np.zeros((m, m))
+    result, mean = np.zeros((m, m)), np.full((m, m), np.inf)
     for a, b in np.argwhere(rays.view[:, None] < rays.view):
         distances, weights = [], []
         for j in range(joints):
@@ -116,9 +118,22 @@ def by_hand(rays, *, midpoint, slope, threshold, saturation, least_joints, neare
             nearby = min(np.linalg.norm(p + s * u - q - t * v) for s, t in candidates)
             distances.append(min(nearby, saturation))
             weights.append(weight)
-        if len(weights) >= least_joints and (mean := np.average(distances, weights=weights)) <= threshold:
-            result[a, b] = result[b, a] = 1 / (1 + np.exp((mean - midpoint) / slope))
+        if len(weights) >= least_joints and (distance := np.average(distances, weights=weights)) <= widest * threshold:
+            mean[a, b] = mean[b, a] = distance
+    sure = mutually_nearest(rays.view, mean)
+    factor = np.clip(sorted(sure)[int(0.35 * len(sure))] / 0.05, 1, widest) if len(sure) >= 12 else 1.0
+    near = mean <= factor * threshold
+    result[near] = 1 / (1 + np.exp((mean[near] / factor - midpoint) / slope))
     return result
+
+
+def mutually_nearest(view, distance):
+    """The distances of pairs of two views that are nearer to each other than to anybody else there."""
+    found = []
+    for a, b in np.argwhere(np.isfinite(distance) & (view[:, None] < view)):
+        if distance[a, b] == min(distance[a, view == view[b]].min(), distance[view == view[a], b].min()):
+            found.append(distance[a, b])
+    return found
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -133,11 +148,75 @@ def test_the_kernel_does_what_is_written(seed):
         saturation=rng.uniform(0.4, 0.8),
         least_joints=int(rng.integers(3, 6)),
         nearest=rng.uniform(0.0, 5.0),
+        widest=rng.uniform(1.0, 3.0),
     )
     rays = viewing_rays(rig, detections)
     found = GeometricAffinity(**parameters)(rig, detections, rays)
     assert 0.1 < (found > 0).mean() < 0.7  # there is something of everything
     np.testing.assert_allclose(found, by_hand(rays, **parameters), atol=1e-9)
+
+
+@given(st.integers(0, 100_000))
+def test_the_misfit_is_a_quantile_of_the_mutually_nearest(seed):
+    rng = np.random.default_rng(seed)
+    view = rng.permutation(np.repeat(np.arange(4), rng.integers(0, 5, 4)))
+    distance = rng.choice([np.inf, 1.0], (len(view), len(view)), p=[0.2, 0.8]) * rng.random((len(view), len(view)))
+    distance = np.minimum(distance, distance.T)
+    distance[view[:, None] == view] = np.inf
+    sure = sorted(mutually_nearest(view, distance))
+    assert misfit(view, distance) == (sure[int(0.35 * len(sure))] if len(sure) >= 12 else 0.0)
+
+
+def shifted(rig, metres, seed=0):
+    """The rig as somebody believes it whose cameras all are some way off."""
+    rng = np.random.default_rng(seed)
+    moved = []
+    for camera in rig:
+        aside = rng.standard_normal(3)
+        center = camera.center + metres * aside / np.linalg.norm(aside)
+        moved.append(Camera(camera.K, camera.R, -camera.R @ center, camera.distortion, camera.size, camera.name))
+    return Rig(moved)
+
+
+def test_a_rig_that_is_wrong_all_over_keeps_more_people_together():
+    """Cameras believed 20 cm off: of all pairs that matching makes or should make, more are right than at a fixed scale."""
+    rig, found = ring(5), {1.0: [], 2.0: []}
+    for seed in range(10):
+        detections, person = detect(rig, crowd(4, spacing=1.2, seed=seed), noise=2.0, seed=seed)
+        first, second = np.triu_indices(len(person), 1)
+        true = person[first] == person[second]
+        for widest, f1 in found.items():
+            affinity = affinities(shifted(rig, 0.2, seed), detections, GeometricAffinity(widest=widest))
+            labels = match(affinity, detections.view).labels
+            made = (labels[first] == labels[second]) & (labels[first] >= 0)
+            f1.append(2 * (made & true).sum() / (made.sum() + true.sum()))
+    assert np.mean(found[2.0]) > np.mean(found[1.0]) + 0.08
+    assert np.mean(found[2.0]) > 0.85
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_rig_that_is_right_keeps_its_scale(count):
+    """Whatever phantoms there are: they are a minority of the mutually nearest, or too few to go by."""
+    rig = ring(5)
+    detections, _ = detect(rig, crowd(count, spacing=1.2), noise=3.0)
+    rng = np.random.default_rng(1)
+    ghosts = Detections.from_keypoints(
+        np.arange(5), rng.uniform(0, 900, (5, 1, 2)) + rng.uniform(0, 200, (5, 17, 2)), np.full((5, 17), 0.5)
+    )
+    both = Detections.from_keypoints(
+        np.concatenate([detections.view, ghosts.view]),
+        np.concatenate([detections.keypoints, ghosts.keypoints]),
+        np.concatenate([detections.scores, ghosts.scores]),
+    )
+    for each in (detections, both):
+        fixed = affinities(rig, each, GeometricAffinity(widest=1.0))
+        np.testing.assert_allclose(affinities(rig, each), fixed, atol=1e-12)
+
+
+@pytest.mark.parametrize("widest", [0.9, np.inf, np.nan])
+def test_a_scale_that_cannot_be_is_refused(widest):
+    with pytest.raises(ValueError, match="widest of the geometric affinity must be at least 1"):
+        GeometricAffinity(widest=widest)
 
 
 def test_ray_affinity_does_not_depend_on_resolution():
