@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
+from mvpose.skeleton import COCO17, Skeleton
 
 
 @dataclass(frozen=True)
@@ -15,7 +18,8 @@ class Matching:
     """Detections grouped into people; at most one detection of a view in a person.
 
     Attributes:
-        labels: person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,).
+        labels: person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,). Empty where a
+            method does not say of which detections its people are.
         P: the relaxed permutation matrix, (m, m), where the method has one.
         iterations: how many the solver took.
         residuals: primal and dual residual at the stop.
@@ -37,6 +41,20 @@ class Matching:
     def people(self) -> int:
         """How many people were found."""
         return int(self.labels.max(initial=-1)) + 1
+
+    def tells(self, detections: int) -> bool:
+        """Whether it says who is who among so many detections."""
+        return len(self.labels) > 0 or detections == 0
+
+    def labels_of(self, detections: int) -> NDArray[np.int64]:
+        """Labels of so many detections, (m,): all -1 where the method does not say.
+
+        Raises:
+            ValueError: labels of another number of detections.
+        """
+        if not self.tells(detections):
+            return np.full(detections, -1)
+        return as_array(self.labels, (detections,), "labels", np.int64)
 
 
 @dataclass(frozen=True)
@@ -63,6 +81,55 @@ class Estimate:
         object.__setattr__(self, "scores", as_array(self.scores, joints.shape[:2], "scores"))
         if self.covariance is not None:
             object.__setattr__(self, "covariance", as_array(self.covariance, (*joints.shape, 3), "covariance"))
+
+    @classmethod
+    def of_joints(
+        cls,
+        joints: ArrayLike,
+        *,
+        scores: ArrayLike | None = None,
+        labels: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        timings: Mapping[str, float] | None = None,
+        skeleton: Skeleton = COCO17,
+    ) -> Self:
+        """People of whom joints are known and perhaps no more, as a method from elsewhere reports them.
+
+        Args:
+            joints: metres, (n, J, 3), in the order of the skeleton; NaN or None for a joint that could not be placed;
+                an empty list for nobody.
+            scores: confidence, 0 to 1, of joints (n, J) or of people (n,); by default 1. A joint that could not be
+                placed has 0 whatever is said.
+            labels: person of each detection that was given, 0 to n - 1, or -1 for nobody's, (m,); leave it out where
+                the method does not say.
+            covariance: of each joint, (n, J, 3, 3), square metres.
+            timings: seconds by stage.
+            skeleton: the J joints.
+
+        Raises:
+            ValueError: a wrong shape, scores outside 0..1, labels of people who are not there.
+        """
+        if np.asarray(joints, object).shape[:1] == (0,):
+            joints = np.zeros((0, len(skeleton), 3))
+        joints = as_array(joints, ("n", len(skeleton), 3), "joints")
+        placed = np.isfinite(joints).all(axis=2)
+        if scores is None:
+            scores = np.ones(len(joints))
+        scores = as_array(scores, (len(joints),) if np.ndim(scores) < 2 else placed.shape, "scores")
+        if not ((scores >= 0) & (scores <= 1)).all():
+            raise ValueError(f"scores must lie in 0..1, got {scores.min():.6g} to {scores.max():.6g}")
+        labels = as_array([] if labels is None else labels, ("m",), "labels", np.int64)
+        if len(labels) and not -1 <= labels.min() <= labels.max() < len(joints):
+            raise ValueError(
+                f"labels must be -1, or 0 to n - 1 of n = {len(joints)} people, got {labels.min()} to {labels.max()}"
+            )
+        return cls(
+            np.where(placed[..., None], joints, np.nan),
+            np.where(placed, scores if scores.ndim == 2 else scores[:, None], 0.0),
+            Matching(labels),
+            None if covariance is None else as_array(covariance, (*joints.shape, 3), "covariance"),
+            dict(timings or {}),
+        )
 
     def __len__(self) -> int:
         return len(self.joints)

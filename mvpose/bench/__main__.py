@@ -5,10 +5,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from mvpose.bench import curve, hard, memory, stages, start
+from mvpose.bench import curve, hard, memory, published, reid, stages, start
 from mvpose.bench.command import Section, run
 
-SECTIONS: dict[str, Section] = {"stages": stages, "hard": hard, "curve": curve, "memory": memory, "start": start}
+SECTIONS: dict[str, Section] = {
+    "stages": stages,
+    "published": published,
+    "reid": reid,
+    "hard": hard,
+    "curve": curve,
+    "memory": memory,
+    "start": start,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

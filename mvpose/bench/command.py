@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
-from mvpose.bench.measure import machine
+from mvpose.bench.measure import machine, versions
 from mvpose.bench.report import encodable
+
+_TITLES = {"python": "Python", "numpy": "NumPy", "scipy": "SciPy"}
 
 
 class Section(Protocol):
@@ -38,19 +42,37 @@ def run(package: str, about: str, sections: Mapping[str, Section], arguments: Se
         arguments: of the command line; by default the process's.
     """
     options = _parser(package, about, sections).parse_args(arguments)
-    here = machine()
-    title = f"{here.cpu}, {here.cores} cores · Python {here.python}, NumPy {here.numpy}, numba {here.numba}"
+    here, software, begin = machine(), versions(), time.perf_counter()
+    title = f"{here.cpu}, {here.cores} cores\n" + ", ".join(
+        f"{_TITLES.get(name, name)} {number}" for name, number in software.items()
+    )
     warning = " · quick: these figures are not to be quoted" if options.quick else ""
     _say(f"{package} benchmark · ✓ target met, ✗ missed{warning}\n{title}")
-    results: dict[str, Any] = {"machine": asdict(here), "quick": options.quick}
+    measured: dict[str, Any] = {}
     for name in options.only or sections:
         section = sections[name]
         rows = section.measure(quick=options.quick)
-        results[name] = [asdict(row) for row in rows]
+        measured[name] = [asdict(row) for row in rows]
         _say(f"\n\n{name.upper()}: {(section.__doc__ or '').splitlines()[0].rstrip('.')}\n\n{section.table_of(rows)}")
     if options.json:
+        results = {
+            "command": _command(package, options),
+            "machine": asdict(here),
+            "versions": software,
+            "seconds": round(time.perf_counter() - begin, 1),
+            "quick": options.quick,
+            **measured,
+        }
+        options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(results, indent=2, allow_nan=False) + "\n")
     return 0
+
+
+def _command(package: str, options: argparse.Namespace) -> str:
+    """What was asked for, on any machine: of the file only the name."""
+    only = ["--only", *options.only] if options.only else []
+    quick = ["--quick"] if options.quick else []
+    return shlex.join(["python", "-m", f"{package}.bench", *only, *quick, "--json", options.json.name])
 
 
 def _parser(package: str, about: str, sections: Mapping[str, Section]) -> argparse.ArgumentParser:

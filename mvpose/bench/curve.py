@@ -21,7 +21,7 @@ SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {
 
 @dataclass(frozen=True)
 class Point:
-    """One size: milliseconds by preset and stage, the first quartile of the calls."""
+    """One size: milliseconds by preset and stage; of a curve the first quartile of the calls."""
 
     views: int
     people: int
@@ -44,7 +44,7 @@ def measure(*, quick: bool = False) -> list[Sweep]:
 
 
 def _sweep(grows: str, sizes: tuple[tuple[int, int], ...], quick: bool) -> Sweep:
-    points = [_point(views, people, quick) for views, people in sizes]
+    points = [timed(views, people, quick=quick) for views, people in sizes]
     size = [getattr(point, grows) for point in points]
     exponents = {
         preset: {cost: exponent(size, [point.ms[preset][cost] for point in points]) for cost in COSTS}
@@ -53,13 +53,21 @@ def _sweep(grows: str, sizes: tuple[tuple[int, int], ...], quick: bool) -> Sweep
     return Sweep(grows, points, exponents)
 
 
-def _point(views: int, people: int, quick: bool) -> Point:
+def timed(views: int, people: int, *, share: float = 0.25, quick: bool = False) -> Point:
+    """Time both presets at one size.
+
+    Args:
+        views: cameras.
+        people: in the room.
+        share: of the calls, which take no longer than the milliseconds told.
+        quick: few calls on few frames.
+    """
     cases = prepare(frames(views, people, 3 if quick else 10))
     samples = interleaved(
         {preset: estimating(preset) for preset in PRESETS}, cases, calls=3 if quick else 100, seconds=2.0
     )
     ms = {
-        preset: {"total": sample.quantile(0.25), **{stage: sample.noted(stage, 0.25) for stage in STAGES}}
+        preset: {"total": sample.quantile(share), **{stage: sample.noted(stage, share) for stage in STAGES}}
         for preset, sample in samples.items()
     }
     return Point(views, people, sorted(len(case.scene.detections) for case in cases)[len(cases) // 2], ms)

@@ -7,9 +7,9 @@ import os
 import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +28,10 @@ class Machine:
 
     cpu: str
     cores: int
-    python: str
-    numpy: str
-    numba: str
 
 
 def machine() -> Machine:
-    """The machine and the versions of this process."""
+    """The machine of this process."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -42,7 +39,16 @@ def machine() -> Machine:
             line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
         ]
         cpu = names[0] if names else cpu
-    return Machine(cpu, os.cpu_count() or 1, platform.python_version(), np.__version__, version("numba"))
+    return Machine(cpu, os.cpu_count() or 1)
+
+
+def versions() -> dict[str, str]:
+    """Python's version and those of the packages that times depend on and that are installed, by name."""
+    found = {"python": platform.python_version()}
+    for package in ("numpy", "scipy", "numba", "onnxruntime"):
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from mvpose.bench.measure import Sample, interleaved
+from mvpose.bench.published import RELEASED, others_at
 from mvpose.bench.report import against, caption, figure, table
 from mvpose.bench.scenes import frames
 from mvpose.bench.tasks import STAGES, decomposing, estimating, matching, prepare
@@ -20,8 +21,6 @@ TARGETS: dict[tuple[int, int], dict[str, float]] = {
     (10, 10): {"fast": 0.6, "fast p99": 1.0, "admm": 8.0, "3dps": 2.0},
     (31, 10): {"fast": 4.0, "fast p99": 8.0, "admm": 70.0, "admm in eigh": 10.0, "3dps": 15.0},
 }
-# Matching and 3DPS of the released code, networks excluded, measured once on one core of a 2-core machine.
-RELEASED = {(5, 4): 28.0, (10, 10): 328.0, (31, 10): 5555.0}
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def _size(views: int, people: int, quick: bool) -> Size:
         },
         iterations=alone["admm"].noted("iterations"),
         targets=TARGETS[views, people],
-        released=RELEASED[views, people],
+        released=others_at((views, people))[RELEASED],
     )
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from time import perf_counter
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
 from simharness.cli.border import after_reading, border, write_json
-from simharness.cli.options import JsonFile, Overrides, ScenarioFile
+from simharness.cli.options import JsonFile, Overrides, ScenarioFile, command_line
 
 
 class HeadMapping(enum.StrEnum):
@@ -21,6 +23,11 @@ class HeadMapping(enum.StrEnum):
 
 
 app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
+
+
+def _made_by(command: str, which: str) -> Any:
+    """An option for a file that another command wrote."""
+    return typer.Option(metavar="FILE", help=f"What simharness {command} wrote, {which}.", dir_okay=False)
 
 
 @app.command()
@@ -44,6 +51,7 @@ def shelf(
     FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
     """
     with border():
+        start = perf_counter()
         from mvpose import Pipeline
         from mvpose.pipeline import NEED_DESCRIPTORS
         from simharness.datasets.evaluate import evaluate, print_evaluation
@@ -64,7 +72,7 @@ def shelf(
         ):
             evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
         if json_file is not None:
-            write_json(evaluation.summary(), json_file)
+            _write(evaluation.summary(), json_file, seeds=(), variants=pipelines, start=start)
     print_evaluation(evaluation, Console())
 
 
@@ -82,6 +90,7 @@ def twin(
 ) -> None:
     """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
     with border():
+        start = perf_counter()
         from simharness.datasets.shelf import read_shelf
         from simharness.experiment.progress import reporter
         from simharness.experiment.twin import compare, print_comparison
@@ -92,7 +101,7 @@ def twin(
         with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
             comparison = compare(recorded, loaded, count=twins, progress=advance)
         if json_file is not None:
-            write_json(comparison.summary(), json_file)
+            _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
     print_comparison(comparison, Console())
 
 
@@ -105,6 +114,7 @@ def evaluate_seeds(
 ) -> None:
     """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
     with border():
+        start = perf_counter()
         from simharness.experiment.progress import reporter
         from simharness.experiment.seeds import evaluate_seeds as evaluate_at
         from simharness.experiment.seeds import print_seeds
@@ -114,5 +124,34 @@ def evaluate_seeds(
         with reporter() as bars, bars.stage("evaluate", seeds) as advance:
             result = evaluate_at(loaded, seeds, progress=advance)
         if json_file is not None:
-            write_json(result.summary(), json_file)
+            _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
     print_seeds(result, Console())
+
+
+@app.command()
+def paper(
+    shelf: Annotated[Path, _made_by("evaluate shelf", "with the VoxelPose head")],
+    shelf_2019: Annotated[Path, _made_by("evaluate shelf", "with the 2019 head")],
+    campus_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/campus.toml")],
+    shelf_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/shelf.toml")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where tables.md and tables.json go.", file_okay=False)],
+) -> None:
+    """Tables 1 and 2 of the paper three ways: as printed, on real Shelf, on the twins of Campus and Shelf.
+
+    Reads what the other commands wrote, all variants of table 2 in each.
+    """
+    with border():
+        from simharness.report.paper import paper_tables, read_inputs, write_tables
+
+        files = {"voxelpose": shelf, "2019": shelf_2019, "campus": campus_twin, "shelf": shelf_twin}
+        write_tables(paper_tables(read_inputs(files), command=command_line()), out)
+    typer.echo(f"tables: {out / 'tables.md'}")
+
+
+def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
+    """Write a summary with where it comes from; what it says of seeds and variants itself is more, and stands."""
+    from simharness.study.provenance import provenance
+
+    seconds = perf_counter() - start
+    made = provenance(command=command_line(), seeds=seeds, variants=variants, seconds=seconds)
+    write_json({**made, **summary}, path)

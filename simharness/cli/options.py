@@ -1,7 +1,9 @@
-"""Arguments and options that several commands take."""
+"""Arguments and options that several commands take, and how a command was asked for."""
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -17,3 +19,8 @@ JsonFile = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
 ]
+
+
+def command_line() -> str:
+    """How the user asked for this, to be run again."""
+    return shlex.join(["simharness", *sys.argv[1:]])

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +10,7 @@ import typer
 from rich.console import Console
 
 from simharness.cli.border import border
-from simharness.cli.options import Overrides, ScenarioFile, Seed
+from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -47,7 +45,7 @@ def run(
         loaded = load(scenario, overrides=overrides or (), seed=seed)  # before the slow imports, to answer at once
         from simharness.experiment.run import run as run_scenario
 
-        command = shlex.join(["simharness", *sys.argv[1:]])
+        command = command_line()
         with reporter() as bars:
             folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import shlex
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from simharness.cli.border import FAILED, after_reading, border
-from simharness.cli.options import Overrides, ScenarioFile
+from simharness.cli.options import Overrides, ScenarioFile, command_line
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -87,7 +85,7 @@ def study(
             _say(f"store: {kept_in}")
             _say("when all parts are run: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
-            command = shlex.join(["simharness", *sys.argv[1:]])
+            command = command_line()
             with watching() as watch:
                 results = run_study(
                     loaded, out=out, store=store, workers=workers, scheduler=scheduler, watch=watch, command=command

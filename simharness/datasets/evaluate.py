@@ -15,6 +15,7 @@ from rich.text import Text
 
 from mvpose.pipeline import Estimator
 from mvpose.skeleton import HeadMapping
+from simharness.datasets.published import ABLATION
 from simharness.datasets.shelf import Shelf
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
@@ -24,14 +25,7 @@ from simharness.scoring.summary import STAGES, VariantScores, summarize
 ACTORS = (0, 1, 2)
 """The actors of Shelf whose PCP papers average."""
 
-PUBLISHED: dict[str, tuple[float, ...]] = {
-    "full": (98.8, 94.1, 97.8, 96.9),
-    "appearance": (98.6, 60.5, 94.3, 84.5),
-    "geometry": (97.2, 79.5, 96.5, 91.1),
-    "no-3dps": (97.9, 89.5, 97.8, 95.1),
-    "no-matching": (98.1, 91.1, 92.8, 94.0),
-}
-"""PCP of actors 1 to 3 on Shelf and their average, as Dong et al., CVPR 2019, tables 1 and 2, print them."""
+_PAPER = ABLATION["shelf"]
 
 
 @dataclass(frozen=True)
@@ -148,7 +142,7 @@ def _pcp_table(name: str, scores: VariantScores) -> Table:
     for group in GROUPS:
         table.add_column(group.replace("_", " "), justify="right")
     table.add_column("all", justify="right", style="bold")
-    published = PUBLISHED.get(name)
+    published = _PAPER.get(name)
     if published:
         table.add_column("paper", justify="right", style="cyan")
     rows = scores.pcp_table(actors=ACTORS)
@@ -171,8 +165,8 @@ def _comparison(evaluation: Evaluation) -> Table:
     table.add_column("average", justify="right", style="bold")
     for name, scores in evaluation.summary()["variants"].items():
         table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
-        if name in PUBLISHED:
-            table.add_row("  paper", *(_number(value, 1) for value in PUBLISHED[name]), style="cyan not bold")
+        if name in _PAPER:
+            table.add_row("  paper", *(_number(value, 1) for value in _PAPER[name]), style="cyan not bold")
     return table
 
 

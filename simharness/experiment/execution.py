@@ -52,7 +52,7 @@ def map_frames(
 
     Raises:
         ValueError: fewer than one worker.
-        RunError: the function raised, or a worker died. The function's own error is its cause.
+        RunError: the function raised, or a worker died. The function's own error is its cause, if it is no RunError.
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
@@ -75,6 +75,8 @@ def _map_here(
         for chunk in chunks:
             try:
                 yield function(chunk)
+            except RunError:
+                raise
             except Exception as error:
                 raise RunError(_failure(chunk, error)) from error
             progress(len(chunk))
@@ -98,6 +100,8 @@ def _map_there(
                 f"a worker process died within {span}; it may have run out of memory: try fewer workers, "
                 "or --workers 1 to see it happen in this process"
             ) from error
+        except RunError:
+            raise
         except Exception as error:
             raise RunError(_failure(futures[future], error)) from error
         finally:

@@ -11,6 +11,7 @@ from typing import Any
 import polars as pl
 
 from mvpose import Estimate
+from mvpose.pipeline import PRESETS
 from simharness.detector.detect import Detected, detect
 from simharness.experiment.atomic import appearing
 from simharness.experiment.audit import audit
@@ -60,7 +61,7 @@ def run(
     with clock.stage("build", 1, foresee=True):
         trial = prepare(scenario)
         _make_folder(out)
-    compilation = Compilation(trial.pipelines)
+    compilation = Compilation(trial.pipelines.keys() & PRESETS.keys())
     compilation.start()
     with clock.stage("simulate", 1):
         sequence = simulate(trial.scene)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mvpose import Pipeline, Rig
+from mvpose import Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
 from simharness.detector.describing import Looks
+from simharness.experiment.estimators import estimators_of
 from simharness.experiment.work import looks_of, pose_head, re_id, renderer_of
 from simharness.rendering.renderer import Unavailable
 from simharness.rigs.faults import shoot
@@ -48,10 +49,7 @@ def prepare(scenario: Scenario) -> Trial:
     if scenario.detector.onnx:
         pose_head(scenario)
     appearance = re_id(scenario).affinity if described else AppearanceAffinity()
-    try:
-        pipelines = {name: Pipeline.preset(name, appearance=appearance) for name in scenario.method.variants}
-    except ValueError as error:
-        raise ValueError(f"method.variants: {error}") from None
+    pipelines = estimators_of(scenario.method, appearance=appearance)
     if not described and (blind := NEED_DESCRIPTORS & pipelines.keys()):
         raise ValueError(
             f"method.variants: {', '.join(blind)} goes by descriptors alone, and detections have none; choose "

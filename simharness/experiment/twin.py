@@ -14,10 +14,10 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from mvpose import Pipeline
 from mvpose.skeleton import HeadMapping
 from simharness.datasets.evaluate import ACTORS, evaluate
 from simharness.datasets.shelf import Shelf
+from simharness.experiment.estimators import estimators_of
 from simharness.experiment.seeds import Score, evaluate_seeds, score
 from simharness.scenario.models import Scenario
 
@@ -105,7 +105,7 @@ def compare(
     Raises:
         ValueError: twins cannot be built.
     """
-    estimators = {name: Pipeline.preset(name) for name in scenario.method.variants}
+    estimators = estimators_of(scenario.method)
     real = evaluate(recorded, estimators, head=head)
     progress(1)
     twins = evaluate_seeds(scenario, count, head=head, progress=progress)

@@ -5,6 +5,7 @@ Imported by every worker, so it imports little; what else a worker needs comes w
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -12,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.pipeline import READ_HEATMAPS, Estimator
+from mvpose.pipeline import PRESETS, READ_HEATMAPS, Estimator
+from simharness.experiment.execution import RunError
 
 if TYPE_CHECKING:
     from mvpose.networks import PoseHead, ReId
@@ -175,7 +177,8 @@ class Estimating:
         answers: dict[str, list[Estimate]] = {name: [] for name in self.pipelines}
         for frame in frames:
             for name, seen in self._seen(frame, self.pipelines):
-                answers[name].append(self.pipelines[name].estimate(self.rig, seen))
+                with naming_frame(frame):
+                    answers[name].append(self.pipelines[name].estimate(self.rig, seen))
         return answers
 
     def seen(self, frame: int, variant: str) -> Detections:
@@ -188,21 +191,36 @@ class Estimating:
         peaks = self.detected[frame].peaks
         if plain.likelihoods is not None:
             plain = replace(plain, likelihoods=None)
-        elif peaks is not None and READ_HEATMAPS & set(names):
+        elif peaks is not None and set(names) - _PASS_BY_HEATMAPS:
             mapped = replace(plain, likelihoods=peaks.heatmaps())
         for name in names:
-            yield name, mapped if name in READ_HEATMAPS else plain
+            yield name, plain if name in _PASS_BY_HEATMAPS else mapped
 
     def _warm_up(self) -> None:
         """Compile and load what a process does once: it is no part of the time of a frame."""
         fresh = [name for name in self.pipelines if name not in _warm]
         fullest = max(range(len(self.detected)), key=lambda frame: len(self.detected[frame].detections))
         for name, seen in self._seen(fullest, fresh):
-            self.pipelines[name].estimate(self.rig, seen)
+            with naming_frame(fullest):
+                self.pipelines[name].estimate(self.rig, seen)
         _warm.update(fresh)
 
 
 _warm: set[str] = set()  # variants that this process has run
+_PASS_BY_HEATMAPS = PRESETS.keys() - READ_HEATMAPS
+
+
+@contextlib.contextmanager
+def naming_frame(frame: int) -> Iterator[None]:
+    """Say which frame a method failed at.
+
+    Raises:
+        RunError: in place of one.
+    """
+    try:
+        yield
+    except RunError as error:
+        raise RunError(f"frame {frame}: {error}") from error
 
 
 @functools.cache

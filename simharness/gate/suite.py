@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from simharness.experiment.estimators import estimators_of
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.check import Failed
 from simharness.gate.reference import time_reference
@@ -47,8 +48,9 @@ def run_suite(study: Study, *, workers: int = 1, progress: Callable[[int], None]
         progress: is told of every trial that is done.
 
     Raises:
-        ValueError: fewer than one worker.
+        ValueError: fewer than one worker, or a method of one's own that cannot be loaded.
     """
+    estimators_of(study.base.method)  # better now than at every trial
     units: dict[str, Unit] = {}
     places: dict[str, list[tuple[str, int]]] = {}  # two settings may come to the same scenario
     for setting, seed in scenes_of(study):

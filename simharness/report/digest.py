@@ -17,17 +17,20 @@ import polars as pl
 from simharness.experiment.atomic import appearing
 from simharness.report import study_plots, tables
 from simharness.report.curves import Factor, breaking, factors
+from simharness.report.markdown import duration, origin, table
 from simharness.report.sheet import sheet
 from simharness.report.study import THRESHOLDS
-from simharness.scoring.catalogue import SCORES
+from simharness.scoring.catalogue import AP_MM, SCORES
 from simharness.scoring.statistics import Interval, mean_interval
+from simharness.study.provenance import PROVENANCE
 from simharness.study.results import Results
 
-SCORED = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
+HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
+"""The scores of a digest's first table."""
+PRINTED = (*(f"ap{limit}" for limit in AP_MM), "map", "recall", "mpjpe_mm", "pcp", "ghosts")
+"""The scores of one variant at every value of a factor, in the form in which papers print Panoptic."""
+SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
 """The scores of a digest."""
-
-PROVENANCE = ("command", "seeds", "variants", "code", "digests", "versions", "machine", "seconds")
-"""What a digest says of where it comes from: the keys of ``study.json`` that it repeats."""
 
 _CURVES = (("pcp", "map"), ("recall", "ghosts"))  # as they stand in the picture
 _STAGES = ("affinity", "matching", "reconstruction")
@@ -63,9 +66,10 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
 def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> dict[str, Any]:
     """The numbers of a study, JSON-ready; means with the ends of their 95 % intervals over seeds.
 
-    Beside :data:`PROVENANCE`: ``variants`` and, where there are any, ``cases`` by name; ``factors`` with the scores at
-    every value; ``breaking`` points; ``failures`` in 100 frames by kind and by stage, and the share of them that the
-    right matching of the real detections would have mended; ``time_ms`` of each stage.
+    Beside the keys of :data:`simharness.study.provenance.PROVENANCE`: ``means`` of the variants and, where there are
+    any, of ``cases`` by name; ``factors`` with the scores at every value; ``breaking`` points; ``failures`` in 100
+    frames by kind and by stage, and the share of them that the right matching of the real detections would have mended;
+    ``time_ms`` of each stage.
     """
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
@@ -128,16 +132,17 @@ def markdown(told: Mapping[str, Any]) -> str:
 
 def _lines(told: Mapping[str, Any]) -> Iterator[str]:
     names = list(told["means"])
-    seeds = told["seeds"]
+    seeds, took = told["seeds"], duration(told["seconds"])
     yield f"# {told['name']}"
-    yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {_minutes(told)}."
+    yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {took}."
     yield f"\n    {told['command']}"
+    yield f"\n{origin(told)}"
     yield "\nMeans over seeds, each the mean over its settings, with 95 % intervals over seeds.\n"
-    heads = [f"{SCORES[key].title}{f', {SCORES[key].unit}' if SCORES[key].unit else ''}" for key in SCORED]
+    heads = [_head(key) for key in HEADS]
     for case, means in {"": told["means"], **told["cases"]}.items():
         if case:
             yield f"\nCase {case}:\n"
-        yield from _table(["variant", *heads], [[name, *(_said(means[name][k], k) for k in SCORED)] for name in names])
+        yield from table(["variant", *heads], [[name, *(_said(means[name][k], k) for k in HEADS)] for name in names])
     for factor in told["factors"]:
         along = f" (with {', '.join(factor['along'])})" if factor["along"] else ""
         yield f"\nPCP, %, against `{factor['key']}`{along}:\n"
@@ -145,7 +150,14 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
             [study_plots.short(value), *(_said(factor["scores"][name]["pcp"][row], "pcp") for name in names)]
             for row, value in enumerate(factor["values"])
         ]
-        yield from _table([factor["key"], *names], rows)
+        yield from table([factor["key"], *names], rows)
+        first = names[0]
+        yield f"\n`{first}`, all scores, against `{factor['key']}`{along}:\n"
+        rows = [
+            [study_plots.short(value), *(_mean(factor["scores"][first][key][row], key) for key in PRINTED)]
+            for row, value in enumerate(factor["values"])
+        ]
+        yield from table([factor["key"], *(_head(key) for key in PRINTED)], rows)
     if told["breaking"]:
         yield "\nBreaking points: where the mean passes the threshold.\n"
         rows = [
@@ -157,9 +169,11 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
             ]
             for each in told["breaking"]
         ]
-        yield from _table(["factor", "variant", "score", "at"], rows)
+        yield from table(["factor", "variant", "score", "at"], rows)
     yield "\nFailures in 100 frames, and the share that right matching of the real detections would mend.\n"
     kinds, stages = list(study_plots.KIND_COLORS), list(study_plots.BLAME_COLORS)
+    if not any("method" in failed["stages"] for failed in told["failures"].values()):
+        stages.remove("method")  # which only methods from elsewhere are blamed as
     rows = [
         [
             name,
@@ -170,17 +184,16 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
         for name, failed in told["failures"].items()
     ]
     heads = [kind.replace("_", " ") for kind in kinds]
-    yield from _table(["variant", *heads, *(f"by {stage}" for stage in stages), "matching alone"], rows)
+    yield from table(["variant", *heads, *(f"by {stage}" for stage in stages), "matching alone"], rows)
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(heads)} |"
-    yield f"|{'|'.join([':--', *['--:'] * (len(heads) - 1)])}|"
-    yield from (f"| {' | '.join(row)} |" for row in rows)
+def _head(score: str) -> str:
+    info = SCORES[score]
+    return f"{info.title}, {info.unit}" if info.unit else info.title
 
 
-def _minutes(told: Mapping[str, Any]) -> str:
-    return f"{told['seconds'] / 60:.0f} min" if told["seconds"] >= 90 else f"{told['seconds']:.0f} s"
+def _mean(ends: Sequence[float] | None, score: str) -> str:
+    return "–" if ends is None else f"{ends[0]:.{SCORES[score].digits}f}"
 
 
 def _said(ends: Sequence[float] | None, score: str) -> str:

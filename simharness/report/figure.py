@@ -26,6 +26,7 @@ STAGE_COLORS: Mapping[str, Color] = {
     "affinity": "#3b82c4",
     "matching": "#d9a514",
     "reconstruction": "#2e9e6b",
+    "method": "#8b93a1",
 }
 VARIANT_COLORS: tuple[Color, ...] = ("#3b82c4", "#d9643a", "#2e9e6b", "#8a63c9", "#d9a514", "#c2568f")
 

@@ -180,7 +180,9 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
         ),
         "times": plots.stage_times(
             {
-                variant: {stage: time["median"] or 0.0 for stage, time in scores["timings_ms"].items()}
+                variant: {
+                    stage: time["median"] for stage, time in scores["timings_ms"].items() if time["median"] is not None
+                }
                 for variant, scores in record.summary["variants"].items()
             }
         ),

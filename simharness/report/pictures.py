@@ -170,7 +170,7 @@ def annotate(
         partner = pair(truth.joints, estimate.joints).estimate
         owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
         # True person of each detection as the method sees it; label -1 has none.
-        said = np.append(owner, -1)[estimate.matching.labels]
+        said = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
         for joints, person in zip(estimate.joints, owner, strict=True):
             _draw_estimate(overlay, camera, joints, person_color(int(person)))
     if show_truth:

@@ -76,7 +76,8 @@ def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequenc
 
 
 def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
-    """Median milliseconds a frame of each stage of each variant."""
+    """Median milliseconds a frame of each stage of each variant; a method without stages is one, ``method``."""
+    times = {name: {"method": each["total"]} if set(each) == {"total"} else each for name, each in times.items()}
     with figure("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
         rows = np.arange(len(times))
         left = np.zeros(len(times))

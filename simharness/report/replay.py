@@ -12,7 +12,7 @@ from simharness.detector.truth import Truth
 from simharness.experiment.looking import look
 from simharness.experiment.trial import Trial, prepare
 from simharness.experiment.work import Estimating
-from simharness.scenario.models import Method, Scenario
+from simharness.scenario.models import Scenario
 from simharness.scoring.pose import pair
 
 
@@ -51,7 +51,8 @@ def replay(scenario: Scenario, variant: str) -> Replay:
     Raises:
         ValueError: the scenario cannot be built any more: a file that it names is gone.
     """
-    trial = prepare(scenario.model_copy(update={"method": Method(variants=(variant,))}))
+    method = scenario.method.model_copy(update={"variants": (variant,)})
+    trial = prepare(scenario.model_copy(update={"method": method}))
     sequence, answers = look(trial)
     estimates = Estimating(trial.shots.believed, tuple(answers), trial.pipelines)(range(len(answers)))
     return Replay(

@@ -100,7 +100,7 @@ def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
         strips += limbs
         colors += [person_color(owner)] * len(limbs)
     recording.log("world/estimates", rerun.LineStrips3D(strips, colors=colors, radii=_THICK))
-    said = np.append(owners, -1)[estimate.matching.labels]
+    said = np.append(owners, -1)[estimate.matching.labels_of(len(detections))]
     for view, camera in enumerate(replay.trial.shots.believed):
         place = f"world/cameras/{camera.name}"
         points, shades = _keypoints(detections.keypoints, np.flatnonzero(detections.view == view), said)

@@ -251,6 +251,7 @@ def _failures(results: Results, variants: Sequence[str]) -> dict[str, Any]:
             study_plots.failure_bars("failure-stages", amounts=stages, colors=study_plots.BLAME_COLORS, hatched=alone)
         ),
         "asked": asked,
+        "foreign": "method" in set(failures["stage"]),
         "rows": rows,
         "total": len(failures),
     }

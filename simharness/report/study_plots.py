@@ -28,6 +28,7 @@ BLAME_COLORS: Mapping[str, Color] = {
     "detection": "#8a63c9",
     "matching": "#d9a514",
     "reconstruction": "#2e9e6b",
+    "method": "#3b82c4",
 }
 _SPARE = "#8b93a1"
 

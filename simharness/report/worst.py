@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import polars as pl
@@ -14,6 +16,7 @@ from simharness.gate.trials import overrides
 from simharness.report.pictures import MOST_VIEWS, Picture, draw_frame
 from simharness.report.replay import Replay, replay
 from simharness.report.turnable import Turnable, turnable
+from simharness.scenario.files import relative_files
 from simharness.scenario.models import Scenario
 from simharness.scenario.study import Study, load_study
 from simharness.scene.playback import Playback
@@ -102,7 +105,8 @@ def show(
     Raises:
         ValueError: a trial that cannot be built any more: a file that it names is gone.
     """
-    study = load_study(results.folder / "study.toml", limit=None) if frames else None
+    # Files in it are relative to where the study was started.
+    study = load_study(results.folder / "study.toml", limit=None, folder=Path()) if frames else None
     for number, frame in enumerate(frames, start=1):
         scenario = results.scenario_of(frame.trial)
         again = replay(scenario, frame.variant)
@@ -127,7 +131,8 @@ def show(
 def _command(study: Study, scenario: Scenario) -> str:
     """What renders a trial of a study again, for a shell."""
     setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
-    sets = [part for override in overrides(study, setting) for part in ("--set", override)]
+    files = [f"{'.'.join(key)}={json.dumps(value)}" for key, value in relative_files(dict(study.said))]
+    sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]
     layers = ["--overlay", "truth,detections,estimates"]
     return shlex.join(["simharness", "render", str(study.path), *sets, "--seed", str(scenario.seed), *layers])
 

@@ -15,16 +15,18 @@ def dumps(scenario: Scenario) -> str:
     return "\n".join(_lines(scenario)) + "\n"
 
 
-def _lines(section: BaseModel, name: str = "") -> list[str]:
-    lines = [f"[{name}]"] if name else []
+def _lines(section: BaseModel, name: str = "", about: str | None = None) -> list[str]:
+    head = f"[{name}]"
+    lines = [f"{head:<31} # {about}" if about else head] if name else []
     nested: list[str] = []
     for key, field in type(section).model_fields.items():
         value = getattr(section, key)
         if isinstance(value, BaseModel):
-            nested += ["", *_lines(value, f"{name}.{key}" if name else key)]
+            nested += ["", *_lines(value, f"{name}.{key}" if name else key, field.description)]
         elif value is not None:
             assignment = f"{key} = {_written(value)}"
             lines.append(f"{assignment:<31} # {field.description}" if field.description else assignment)
+    lines += [f"{key} = {_written(value)}" for key, value in (section.model_extra or {}).items()]
     return lines + nested
 
 

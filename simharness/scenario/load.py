@@ -44,7 +44,7 @@ def fingerprint(scenario: Scenario) -> str:
     """Ten hexadecimal digits that change with any value of the scenario, its files and the version of the code."""
     resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
     digest = hashlib.blake2b(resolved.encode(), digest_size=5)
-    for file in scenario.files:
+    for file in (*scenario.files, *scenario.method.estimators.files):
         digest.update(file.read_bytes() if file.is_file() else b"")
     return digest.hexdigest()
 

@@ -35,7 +35,7 @@ def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file
         return f"{place}: {key} is missing and has no default; give it a value"
     section = section_at(location)
     if mistake["type"] in ("model_type", "model_attributes_type") and section is not None:
-        expected = f"a section [{key}] with keys {', '.join(sorted(section.model_fields))}"
+        expected = f"a section [{key}] with keys {', '.join(sorted(section.model_fields)) or 'of your own'}"
     else:
         said = mistake["msg"].replace(" should match ", " should be text that matches ")
         expected = re.sub(r"^(?:\w+ should(?: be| have)?|Value error,) ", "", said)

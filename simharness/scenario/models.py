@@ -5,10 +5,11 @@ Metres and seconds as everywhere; angles are in degrees here, for people write a
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, model_validator
 
 from simharness.scenario.appearance import Appearance
 from simharness.scenario.cameras import Cameras, Faults, Sensor
@@ -23,6 +24,7 @@ __all__ = [
     "Clutter",
     "Decoys",
     "Detector",
+    "Estimators",
     "Faults",
     "Method",
     "People",
@@ -33,10 +35,52 @@ __all__ = [
 ]
 
 
+_NAME = r"^[a-z0-9][a-z0-9_-]*$"
+_PLACE = r"^.+:[A-Za-z_]\w*$"
+
+
+class Estimators(Section):
+    """Methods of one's own by name: a file or a module, and what there has a method ``estimate``."""
+
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "additionalProperties": {"type": "string", "pattern": _PLACE},
+            "propertyNames": {"pattern": _NAME},
+        },
+    )
+    __pydantic_extra__: dict[str, str]
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Where each of them is, by name."""
+        return dict(self.model_extra or {})
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files among those places."""
+        sources = (place.rpartition(":")[0] for place in self.places.values())
+        return tuple(Path(source) for source in sources if source.endswith(".py"))
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name, place in self.places.items():
+            if not re.match(_NAME, name):
+                raise ValueError(f"names of small letters, digits, - and _, {name!r} is none")
+            if not re.match(_PLACE, place):
+                raise ValueError(f"FILE.py:ATTRIBUTE or PACKAGE.MODULE:ATTRIBUTE, {place!r} of {name!r} is neither")
+        return self
+
+
 class Method(Section):
     """Which variants of the method run on the detections."""
 
-    variants: tuple[str, ...] = Field(("full", "no-3dps"), min_length=1, description="presets of mvpose.Pipeline")
+    variants: tuple[str, ...] = Field(
+        ("full", "no-3dps"), min_length=1, description="presets of mvpose.Pipeline, and names of method.estimators"
+    )
+    estimators: Estimators = Field(
+        Estimators(), description='methods of one\'s own: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"'
+    )
 
 
 class Rendering(Section):
@@ -53,7 +97,7 @@ class Rendering(Section):
 class Scenario(Section):
     """A whole scenario file."""
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
+    name: str = Field(pattern=_NAME)
     description: str = ""
     seed: int = Field(0, ge=0, description="of every random draw; 0 is a seed like any other")
     duration: Positive = Field(4.0, description="seconds")

@@ -19,6 +19,9 @@ A scenario file may say, beside the keys of a scenario::
     [cases.crowd]                     # named changes, each run with every setting of the sweep
     people.count = 8
 
+    [method.estimators]               # methods of one's own, for variants to name: simharness.experiment.estimators
+    mine = "mine.py:Mine"
+
     [gate]                            # simharness.scenario.gate
 
 A setting at a seed is a trial; all variants of a trial see the same detections. A file that says none of this is a
@@ -27,7 +30,6 @@ study of one trial.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,7 +79,7 @@ class Study:
         name: of the scenario.
         description: of the scenario.
         seeds: of every setting.
-        variants: presets of :class:`mvpose.Pipeline`, of every trial.
+        variants: of the method, in every trial.
         factors: dotted keys that are swept, in the file's order.
         one_at_a_time: every factor by itself, beside the base.
         settings: case by case, the last factor first.
@@ -116,6 +118,7 @@ def load_study(
     seeds: int | Sequence[int] | None = None,
     variants: Sequence[str] | None = None,
     limit: int | None = LIMIT,
+    folder: Path | None = None,
 ) -> Study:
     """Read a scenario file as a study; every setting is resolved and checked.
 
@@ -125,12 +128,13 @@ def load_study(
         seeds: replaces the file's seeds: how many, or which.
         variants: replaces the file's variants.
         limit: the most trials; None: any number.
+        folder: what files that the scenario file names are relative to; by default its own.
 
     Raises:
         StudyTooLarge: there would be more trials than ``limit``; none was made.
         ScenarioError: as :func:`simharness.scenario.load.load`. All mistakes of a study are named at once.
     """
-    plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants)
+    plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants, folder=folder)
     _check_variants(plan)
     if limit is not None and plan.trials > limit:
         raise StudyTooLarge(
@@ -169,16 +173,11 @@ def _settings(plan: Plan) -> Iterator[Setting]:
 
 
 def _check_variants(plan: Plan) -> None:
-    from mvpose.pipeline import PRESETS
+    from simharness.scenario.variants import wrong_variants
 
-    variants, place = plan.base.method.variants, _place_of_variants(plan)
-    for name in variants:
-        if name not in PRESETS:
-            near = difflib.get_close_matches(name, PRESETS, n=1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise ScenarioError(f"{place}: variants: there is no {name!r}; {hint}there are {', '.join(PRESETS)}")
-    if len(set(variants)) < len(variants):
-        raise ScenarioError(f"{place}: variants: {', '.join(variants)} has one twice; take one out")
+    for key, said in wrong_variants(plan.base.method):
+        place = place_of(("method", *key.split(".")), plan.document.places, str(plan.document.path))
+        raise ScenarioError(f"{place}: {key if key == 'variants' else f'method.{key}'}: {said}")
 
 
 def _blind(scenario: Scenario, plan: Plan) -> list[str]:

@@ -26,6 +26,7 @@ NOT_VARIED: dict[Key, str] = {
     ("description",): _NAMES,
     ("variants",): _VARIANTS,
     ("method", "variants"): _VARIANTS,
+    ("method", "estimators"): _VARIANTS,
     ("extends",): "a study has one base; make a study of each file",
     ("gate",): "a study has one gate",
     ("sweep",): "a study has one [sweep]",

@@ -17,7 +17,7 @@ from simharness.scoring.bones import bone_errors
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.frame import FrameScore, score_frame
 from simharness.scoring.jitter import jitter
-from simharness.scoring.matching import GroupCounts, count_groups, count_pairs, count_violations
+from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pck import joint_errors, pck, pck_area
 from simharness.scoring.pcp import Part
 from simharness.scoring.pose import Pairing
@@ -26,8 +26,10 @@ from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
 
 Floats = NDArray[np.float64]
+Labels = NDArray[np.int64]
 Scores = dict[str, float | None]
 
+_PAIRS = ("pairs_correct", "pairs_wrong", "pairs_lost")
 _IN_SIGHT = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
 
 
@@ -71,7 +73,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         raise ValueError(f"a recording of {len(recording)} frames needs as many estimates, got {len(estimates)}")
     variant = score_variant(recording, estimates)
     summary = variant.summary()
-    groups, violations = _group(recording, estimates)
+    groups = _group(recording, estimates)
     truth = np.stack([true.joints for true in recording.truth])
     placed = _placed(truth.shape, variant.frames, estimates)
     errors = joint_errors(truth, placed)
@@ -82,12 +84,12 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         | _pck(errors)
         | _of_shape(truth, placed)
         | _in_pictures(recording, placed)
-        | _of_matching(summary, groups, violations)
+        | _of_matching(summary, groups)
         | _times(summary)
     )
     return Assessment(
         scores,
-        _frame_table(recording, variant, groups, violations),
+        _frame_table(recording, variant, groups),
         _people_table(recording, variant, errors),
         errors,
     )
@@ -96,18 +98,36 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
 def score_variant(recording: Recording, estimates: Sequence[Estimate]) -> VariantScores:
     """The scores of every frame, as ``summary.json`` has them together."""
     frames = [
-        score_frame(
-            true.joints, estimate.joints, matching=count_pairs(detected.view, estimate.matching.labels, true.person)
-        )
-        for detected, true, estimate in zip(recording.detections, recording.truth, estimates, strict=True)
+        score_frame(true.joints, estimate.joints, matching=pairs)
+        for true, estimate, pairs in zip(recording.truth, estimates, _pairs(recording, estimates), strict=True)
     ]
     return VariantScores(tuple(frames), tuple(estimate.timings for estimate in estimates))
 
 
-def _group(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[GroupCounts], list[int]]:
-    """Groups and violations of every frame."""
+def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels] | None:
+    """Labels of every frame; None of a method that leaves out who is who in one or all."""
+    counts = list(map(len, recording.detections))
+    matchings = [estimate.matching for estimate in estimates]
+    if not all(matching.tells(count) for matching, count in zip(matchings, counts, strict=True)):
+        return None
+    return [matching.labels_of(count) for matching, count in zip(matchings, counts, strict=True)]
+
+
+def _pairs(recording: Recording, estimates: Sequence[Estimate]) -> list[PairCounts | None]:
+    """Pairs of every frame; None where nobody knows them."""
+    labels = _labels(recording, estimates)
+    if labels is None:
+        return [None] * len(recording)
+    seen = zip(recording.detections, labels, recording.truth, strict=True)
+    return [count_pairs(detected.view, said, true.person) for detected, said, true in seen]
+
+
+def _group(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[GroupCounts], list[int]] | None:
+    """Groups and violations of every frame; None where nobody knows them."""
+    labels = _labels(recording, estimates)
+    if labels is None:
+        return None
     views = [detections.view for detections in recording.detections]
-    labels = [estimate.matching.labels for estimate in estimates]
     people = [true.person for true in recording.truth]
     return list(map(count_groups, views, labels, people)), list(map(count_violations, views, labels))
 
@@ -173,10 +193,14 @@ def _in_pictures(recording: Recording, placed: Floats) -> Scores:
     return {"reprojection_px": _statistic(np.median, estimate), "detection_px": _statistic(np.median, detection)}
 
 
-def _of_matching(summary: Mapping[str, Any], groups: Sequence[GroupCounts], violations: Sequence[int]) -> Scores:
+def _of_matching(summary: Mapping[str, Any], counted: tuple[list[GroupCounts], list[int]] | None) -> Scores:
+    pairs = {f"match_{key}": _percent(share) for key, share in summary["matching"].items()}
+    if counted is None:
+        return pairs | dict.fromkeys(("violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"))
+    groups, violations = counted
     phantoms, admitted = (sum(getattr(each, key) for each in groups) for key in ("phantoms", "admitted"))
     return {
-        **{f"match_{key}": _percent(share) for key, share in summary["matching"].items()},
+        **pairs,
         "violations": sum(violations) / len(groups),
         "merged": sum(each.merged for each in groups) / len(groups),
         "split": sum(each.split for each in groups) / len(groups),
@@ -196,21 +220,23 @@ def _time_column(stage: str) -> str:
 
 
 def _frame_table(
-    recording: Recording, variant: VariantScores, groups: Sequence[GroupCounts], violations: Sequence[int]
+    recording: Recording, variant: VariantScores, counted: tuple[list[GroupCounts], list[int]] | None
 ) -> pl.DataFrame:
     rows = []
+    groups, violations = counted or ([], [])
     for index, (frame, timing) in enumerate(zip(variant.frames, variant.timings, strict=True)):
         row = frame.row()
         del row["errors_mm"], row["parts"]  # which are in the table of people
-        group = groups[index]
+        group = groups[index] if counted else None
         rows.append(
             {"frame": index, "time": float(recording.time[index]), **row}
-            | {"violations": violations[index], "merged": group.merged, "split": group.split}
-            | {"phantoms": group.phantoms, "admitted": group.admitted}
+            | {"violations": violations[index] if counted else None}
+            | {key: getattr(group, key, None) for key in ("merged", "split", "phantoms", "admitted")}
             | {_time_column(stage): 1000.0 * timing[stage] if stage in timing else None for stage in STAGES}
         )
-    floats = ("pcp", "mpjpe_mm", *map(_time_column, STAGES))
-    return pl.DataFrame(rows, schema_overrides=dict.fromkeys(floats, pl.Float64), infer_schema_length=None)
+    types: dict[str, Any] = dict.fromkeys(("pcp", "mpjpe_mm", *map(_time_column, STAGES)), pl.Float64)
+    types |= dict.fromkeys((*_PAIRS, "violations", "merged", "split", "phantoms", "admitted"), pl.Int64)
+    return pl.DataFrame(rows, schema_overrides=types, infer_schema_length=None)
 
 
 def _people_table(recording: Recording, variant: VariantScores, errors: Floats) -> pl.DataFrame:

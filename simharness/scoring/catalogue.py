@@ -120,6 +120,8 @@ def _failures() -> Iterator[ScoreInfo]:
     for stage in ("detection", "matching", "reconstruction"):
         about = f"failures that the truth in place of {stage} mends, and in place of no stage before"
         yield _lower(f"blame_{stage}", f"Blame {stage}", "%", about)
+    about = "failures that perfect detections do not mend, of a method whose other stages cannot be told apart"
+    yield _lower("blame_method", "Blame method", "%", about)
 
 
 SCORES: Mapping[str, ScoreInfo] = MappingProxyType(

@@ -110,7 +110,7 @@ def failures_of_frame(
         rig: as believed, V cameras.
         detections: m of them, what was estimated from.
         truth: about the same m detections.
-        estimate: n people; person i is label i of the matching.
+        estimate: n people; person i is label i of the matching. Without labels nobody is merged or split.
         frame: its index.
 
     Raises:
@@ -118,7 +118,7 @@ def failures_of_frame(
     """
     joints = as_array(estimate.joints, ("n", len(COCO17), 3), "estimated joints")
     truth_joints = as_array(truth.joints, ("P", len(COCO17), 3), "true joints")
-    labels = as_array(estimate.matching.labels, truth.person.shape, "labels", np.int64)
+    labels = estimate.matching.labels_of(len(truth.person))
     pairing = pair(truth_joints, joints)
     own = pairing.estimate
     missed = pairing.present & (own < 0)

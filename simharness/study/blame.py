@@ -7,6 +7,7 @@ A frame with failures is estimated again, and the first substitution that mends 
 - matching: perfect detections and the true labels.
 - reconstruction: nothing of that mends it. What is left is reconstruction itself, and what it is given besides
   detections: a calibration that is off, pictures that are late, and too few views that have the joint in the picture.
+- method: the last two, of a method that cannot be told labels: one from elsewhere, of which no stages are known.
 
 With perfect detections little is left to mend, so one more substitution stands beside that order: the real detections
 with the true labels, which says what a perfect matching alone would save.
@@ -39,6 +40,7 @@ class Stage(StrEnum):
     DETECTION = "detection"
     MATCHING = "matching"
     RECONSTRUCTION = "reconstruction"
+    METHOD = "method"
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ def blame(
     Args:
         recording: T frames, as they were estimated. Heat maps are used if the detections carry them.
         estimator: the method. If it is none of mvpose's pipelines, true labels cannot be put in, and what perfect
-            detections do not mend is left to reconstruction.
+            detections do not mend is the method's.
         estimates: what it said of the frames, T.
         failures: :func:`simharness.scoring.failures.find_failures` of these.
 
@@ -130,15 +132,18 @@ def _blame_frame(
     perfect = _Scene(real.rig, *perfect_detections(real.detections, real.truth))
     by_detection = perfect.mends(estimator, estimate, failures)
     by_matching = [False] * len(failures)
+    left = Stage.RECONSTRUCTION
     told = with_labels(estimator, true_labels(perfect.detections, perfect.truth))
-    if told is not None and not all(by_detection):
+    if told is None:
+        left = Stage.METHOD
+    elif not all(by_detection):
         by_matching = perfect.mends(told, estimate, failures)
     alone: list[bool | None] = [None] * len(failures)
     told = with_labels(estimator, true_labels(real.detections, real.truth))
     if told is not None:
         alone = list(real.mends(told, estimate, failures))
     for failure, detection, matching, saved in zip(failures, by_detection, by_matching, alone, strict=True):
-        stage = Stage.DETECTION if detection else Stage.MATCHING if matching else Stage.RECONSTRUCTION
+        stage = Stage.DETECTION if detection else Stage.MATCHING if matching else left
         yield Blamed(failure, stage, saved)
 
 
@@ -171,7 +176,7 @@ def _row(each: Failure | Blamed) -> tuple[Any, ...]:
 
 def failure_scores(table: pl.DataFrame, frames: int) -> dict[str, float | None]:
     """``failures_<kind>``, of each kind a frame, and ``blame_<stage>``, percent of the failures; None without any whose
-    stage is known.
+    stage is known, and of the stages of a method that are not.
 
     Args:
         table: of :func:`failure_table`.
@@ -184,6 +189,8 @@ def failure_scores(table: pl.DataFrame, frames: int) -> dict[str, float | None]:
         raise ValueError(f"failures are counted over one frame or more, got {frames}")
     kinds, stages = table["kind"].to_list(), table["stage"].drop_nulls().to_list()
     scores: dict[str, float | None] = {f"failures_{kind}": kinds.count(kind) / frames for kind in FailureKind}
+    unknown = {Stage.MATCHING, Stage.RECONSTRUCTION} if Stage.METHOD in stages else set()
     for stage in Stage:
-        scores[f"blame_{stage}"] = 100.0 * stages.count(stage) / len(stages) if stages else None
+        known = stages and stage not in unknown
+        scores[f"blame_{stage}"] = 100.0 * stages.count(stage) / len(stages) if known else None
     return scores

@@ -16,7 +16,9 @@ def document(study: Study) -> str:
     What it extended is in it; rigs and detectors are by name, and other files relative to where the study was started.
     """
     said = {key: value for key, value in study.said.items() if key not in ("seed", "seeds", "method")}
-    head = {"name": study.name, "seeds": list(study.seeds), "variants": list(study.variants)}
+    head: dict[str, Any] = {"name": study.name, "seeds": list(study.seeds), "variants": list(study.variants)}
+    if own := study.base.method.estimators.places:
+        said["method"] = {"estimators": own}
     return "\n".join(_lines({**head, **said})) + "\n"
 
 

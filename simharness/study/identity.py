@@ -10,7 +10,9 @@ What makes a trial anew, and all its entries:
 - :func:`code` ``.simulation``: a byte of the code or data of ``simharness`` that films, detects and scores;
 - the versions of the packages in :data:`PACKAGES`.
 
-What makes an entry anew besides: its variant, and :func:`code` ``.method``, a byte of ``mvpose``.
+What makes an entry anew besides: its variant, and :func:`code` ``.method``, a byte of ``mvpose``. Of a method of one's
+own also where in its file it is, and the sources that :func:`simharness.experiment.estimators.sources_of` finds; what
+else it runs or reads is not seen.
 
 What changes neither: names and descriptions of scenarios, detectors and studies, the folder that they lie in, which
 other variants are asked for, the number of workers, the machine; nor the code of the command line, of reports, of the
@@ -31,12 +33,13 @@ from typing import Any
 
 import mvpose
 import simharness
+from simharness.experiment.estimators import sources_of
 from simharness.scenario.models import Scenario
 
 PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "pyrender2", "pillow")
 """What a result also depends on: distributions whose versions count."""
 
-_MODELS = ("appearance", "cameras", "detector", "models", "people", "room", "section")
+_MODELS = ("appearance", "cameras", "detector", "models", "people", "room", "section", "variants")
 _SIMULATION = (
     "random.py",
     *(f"scenario/{name}.py" for name in _MODELS),  # scenarios are hashed as resolved: what reads files does not count
@@ -48,6 +51,7 @@ _SIMULATION = (
     "detector",
     "scoring",
     "datasets",  # rigs read calibrations by it
+    "experiment/estimators.py",
     "experiment/execution.py",
     "experiment/looking.py",
     "experiment/trial.py",
@@ -107,14 +111,29 @@ def trial_identity(scenario: Scenario) -> str:
     return _digest({"scenario": said, "files": content, "code": code().simulation, "versions": _versions()})
 
 
-def entry_identity(trial: str, variant: str) -> str:
+def entry_identity(trial: str, variant: str, own: str = "") -> str:
     """The identity of what one variant makes of a trial, 32 hexadecimal digits.
 
     Args:
         trial: from :func:`trial_identity`.
-        variant: a preset of :class:`mvpose.Pipeline`.
+        variant: its name.
+        own: from :func:`own_code`, of a method of one's own; "" of a preset of :class:`mvpose.Pipeline`.
     """
-    return _digest({"trial": trial, "variant": variant, "code": code().method})
+    said: dict[str, Any] = {"trial": trial, "variant": variant, "code": code().method}
+    if own:
+        said["own"] = own
+    return _digest(said)
+
+
+def own_code(place: str) -> str:
+    """Digest of a method of one's own: of its sources, and of its file's and its own name.
+
+    Args:
+        place: of section [method.estimators].
+    """
+    source, _, attribute = place.rpartition(":")
+    sources = {name: hashlib.blake2b(text).hexdigest() for name, text in sources_of(place).items()}
+    return _digest({"place": [Path(source).name, attribute], "sources": sources})
 
 
 def _files(scenario: Scenario) -> dict[str, list[Path]]:

@@ -11,7 +11,7 @@ from mvpose import Estimate
 from simharness.experiment.execution import RunError
 from simharness.experiment.looking import look
 from simharness.experiment.trial import Trial, prepare
-from simharness.experiment.work import Estimating
+from simharness.experiment.work import Estimating, naming_frame
 from simharness.scenario.models import Scenario
 from simharness.scoring.assessment import assess
 from simharness.scoring.catalogue import SCORES
@@ -37,7 +37,7 @@ def measure(scenario: Scenario, variants: Sequence[str] | None = None, *, blame:
 
     Raises:
         ValueError: the scenario cannot be built at this seed.
-        RunError: anything that went wrong after that, which is its cause.
+        RunError: anything that went wrong after that, which is its cause, if it is no RunError.
     """
     if variants is not None:
         scenario = scenario.model_copy(
@@ -47,6 +47,8 @@ def measure(scenario: Scenario, variants: Sequence[str] | None = None, *, blame:
         trial = prepare(scenario)
         try:
             return _measure(trial, blame)
+        except RunError:
+            raise
         except Exception as error:
             raise RunError(f"{type(error).__name__}: {error}") from error
 
@@ -80,5 +82,7 @@ def _stages(
         if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
             seen = estimating.seen(frame, variant)
             moment = Recording(recording.time[[frame]], recording.rig, (seen,), (truth,))
-            for blamed in find_stages(moment, estimating.pipelines[variant], [estimate], failures):
+            with naming_frame(frame):
+                stages = find_stages(moment, estimating.pipelines[variant], [estimate], failures)
+            for blamed in stages:
                 yield replace(blamed, failure=replace(blamed.failure, frame=frame))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from simharness.scenario.models import Scenario
 from simharness.scenario.study import Setting, Study
-from simharness.study.identity import entry_identity, trial_identity
+from simharness.study.identity import entry_identity, own_code, trial_identity
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,13 @@ class Planned:
 
 def plan(study: Study) -> list[Planned]:
     """All trials of a study: every setting at the first seed, then at the second, for half a study is of use then."""
-    return [_planned(study, setting, seed) for seed in study.seeds for setting in study.settings]
+    places = study.base.method.estimators.places
+    own = {variant: own_code(places[variant]) if variant in places else "" for variant in study.variants}
+    return [_planned(study, setting, seed, own) for seed in study.seeds for setting in study.settings]
 
 
-def _planned(study: Study, setting: Setting, seed: int) -> Planned:
+def _planned(study: Study, setting: Setting, seed: int, own: Mapping[str, str]) -> Planned:
     scenario = study.at(setting, seed)
     trial = trial_identity(scenario)
-    return Planned(
-        setting, seed, scenario, trial, {variant: entry_identity(trial, variant) for variant in study.variants}
-    )
+    entries = {variant: entry_identity(trial, variant, code) for variant, code in own.items()}
+    return Planned(setting, seed, scenario, trial, entries)

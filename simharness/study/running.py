@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -12,13 +10,13 @@ from time import perf_counter
 from typing import Any
 
 from simharness.experiment.atomic import appearing
-from simharness.scenario.load import code_version
+from simharness.experiment.estimators import estimators_of
 from simharness.scenario.study import Study, Value
 from simharness.study.document import document
-from simharness.study.identity import code, versions
 from simharness.study.measure import measure as measure_trial
 from simharness.study.plan import Planned, plan
 from simharness.study.progress import Quiet, Watch
+from simharness.study.provenance import provenance
 from simharness.study.results import Results, read_study, write_study
 from simharness.study.scheduling import Failure, Measure, Unit, work_off
 from simharness.study.store import Entry, Store, StoreError
@@ -101,12 +99,14 @@ def run_study(
         The results, as :func:`simharness.study.results.read_study` reads them; ``info["failed"]`` says what is missing.
 
     Raises:
-        ValueError: the folder is no place for a study, the store is no store, the scheduler does not answer.
+        ValueError: the folder is no place for a study, the store is no store, the scheduler does not answer, or a
+            method of one's own cannot be loaded.
         RunError: the disk is full, or the cluster went away. What is finished is kept.
         Interrupted: Ctrl-C. What is finished is kept.
     """
     folder, store = out / study.name, out / "store" if store is None else store
     _check_place(folder, store)
+    estimators_of(study.base.method)  # better now than at every trial
     opened, planned = Store(store), plan(study)
     tally = _run(planned, opened, workers=workers, scheduler=scheduler, watch=watch, measure=measure)
     order = {id(setting): index for index, setting in enumerate(study.settings)}
@@ -152,6 +152,7 @@ def run_shard(
     part, parts = shard
     if not 1 <= part <= parts:
         raise ValueError(f"a shard is i/n with i from 1 to n, got {part}/{parts}")
+    estimators_of(study.base.method)
     planned = list(_different(plan(study)))[part - 1 :: parts]
     return _run(planned, Store(store), workers=workers, scheduler=scheduler, watch=watch, measure=measure)
 
@@ -244,8 +245,6 @@ def _info(study: Study, tally: Tally, command: str | None) -> dict[str, Any]:
     return {
         "name": study.name,
         "description": study.description,
-        "seeds": list(study.seeds),
-        "variants": list(study.variants),
         "factors": list(study.factors),
         "one_at_a_time": study.one_at_a_time,
         "settings": len(study.settings),
@@ -254,12 +253,7 @@ def _info(study: Study, tally: Tally, command: str | None) -> dict[str, Any]:
         "run": tally.run,
         "failed": [asdict(each) for each in tally.failed],
         "damaged": list(tally.damaged),
-        "seconds": tally.seconds,
-        "command": command,
-        "machine": {"system": platform.platform(), "processor": platform.machine(), "cpus": os.cpu_count()},
-        "code": code_version(),
-        "digests": asdict(code()),
-        "versions": {"python": platform.python_version(), **versions()},
+        **provenance(command=command, seeds=study.seeds, variants=study.variants, seconds=tally.seconds),
     }
 
 

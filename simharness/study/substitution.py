@@ -12,6 +12,7 @@ from mvpose.estimate import Matching
 from mvpose.pipeline import Estimator, UnmatchedPipeline
 from mvpose.rays import Rays
 from simharness.detector.truth import KeypointError, Truth
+from simharness.experiment.estimators import OwnEstimator
 from simharness.rendering.visibility import Visibility
 
 Floats = NDArray[np.float64]
@@ -77,6 +78,8 @@ def with_labels(estimator: Estimator, labels: Integers) -> Pipeline | None:
         estimator: the method.
         labels: person of each detection that it will get, (m,).
     """
+    if isinstance(estimator, OwnEstimator):
+        estimator = estimator.loaded  # which may be a pipeline with stages of one's own
     if isinstance(estimator, UnmatchedPipeline):
         estimator = Pipeline()
     if not isinstance(estimator, Pipeline):

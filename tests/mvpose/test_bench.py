@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections import Counter
@@ -17,6 +18,7 @@ from mvpose.bench.__main__ import main
 from mvpose.bench.hard import pairs, ratio
 from mvpose.bench.measure import exponent, interleaved
 from mvpose.bench.processes import report
+from mvpose.bench.published import OTHERS, SIZES, others_at
 from mvpose.bench.report import WIDTH, against, bar, encodable, figure, table
 from mvpose.bench.scenes import CLEARANCE, HARD, LIVE, Conditions, film, frames, ring
 from mvpose.bench.tasks import Task
@@ -230,8 +232,10 @@ def test_the_command_line_prints_a_section_and_writes_its_figures(tmp_path):
     assert "HARD" in done.stdout
     assert "STAGES" not in done.stdout
     result = json.loads(file.read_text())
-    assert set(result) == {"machine", "quick", "hard"}
-    assert set(result["machine"]) == {"cpu", "cores", "python", "numpy", "numba"}
+    assert set(result) == {"command", "machine", "versions", "seconds", "quick", "hard"}
+    assert set(result["machine"]) == {"cpu", "cores"}
+    assert result["versions"]["numpy"] == np.__version__
+    assert 0 < result["seconds"] < 600
     assert np.isfinite(numbers(result)).all()
     for row in result["hard"]:
         assert row["share"] <= 1 + 1e-9 or row["method"] == "truth"
@@ -256,6 +260,46 @@ def test_stages_and_curve_fit_a_page_and_hold_what_is_asked(tmp_path, capsys):
         assert all(
             set(costs) == {"total", "affinity", "matching", "reconstruction"} for costs in sweep["exponents"].values()
         )
+
+
+def test_the_figures_say_what_command_made_them_and_nothing_of_the_machine_s_folders(tmp_path, capsys):
+    file = tmp_path / "made" / "a name.json"
+    asked = ["--only", "reid", "published", "--quick", "--json"]
+    assert main([*asked, str(file)]) == 0
+    text = file.read_text()
+    assert shlex.split(json.loads(text)["command"]) == ["python", "-m", "mvpose.bench", *asked, file.name]
+    assert str(tmp_path) not in text
+
+
+def test_published_sizes_carry_our_times_and_the_figures_of_others_in_their_own_columns(tmp_path, capsys):
+    file = tmp_path / "figures.json"
+    assert main(["--quick", "--only", "published", "reid", "--json", str(file)]) == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= WIDTH
+    result = json.loads(file.read_text())
+    assert np.isfinite(numbers(result)).all()
+    rows = {(row["ours"]["views"], row["ours"]["people"]): row for row in result["published"]}
+    assert set(rows) == {(3, 3), (5, 4)}
+    for preset in ("fast", "full"):
+        ms = rows[5, 4]["ours"]["ms"][preset]
+        assert 0 < max(stage for name, stage in ms.items() if name != "total") < ms["total"]
+    # Section "Running time" of the paper, and its repository as timed for this project.
+    assert rows[5, 4]["paper"] == {"affinity": 25, "matching": 20, "reconstruction": 60}
+    assert rows[3, 3]["paper"] is None
+    assert rows[3, 3]["others"]["released, matching + 3DPS"] == 8.4
+    assert rows[5, 4]["others"]["released, matching + 3DPS"] == 28
+    for row in result["reid"]:
+        assert 0.8 * row["views"] * row["people"] <= row["crops"] <= row["views"] * row["people"]
+        assert row["crop"] * row["crops"] == pytest.approx(row["frame"], rel=0.5)
+
+
+def test_figures_of_others_stand_at_the_size_they_were_measured_at():
+    assert [others_at(size)["released, matching + 3DPS"] for size in SIZES] == [8.4, 28, 75, 328, 5555]
+    assert {len(figures) for figures in OTHERS.values()} == {len(SIZES)}
+    for size in SIZES:  # a constraint more costs more, in one language; matching alone costs less than with 3DPS
+        told = others_at(size)
+        assert told["released, matching"] < told["released, matching + 3DPS"]
+        assert told["EasyMocap, matching, constrained"] < told["released, matching, constrained"]
 
 
 def test_an_unknown_section_names_the_known_ones(capsys):

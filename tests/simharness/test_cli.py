@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from simharness.cli import app
 from simharness.experiment.execution import RunError
 from simharness.scenario.profiles import read_profile
+from simharness.study.provenance import PROVENANCE
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [
@@ -44,7 +45,8 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-COMMANDS = ("", "run", "render", "evaluate", "evaluate shelf", "evaluate seeds", "evaluate twin", "fit-detector shelf")
+EVALUATIONS = ("evaluate shelf", "evaluate seeds", "evaluate twin", "evaluate paper")
+COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -138,14 +140,19 @@ def test_a_run_prints_the_numbers_and_where_the_report_is(simharness, tmp_path):
         assert variant in result.stdout
 
 
-def test_many_seeds_of_a_scenario(simharness, tmp_path):
+def test_many_seeds_of_a_scenario(simharness, tmp_path, monkeypatch):
     file = tmp_path / "seeds.json"
     quick = [*TINY, "--set", "rendering.renderer=rays", "--set", 'method.variants=["fast", "no-3dps"]']
+    monkeypatch.setattr("sys.argv", ["simharness", "evaluate", "seeds", QUICKSTART])
     result = simharness("evaluate", "seeds", QUICKSTART, *quick, "--seeds", "2", "--json", str(file))
     assert result.exit_code == 0
     assert "PCP over 2 seeds" in result.stdout
     summary = json.loads(file.read_text())
     assert summary["seeds"] == [7, 8]
+    assert summary["command"] == f"simharness evaluate seeds {QUICKSTART}"
+    assert summary.keys() >= set(PROVENANCE)
+    assert summary["variants"] == ["fast", "no-3dps"]
+    assert 0 < summary["seconds"] < 600
     for variant in ("fast", "no-3dps"):
         scores = summary["pcp"][variant]
         assert scores["low"] <= scores["pcp"] <= scores["high"]

@@ -3,15 +3,27 @@
 import json
 import math
 import shlex
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from simharness.report.digest import PROVENANCE, SCORED, markdown
+from simharness.report.digest import SCORED, markdown
+from simharness.report.paper import INPUTS, paper_tables, read_inputs
+from simharness.report.paper_text import markdown as paper_text
+from simharness.scenario.load import load
 from simharness.scenario.study import load_study
+from simharness.study.provenance import PROVENANCE
 
 ROOT = Path(__file__).parents[2]
 DIGESTS = sorted(path.parent.name for path in (ROOT / "results").glob("*/digest.json"))
+PAPER = {
+    "voxelpose": "shelf/voxelpose.json",
+    "2019": "shelf/2019.json",
+    "campus": "campus/variants.json",
+    "shelf": "shelf/variants.json",
+}
+EVALUATIONS = sorted({*PAPER.values(), "shelf/twin.json", "shelf/look_alikes.json"})
 
 
 @pytest.mark.parametrize("name", DIGESTS)
@@ -41,3 +53,50 @@ def test_numbers_and_text_of_a_digest_agree(name):
             mean, low, high = means[score]
             assert all(map(math.isfinite, (mean, low, high)))
             assert low <= mean <= high
+
+
+@pytest.mark.parametrize("name", EVALUATIONS)
+def test_an_evaluation_says_where_it_comes_from(name):
+    told = json.loads((ROOT / "results" / name).read_text(encoding="utf-8"))
+    lacking = [key for key in PROVENANCE if key not in told]
+    assert not lacking, f"results/{name} lacks {lacking}: results/README.md has the command that makes it again"
+    program, command, what, subject, *words = shlex.split(told["command"])
+    assert (program, command) == ("simharness", "evaluate")
+    assert told["digests"].keys() == {"simulation", "method"}
+    assert told["seconds"] > 0
+    given = list(pairwise([what, subject, *words]))
+    if what == "shelf":
+        asked = [value for option, value in given if option == "--method"]
+    else:
+        seeds = int(dict(given)["--seeds" if what == "seeds" else "--twins"])
+        assert len(told["seeds"]) == len(set(told["seeds"])) == seeds
+        file = ROOT / (subject if what == "seeds" else "scenarios/shelf.toml")
+        asked = load(file, overrides=[value for option, value in given if option == "--set"]).method.variants
+    assert list(told["variants"]) == list(asked)
+
+
+class TestThePaper:
+    """Its tables, three ways."""
+
+    @pytest.fixture
+    def told(self):
+        return json.loads((ROOT / "results" / "paper" / "tables.json").read_text(encoding="utf-8"))
+
+    def test_numbers_are_those_of_the_files_beside(self, told):
+        inputs = read_inputs({key: ROOT / "results" / PAPER[key] for key in INPUTS})
+        assert told == json.loads(json.dumps(paper_tables(inputs, command=told["command"])))
+
+    def test_numbers_and_text_agree(self, told):
+        assert (ROOT / "results" / "paper" / "tables.md").read_text(encoding="utf-8") == paper_text(told)
+
+    def test_twins_have_twenty_seeds(self, told):
+        assert [len(told["inputs"][key]["seeds"]) for key in ("campus", "shelf")] == [20, 20]
+
+
+def test_no_evaluation_is_forgotten():
+    told = {
+        str(path.relative_to(ROOT / "results"))
+        for folder in ("campus", "shelf")
+        for path in (ROOT / "results" / folder).glob("*.json")
+    }
+    assert told - {"shelf/detector.json"} == set(EVALUATIONS)

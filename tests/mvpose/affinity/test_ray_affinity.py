@@ -179,7 +179,7 @@ def shifted(rig, metres, seed=0):
 
 
 def test_a_rig_that_is_wrong_all_over_keeps_more_people_together():
-    """Cameras believed 20 cm off: of all pairs that matching makes or should make, more are right than at a fixed scale."""
+    """Cameras believed 20 cm off: of the pairs that matching makes, or should, more are right than at a fixed scale."""
     rig, found = ring(5), {1.0: [], 2.0: []}
     for seed in range(10):
         detections, person = detect(rig, crowd(4, spacing=1.2, seed=seed), noise=2.0, seed=seed)

@@ -90,7 +90,7 @@ def make_study(
         "factors": keys,
         "one_at_a_time": one_at_a_time,
         "command": "simharness study made.toml",
-        "machine": {"system": "Linux", "processor": "x86_64", "cores": 2},
+        "machine": {"system": "Linux", "processor": "x86_64", "cpus": 2},
         "seconds": 100.0,
         "kept": 0,
         "versions": {"numpy": np.__version__},

@@ -1,6 +1,7 @@
 """What is kept of a study beside the code: right numbers, where they come from, and a picture that stands by itself."""
 
 import json
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,9 +10,10 @@ from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.digest import PROVENANCE, curves, digest, markdown, write_digest
+from simharness.report.digest import curves, digest, markdown, write_digest
 from simharness.report.sheet import sheet
 from simharness.report.study_plots import BLAME_COLORS, KIND_COLORS
+from simharness.study.provenance import PROVENANCE
 
 SVG = "{http://www.w3.org/2000/svg}"
 COUNTS = [2, 3, 5]
@@ -57,18 +59,41 @@ def test_every_failure_has_a_kind_and_a_stage(study):
         assert failed["stages"].keys() <= BLAME_COLORS.keys()
 
 
+def test_a_whole_method_is_to_blame_only_where_one_from_elsewhere_is(study):
+    assert "| by reconstruction | matching alone |" in markdown(digest(study))
+    stages = study.failures["stage"].replace({"matching": "method"})
+    told = digest(replace(study, failures=study.failures.with_columns(stages)))
+    assert "| by reconstruction | by method | matching alone |" in markdown(told)
+    assert told["failures"]["full"]["stages"]["method"] > 0
+
+
+def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
+    told = digest(study)
+    block = markdown(told).split("`full`, all scores, against `cameras.count`:\n\n")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines() if "--" not in line]
+    assert rows[0][1:7] == [f"AP {limit}, %" for limit in (25, 50, 75, 100, 125, 150)]
+    assert [row[0] for row in rows[1:]] == [str(count) for count in COUNTS]
+    pcp = rows[0].index("PCP, %")
+    assert [float(row[pcp]) for row in rows[1:]] == pytest.approx(
+        [np.mean([pcp_of("full", {"cameras.count": n}, seed, 10.0) for seed in range(4)]) for n in COUNTS], abs=0.05
+    )
+
+
 def test_it_says_where_it_comes_from(study):
     told = digest(study)
     assert told["command"] == study.info["command"]
     assert all(told[key] == study.info[key] for key in PROVENANCE)
-    assert study.info["command"] in markdown(told)
+    text = markdown(told)
+    assert study.info["command"] in text
+    assert all(f"{name} {version}" in text for name, version in study.info["versions"].items())
+    assert all(digest[:8] in text for digest in study.info["digests"].values())
 
 
 def test_a_table_has_as_many_cells_as_headings(tmp_path):
     told = digest(make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("a", "b")))
     tables = [[line for line in block.splitlines() if line.startswith("|")] for block in markdown(told).split("\n\n")]
     tables = [table for table in tables if table]
-    assert len(tables) == 3 + 2 + 1 + 1  # all and two cases, two factors, breaking points, failures
+    assert len(tables) == 3 + 2 * 2 + 1 + 1  # all and two cases, two factors twice, breaking points, failures
     for table in tables:
         assert len(table) > 2
         assert len({line.count("|") for line in table}) == 1

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from simharness.report import plots
+from simharness.report.figure import STAGE_COLORS
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Cameras
 
@@ -60,6 +61,14 @@ def test_every_reference_has_its_target():
 
 def test_plots_are_the_same_every_time():
     assert draw_all() == draw_all()
+
+
+def test_a_method_without_stages_is_one():
+    svg = plots.stage_times({"own": {"total": 7.0}, "full": {"affinity": 1.0, "matching": 2.0, "total": 3.0}})
+    assert svg.count("7.0 ms") == svg.count("3.0 ms") == 1
+    colors = [STAGE_COLORS[stage] for stage in ("affinity", "matching", "method")]
+    assert all(color in svg for color in colors)
+    assert STAGE_COLORS["method"] not in plots.stage_times({"full": {"affinity": 1.0, "total": 1.0}})
 
 
 def test_nothing_to_plot_is_still_a_plot():

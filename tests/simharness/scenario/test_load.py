@@ -219,6 +219,42 @@ class TestNamedFiles:
         assert load(path, folder=Path()).cameras.file == "rig.json"
         assert [file.name for file in load(path).files] == ["a.bvh", "rig.json"]
 
+    def test_methods_of_ones_own_are_files_or_modules(self, scenario_file):
+        path = scenario_file(
+            'name = "x"\nmethod.estimators = { mine = "in/mine.py:Mine", theirs = "package.module:Theirs" }'
+        )
+        there = {"mine": f"{path.parent}/in/mine.py:Mine", "theirs": "package.module:Theirs"}
+        loaded = load(path)
+        assert loaded.method.estimators.places == there
+        assert load(path, folder=Path()).method.estimators.places["mine"] == "in/mine.py:Mine"
+        more = load(path, overrides=['method.estimators.mine="other.py:Mine"', "method.estimators.more=third.py:make"])
+        assert more.method.estimators.places == there | {"mine": "other.py:Mine", "more": "third.py:make"}
+        path.write_text(dumps(more), encoding="utf-8")
+        assert load(path, folder=Path()) == more != loaded
+
+    def test_a_method_of_ones_own_changes_the_fingerprint(self, scenario_file):
+        path = scenario_file('name = "x"\nmethod.estimators.mine = "mine.py:Mine"')
+        missing = fingerprint(load(path))
+        path.with_name("mine.py").write_text("1")
+        first = fingerprint(load(path))
+        path.with_name("mine.py").write_text("2")
+        assert len({missing, first, fingerprint(load(path))}) == 3
+
+    @pytest.mark.parametrize(
+        ("written", "said"),
+        [
+            ('estimators.Mine = "mine.py:Mine"', "expected names of small letters, digits, - and _, 'Mine' is none"),
+            ('estimators.mine = "mine.py"', "FILE.py:ATTRIBUTE or PACKAGE.MODULE:ATTRIBUTE, '"),
+            ('estimators.mine = "mine.py:two words"', "is neither"),
+            ("estimators.mine = 3", "method.estimators.mine: expected a valid string, got 3"),
+            ('estimators = "mine.py:Mine"', "expected a section [method.estimators] with keys of your own"),
+        ],
+    )
+    def test_what_is_no_place_of_a_method_is_refused(self, scenario_file, written, said):
+        path = scenario_file(f'name = "x"\n[method]\n{written}')
+        assert said in refusal(path)
+        assert refusal(path).startswith(f"{path}: method.estimators")
+
     def test_what_is_in_them_changes_the_fingerprint(self, scenario_file):
         path = scenario_file('name = "x"\n[people]\nmotion = { file = "a.bvh" }')
         clip = path.parent / "a.bvh"

@@ -29,6 +29,8 @@ STUDIES = [
     "stress",
     "sync",
     "views",
+    "views_corners",
+    "views_side",
 ]
 
 

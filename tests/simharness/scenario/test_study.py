@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.planning import read_plan
 from simharness.scenario.study import StudyTooLarge, load_study
+from simharness.study.document import document
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
 
@@ -287,6 +288,21 @@ class TestSeedsAndVariants:
         drawn = load_study(path, variants=["appearance"], overrides=["appearance.source=drawn"])
         assert drawn.variants == ("appearance",)
 
+    def test_methods_of_ones_own_are_variants_and_no_presets(self, study_file):
+        path = study_file('variants = ["full", "mine"]\n[method.estimators]\nmine = "mine.py:Mine"')
+        assert load_study(path).variants == ("full", "mine")
+        assert "there is no 'mien'; did you mean mine? there are full, " in refusal(path, variants=["mien"])
+        clash = "method.estimators.full=mine.py:Mine"
+        assert refusal(path, overrides=[clash]).startswith(f"--set {clash}: method.estimators.full: that is a preset")
+
+    def test_a_study_with_a_method_of_ones_own_is_written_as_it_was_run(self, study_file, tmp_path):
+        path = study_file('variants = ["mine"]\n[method.estimators]\nmine = "mine.py:Mine"\n[sweep]\nrate = [2, 3]')
+        study = load_study(path)
+        written = tmp_path / "elsewhere" / "study.toml"
+        written.parent.mkdir()
+        written.write_text(document(study))
+        assert load_study(written, folder=Path()).settings == study.settings
+
 
 class TestMistakes:
     @pytest.mark.parametrize(
@@ -304,6 +320,7 @@ class TestMistakes:
             ("seeds = [1, 2]", "seeds is not swept: say seeds = 20"),
             ("name = ['a']", "name is not swept: name what differs by [cases.NAME]"),
             ("method.variants = [['full']]", 'method.variants is not swept: say variants = ["full", "fast"]'),
+            ("method.estimators.mine = ['a.py:A']", "method.estimators is not swept: say variants = "),
             ("gate.level = [0.1]", "gate is not swept"),
             ("one_at_a_time = 1", "one_at_a_time: expected true, got 1"),
             ("paired = [1]", "paired: expected tables [[sweep.paired]], got [1]"),
@@ -333,6 +350,7 @@ class TestMistakes:
             ("people.count = -2", "people.count: expected greater than or equal to 0, got -2"),
             ("seed = 2", "seed is nothing for a case: say seeds = 20"),
             ("method.variants = ['full']", "method.variants is nothing for a case"),
+            ("method.estimators.mine = 'a.py:A'", "method.estimators is nothing for a case"),
             ("room.size = [8.0, 8.0, 3.0]", "room.size is swept, too"),
         ],
     )

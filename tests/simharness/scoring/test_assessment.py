@@ -208,6 +208,22 @@ def test_matching_is_counted_a_frame():
     assert scores.frames["admitted"].to_list() == [0, 1]
 
 
+@pytest.mark.parametrize("silent", [(0, 1, 2), (1,)])
+def test_a_method_that_does_not_say_who_is_who_has_no_scores_of_matching(silent):
+    recording = record(3, phantoms=1, noise=2.0)
+    told = answer(recording, noise=0.05)
+    untold = [replace(each, matching=Matching([])) if k in silent else each for k, each in enumerate(told)]
+    mute, loud = assess(recording, untold), assess(recording, told)
+    unknown = {key for key in ASSESSED if loud.scores[key] is not None and mute.scores[key] is None}
+    of_matching = {"violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"}
+    assert unknown == of_matching | {f"match_{key}" for key in ("precision", "recall", "f1")}
+    assert all(mute.scores[key] == loud.scores[key] for key in ASSESSED if key not in unknown)
+    assert mute.frames.schema == loud.frames.schema
+    empty = {key for key in mute.frames.columns if mute.frames[key].is_null().all()}
+    full = {"pairs_correct", "pairs_wrong", "pairs_lost", "violations", "merged", "split", "phantoms", "admitted"}
+    assert empty - {key for key in empty if key.startswith("time_")} == full
+
+
 def test_two_people_made_one_are_merged_and_not_split():
     recording = record(2)
     right, wrong = answer(recording)

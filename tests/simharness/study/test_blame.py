@@ -136,13 +136,22 @@ class Fixed:
 class TestMending:
     def test_a_method_from_elsewhere_cannot_be_told_labels(self):
         assert blamed(Fixed(PEOPLE[1:], PEOPLE), MOMENT) == [(0, "missed", "detection", None)]
-        assert blamed(Fixed(PEOPLE[1:], PEOPLE[1:]), MOMENT) == [(0, "missed", "reconstruction", None)]
+        assert blamed(Fixed(PEOPLE[1:], PEOPLE[1:]), MOMENT) == [(0, "missed", "method", None)]
+
+    def test_its_other_stages_are_not_known(self):
+        recording = recorded(RIG, MOMENT, MOMENT)
+        for exact, stages in ((PEOPLE, (100, 0, 0, 0)), (PEOPLE[1:], (0, None, None, 100))):
+            method = Fixed(PEOPLE[1:], exact)
+            estimates = [method.estimate(RIG, detections) for detections in recording.detections]
+            table = failure_table(blame(recording, method, estimates, find_failures(recording, estimates)))
+            scores = failure_scores(table, 2)
+            assert tuple(scores[f"blame_{stage}"] for stage in Stage) == stages
 
     def test_as_many_ghosts_are_mended_as_there_are_fewer(self):
         near, far = PEOPLE[:1] + [9.0, 0, 0], PEOPLE[:1] + [-9.0, 0, 0]
         two = np.concatenate([PEOPLE, far, near])
         one = np.concatenate([PEOPLE, PEOPLE[:1] + [7.0, 0, 0]])  # not where any was, but nearer to one
-        detection, left = (-1, "ghost", "detection", None), (-1, "ghost", "reconstruction", None)
+        detection, left = (-1, "ghost", "detection", None), (-1, "ghost", "method", None)
         assert blamed(Fixed(two, one), MOMENT) == [detection, left]
         assert blamed(Fixed(two, PEOPLE), MOMENT) == [detection, detection]
         assert blamed(Fixed(one, two), MOMENT) == [left]
@@ -154,8 +163,8 @@ class TestMending:
         bent[0, COCO17.index("nose")] += 0.3
         stray[0, COCO17.index("left_knee")] += 0.3
         assert blamed(Fixed(PEOPLE[1:], bent), MOMENT) == [(0, "missed", "detection", None)]
-        assert blamed(Fixed(bent, stray), MOMENT) == [(0, "displaced_joint", "reconstruction", None)]
-        assert blamed(Fixed(bent, PEOPLE[1:]), MOMENT) == [(0, "displaced_joint", "reconstruction", None)]
+        assert blamed(Fixed(bent, stray), MOMENT) == [(0, "displaced_joint", "method", None)]
+        assert blamed(Fixed(bent, PEOPLE[1:]), MOMENT) == [(0, "displaced_joint", "method", None)]
 
     def test_only_frames_with_failures_are_estimated_again_and_three_times_at_most(self):
         counted = []

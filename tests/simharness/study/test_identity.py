@@ -15,7 +15,8 @@ from simharness.scenario.load import load
 from simharness.scenario.section import Section
 from simharness.scenario.study import load_study
 from simharness.study import identity
-from simharness.study.identity import entry_identity, simulation_files, trial_identity
+from simharness.study.identity import entry_identity, own_code, simulation_files, trial_identity
+from simharness.study.plan import plan
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 
@@ -93,6 +94,33 @@ def test_an_entry_is_of_a_trial_and_a_variant(quickstart):
     trial = trial_identity(quickstart)
     identities = {entry_identity(each, name) for each in (trial, trial[::-1]) for name in ("full", "fast")}
     assert len(identities) == 4
+
+
+def test_a_method_of_ones_own_counts_by_its_content(tmp_path, monkeypatch):
+    places = {}
+    for folder, text in (("one", "1"), ("same", "1"), ("other", "2"), ("helped", "1")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "mine.py").write_text(text)
+        places[folder] = f"{tmp_path / folder / 'mine.py'}:Mine"
+    (tmp_path / "helped" / "helper.py").write_text("3")
+    digests = {folder: own_code(place) for folder, place in places.items()}
+    assert digests["one"] == digests["same"]
+    digests["name"] = own_code(places["one"] + "2")
+    assert len(set(digests.values())) == 4
+
+    def identities(folder):
+        path = tmp_path / "own.toml"
+        path.write_text(f'name = "own"\nvariants = ["full", "mine"]\nmethod.estimators.mine = "{folder}/mine.py:Mine"')
+        (planned,) = plan(load_study(path))
+        return planned.trial, planned.entries["full"], planned.entries["mine"]
+
+    assert identities("one") == identities("same")
+    assert identities("one")[:2] == identities("other")[:2]
+    assert identities("one")[2] != identities("other")[2]
+    own = identity.code()
+    mine = identities("one")[2]
+    monkeypatch.setattr(identity, "code", lambda: replace(own, method="another"))
+    assert identities("one")[2] != mine  # for it may use mvpose, too
 
 
 @pytest.mark.parametrize(
