@@ -6,13 +6,16 @@ import enum
 from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
 from simharness.cli.border import after_reading, border, write_json
 from simharness.cli.options import JsonFile, Overrides, ScenarioFile, command_line
+
+if TYPE_CHECKING:
+    from mvpose.pipeline import Estimator
 
 
 class HeadMapping(enum.StrEnum):
@@ -43,7 +46,11 @@ def shelf(
     ] = HeadMapping.VOXELPOSE,
     method: Annotated[
         list[str] | None,
-        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline. Repeatable. [dim]\\[default: full][/]"),
+        typer.Option(
+            metavar="VARIANT",
+            help="A preset of mvpose.Pipeline, or a method of one's own, FILE.py:NAME. Repeatable. "
+            "[dim]\\[default: full][/]",
+        ),
     ] = None,
 ) -> None:
     """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.
@@ -52,13 +59,12 @@ def shelf(
     """
     with border():
         start = perf_counter()
-        from mvpose import Pipeline
         from mvpose.pipeline import NEED_DESCRIPTORS
         from simharness.datasets.evaluate import evaluate, print_evaluation
         from simharness.datasets.shelf import read_shelf
         from simharness.experiment.progress import reporter
 
-        pipelines = {name: Pipeline.preset(name) for name in method or ["full"]}
+        pipelines = {name: _estimator(name) for name in method or ["full"]}
         if blind := NEED_DESCRIPTORS & pipelines.keys():
             raise ValueError(
                 f"--method {', '.join(blind)}: goes by descriptors alone, and the detections of Shelf carry none; "
@@ -146,6 +152,17 @@ def paper(
         files = {"voxelpose": shelf, "2019": shelf_2019, "campus": campus_twin, "shelf": shelf_twin}
         write_tables(paper_tables(read_inputs(files), command=command_line()), out)
     typer.echo(f"tables: {out / 'tables.md'}")
+
+
+def _estimator(name: str) -> Estimator:
+    """A preset, or a method of one's own by its place."""
+    from mvpose import Pipeline
+    from simharness.experiment.estimators import OwnEstimator, load_estimator
+
+    if ":" not in name:
+        return Pipeline.preset(name)
+    load_estimator(name)  # better now than at the first frame
+    return OwnEstimator("--method", name)
 
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:

@@ -108,6 +108,22 @@ class TestBadInput:
     def test_unknown_method(self, simharness):
         assert_refused(simharness("evaluate", "shelf", "nowhere", "--method", "best"), "'best'", "full")
 
+    def test_a_method_of_ones_own_that_is_not_there(self, simharness):
+        refused = simharness("evaluate", "shelf", "nowhere", "--method", "nobody.py:Mine")
+        assert_refused(refused, "nobody.py", "no such file")
+
+    @pytest.mark.slow
+    def test_a_method_of_ones_own_scores_what_it_is(self, simharness, tmp_path, shared_data):
+        """One that is a preset by another name."""
+        own, summary = tmp_path / "mine.py", tmp_path / "shelf.json"
+        own.write_text('from mvpose import Pipeline\n\nmine = Pipeline.preset("fast")\n')
+        methods = ["--method", "fast", "--method", f"{own}:mine"]
+        assert (
+            simharness("evaluate", "shelf", str(shared_data / "shelf"), *methods, "--json", str(summary)).exit_code == 0
+        )
+        fast, mine = json.loads(summary.read_text())["variants"].values()
+        assert mine["pcp"] == fast["pcp"] > 90
+
     def test_nothing_is_left_behind(self, simharness, tmp_path):
         simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
         assert list(tmp_path.rglob("*.json")) == list(tmp_path.rglob("*.html")) == []
