@@ -6,12 +6,13 @@ traceback), 130 interrupted. Nothing heavy is imported before a command needs it
 
 from __future__ import annotations
 
-from simharness.cli import evaluating, fitting, gating, reporting, running, scenarios, studying
+from simharness.cli import evaluating, exporting, fitting, gating, reporting, running, scenarios, studying
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
 
 running.add_to(app)
+exporting.add_to(app)
 scenarios.add_to(app)
 gating.add_to(app)
 reporting.add_to(app)

@@ -1,0 +1,135 @@
+"""What an exported sequence says of itself: what is in it, in which units and axes, who is who, where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mvpose.skeleton import PANOPTIC19
+from simharness.experiment.trial import Trial
+from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
+from simharness.export.openpose import BODY_25
+from simharness.export.poses import CONFIDENCES
+from simharness.humans.population import is_child
+from simharness.motion.choreography import roles
+from simharness.rigs.shots import Shots
+from simharness.study.provenance import provenance
+
+_UNITS = {
+    "calibration": "x_cam = R X + t; t in centimetres; K in pixels, of which integers are the centres; distCoef k1 k2 "
+    "p1 p2 k3",
+    "joints19": "x y z in centimetres, confidence",
+    "univTime": "milliseconds from the first frame",
+    "clock": "seconds that pictures are taken after their frames' times: their mean and standard deviation",
+    "lost": "frames whose picture never arrives: black here",
+    "repeated": "frames in which a camera repeats its picture of an earlier one: [frame, earlier one]",
+    "drift": "of the camera about its own axes, rad/s, and of its centre in simharness's axes, m/s",
+    "pose_keypoints_2d": "x y in pixels, score 0 to 1; 0 0 0 where missing",
+    "rolling_shutter": "seconds from the first row of a picture to the last",
+    "stature, mass": "metres, kilograms",
+}
+_AXES = "right-handed, y down, the floor at y = 0; (X, Y, Z) = 100 (x, -z, y) of simharness's metres, z up"
+_CALIBRATION = (
+    "of the cameras that take the pictures, as they hang at time 0; what a method is told of them, with the faults of "
+    "the scenario, is in calibration_believed, where that differs"
+)
+_BODIES = (
+    "everybody in every frame, hidden or not, at the frame's own time, whatever the cameras' clocks say; an id is one "
+    "person throughout"
+)
+_MADE = "neck and mid_hip halfway between shoulders and hips, where both were detected; feet missing"
+
+
+def manifest(
+    trial: Trial,
+    *,
+    frames: range,
+    names: Sequence[str],
+    pictures: bool,
+    believed: bool,
+    command: str | None,
+    seconds: float,
+) -> dict[str, Any]:
+    """What is to be known of a sequence, JSON-ready.
+
+    Args:
+        trial: what was exported.
+        frames: which of its frames.
+        names: of the cameras in the files, in the order of the rig.
+        pictures: whether pictures were written.
+        believed: whether a believed calibration was.
+        command: how the user asked for this.
+        seconds: that it took.
+    """
+    scenario = trial.scenario
+    return {
+        "format": FORMAT,
+        "version": 1,
+        "name": scenario.name,
+        "description": scenario.description,
+        "seed": scenario.seed,
+        "rate": scenario.rate,
+        "frames": {"first": frames.start, "every": frames.step, "count": len(frames)},
+        "files": {
+            "calibration": f"calibration_{scenario.name}.json",
+            "calibration_believed": f"calibration_believed_{scenario.name}.json" if believed else None,
+            "pictures": PICTURES if pictures else None,
+            "bodies": BODIES,
+            "detections": PEOPLE,
+            "scenario": "scenario.toml",
+        },
+        "units": _UNITS,
+        "axes": _AXES,
+        "calibration": _CALIBRATION,
+        "bodies": _BODIES,
+        "confidence": {
+            "of a joint by how many pictures show it": CONFIDENCES,
+            "none": "hidden in all pictures, others of the person's joints are not",
+            "nobody": "no picture shows any joint of the person",
+        },
+        "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _MADE},
+        "rolling_shutter": trial.shots.readout,
+        "cameras": [_camera(trial.shots, trial.scene.time, frames, view, name) for view, name in enumerate(names)],
+        "people": _people(trial),
+        "provenance": provenance(command=command, seeds=[scenario.seed], variants=[], seconds=seconds),
+    }
+
+
+def _camera(shots: Shots, time: np.ndarray, frames: range, view: int, name: str) -> dict[str, Any]:
+    """One view: whose pictures it has, when they were taken, which are missing."""
+    numbers = np.array(frames)
+    source, taker = shots.source[numbers, view], int(shots.taker[view])
+    taken = source >= 0
+    late = shots.time[numbers, view][taken] - time[source[taken]]
+    turn, travel = shots.turn[taker], shots.travel[taker]
+    drifts = turn.any() or travel.any()
+    return {
+        "name": name,
+        "called": shots.believed[view].name,
+        "pictures_of": shots.true[taker].name,
+        "size": list(shots.believed[view].size),
+        "clock": {"mean": _short(late.mean()), "deviation": _short(late.std())} if taken.any() else None,
+        "lost": numbers[~taken].tolist(),
+        "repeated": [[int(frame), int(old)] for frame, old in zip(numbers, source, strict=True) if 0 <= old < frame],
+        "drift": {"turn": turn.tolist(), "travel": travel.tolist()} if drifts else None,
+    }
+
+
+def _people(trial: Trial) -> list[dict[str, Any]]:
+    scenario = trial.scenario
+    return [
+        {
+            "id": person,
+            "activity": role,
+            "child": is_child(scenario.seed, person, scenario.people.children),
+            "stature": _short(body.stature),
+            "mass": _short(body.mass),
+        }
+        for person, (role, body) in enumerate(zip(roles(scenario.people), trial.scene.bodies, strict=True))
+    ]
+
+
+def _short(value: float) -> float:
+    return round(float(value), 6)

@@ -1,0 +1,36 @@
+"""One small trial with a lens that bends and a calibration that is wrong, and its export."""
+
+from __future__ import annotations
+
+import pytest
+
+from simharness.experiment.trial import prepare
+from simharness.export.export import Export, export
+from simharness.scenario.models import Cameras, Clutter, Faults, People, Rendering, Scenario
+
+
+def tiny(**sections) -> Scenario:
+    defaults = {
+        "people": People(count=3, activities=("walk", "stand")),
+        "cameras": Cameras(count=3, size=(320, 240), distortion=(-0.12, 0.02, 0.001, -0.002, 0.0)),
+        "clutter": Clutter(boxes=1),
+        "faults": Faults(rotation=1.0, translation=0.02),
+        "rendering": Rendering(renderer="rays"),
+    }
+    return Scenario(name="tiny", seed=5, duration=0.3, rate=10.0, **{**defaults, **sections})
+
+
+@pytest.fixture(scope="session")
+def trial():
+    return prepare(tiny())
+
+
+@pytest.fixture(scope="session")
+def folder(trial, tmp_path_factory):
+    return export(trial, Export(tmp_path_factory.mktemp("export") / "tiny"), command="simharness export tiny.toml out")
+
+
+@pytest.fixture(scope="session")
+def scenario():
+    """Makes scenarios like that of ``trial``, with other sections."""
+    return tiny
