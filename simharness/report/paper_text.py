@@ -42,7 +42,7 @@ _WHY: dict[str, dict[str, str]] = {
     },
     "geometry": {
         "campus": "The measure is not why: an epipolar distance in pixels, as the paper's, loses as little on this "
-        "twin. Its cameras are calibrated to 0.2 degrees, so that rays agree; at 1 degree geometry alone falls behind.",
+        "twin. Its cameras are calibrated to 0.2 degrees, so that rays agree and leave little to decide.",
         "shelf": "Not the simulation: on real Shelf this code scores by geometry alone what stands above, with other "
         "detections than the paper's and affinities on another scale, metres between rays.",
     },

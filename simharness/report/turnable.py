@@ -72,7 +72,7 @@ def turnable(replay: Replay, frame: int) -> Turnable:
         "estimates": estimates,
         "colors": [css(person_color(person)) for person in range(people)],
         "ghost": css(person_color(-1)),
-        "cameras": [_millimetres(_pyramid(camera)) for camera in rig],
+        "cameras": [_millimetres(pyramid(camera)) for camera in rig],
         "boxes": [_millimetres(solid.hull.corners) for solid in scene.solids if solid.kind != "room"],
         "room": _millimetres(size[:2]),
         "center": _millimetres(center),
@@ -109,7 +109,7 @@ def _millimetres(metres: ArrayLike) -> list[Any]:
     return np.rint(1000 * np.asarray(metres, float)).astype(int).tolist()
 
 
-def _pyramid(camera: Camera) -> Floats:
+def pyramid(camera: Camera) -> Floats:
     """The centre of a camera and the corners of what it sees close by, (5, 3), metres in the world."""
     width, height = camera.size
     pixels = np.array([[0, 0], [width, 0], [width, height], [0, height]]) - 0.5
