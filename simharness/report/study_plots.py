@@ -35,6 +35,7 @@ _SPARE = "#8b93a1"
 _SIZE = (4.5, 3.0)  # inches of 72 px: a phone's width
 _WIDE_RANGE = 30.0  # numbers that differ by this factor are better told apart on a logarithmic axis
 _FEW_TICKS = 7  # so many values of a factor have a tick each
+_LETTER = 0.025  # of the axis: the width of a label's letter, and between two labels
 _DARK = 0.55  # luma of a cell under which its number is written in white
 
 
@@ -117,11 +118,26 @@ def _ticks(axes: Axes, values: Sequence[Any], places: Floats, numeric: bool) -> 
         axes.set_xscale("log")
         axes.minorticks_off()
     if len(places) <= _FEW_TICKS:
-        axes.set_xticks(places, [f"{place:g}" for place in places])
+        across = np.log(places) if axes.get_xscale() == "log" else places
+        axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))
     elif axes.get_xscale() == "linear":
         axes.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS, integer=bool((places % 1 == 0).all())))
     if axes.get_xscale() == "log":
         axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+
+
+def _spaced(places: Floats, labels: Sequence[str]) -> list[str]:
+    """Labels at ascending places along an axis, but for those that would run into another: the ends come first."""
+    space = np.ptp(places) or 1.0
+
+    def near(one: int, other: int) -> bool:
+        return abs(places[one] - places[other]) < space * _LETTER * (len(labels[one]) + len(labels[other]) + 1) / 2
+
+    kept = [0]
+    for index in range(len(labels) - 1, 0, -1):
+        if not any(near(index, other) for other in kept):
+            kept.append(index)
+    return [label if index in kept else "" for index, label in enumerate(labels)]
 
 
 def heat_map(

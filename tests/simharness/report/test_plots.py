@@ -1,15 +1,18 @@
 """Plots: the page's colours, no ids twice, and nothing breaks on nothing."""
 
+import itertools
 import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
 
-from simharness.report import plots
+from simharness.report import plots, study_plots
 from simharness.report.figure import STAGE_COLORS
 from simharness.rigs.layouts import build_rig
 from simharness.scenario.models import Cameras
+from simharness.scoring.catalogue import SCORES
+from simharness.scoring.statistics import Interval
 
 COLORS = ["#336699", "#996633", "#339966"]
 
@@ -79,3 +82,27 @@ def test_nothing_to_plot_is_still_a_plot():
     rig = build_rig(Cameras())
     empty = {"things": [], "paths": np.zeros((4, 0, 2)), "estimates": np.zeros((0, 2)), "colors": []}
     assert "<svg" in plots.floor_plan(rig, (8, 8), **empty)
+
+
+@pytest.mark.parametrize(
+    "values", [[0, 0.25, 0.5, 1, 2, 4], [0, 0.02, 0.05, 0.1, 0.2, 0.4], [2, 3, 4, 5, 6], [0, 0.001, 1], [5], [3, 3.001]]
+)
+def test_labels_along_an_axis_do_not_run_into_each_other(values):
+    """Drawn by matplotlib, boxes of what is written stand apart; the first is there, and all that have room."""
+    drawn = study_plots.curve(
+        "labels",
+        factor="faults.rotation",
+        values=values,
+        numeric=True,
+        lines={"full": [Interval(90.0, 80.0, 95.0, 3)] * len(values)},
+        score=SCORES["pcp"],
+    )
+    labels = [f"{value:g}" for value in values]
+    written = re.findall(r'text-anchor: middle[^>]* x="([\d.]+)"[^>]*>([\d.]+)</text>', drawn)
+    along = [(float(x), text) for x, text in written]
+    assert along[0][1] == labels[0]
+    assert {text for _, text in along} <= set(labels)
+    for (x, text), (beside, other) in itertools.pairwise(along):
+        assert beside - x > 5.5 * (len(text) + len(other)) / 2  # a letter of 9 px is 5.5 wide
+    if values == list(range(values[0], values[0] + len(values))):
+        assert [text for _, text in along] == labels
