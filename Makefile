@@ -20,8 +20,8 @@ lint: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# An hour on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
-results: $(STUDIES:%=results-%)
+# An hour and a half on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
+results: $(STUDIES:%=results-%) results-paper results-time results-overview
 
 results-%: $(RUN)
 	$(BIN)/simharness study scenarios/$*.toml --workers $(WORKERS)
@@ -59,6 +59,13 @@ paper-shelf: $(RUN)
 results-time: $(RUN)
 	$(BIN)/python -m mvpose.bench --only published reid curve --json results/time/bench.json
 	$(BIN)/python -m simharness.bench.plot results/time/bench.json results/time
+
+# The picture in the README: a frame of a run, and the curve of the study of views.
+.PHONY: results-overview
+results-overview: results-views
+	rm -rf results/runs/overview
+	$(BIN)/simharness run scenarios/overview.toml --out results/runs/overview
+	$(BIN)/python -m simharness.report.overview results/runs/overview/overview-* results/views/digest.json results/overview.svg
 
 $(VENV):
 	$(PYTHON) -m venv $(VENV)

@@ -20,6 +20,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
+from simharness.datasets.voxelpose import write_calibration
 from simharness.scenario.study import load_study
 
 ROOT = Path(__file__).parents[2]
@@ -34,18 +35,28 @@ _COMMENT = re.compile(r"\s+# .*")
 SMALL_SCENE = "--set people.count=2 --set duration=0.4 --set rate=5"
 RAYS = f"{SMALL_SCENE} --set cameras.count=3 --set cameras.size=[160,120] --set rendering.renderer=rays"
 PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --set clutter.shelves=0"
-HEIGHTS = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
+LAB = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
 ALONE = {
     "simharness run scenarios/quickstart.toml --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": (
         f"{RAYS} --workers 1"
     ),
-    "simharness render scenarios/gathering.toml": f"{PICTURES} --every 2",
+    "simharness export scenarios/gathering.toml benchmark": f"{PICTURES} --every 2",
     "simharness render scenarios/gathering.toml --video --overlay truth,detections,estimates": PICTURES,
-    "simharness study scenarios/views.toml --workers 2": (
-        f"{RAYS} --set sweep.cameras.count=[3] --seeds 1 --variant fast --workers 1"
-    ),
     "simharness scenarios": "",
     "simharness show FILE": "",
+    "simharness show scenarios/quickstart.toml": "",
+}
+# What somebody brings along: each needs a file that the test makes.
+BROUGHT = {
+    "clip.bvh": (
+        "simharness run scenarios/quickstart.toml --set 'people.activities=[\"mocap\"]' "
+        "--set people.motion.file=clip.bvh"
+    ),
+    "calibration.json": (
+        "simharness run scenarios/quickstart.toml --set cameras.layout=file --set cameras.file=calibration.json "
+        "--set 'cameras.size=[1032,776]'"
+    ),
+    "night.toml": "simharness run scenarios/quickstart.toml --set detector.profile=night.toml",
 }
 NAMES = ("simharness check", "simharness fit-detector")  # how the text calls them
 CHECKS = (
@@ -54,29 +65,43 @@ CHECKS = (
     "--summary summary.md",
 )
 SHELF = (
-    "simharness evaluate shelf path/to/shelf --json shelf.json",
     "simharness evaluate shelf FOLDER",
-    "simharness fit-detector shelf path/to/shelf --out my-detector.toml",
-    "simharness fit-detector shelf FOLDER",
-    "simharness evaluate twin path/to/shelf",
     "simharness evaluate twin FOLDER",
+    "simharness fit-detector shelf FOLDER --out mine.toml",
 )
 OWN_STUDY = {
-    "simharness study heights.toml --workers 4": f"{HEIGHTS} --seeds 1",
-    "simharness study heights.toml --seeds 40": f"{HEIGHTS} --seeds 2",
-    "simharness report results/studies/heights --rerun heights.rrd": "",
+    "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
+    "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
+    "simharness report results/studies/my-lab --rerun my-lab.rrd": "",
     "simharness report STUDY --digest FOLDER": "",
 }
+OWN_GATE = (
+    "simharness check my-ci.toml --baseline my-ci.json --update-baseline",
+    "simharness check my-ci.toml --baseline my-ci.json",
+)
 IN_PARTS = {
-    "simharness study heights.toml --shard 1/3 --store part1": f"{HEIGHTS} --seeds 2",
+    "simharness study my-lab.toml --shard 1/3 --store part1": f"{LAB} --seeds 2",
     "simharness merge part1 part2 part3 --into results/studies/store": "",
-    "simharness study heights.toml": f"{HEIGHTS} --seeds 2",
+    "simharness study my-lab.toml": f"{LAB} --seeds 2",
 }
 MAKE = ("make demo", "make test", "make lint", "make results")
 HELPFUL = ("python -m mvpose.bench", "python -m simharness.bench", "python -m simharness.train.reid")
 BAKE = "python -m simharness.humans.bake"  # takes no arguments: it would go and bake
 PYTEST = '.venv/bin/python -m pytest -m "not slow"'
-KNOWN = {*ALONE, *NAMES, *CHECKS, *SHELF, *OWN_STUDY, *IN_PARTS, *MAKE, *HELPFUL, BAKE, PYTEST}
+KNOWN = {
+    *ALONE,
+    *BROUGHT.values(),
+    *NAMES,
+    *CHECKS,
+    *SHELF,
+    *OWN_STUDY,
+    *OWN_GATE,
+    *IN_PARTS,
+    *MAKE,
+    *HELPFUL,
+    BAKE,
+    PYTEST,
+}
 
 # Stands for scenarios/ci.toml, which takes minutes: nothing here is hard for the method.
 EASY = f"""
@@ -113,12 +138,18 @@ def blocks(language: str) -> list[str]:
     return [block for name, block in _FENCE.findall(README) if name == language]
 
 
+def named(name: str) -> str:
+    """The TOML file of that name, which its first line says."""
+    (block,) = (block for block in blocks("toml") if block.startswith(f"# {name}\n"))
+    return block
+
+
 @pytest.fixture
 def workplace(tmp_path, monkeypatch):
     """A folder like that of a checkout, with the study that the README writes."""
     (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
-    (heights,) = blocks("toml")
-    (tmp_path / "heights.toml").write_text(heights, encoding="utf-8")
+    for name in ("my-lab.toml", "night.toml"):
+        (tmp_path / name).write_text(named(name), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -174,11 +205,12 @@ def test_every_command_is_run_here():
 
 
 def test_every_block_is_looked_at_here():
-    assert sorted(language for language, _ in _FENCE.findall(README)) == ["python", "python", "toml", "yaml"]
+    assert sorted(language for language, _ in _FENCE.findall(README)) == [*["python"] * 4, *["toml"] * 4, "yaml"]
 
 
 MADE = {
     "run": "results/runs/*/report.html",
+    "export": "benchmark/gathering/manifest.json",
     "render": "results/renders/gathering/mosaic*",
     "study": "results/*/*/report.html",
 }
@@ -187,10 +219,24 @@ MADE = {
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ALONE)
 def test_commands_that_stand_alone(workplace, command):
-    said = done(command.replace("FILE", "heights.toml"), ALONE[command])
+    said = done(command.replace("FILE", "my-lab.toml"), ALONE[command])
     assert said
     if made := MADE.get(command.split()[1]):
         assert list(workplace.glob(made))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", BROUGHT)
+def test_what_somebody_brings_along(workplace, file):
+    small = RAYS.replace("--set cameras.count=3 ", "").replace("--set cameras.size=[160,120] ", "")
+    if file == "calibration.json":
+        ring = runpy.run_path(str(ROOT / "tests" / "mvpose" / "people.py"))["ring"](3, radius=3.2, size=(1032, 776))
+        write_calibration(workplace / file, ring)
+        small += " --set people.area=1.0"
+    elif file == "clip.bvh":
+        made = runpy.run_path(str(ROOT / "tests" / "simharness" / "motion" / "test_mocap_retarget.py"))
+        (workplace / file).write_text(made["bvh"](**made["HANG"]), encoding="utf-8")
+    assert "full" in done(BROUGHT[file], f"{small} --set clutter.boxes=0 --set clutter.shelves=0")
 
 
 @pytest.mark.parametrize("command", NAMES)
@@ -207,6 +253,18 @@ def test_the_check(easy_workplace):
     assert (easy_workplace / "summary.md").read_text().startswith("## easy: no regression")
 
 
+@pytest.mark.slow
+def test_the_gate_of_your_own(easy_workplace):
+    for name in ("wrapped.py", "program.py"):
+        (easy_workplace / name).symlink_to(ROOT / "tests" / "simharness" / "experiment" / "foreign" / name)
+    (easy_workplace / "my-ci.toml").write_text(named("my-ci.toml"), encoding="utf-8")
+    first, again = OWN_GATE
+    done(first)
+    trials = json.loads((easy_workplace / "my-ci.json").read_text())["trials"]
+    assert {trial["variant"] for trial in trials} == {"foreign"}
+    assert "no regression" in done(again)
+
+
 @pytest.mark.parametrize("command", SHELF)
 def test_commands_on_shelf_say_that_there_are_no_data(workplace, command):
     result = call(command)
@@ -217,22 +275,19 @@ def test_commands_on_shelf_say_that_there_are_no_data(workplace, command):
 
 @pytest.mark.slow
 def test_shelf_is_evaluated(workplace, shared_data):
-    (workplace / "path" / "to").mkdir(parents=True)
-    (workplace / "path" / "to" / "shelf").symlink_to(shared_data / "shelf")
+    (workplace / "FOLDER").symlink_to(shared_data / "shelf")
     assert "PCP" in done(SHELF[0], "--method fast")
-    assert json.loads((workplace / "shelf.json").read_text())["variants"]
 
 
 def test_the_study_of_your_own_makes_what_it_says(workplace):
-    study = load_study("heights.toml")
-    (block,) = blocks("toml")
-    said = tomllib.loads(block)
+    study = load_study("my-lab.toml")
+    said = tomllib.loads(named("my-lab.toml"))
     heights, people = said["sweep"]["cameras"]["height"], said["sweep"]["people"]["count"]
-    assert (people["from"], people["to"], people["steps"]) == (4, 8, 2)
+    assert (people["from"], people["to"], people["steps"]) == (2, 8, 4)
     assert len(study.seeds) == said["seeds"]
     assert list(study.variants) == said["variants"]
     settings = {(each.case, *map(each.factors.get, ("cameras.height", "people.count"))) for each in study.settings}
-    assert settings == set(product(said["cases"], heights, (4, 8)))
+    assert settings == set(product(said["cases"], heights, (2, 4, 6, 8)))
 
 
 @pytest.mark.slow
@@ -240,12 +295,12 @@ def test_the_study_of_your_own(workplace):
     first, more, recording, digest = OWN_STUDY
     assert "2 trials: 0 kept from before, 2 run, 0 failed" in done(first, OWN_STUDY[first])
     assert "4 trials: 2 kept from before, 2 run, 0 failed" in done(more, OWN_STUDY[more])
-    assert (workplace / "results/studies/heights/report.html").is_file()
-    done(digest.replace("STUDY", "results/studies/heights").replace("FOLDER", "kept"))
+    assert (workplace / "results/studies/my-lab/report.html").is_file()
+    done(digest.replace("STUDY", "results/studies/my-lab").replace("FOLDER", "kept"))
     assert {"digest.json", "table.md"} <= {path.name for path in (workplace / "kept").iterdir()}
     if importlib.util.find_spec("rerun"):
         done(recording)
-        assert (workplace / "heights.rrd").stat().st_size
+        assert (workplace / "my-lab.rrd").stat().st_size
     else:
         result = call(recording)
         assert (result.exit_code, "needs the rerun SDK" in result.stderr) == (2, True)
@@ -291,8 +346,25 @@ def test_pytest_leaves_out_what_is_slow():
     assert "deselected" in said.stdout
 
 
+def test_the_example_of_simharness(monkeypatch):
+    (example,) = (block for block in blocks("python") if "simharness.study.measure" in block)
+    monkeypatch.chdir(ROOT)
+    less = "'duration=0.4', 'people.count=6'"
+    names: dict = {}
+    exec(example.replace('"people.count=6"', less), names)
+    assert names["measured"].keys() == {"full", "fast"}
+    assert 50 < names["measured"]["full"].scores["pcp"] <= 100
+    assert {"kind", "stage"} <= set(names["measured"]["full"].failures.columns)
+
+
+def test_the_foreign_program_is_the_one_that_is_tested():
+    wrapped = (ROOT / "tests/simharness/experiment/foreign/wrapped.py").read_text(encoding="utf-8")
+    (shown,) = (block for block in blocks("python") if "subprocess" in block)
+    assert wrapped.endswith(shown)
+
+
 def test_the_example_of_mvpose():
-    example = next(block for block in blocks("python") if "mvpose" in block)
+    example = next(block for block in blocks("python") if "Rig(cameras)" in block)
     made = runpy.run_path(str(ROOT / "tests" / "mvpose" / "people.py"))  # rigs and people, without the simulator
     rig, true = made["ring"](4), made["crowd"](2)
     seen, person = made["detect"](rig, true)

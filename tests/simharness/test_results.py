@@ -1,7 +1,10 @@
 """The reference results beside the code: they can be read, and are of the scenarios as these are now."""
 
+import functools
 import json
 import math
+import operator
+import re
 import shlex
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +26,7 @@ PAPER = {
     "campus": "campus/variants.json",
     "shelf": "shelf/variants.json",
 }
-EVALUATIONS = sorted({*PAPER.values(), "shelf/twin.json", "shelf/look_alikes.json"})
+EVALUATIONS = sorted({*PAPER.values(), "shelf/twin.json"})
 
 
 @pytest.mark.parametrize("name", DIGESTS)
@@ -100,3 +103,70 @@ def test_no_evaluation_is_forgotten():
         for path in (ROOT / "results" / folder).glob("*.json")
     }
     assert told - {"shelf/detector.json"} == set(EVALUATIONS)
+
+
+def test_digests_are_of_one_code():
+    made = [json.loads((ROOT / "results" / name / "digest.json").read_text(encoding="utf-8")) for name in DIGESTS]
+    assert len({json.dumps([told["digests"], told["versions"]]) for told in made}) == 1
+
+
+class TestFindings:
+    """Every figure of a finding is one of a committed file, which an invisible comment behind it names."""
+
+    FINDINGS = re.split(
+        r"\n(?=\d+\. )",
+        re.search(r"## Ten findings\n(.*?)\n## ", (ROOT / "results" / "README.md").read_text(), re.S)[1],
+    )[1:]
+
+    @staticmethod
+    def value(named: str) -> float:
+        """What a file says.
+
+        ``FOLDER/FILE.json:key.key``; or ``STUDY VARIANT SCORE``, of all, at ``KEY=VALUE`` or in ``case=NAME``; or
+        ``STUDY VARIANT breaks KEY``, where its PCP passes 90; or ``STUDY VARIANT matching_alone``.
+        """
+        if ".json:" in named:
+            file, path = named.split(":")
+            told = json.loads((ROOT / "results" / file).read_text(encoding="utf-8"))
+            keys = [int(key) if key.isdigit() else key for key in path.split(".")]
+            return functools.reduce(operator.getitem, keys, told)
+        study, variant, what, *where = named.split()
+        told = json.loads((ROOT / "results" / study / "digest.json").read_text(encoding="utf-8"))
+        if what == "breaks":
+            (point,) = (
+                each["value"]
+                for each in told["breaking"]
+                if (each["factor"], each["variant"], each["score"], each["threshold"]) == (*where, variant, "pcp", 90.0)
+            )
+            return point
+        if what == "matching_alone":
+            return told["failures"][variant][what]
+        if not where:
+            return told["means"][variant][what][0]
+        key, _, at = where[0].partition("=")
+        if key == "case":
+            return told["cases"][at][variant][what][0]
+        (factor,) = (each for each in told["factors"] if each["key"] == key)
+        return factor["scores"][variant][what][[str(value) for value in factor["values"]].index(at)][0]
+
+    def test_there_are_ten(self):
+        assert [int(finding.split(".")[0]) for finding in self.FINDINGS] == list(range(1, 11))
+
+    @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.split(".")[0])
+    def test_figures_are_those_of_the_files(self, finding):
+        (comment,) = re.findall(r"<!-- (.*?) -->", finding, re.S)
+        text = " ".join(re.sub(r"<!-- .*? -->", "", finding, flags=re.S).split())
+        figures = [each.rsplit(maxsplit=1) for each in comment.split(";")]
+        assert figures
+        for named, number in figures:
+            decimals = len(number.partition(".")[2])
+            assert f"{self.value(named.strip()):.{decimals}f}" == number, named
+            assert re.search(rf"(?<![\d.]){re.escape(number.lstrip('-'))}(?![\d]|\.\d)", text), number
+
+    @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.split(".")[0])
+    def test_every_finding_has_its_command(self, finding):
+        named = re.findall(r"`make (results-\S+)`", finding)
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        studies = re.search(r"^STUDIES := (.*)$", makefile, re.M)[1].split()
+        assert named
+        assert set(named) <= {*(f"results-{study}" for study in studies), "results-paper", "results-time"}
