@@ -66,7 +66,8 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
 def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> dict[str, Any]:
     """The numbers of a study, JSON-ready; means with the ends of their 95 % intervals over seeds.
 
-    Beside the keys of :data:`simharness.study.provenance.PROVENANCE`: ``means`` of the variants and, where there are
+    Beside the keys of :data:`simharness.study.provenance.PROVENANCE`, of which ``seconds`` are those of all trials, one
+    after the other: ``means`` of the variants and, where there are
     any, of ``cases`` by name; ``factors`` with the scores at every value; ``breaking`` points; ``failures`` in 100
     frames by kind and by stage, and the share of them that the right matching of the real detections would have mended;
     ``time_ms`` of each stage.
@@ -79,6 +80,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         "name": info["name"],
         "description": info["description"],
         **{key: info[key] for key in PROVENANCE},
+        "seconds": round(float(trials["seconds"].sum()), 1),  # those of the run leave out trials that were there before
         "trials": info["trials"],
         "one_at_a_time": info["one_at_a_time"],
         "means": _means(trials, names),
@@ -134,7 +136,7 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
     names = list(told["means"])
     seeds, took = told["seeds"], duration(told["seconds"])
     yield f"# {told['name']}"
-    yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {took}."
+    yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {took} of one core."
     yield f"\n    {told['command']}"
     yield f"\n{origin(told)}"
     yield "\nMeans over seeds, each the mean over its settings, with 95 % intervals over seeds.\n"

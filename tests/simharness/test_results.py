@@ -165,7 +165,7 @@ class TestFindings:
 
     @pytest.mark.parametrize("finding", FINDINGS, ids=lambda finding: finding.split(".")[0])
     def test_every_finding_has_its_command(self, finding):
-        named = re.findall(r"`make (results-\S+)`", finding)
+        named = re.findall(r"`make (results-\S+)`", " ".join(finding.split()))
         makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
         studies = re.search(r"^STUDIES := (.*)$", makefile, re.M)[1].split()
         assert named

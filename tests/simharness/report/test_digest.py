@@ -82,7 +82,9 @@ def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
 def test_it_says_where_it_comes_from(study):
     told = digest(study)
     assert told["command"] == study.info["command"]
-    assert all(told[key] == study.info[key] for key in PROVENANCE)
+    assert all(told[key] == study.info[key] for key in PROVENANCE if key != "seconds")
+    assert told["seconds"] > 0
+    assert told["seconds"] == pytest.approx(study.trials["seconds"].sum(), abs=0.1)
     text = markdown(told)
     assert study.info["command"] in text
     assert all(f"{name} {version}" in text for name, version in study.info["versions"].items())
