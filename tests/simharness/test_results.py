@@ -170,3 +170,10 @@ class TestFindings:
         studies = re.search(r"^STUDIES := (.*)$", makefile, re.M)[1].split()
         assert named
         assert set(named) <= {*(f"results-{study}" for study in studies), "results-paper", "results-time"}
+
+    def test_the_readme_quotes_them(self):
+        """What the README says was found has no figure that a finding has not."""
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        quoted = set(re.findall(r"\d+\.\d+", re.search(r"## What we found\n(.*?)\n## ", readme, re.S)[1]))
+        assert len(quoted) > 5
+        assert quoted <= set(re.findall(r"\d+\.\d+", "".join(self.FINDINGS)))
