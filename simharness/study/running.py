@@ -188,8 +188,9 @@ def _run(
                         store.write(each.entries[variant], entry)
                     run += 1
                 watch.advance(isinstance(result, Failure))
-    except KeyboardInterrupt:
-        raise Interrupted(kept + run, len(different)) from None
+    except KeyboardInterrupt:  # which may come between a trial's last entry and its count: the store knows
+        finished = sum(all(map(store.holds, different[unit.trial].entries.values())) for unit in units)
+        raise Interrupted(kept + finished, len(different)) from None
     losses = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)
     return Tally(len(different), kept, run, losses, damaged, perf_counter() - start)
 

@@ -80,6 +80,10 @@ class Store:
         except OSError as error:
             raise ValueError(f"store {self.folder}: cannot be used: {error.strerror}: {error.filename}") from None
 
+    def holds(self, identity: str) -> bool:
+        """Whether there is an entry that was not found damaged so far; unlike :meth:`has`, without reading it."""
+        return identity not in self.damaged and self.file_of(identity).exists()
+
     def has(self, identity: str) -> bool:
         """Whether there is an entry, and all of it can be read."""
         return self._sound(identity) is not None

@@ -15,15 +15,18 @@ from simharness.study.store import Store
 
 
 def store_is_clean(folder):
-    """Every file of the store is a whole entry with the right numbers; returns how many trials it has."""
-    store, trials = Store(folder / "out" / "store"), set()
+    """Every file of the store is a whole entry with the right numbers; returns of how many trials it has all variants.
+
+    A kill may well come between two variants of a trial: that trial is not finished.
+    """
+    store, finished = Store(folder / "out" / "store"), 0
     for each in plan(study_of(folder, cameras=(3, 4), seeds=3)):
-        for variant, identity in each.entries.items():
-            if store.file_of(identity).exists():
-                assert store.read(identity).measured.scores == made_up(each.scenario, variant).scores
-                trials.add(each.trial)
+        there = {variant: store.file_of(identity).exists() for variant, identity in each.entries.items()}
+        for variant in (variant for variant, exists in there.items() if exists):
+            assert store.read(each.entries[variant]).measured.scores == made_up(each.scenario, variant).scores
+        finished += all(there.values())
     assert not store.damaged
-    return len(trials)
+    return finished
 
 
 def wait_for(condition, seconds=60.0):

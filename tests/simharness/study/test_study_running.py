@@ -10,7 +10,7 @@ from simharness.scenario.study import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.identity import entry_identity, trial_identity
 from simharness.study.results import read_study
-from simharness.study.running import FailedTrial, run_shard, run_study
+from simharness.study.running import FailedTrial, Interrupted, run_shard, run_study
 from simharness.study.store import Store
 
 
@@ -103,6 +103,27 @@ class TestResuming:
         results = run(study_of(tmp_path, variants=("full", "fast")))
         assert called(run.calls)[2:] == ["0 3 full", "1 3 full"]
         assert results.trials["variant"].to_list() == ["full", "fast"] * 2
+
+    @pytest.mark.parametrize("entries", range(1, 7))
+    def test_an_interruption_after_any_entry_says_what_is_finished(self, tmp_path, run, monkeypatch, entries):
+        study, write, written = study_of(tmp_path, seeds=3), Store.write, []
+
+        def interrupted(store, identity, entry):
+            write(store, identity, entry)
+            written.append(identity)
+            if len(written) == entries:
+                raise KeyboardInterrupt
+
+        with monkeypatch.context() as context, pytest.raises(Interrupted) as stopped:
+            context.setattr(Store, "write", interrupted)
+            run(study)
+        finished, half = divmod(entries, 2)
+        assert str(stopped.value).startswith(f"interrupted: {finished} of 3 trials are kept")
+        before = len(called(run.calls))
+        assert counts(run(study)) == (3, finished, 3 - finished, 0)
+        if half:
+            assert called(run.calls)[before] == f"{finished} 3 fast"  # the other variant is there
+        assert len(called(run.calls)) == before + 3 - finished
 
     def test_a_new_name_runs_nothing(self, tmp_path, run):
         run(study_of(tmp_path))
