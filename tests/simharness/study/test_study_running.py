@@ -114,9 +114,10 @@ class TestResuming:
             if len(written) == entries:
                 raise KeyboardInterrupt
 
-        with monkeypatch.context() as context, pytest.raises(Interrupted) as stopped:
+        with monkeypatch.context() as context:
             context.setattr(Store, "write", interrupted)
-            run(study)
+            with pytest.raises(Interrupted) as stopped:
+                run(study)
         finished, half = divmod(entries, 2)
         assert str(stopped.value).startswith(f"interrupted: {finished} of 3 trials are kept")
         before = len(called(run.calls))
