@@ -73,6 +73,11 @@ class Skeleton:
         return tuple((parent, child) for child, parent in enumerate(self.parents) if parent >= 0)
 
     @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """What each joint is of the body, whichever its side: the names without ``left_`` and ``right_``, (J,)."""
+        return tuple(joint.removeprefix("left_").removeprefix("right_") for joint in self.joints)
+
+    @cached_property
     def variances(self) -> Floats:
         """What OKS divides squared distances by, ``(2 sigma)²``, (J,), as fractions of the person's area."""
         variances = (2.0 * np.array(self.sigmas)) ** 2

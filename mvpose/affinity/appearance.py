@@ -80,7 +80,13 @@ def _unit(descriptors):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def likeness(cosine, midpoint, slope):  # type: ignore[no-untyped-def]
     """Affinity of two unit vectors."""
-    return falling(math.sqrt(max(2.0 - 2.0 * cosine, 0.0)), midpoint, slope)
+    return falling(apart(cosine), midpoint, slope)
+
+
+@njit(cache=True)
+def apart(cosine):  # type: ignore[no-untyped-def]
+    """Distance of two unit vectors."""
+    return math.sqrt(max(2.0 - 2.0 * cosine, 0.0))
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numba import njit
 
-from mvpose.affinity.appearance import AppearanceAffinity, cosines, likeness
+from mvpose.affinity.appearance import AppearanceAffinity, apart, cosines, likeness
 from mvpose.affinity.base import Floats
 from mvpose.affinity.epipolar import EpipolarAffinity
 from mvpose.affinity.geometry import GeometricAffinity
@@ -110,17 +110,11 @@ def _weigh(affinity, cosine, described, view, midpoint, slope, weight):  # type:
         for i in range(m):
             if affinity[i, k] > 0.0:
                 c = second[view[i]] if nearest[view[i]] == i else first[view[i]]
-                distance = _distance(cosine[i, k])
-                side[i, k] = weight * (_distance(c) - distance) if c > nobody else midpoint - distance
+                distance = apart(cosine[i, k])
+                side[i, k] = weight * (apart(c) - distance) if c > nobody else midpoint - distance
     for i in range(m):
         for k in range(i + 1, m):
             geometric = affinity[i, k]
             if geometric > 0.0 and described[i] and described[k]:
                 against = (1.0 - geometric) * math.exp(-0.5 * (side[i, k] + side[k, i]) / slope)
                 affinity[i, k] = affinity[k, i] = geometric / (geometric + against)
-
-
-@njit(cache=True)
-def _distance(cosine):  # type: ignore[no-untyped-def]
-    """Of two unit vectors."""
-    return math.sqrt(max(2.0 - 2.0 * cosine, 0.0))

@@ -66,9 +66,7 @@ def bones(skeleton: Skeleton) -> Bones:
     """The published bones of a skeleton."""
     length, definition = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
     for parent, child in skeleton.edges:
-        ends = frozenset(
-            skeleton.joints[joint].removeprefix("left_").removeprefix("right_") for joint in (parent, child)
-        )
+        ends = frozenset((skeleton.parts[parent], skeleton.parts[child]))
         if ends in _BONES:
             length[child], definition[child] = _BONES[ends]
     return Bones(length, definition)

@@ -29,27 +29,22 @@ _CONCENTRATION: dict[tuple[str, str], float] = {
     ("hip", "knee"): 3.0,
     ("knee", "ankle"): 3.0,
 }
-_PARTS = {"shoulder": 1, "hip": 2, "nose": 3, "eye": 3, "ear": 3, "head_top": 3}
+_SEGMENTS = {"shoulder": 1, "hip": 2, "nose": 3, "eye": 3, "ear": 3, "head_top": 3}
 
 
 @cache
 def hang(skeleton: Skeleton) -> Floats:
     """Concentration of the direction from the parent to every joint about that down the trunk, (J,); 0: any will do."""
-    words = _words(skeleton)
     concentration = np.zeros(len(skeleton))
     for parent, child in skeleton.edges:
-        concentration[child] = _CONCENTRATION.get((words[parent], words[child]), 0.0)
+        concentration[child] = _CONCENTRATION.get((skeleton.parts[parent], skeleton.parts[child]), 0.0)
     return concentration
 
 
 @cache
 def parts(skeleton: Skeleton) -> NDArray[np.int64]:
     """What tells the trunk's direction: 1 for the shoulders, 2 for the hips, 3 for the head, 0 for others, (J,)."""
-    return np.array([_PARTS.get(word, 0) for word in _words(skeleton)], np.int64)
-
-
-def _words(skeleton: Skeleton) -> list[str]:
-    return [joint.removeprefix("left_").removeprefix("right_") for joint in skeleton.joints]
+    return np.array([_SEGMENTS.get(part, 0) for part in skeleton.parts], np.int64)
 
 
 @njit(cache=True)

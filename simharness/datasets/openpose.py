@@ -18,7 +18,16 @@ from simharness.datasets.files import read_json
 Floats = NDArray[np.float64]
 
 _WHAT = "OpenPose output of one image: {'people': [{'pose_keypoints_2d': [25 x (x, y, score)]}, ...]}"
-_BODY25_TO_COCO17 = (0, 16, 15, 18, 17, 5, 2, 6, 3, 7, 4, 12, 9, 13, 10, 14, 11)
+# fmt: off
+BODY_25 = (
+    "nose", "neck", "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist",
+    "mid_hip", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle",
+    "right_eye", "left_eye", "right_ear", "left_ear",
+    "left_big_toe", "left_small_toe", "left_heel", "right_big_toe", "right_small_toe", "right_heel",
+)
+# fmt: on
+BODY_25_OF_COCO17 = [BODY_25.index(joint) for joint in COCO17.joints]
+"""Where each joint of COCO-17 stands in BODY_25."""
 
 
 def read_people(path: str | Path) -> tuple[Floats, Floats]:
@@ -37,7 +46,7 @@ def read_people(path: str | Path) -> tuple[Floats, Floats]:
     if not isinstance(people, list):
         raise ValueError(f"{path}: no list 'people'; expected {_WHAT}")
     body = np.array([_keypoints(path, index, person) for index, person in enumerate(people)])
-    coco = body.reshape(-1, 25, 3)[:, _BODY25_TO_COCO17]
+    coco = body.reshape(-1, 25, 3)[:, BODY_25_OF_COCO17]
     scores = np.clip(coco[..., 2], 0.0, 1.0)
     keypoints = np.where(scores[..., None] > 0, coco[..., :2], np.nan)
     found = (scores > 0).any(axis=1)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from mvpose.skeleton import PANOPTIC19
+from simharness.datasets.openpose import BODY_25
 from simharness.experiment.trial import Trial
 from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
-from simharness.export.openpose import BODY_25
 from simharness.export.poses import CONFIDENCES
 from simharness.humans.population import is_child
 from simharness.motion.choreography import roles

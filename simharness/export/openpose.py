@@ -12,19 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose import COCO17
-
-# fmt: off
-BODY_25 = (
-    "nose", "neck", "right_shoulder", "right_elbow", "right_wrist", "left_shoulder", "left_elbow", "left_wrist",
-    "mid_hip", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle",
-    "right_eye", "left_eye", "right_ear", "left_ear",
-    "left_big_toe", "left_small_toe", "left_heel", "right_big_toe", "right_small_toe", "right_heel",
-)
-# fmt: on
+from simharness.datasets.openpose import BODY_25, BODY_25_OF_COCO17
 
 _VERSION = 1.3  # of OpenPose's files
 _OTHERS = ("face", "hand_left", "hand_right")
-_PLACES = [BODY_25.index(joint) for joint in COCO17.joints]
 _MIDDLES = {"neck": "shoulder", "mid_hip": "hip"}
 
 
@@ -38,7 +29,7 @@ def people_file(keypoints: ArrayLike, scores: ArrayLike) -> dict[str, Any]:
     keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
     triples = np.where(scores[..., None] > 0, np.concatenate([keypoints, scores[..., None]], axis=-1), 0.0)
     body = np.zeros((len(scores), len(BODY_25), 3))
-    body[:, _PLACES] = triples
+    body[:, BODY_25_OF_COCO17] = triples
     for joint, end in _MIDDLES.items():
         ends = triples[:, [COCO17.index(f"left_{end}"), COCO17.index(f"right_{end}")]]
         middle = np.concatenate([ends[..., :2].mean(axis=1), ends[..., 2:].min(axis=1)], axis=-1)
