@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from simharness.scenario.dump import toml
 from simharness.scenario.extending import read_document
 from simharness.scenario.layers import leaves
 from simharness.scenario.study import Setting, Study
@@ -81,7 +82,7 @@ def _values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _written(value: Any) -> str:
-    """A TOML value, for which JSON's are good; words without the quotes that a shell would need quotes around."""
+    """A TOML value; words without the quotes that a shell would need quotes around."""
     if isinstance(value, str) and _WORD.fullmatch(value) and value not in _VALUES:
         return value
-    return json.dumps(value)
+    return toml(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from simharness.gate.trials import overrides
 from simharness.report.pictures import MOST_VIEWS, Picture, draw_frame
 from simharness.report.replay import Replay, replay
 from simharness.report.turnable import Turnable, turnable
+from simharness.scenario.dump import toml
 from simharness.scenario.files import relative_files
 from simharness.scenario.models import Scenario
 from simharness.scenario.study import Study, load_study
@@ -131,7 +131,7 @@ def show(
 def _command(study: Study, scenario: Scenario) -> str:
     """What renders a trial of a study again, for a shell."""
     setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
-    files = [f"{'.'.join(key)}={json.dumps(value)}" for key, value in relative_files(dict(study.said))]
+    files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.said))]
     sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]
     layers = ["--overlay", "truth,detections,estimates"]
     return shlex.join(["simharness", "render", str(study.path), *sets, "--seed", str(scenario.seed), *layers])
