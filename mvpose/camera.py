@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.checks import as_array, as_points
+from mvpose.checks import Sealed, as_array, as_points
 from mvpose.lens import distort, undistort
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ _FARTHEST = 1e6  # focal lengths from the principal point: across the line of si
 
 
 @dataclass(frozen=True)
-class Camera:
+class Camera(Sealed):
     """A pinhole camera with Brown distortion.
 
     Attributes:
@@ -177,7 +177,7 @@ def _bend(points, terms, inverse):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class Rig:
+class Rig(Sealed):
     """Two or more cameras in one world, in a fixed order: the view index of every array.
 
     Some cameras may stand in one point (a pair without a baseline says nothing of depth), but not all.

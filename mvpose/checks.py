@@ -1,6 +1,10 @@
-"""One way to check an array at the border."""
+"""One way to check an array or a number at the border."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +48,47 @@ def seal(*arrays: NDArray) -> None:
     """Make fresh arrays read-only, so that :func:`as_array` need not copy what nobody can write to."""
     for array in arrays:
         array.setflags(write=False)
+
+
+class Sealed:
+    """A frozen dataclass that pickle and copy make anew by its constructor.
+
+    NumPy's arrays come back from either with leave to write: what is cached of them would no longer be true, and numba
+    would compile every kernel once more.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]
+
+
+def check_numbers(
+    owner: object,
+    what: str,
+    *,
+    positive: Iterable[str] = (),
+    not_negative: Iterable[str] = (),
+    limits: Iterable[str] = (),
+) -> None:
+    """Refuse settings that make no sense, by the names of the owner's fields.
+
+    Args:
+        owner: whose fields they are.
+        what: what the message calls the owner.
+        positive: above 0 and finite.
+        not_negative: 0 or more and finite.
+        limits: above 0; infinite where there is none.
+
+    Raises:
+        ValueError: "slope of the geometric affinity must be above 0 and finite, got nan".
+    """
+    for names, allowed, said in (
+        (positive, lambda value: 0.0 < value < np.inf, "above 0 and finite"),
+        (not_negative, lambda value: 0.0 <= value < np.inf, "0 or more and finite"),
+        (limits, lambda value: value > 0.0, "above 0"),
+    ):
+        for name in names:
+            if not allowed(getattr(owner, name)):
+                raise ValueError(f"{name} of {what} must be {said}, got {getattr(owner, name)}")
 
 
 def _sealed(value: ArrayLike, shape: tuple[int | str, ...], dtype: type[np.generic]) -> bool:

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.checks import as_array
+from mvpose.checks import Sealed, as_array
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
 
@@ -19,7 +19,7 @@ _LEAST_SCORE = 1e-6  # no detector is so exact, and products of these are far fr
 
 
 @dataclass(frozen=True)
-class Detections:
+class Detections(Sealed):
     """The 2D poses that a detector found in all views of one frame, as flat arrays of m detections.
 
     A keypoint that was not detected has score 0 and NaN coordinates; both are set where either is given, where a

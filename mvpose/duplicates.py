@@ -26,8 +26,10 @@ class Duplicates:
     detected keypoints, averaged over the two (Xiao, Wu & Wei, "Simple baselines", ECCV 2018, who suppress above 0.9).
     A keypoint far from the others is left out of the box: a single wrong joint must not make everybody alike.
 
-    Suppression is greedy: the detection with the greatest box score stays (of equals the one with the greatest mean
-    score, then the first) and takes those that are like it away; then the next of what is left.
+    Suppression is greedy: the surest detection stays (of equals the first) and takes those that are like it away; then
+    the next of what is left. How sure one is, is its box score times the mean score of all J joints, missing ones as 0
+    (as Xiao et al. rank poses): so a face that is reported once more, each of its few joints sure, is no match for
+    the whole person.
 
     Attributes:
         threshold: OKS above which two poses of one view are one person.
@@ -93,12 +95,11 @@ def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):
 
 @njit(cache=True)
 def _surer(one, other, scores, box_scores):  # type: ignore[no-untyped-def]
-    if box_scores[one] != box_scores[other]:
-        return box_scores[one] > box_scores[other]
-    difference = 0.0
+    sum_one, sum_other = 0.0, 0.0
     for j in range(scores.shape[1]):
-        difference += scores[one, j] - scores[other, j]
-    return difference > 0.0
+        sum_one += scores[one, j]
+        sum_other += scores[other, j]
+    return box_scores[one] * sum_one > box_scores[other] * sum_other
 
 
 @njit(cache=True)

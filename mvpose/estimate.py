@@ -9,12 +9,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.checks import as_array
+from mvpose.checks import Sealed, as_array
 from mvpose.skeleton import COCO17, Skeleton
 
 
 @dataclass(frozen=True)
-class Matching:
+class Matching(Sealed):
     """Detections grouped into people; at most one detection of a view in a person.
 
     Attributes:
@@ -58,7 +58,7 @@ class Matching:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Sealed):
     """The people of one frame in 3D.
 
     Attributes:

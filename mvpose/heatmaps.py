@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from mvpose.checks import as_array, as_points
+from mvpose.checks import Sealed, as_array, as_points
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ _LEAST_SHARE = 0.05  # of the peak that a neighbour counts at least: the logarit
 
 
 @dataclass(frozen=True)
-class Heatmaps:
+class Heatmaps(Sealed):
     """The heat maps of m detections, one for each of J joints.
 
     Attributes:

@@ -84,8 +84,14 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
     A keypoint that no direction is imaged at (far outside the picture of a distorting lens) is missing.
 
     Raises:
-        ValueError: a detection names a view that the rig does not have.
+        ValueError: something that is no rig or no detections, or a detection that names a view which the rig does not
+            have.
     """
+    for value, kind in ((rig, Rig), (detections, Detections)):
+        if not isinstance(value, kind):
+            raise ValueError(
+                f"expected a mvpose.{kind.__name__}, got {type(value).__name__}: estimate(rig, detections)"
+            )
     origins, directions, weights, pixel, last = _viewing_rays(
         rig.packed, detections.view, detections.keypoints, detections.scores
     )
@@ -94,12 +100,14 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
             f"a detection names view {last}, but the rig has {len(rig)} cameras (0 to {len(rig) - 1}); "
             "pass the rig that the detections were made with, its cameras in that order"
         )
-    modes = None if detections.likelihoods is None else _modes(rig, detections.view, detections.likelihoods)
+    modes = None if detections.likelihoods is None else _modes(rig, detections, detections.likelihoods)
     return Rays(detections.view, origins, directions, weights, pixel, modes)
 
 
-def _modes(rig: Rig, view: NDArray[np.int64], maps: Heatmaps) -> Modes:
+def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
+    view = detections.view
     pixels, heights = maps.modes(_MODES)
+    heights = np.where(detections.detected[..., None], heights, 0.0)  # a joint said to be missing is, whatever its map
     m, joints = heights.shape[:2]
     flat = pixels.reshape(m, joints * _MODES, 2), np.minimum(heights, 1.0).reshape(m, joints * _MODES)
     _, directions, weights, _, _ = _viewing_rays(rig.packed, view, *flat)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mvpose.affinity.base import FASTMATH, Floats, falling
 from mvpose.camera import Rig
+from mvpose.checks import check_numbers
 from mvpose.detections import Detections
 from mvpose.rays import Rays
 from mvpose.threads import one_thread
@@ -30,10 +31,16 @@ class AppearanceAffinity:
         midpoint: distance at which a match is as likely as not (affinity 1/2): 1, a cosine of 1/2.
         slope: distance over which the affinity falls from 1/2 to 1/(1 + e). At 0.1 the same person gets 0.9 and more,
             strangers 0.27 and less, at a right angle 0.02.
+
+    Raises:
+        ValueError: a scale that is not above 0.
     """
 
     midpoint: float = 1.0
     slope: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "the appearance affinity", positive=("midpoint", "slope"))
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
         """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`. 0 for a detection without a descriptor.

@@ -10,6 +10,7 @@ from numba import njit
 
 from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, in_common, lay_out
 from mvpose.camera import Rig
+from mvpose.checks import check_numbers
 from mvpose.detections import Detections
 from mvpose.rays import Rays, viewing_rays
 
@@ -42,6 +43,9 @@ class EpipolarAffinity:
         nearest: where a viewing ray starts, metres from the optical centre.
         epipole: a joint within so many pixels of the other camera's image has no line with a direction, as keypoints
             scatter so much; it is left out, as one that is missing.
+
+    Raises:
+        ValueError: a scale that is not above 0.
     """
 
     midpoint: float = 26.0
@@ -51,6 +55,15 @@ class EpipolarAffinity:
     least_joints: int = 3
     nearest: float = 0.5
     epipole: float = 10.0
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            "the epipolar affinity",
+            positive=("midpoint", "slope"),
+            limits=("threshold", "saturation"),
+            not_negative=("nearest", "epipole"),
+        )
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
         """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, in_common, lay_out
 from mvpose.camera import Rig
+from mvpose.checks import check_numbers
 from mvpose.detections import Detections
 from mvpose.rays import Rays
 
@@ -44,6 +45,9 @@ class GeometricAffinity:
         widest: how far midpoint, slope and threshold may grow together in a frame whose rays all meet badly, because
             the calibration is off or the clocks are: the factor by which :func:`misfit` exceeds what keypoints
             explain, at least 1. 1 keeps them as they are. Beyond 2 two people who do not touch would match.
+
+    Raises:
+        ValueError: a scale that is not above 0, ``widest`` below 1.
     """
 
     midpoint: float = 0.15
@@ -55,6 +59,13 @@ class GeometricAffinity:
     widest: float = 2.0
 
     def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            "the geometric affinity",
+            positive=("midpoint", "slope"),
+            limits=("threshold", "saturation"),
+            not_negative=("nearest",),
+        )
         if not 1.0 <= self.widest < math.inf:
             raise ValueError(f"widest of the geometric affinity must be at least 1 and finite, got {self.widest}")
 

@@ -40,10 +40,10 @@ def caption(text: str) -> str:
 
 
 def figure(value: float) -> str:
-    """Three significant digits without an exponent: 0.0521, 0.600, 70.2, 5555."""
+    """Three significant digits without an exponent, four decimals at most: 0.0521, 0.600, 70.2, 5555."""
     if value == 0:
         return "0"
-    places = max(0, 2 - math.floor(math.log10(abs(value))))
+    places = min(max(0, 2 - math.floor(math.log10(abs(value)))), 4)
     return f"{value:.{places}f}"
 
 

@@ -35,6 +35,14 @@ def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: fl
     Returns:
         A part for every detection, (m,): arbitrary names below m, at most one detection of a view in a part.
     """
+    order = np.argsort(view, kind="stable")  # the search goes from view to view: in the same order however listed
+    part = np.empty(len(order), np.int64)
+    part[order] = _cluster(affinity[order[:, None], order], view[order], alpha)
+    return part
+
+
+def _cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
+    """As :func:`cluster`, of detections in the order of their views."""
     affinity, alpha = read_only(affinity, np.float64), float(alpha)
     rank, views = rank_views(read_only(view, np.int64))
     gains = _pair_gains(affinity, alpha, rank)

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvpose.checks import seal
+from mvpose.checks import check_numbers, seal
 from mvpose.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -39,12 +39,20 @@ class Noise:
         pixels: deviation in pixels that no detector goes below.
         floor: likelihood of a keypoint anywhere, as a share of the peak of a right one. One keypoint in ten is
             grossly wrong (PoseFix's rates) and lies anywhere in a square metre; the others within 0.05 m.
+
+    Raises:
+        ValueError: a floor of 0, a deviation below 0, nothing that scatters.
     """
 
     area: float = 0.70
     definition: float = 0.02
     pixels: float = 1.0
     floor: float = 0.01
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "the noise model", positive=("floor",), not_negative=("area", "definition", "pixels"))
+        if not self.area + self.definition:
+            raise ValueError("the noise model needs an area or a definition above 0: no detector is exact")
 
     def sigmas(self, skeleton: Skeleton) -> Floats:
         """Standard deviation of every joint of score 1 across the ray, (J,), metres."""

@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.checks import check_numbers
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import bone_lengths
 from mvpose.reconstruction.hypotheses import hypothesize
@@ -50,6 +51,9 @@ class UnmatchedPictorialStructure:
         apart: two people's joints are further apart than this on average, metres: a chest is 0.25 m deep
             (ANSUR II). What lies nearer is one person seen twice, left-right inverted or not.
         most_states: states that a keypoint can propose, the likeliest ones.
+
+    Raises:
+        ValueError: a setting that is not above 0.
     """
 
     noise: Noise = Noise()
@@ -58,6 +62,14 @@ class UnmatchedPictorialStructure:
     least_joints: int = 6
     apart: float = 0.15
     most_states: int = 8
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            "the unmatched pictorial structure",
+            positive=("agreement", "reach", "least_joints", "most_states"),
+            not_negative=("apart",),
+        )
 
     def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Poses, Integers]:
         """Find everybody.
@@ -91,6 +103,7 @@ class UnmatchedPictorialStructure:
         for joint in outwards:
             outwards += np.flatnonzero(parents == joint).tolist()
         order = np.array(outwards)
+        known = np.isfinite(bone_lengths(skeleton)[1])  # a bone of unknown length binds nothing
         found = _Found([], [], np.full(rays.weights.shape, -1), np.zeros(rays.weights.shape))
         unary = np.ones(len(space.points))
         _weigh(unary, rays.view, found.owner, space)
@@ -98,7 +111,7 @@ class UnmatchedPictorialStructure:
             core, bound = _best_pose(order, parents, unary, space)
             if bound < _SHARED:
                 return found
-            pose = _attach(core, order, parents, unary, rays.view, found.owner, space)
+            pose = _attach(core, order, parents, unary, rays.view, found.owner, known, space)
             if (pose >= 0).sum() < self.least_joints:
                 unary[core[core >= 0]] = 0.0
                 continue
@@ -233,7 +246,7 @@ def _best_pose(order, parents, unary, space):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _attach(core, order, parents, unary, view, owner, space):  # type: ignore[no-untyped-def]
+def _attach(core, order, parents, unary, view, owner, known, space):  # type: ignore[no-untyped-def]
     """The pose with joints that an absent one cuts it off from: those on which two of its own detections agree.
 
     Its own is, in each view, the detection that vouches for most of its joints, if for three or more.
@@ -267,9 +280,9 @@ def _attach(core, order, parents, unary, view, owner, space):  # type: ignore[no
             fits = True  # to the neighbours that there are
             for other in range(len(parents)):
                 if pose[other] >= 0 and parents[joint] == other:
-                    fits = fits and _linked(state, pose[other], space)
+                    fits = fits and (not known[joint] or _linked(state, pose[other], space))
                 elif pose[other] >= 0 and parents[other] == joint:
-                    fits = fits and _linked(pose[other], state, space)
+                    fits = fits and (not known[other] or _linked(pose[other], state, space))
             if fits:
                 best = total
                 pose[joint] = state

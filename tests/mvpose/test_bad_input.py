@@ -10,12 +10,15 @@ from hypothesis.extra import numpy as arrays
 from people import crowd, look_at, ring
 from scipy.optimize import linear_sum_assignment
 
-from mvpose import SHELF14, Camera, Detections, Pipeline, Rig
+from mvpose import COCO17, SHELF14, Camera, Detections, Pipeline, Rig
 from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
+from mvpose.skeleton import PANOPTIC19
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 
 SEEING = [name for name in PRESETS if name not in NEED_DESCRIPTORS]
+MIDDLES = {"neck": ("left_shoulder", "right_shoulder"), "mid_hip": ("left_hip", "right_hip")}
+PANOPTIC = [MIDDLES.get(joint, (joint,)) for joint in PANOPTIC19.joints]  # the joints of COCO-17 it is amid
 BARREL = [-0.37, 0.15, 0.0, 0.0, 0.0]
 WEBCAM = [0.115, -0.219, 0.0012, 0.0086, 0.113]
 WILD = [np.nan, np.inf, -np.inf, 1e4, -1e6, 1e6, 1e12, 1e300, -1.7e308]
@@ -303,3 +306,21 @@ def test_another_skeleton_than_coco_works(preset):
     assert len(estimate) == 3
     limbs = distances(estimate, frame.people[:, rows])[:, :12]
     assert (limbs < 0.15).all()
+
+
+@pytest.mark.parametrize("preset", SEEING)
+def test_a_skeleton_with_bones_of_unknown_length_has_all_its_joints(preset):
+    """Nobody publishes how far the neck is from the middle of the hips: such a bone binds nothing."""
+    frame = clean(0, noise=1.0)
+
+    def panoptic(joints):
+        """Of COCO-17 (..., 17, k), where the points in between are taken in the picture as in space."""
+        return np.stack([joints[..., [COCO17.index(end) for end in ends], :].mean(axis=-2) for ends in PANOPTIC], -2)
+
+    keypoints, people = panoptic(frame.keypoints), panoptic(frame.people)
+    detections = Detections.from_keypoints(
+        frame.view, keypoints, np.full(keypoints.shape[:2], 0.9), skeleton=PANOPTIC19
+    )
+    estimate = estimated(preset, frame, detections)
+    assert len(estimate) == len(people)
+    assert (distances(estimate, people) < 0.1).all()

@@ -48,7 +48,7 @@ def by_definition(detections, threshold=0.9, least=3):
             exponent = np.where(d2 > 0, d2 / (2 * s2 * (2 * sigmas[both]) ** 2), 0.0)
         return np.exp(-exponent).mean()
 
-    rank = sorted(range(len(detections)), key=lambda d: (-detections.box_scores[d], -np.round(scores[d].sum(), 9), d))
+    rank = sorted(range(len(detections)), key=lambda d: (-detections.box_scores[d] * scores[d].sum(), d))
     kept = []
     for d in rank:
         if all(detections.view[k] != detections.view[d] or oks(k, d) <= threshold for k in kept):
@@ -89,9 +89,17 @@ def test_the_surest_stays():
     near = [picture() + [shift, 0.0] for shift in (0.0, 0.5, 1.0)]
     assert Duplicates()(poses(near, box_scores=[0.3, 0.9, 0.5])).tolist() == [False, True, False]
     scores = np.full((3, 17), 0.5)
-    scores[2, 0] = 0.6  # equal boxes: the greater mean score
+    scores[2, 0] = 0.6  # equal boxes: the greater sum
     assert Duplicates()(poses(near, scores=scores, box_scores=[0.5] * 3)).tolist() == [False, False, True]
     assert Duplicates()(poses(near)).tolist() == [True, False, False]  # all equal: the first
+
+
+def test_a_few_sure_joints_are_no_match_for_the_whole_person():
+    scores = np.full((2, 17), 0.9)
+    scores[1] = [0.97] * 5 + [0.0] * 12  # the face once more, surer than the person in the mean over what it has
+    whole_and_face = poses([picture()] * 2, scores=scores)
+    assert whole_and_face.box_scores[1] > whole_and_face.box_scores[0]
+    assert Duplicates()(whole_and_face).tolist() == [True, False]
 
 
 def test_suppression_is_greedy_and_not_transitive():

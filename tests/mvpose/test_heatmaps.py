@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from people import crowd, detect, ring
 
-from mvpose import COCO17, SHELF14, Detections
+from mvpose import COCO17, SHELF14, Detections, Pipeline
 from mvpose.heatmaps import Heatmaps
 
 
@@ -217,3 +220,16 @@ def test_what_is_no_heat_map_is_refused():
 def test_no_detections_have_no_maps():
     maps = Heatmaps(np.zeros((0, 17, 4, 4)), np.zeros((0, 2)), np.zeros((0, 2)))
     assert len(Detections.from_heatmaps([], maps)) == 0
+
+
+def test_a_joint_that_is_said_to_be_missing_is_whatever_its_map():
+    rig, people = ring(4), crowd(2)
+    detections, _ = detect(rig, people)
+    values = np.tile(blobs((8.0, 12.0, 0.9), shape=(24, 16)), (len(detections), 17, 1, 1))
+    maps = Heatmaps(values, detections.keypoints[:, 9] - [8.0, 12.0], np.ones((len(detections), 2)))  # all peak at it
+    scores = detections.scores.copy()
+    scores[:, 9] = 0.0
+    seen = replace(detections, likelihoods=maps)
+    missing = replace(seen, scores=scores)
+    assert np.isfinite(Pipeline().estimate(rig, seen).joints[:, 9]).all()
+    assert np.isnan(Pipeline().estimate(rig, missing).joints[:, 9]).all()

@@ -1,5 +1,8 @@
+import copy
+import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +11,10 @@ from people import crowd, detect, ring
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import Camera, Detections, Pipeline, Rig
+from mvpose.affinity import AppearanceAffinity, EpipolarAffinity, GeometricAffinity
+from mvpose.heatmaps import Heatmaps
 from mvpose.pipeline import PRESETS
+from mvpose.reconstruction import Noise, UnmatchedPictorialStructure
 
 
 def errors(estimate, people):
@@ -108,6 +114,78 @@ def test_a_person_reported_twice_is_one_person(preset):
     assert len(estimate) == 2
     assert errors(estimate, people).max() < 0.06
     assert (np.bincount(estimate.matching.labels + 1)[1:] == 5).all()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_face_reported_once_more_costs_no_joint(preset):
+    rig, people = ring(4), crowd(2)
+    detections, person = detect(rig, people, noise=2.0)
+    twice = np.concatenate([np.arange(len(person))] * 2)
+    scores = 0.9 * np.ones((len(twice), 17))
+    scores[len(person) :] = [0.97] * 5 + [0.0] * 12
+    again = Detections.from_keypoints(detections.view[twice], detections.keypoints[twice], scores)
+    estimate = Pipeline.preset(preset).estimate(rig, described(again, person[twice]))
+    assert len(estimate) == 2
+    assert errors(estimate, people).max() < 0.06
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, copy.copy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_copies_are_as_frozen_as_what_they_are_of(copied):
+    rig, people = ring(3), crowd(2)
+    detections, person = detect(rig, people)
+    maps = Heatmaps(np.ones((len(person), 17, 2, 2)), np.zeros((len(person), 2)), np.ones((len(person), 2)))
+    detections = replace(described(detections, person), likelihoods=maps)
+    estimate = Pipeline().estimate(rig, detections)
+    for each, names in (
+        (rig[0], "K R t distortion"),
+        (copied(rig)[0], "K R t distortion"),
+        (detections, "view keypoints scores boxes box_scores descriptors"),
+        (maps, "values origin stride"),
+        (estimate, "joints scores covariance"),
+        (estimate.matching, "labels"),
+    ):
+        other = copied(each)
+        assert type(other) is type(each)
+        for name in names.split():
+            np.testing.assert_array_equal(getattr(other, name), getattr(each, name))
+            assert not getattr(other, name).flags.writeable
+    again = Pipeline().estimate(copied(rig), copied(detections))
+    np.testing.assert_array_equal(again.joints, estimate.joints)
+
+
+def test_estimating_in_threads_gives_the_same():
+    rig, people = ring(5), crowd(4)
+    detections, person = detect(rig, people, noise=3.0)
+    detections, pipeline = described(detections, person), Pipeline()
+    alone = pipeline.estimate(rig, detections).joints
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: pipeline.estimate(rig, detections).joints, range(40)))
+    assert all(np.array_equal(joints, alone) for joints in found)
+
+
+@pytest.mark.parametrize("swapped", [lambda rig, detections: (detections, rig), lambda rig, found: (list(rig), found)])
+def test_what_is_no_rig_is_said(swapped):
+    rig = ring(3)
+    with pytest.raises(ValueError, match=r"expected a mvpose\.Rig, got (Detections|list): estimate\(rig, detections\)"):
+        Pipeline().estimate(*swapped(rig, detect(rig, crowd(1))[0]))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: GeometricAffinity(midpoint=np.nan), "midpoint of the geometric affinity must be above 0 and finite"),
+        (lambda: GeometricAffinity(slope=0.0), "slope of the geometric affinity must be above 0"),
+        (lambda: GeometricAffinity(threshold=-1.0), "threshold of the geometric affinity must be above 0, got -1"),
+        (lambda: EpipolarAffinity(nearest=-0.1), "nearest of the epipolar affinity must be 0 or more"),
+        (lambda: AppearanceAffinity(slope=-0.1), "slope of the appearance affinity must be above 0"),
+        (lambda: Noise(floor=0.0), "floor of the noise model must be above 0"),
+        (lambda: Noise(area=0.0, definition=0.0), "no detector is exact"),
+        (lambda: UnmatchedPictorialStructure(reach=np.nan), "reach of the unmatched pictorial structure must be"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 def test_timings_add_up_and_the_estimate_is_whole():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from instances import filmed, sort_by_view
 
 from mvpose.matching import Matcher, match
 from mvpose.matching.rounding import round_to_people
@@ -81,6 +82,20 @@ def test_matching_does_not_depend_on_the_order_of_detections(method):
     shuffled = match(affinity[np.ix_(order, order)], view[order], method=method).labels
     np.testing.assert_array_equal(there[order][:, None] == there[order], shuffled[:, None] == shuffled)
     np.testing.assert_array_equal(there[:, None] == there, person[:, None] == person)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nor_does_it_where_the_best_grouping_is_hard_to_find(method):
+    rng = np.random.default_rng(0)
+    for seed in range(20):
+        affinity, view, _ = sort_by_view(*filmed(seed, views=6, people=9))
+        within = [rng.permutation(np.flatnonzero(view == v)) for v in np.unique(view)]
+        order = np.concatenate(within)[rng.permutation(len(view))]
+        there = match(affinity, view, method=method).labels[order]
+        shuffled = match(affinity[np.ix_(order, order)], view[order], method=method).labels
+        np.testing.assert_array_equal(
+            (there[:, None] == there) & (there >= 0), (shuffled[:, None] == shuffled) & (shuffled >= 0)
+        )
 
 
 @pytest.mark.parametrize("method", METHODS)
