@@ -66,7 +66,7 @@ def estimators_of(method: Method, *, appearance: AppearanceAffinity | None = Non
 class OwnEstimator:
     """A method of one's own. Only where it is travels between processes: each loads it for itself, once.
 
-    What it answers is checked, and timed where it does not say how long it took.
+    What it answers is checked, and timed: whoever wraps a pipeline hands on that one's time, not its own.
 
     Attributes:
         name: of the variant.
@@ -102,7 +102,7 @@ class OwnEstimator:
             _check(answer, detections)
         except ValueError as error:
             raise RunError(f"{self.name} ({self.place}): {error}") from None
-        return answer if "total" in answer.timings else replace(answer, timings={**answer.timings, "total": seconds})
+        return replace(answer, timings={**answer.timings, "total": seconds})
 
 
 def load_estimator(place: str) -> Estimator:

@@ -65,19 +65,19 @@ class Cameras(Section):
 
 
 class Faults(Section):
-    """What is wrong with the rig, unknown to the method. Spreads are standard deviations over cameras.
+    """What is wrong with the rig, unknown to the method: drawn for each camera.
 
     Errors are in what the method believes of the cameras; drifts move the cameras away from it.
     """
 
-    focal: Share = Field(0.0, description="error of focal lengths, as a share")
-    center: Amount = Field(0.0, description="error of principal points, each way, pixels")
-    rotation: Amount = Field(0.0, description="error of orientations about each axis, degrees")
-    translation: Amount = Field(0.0, description="error of positions, each way, metres")
-    rotation_drift: Amount = Field(0.0, description="how fast cameras turn, degrees a minute about each axis")
-    translation_drift: Amount = Field(0.0, description="how fast cameras move, metres a minute each way")
-    clock_offset: Amount = Field(0.0, description="how far each camera's clock is off, seconds; at most 0.9")
-    clock_jitter: Amount = Field(0.0, description="how far each picture's time is off besides, seconds")
+    focal: Share = Field(0.0, description="standard deviation of focal lengths' error, as a share")
+    center: Amount = Field(0.0, description="standard deviation of principal points' error, each way, pixels")
+    rotation: Amount = Field(0.0, description="standard deviation of orientations' error about each axis, degrees")
+    translation: Amount = Field(0.0, description="standard deviation of positions' error, each way, metres")
+    rotation_drift: Amount = Field(0.0, description="standard deviation of how fast cameras turn about each axis, degrees a minute")
+    translation_drift: Amount = Field(0.0, description="standard deviation of how fast cameras move, each way, metres a minute")
+    clock_offset: Amount = Field(0.0, description="standard deviation of cameras' clocks, seconds; none is off by more than 0.9")
+    clock_jitter: Amount = Field(0.0, description="standard deviation of each picture's time besides, seconds")
     dropped: Share = Field(0.0, description="chance that a picture never arrives")
     frozen: Share = Field(0.0, description="chance that a camera repeats its last picture")
     dead: tuple[Annotated[int, Field(ge=0)], ...] = Field((), description="cameras that deliver nothing")
