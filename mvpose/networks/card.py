@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal, Self
 
@@ -63,12 +63,13 @@ class Card:
             raise ValueError(f"card: std must be three positive numbers, got {self.std}")
         if self.size is not None:
             object.__setattr__(self, "size", _size(self.size))
-        if isinstance(self.outputs, str):
-            raise ValueError(f"card: outputs must be names in a tuple, got {self.outputs!r}")
-        object.__setattr__(self, "outputs", tuple(self.outputs))
+        if not isinstance(self.name, str):
+            raise ValueError(f"card: name must be text, got {self.name!r}")
+        object.__setattr__(self, "outputs", _names("outputs", self.outputs))
         for key in ("midpoint", "slope", "padding", "peak"):
             value = getattr(self, key)
-            if value is not None and not (_is_number(value) and value > 0):
+            unstated = value is None and key in ("midpoint", "slope")
+            if not unstated and not (_is_number(value) and value > 0):
                 raise ValueError(f"card: {key} must be a positive number, got {value!r}")
         for key, choices in _CHOICES.items():
             if getattr(self, key) not in choices:
@@ -108,7 +109,12 @@ class Card:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def _numbers(key: str, values: Any) -> Colour:
@@ -121,11 +127,19 @@ def _numbers(key: str, values: Any) -> Colour:
     return float(red), float(green), float(blue)
 
 
+def _names(key: str, values: Any) -> tuple[str, ...]:
+    listed = tuple(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes, Mapping)) else None
+    if listed is None or not all(isinstance(name, str) for name in listed):
+        raise ValueError(f"card: {key} must be names in a tuple, got {values!r}")
+    return listed
+
+
 def _size(value: Any) -> tuple[int, int]:
     try:
         width, height = value
         whole = width == int(width) and height == int(height) and width > 0 and height > 0
-    except (TypeError, ValueError):
+        whole = whole and not isinstance(width, bool) and not isinstance(height, bool)
+    except (TypeError, ValueError, OverflowError):
         whole = False
     if not whole:
         raise ValueError(f"card: size must be width and height, two positive whole numbers of pixels, got {value!r}")

@@ -31,6 +31,10 @@ class Placement(NamedTuple):
     origin: Floats
     stride: Floats
 
+    def of(self, rows: NDArray[np.bool_]) -> Placement:
+        """Some of the crops."""
+        return Placement(self.origin[rows], self.stride[rows])
+
     def mirrored(self, middle: float) -> Placement:
         """The same crops seen in a mirror: pixel u of each becomes pixel ``2 * middle - u``."""
         origin, stride = self.origin.copy(), self.stride.copy()
@@ -44,28 +48,44 @@ def stretched(boxes: Floats, size: tuple[int, int]) -> Placement:
 
     The edges of the box are the outer edges of the crop's first and last pixels.
     """
-    stride = boxes[:, 2:] / np.array(size)
-    return Placement(boxes[:, :2] + 0.5 * stride, stride)
+    with np.errstate(over="ignore"):  # boxes beyond all numbers: none of their crop is in view
+        stride = boxes[:, 2:] / np.array(size)
+        return Placement(boxes[:, :2] + 0.5 * stride, stride)
 
 
 def padded(boxes: Floats, size: tuple[int, int], padding: float) -> Placement:
     """Boxes, (m, 4), widened ``padding`` times about their middles and then, one way, to the crop's aspect."""
-    extent = padding * boxes[:, 2:] / np.array(size)
-    stride = np.repeat(extent.max(axis=1, keepdims=True), 2, axis=1)
-    middle = boxes[:, :2] + 0.5 * boxes[:, 2:]
-    return Placement(middle - stride * (np.array(size) - 1) / 2.0, stride)
+    with np.errstate(over="ignore", invalid="ignore"):  # as above
+        extent = padding * boxes[:, 2:] / np.array(size)
+        stride = np.repeat(extent.max(axis=1, keepdims=True), 2, axis=1)
+        middle = boxes[:, :2] + 0.5 * boxes[:, 2:]
+        return Placement(middle - stride * (np.array(size) - 1) / 2.0, stride)
 
 
-def in_view(images: Images, view: NDArray[np.int64], boxes: Floats) -> NDArray[np.bool_]:
-    """Which boxes, (m, 4), have an area and some of it inside the image of their view, (m,).
+def in_view(
+    images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, least: float = 0.0
+) -> NDArray[np.bool_]:
+    """Which crops show something of the image of their view, (m,).
 
-    A view whose image is None has no picture: none of its boxes is in view.
+    Those with an area, of whose pixels some, and at least a share ``least``, have their centres inside the image. The
+    others are of the colour of the fill, all but that share, and look alike whoever is in the box. A view whose image
+    is None has no picture: none of its crops is in view.
+
+    Args:
+        images: (h, w, 3) of each view.
+        view: whose image each crop is of, (m,).
+        placement: where in the image it lies.
+        size: width and height of the crops.
+        least: 0 to 1.
     """
     sizes = np.array([(0, 0) if image is None else (image.shape[1], image.shape[0]) for image in images], float)
-    size = sizes.reshape(-1, 2)[view]
-    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
-    overlapping: NDArray[np.bool_] = (high > -0.5) & (low < size - 0.5)
-    return np.all(overlapping & (boxes[:, 2:] > 0) & (size > 0), axis=1)
+    extent = sizes.reshape(-1, 2)[view]
+    share = np.ones(len(view))
+    for axis, count in enumerate(size):
+        with np.errstate(over="ignore", invalid="ignore"):  # as above
+            centre = placement.origin[:, axis, None] + placement.stride[:, axis, None] * np.arange(count)
+        share *= ((centre >= -0.5) & (centre < extent[:, axis, None] - 0.5)).mean(axis=1)  # as in _taps
+    return np.all(placement.stride > 0, axis=1) & (share > 0) & (share >= least)
 
 
 def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None:

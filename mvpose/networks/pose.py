@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
-from mvpose.networks.crops import Images, Placement, check_images, cut, in_view, padded
+from mvpose.networks.crops import Images, Placement, check_images, cut, in_view, padded, stretched
 from mvpose.networks.decoding import Cells, Values, in_image, outer_product, simcc_modes
 from mvpose.networks.session import Session, as_session
 from mvpose.skeleton import COCO17, Skeleton
@@ -70,8 +70,9 @@ class PoseHead:
             box_scores: confidence of each, 0 to 1, (m,); the mean score of its keypoints where not given.
 
         Returns:
-            Detections, one for each box in their order; a box without area, outside its image or without one has no
-            keypoint. Scores are heights of peaks, 1 at most.
+            Detections, one for each box in their order; a box without area, outside its image or without one, or
+            without a pixel of its crop in it, has no keypoint. Scores are heights of peaks, 1 at most: of a person who
+            is hardly in the image a head itself says how unsure it is, so unlike for a descriptor one pixel is enough.
 
         Raises:
             ValueError: a wrong shape, boxes that are not finite, a view without an image, an image that is none, heat
@@ -80,8 +81,11 @@ class PoseHead:
         view = as_array(view, ("m",), "view", np.int64)
         boxes = as_array(boxes, (len(view), 4), "boxes")
         check_images(images, view, boxes)
-        seen = in_view(images, view, boxes)
-        placement = padded(boxes[seen], self.session.size, self.session.card.padding)
+        size = self.session.size
+        whole = padded(boxes, size, self.session.card.padding)
+        # Where only the padding reaches into the image there is nobody to be seen.
+        seen = in_view(images, view, stretched(boxes, size), size) & in_view(images, view, whole, size)
+        placement = whole.of(seen)
         outputs = self._outputs(images, view[seen], placement)
         found = self._decoded(outputs, view[seen], boxes[seen], placement)
         detections = _among_unseen(found, seen, view, boxes)

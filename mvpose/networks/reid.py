@@ -19,6 +19,16 @@ Floats = NDArray[np.float64]
 DEFAULT = Path(__file__).parent / "data" / "reid.onnx"
 """The network that comes with mvpose."""
 
+_LEAST = 0.3
+"""Share of a crop's pixels that must be inside the image for a descriptor.
+
+With less a descriptor is more the fill's than the person's. Measured on 240 rendered crops covered from one side by the
+fill, by the share of pairs of cut crops of two people whom the shipped network takes for one (distance below its
+midpoint), covered sideways and from below: at 0.1 of the crop left 96 % and 88 %, at 0.2 22 % and 50 %, at 0.3 7 % and
+17 %, of whole crops 1 %. One person's cut and whole crop are taken for one at 0.2 in 30 % and 11 %, at 0.3 in 60 % and
+45 %.
+"""
+
 
 class ReId:
     """Boxes of images to unit descriptors: one person's lie close together in every view.
@@ -69,7 +79,8 @@ class ReId:
     def descriptors(self, images: Images, view: ArrayLike, boxes: ArrayLike) -> Floats:
         """Descriptors of boxes, all views at once.
 
-        Where a box reaches beyond its image, the crop is of the colour that normalisation makes 0.
+        Where a box reaches beyond its image, the crop is of the colour that normalisation makes 0. A box that lies
+        almost all there has no descriptor: it would be that of the colour, and strangers would match.
 
         Args:
             images: for each view a picture (h, w, 3) uint8, red green blue, or None where there is none.
@@ -77,8 +88,8 @@ class ReId:
             boxes: x, y, width, height in pixels, (m, 4).
 
         Returns:
-            Unit vectors, (m, D); NaN for a box without area, outside its image or without one, and where the network
-            answers with zeros.
+            Unit vectors, (m, D); NaN for a box without area or without an image, for one of which less than 0.3 is
+            inside its image (counted in pixels of the crop), and where the network answers with zeros.
 
         Raises:
             ValueError: a wrong shape, boxes that are not finite, a view without an image, an image that is none.
@@ -86,9 +97,10 @@ class ReId:
         view = as_array(view, ("m",), "view", np.int64)
         boxes = as_array(boxes, (len(view), 4), "boxes")
         check_images(images, view, boxes)
-        seen = in_view(images, view, boxes)
+        whole = stretched(boxes, self.session.size)
+        seen = in_view(images, view, whole, self.session.size, least=_LEAST)
         red, green, blue = (round(255 * min(max(mean, 0.0), 1.0)) for mean in self.session.card.mean)
-        placement = stretched(boxes[seen], self.session.size)
+        placement = whole.of(seen)
         crops = cut(images, view[seen], placement, self.session.size, fill=(red, green, blue))
         result = np.full((len(view), self.dimensions), np.nan)
         (raw,) = self.session(crops)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -17,12 +20,38 @@ Values = NDArray[np.float32]
 Provider = Literal["cpu", "cuda", "auto"]
 
 _TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
+_CUDA = "CUDAExecutionProvider"
 _GREY = 128  # of the crops that a network is tried with
 
 
 def as_session(model: str | Path | Session) -> Session:
     """A session as it is, or one with the defaults for a file."""
     return model if isinstance(model, Session) else Session(model)
+
+
+def check_content(path: Path) -> None:
+    """Refuse a file that is not the one whose SHA-256 the card beside it states; without such a card pass it.
+
+    Damaged weights load as well as right ones, and of a file that is cut off near its end only the metadata is lost.
+
+    Args:
+        path: of the ONNX file; its card is the .json of its name, with an entry ``sha256``.
+
+    Raises:
+        ValueError: it is another file.
+    """
+    card = path.with_suffix(".json")
+    expected = _stated_digest(card)
+    if expected is None:
+        return
+    with path.open("rb") as opened:
+        got = hashlib.file_digest(opened, "sha256").hexdigest()
+    if got != expected.lower():
+        raise ValueError(
+            f"network {path}: is not the file of this card: {card} states sha256 {expected}, the file has {got} "
+            f"({path.stat().st_size} bytes). It is damaged, or another network: copy both again from where they came "
+            "from, or move the card away if this network is meant"
+        )
 
 
 class Session:
@@ -47,9 +76,10 @@ class Session:
         shapes: of the outputs for one crop, without the batch.
 
     Raises:
-        ValueError: no such file, one that is cut off or no ONNX, a provider that is not there, anything but one
-            input of pictures, an input size that neither file nor card states or that they contradict, outputs that
-            are missing, or not finite, or not a row for each crop.
+        ValueError: no such file, one that is cut off or no ONNX, one that is not the file of the card beside it (the
+            .json of its name, where that states a ``sha256``), a provider that is not there or does not come up,
+            anything but one input of pictures, an input size that neither file nor card states or that they
+            contradict, outputs that are missing, or not finite, or not a row for each crop.
     """
 
     def __init__(
@@ -113,18 +143,23 @@ class Session:
         providers = _providers(provider, onnxruntime.get_available_providers())
         if not self.path.is_file():
             self._refuse("no such file; expected an ONNX file. Copy it there or correct the path")
+        check_content(self.path)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
         options.log_severity_level = 4  # what matters is raised; the rest is noise on a user's terminal
         try:
-            return onnxruntime.InferenceSession(str(self.path), options, providers=providers)
+            session = onnxruntime.InferenceSession(str(self.path), options, providers=providers)
         except Exception as error:  # onnxruntime's exceptions share no base class
+            why = _reason(str(error).replace(str(self.path), ""), onnxruntime.__version__)
+            self._refuse(f"cannot be loaded: {why}. onnxruntime says: {error}", error)
+        if provider == "cuda" and _CUDA not in session.get_providers():  # onnxruntime takes the CPU and goes on
             self._refuse(
-                f"cannot be loaded: it is cut off, is no ONNX file, or needs a newer onnxruntime than "
-                f"{onnxruntime.__version__}. Copy or export it again. onnxruntime says: {error}",
-                error,
+                f"provider 'cuda': CUDA does not come up here, the network would run on "
+                f"{', '.join(session.get_providers())}; install the driver, CUDA and cuDNN that onnxruntime-gpu "
+                f"{onnxruntime.__version__} needs, or take 'auto'"
             )
+        return session
 
     def _read_input(self) -> None:
         """Name, type, layout, size and batch of the input."""
@@ -144,6 +179,7 @@ class Session:
         if len(shape) != 4:
             self._refuse(f"input {given.name!r} must be (n, 3, height, width) or (n, height, width, 3), got {shape}")
         self._channels_last = shape[3] == 3 and shape[1] != 3
+        self._layout_open = not any(isinstance(extent, int) and extent > 0 for extent in shape[1:])
         channels = shape[3] if self._channels_last else shape[1]
         if isinstance(channels, int) and channels != 3:
             self._refuse(f"input {given.name!r} must have 3 channels, red green blue, got {shape}")
@@ -182,6 +218,11 @@ class Session:
         count = len(crops)
         feed = self._feed(crops, self._fixed or count)
         hint = "" if len(feed) == 1 or self._fixed else "; if it takes one crop at a time, open it with batch=1"
+        if self._layout_open:
+            hint += (
+                f"; the file leaves the extents of its input {self._input!r} open, so it is fed (n, 3, height, width): "
+                "if it takes (n, height, width, 3), export it with that shape stated"
+            )
         try:
             raw = self._session.run(list(self.outputs), {self._input: feed})
         except Exception as error:
@@ -223,9 +264,38 @@ class Session:
 def _providers(wanted: Provider, there: list[str]) -> list[str]:
     if wanted not in ("cpu", "cuda", "auto"):
         raise ValueError(f"provider must be cpu, cuda or auto, got {wanted!r}")
-    cuda = "CUDAExecutionProvider" in there
+    cuda = _CUDA in there
     if wanted == "cuda" and not cuda:
         raise ValueError(
             f"provider 'cuda': this onnxruntime has only {', '.join(there)}; install onnxruntime-gpu, or take 'auto'"
         )
-    return (["CUDAExecutionProvider"] if cuda and wanted != "cpu" else []) + ["CPUExecutionProvider"]
+    return ([_CUDA] if cuda and wanted != "cpu" else []) + ["CPUExecutionProvider"]
+
+
+def _reason(text: str, version: str) -> str:
+    """What keeps a file from being loaded, and what to do, from what onnxruntime says of it."""
+    said = text.lower()
+    if "external data" in said or "external initializer" in said:
+        return (
+            "its weights lie in a file of their own, which is missing or cut off. Copy that file, whole, beside this "
+            "one under the name it had, or export the network as one file"
+        )
+    if re.search(r"opset \d+ is under development|model ir version", said):  # not: "missing opset", of a cut file
+        return (
+            f"it is of a newer ONNX than onnxruntime {version} reads. Install a newer onnxruntime, or export it for an "
+            "older opset"
+        )
+    return (
+        f"it is cut off, is no ONNX file, or needs operations that onnxruntime {version} does not have. Copy or export "
+        "it again"
+    )
+
+
+def _stated_digest(card: Path) -> str | None:
+    """The SHA-256 of a network that the card beside it states; None where there is none, or other JSON."""
+    try:
+        content = json.loads(card.read_bytes())
+    except (OSError, ValueError):
+        return None
+    stated = content.get("sha256") if isinstance(content, dict) else None
+    return stated if isinstance(stated, str) else None

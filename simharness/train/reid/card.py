@@ -92,6 +92,11 @@ def of_crops(crops: Crops) -> dict[str, object]:
     }
 
 
+def of_sample(crops: Crops) -> dict[str, object]:
+    """What a few crops are like, for whoever renders them again to see whether they are the same."""
+    return {**of_crops(crops), "mean_color": [round(float(level), 2) for level in crops.images.mean(axis=(0, 1, 2))]}
+
+
 def bins() -> dict[str, object]:
     """Edges of the bins of the distances."""
     return {

@@ -21,8 +21,10 @@ Split = Literal["training", "validation", "held-out"]
 
 SPLITS: tuple[Split, ...] = ("training", "validation", "held-out")
 CHILDREN = 0.1  # share of people
-_RUNS, _GROUPS = 10**6, 10**6  # seeds of runs, and groups of a split in a run
-_SPAN = _RUNS * _GROUPS
+RUNS = 10**6
+"""Seeds of runs: they are less than this."""
+_GROUPS = 10**6  # of a split in a run
+_SPAN = RUNS * _GROUPS
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,8 @@ def groups(
     Raises:
         ValueError: a run or a count out of range.
     """
-    if not 0 <= run < _RUNS or not 0 <= count <= _GROUPS:
-        raise ValueError(f"a run has a seed from 0 to {_RUNS - 1} and at most {_GROUPS} groups, got {run} and {count}")
+    if not 0 <= run < RUNS or not 0 <= count <= _GROUPS:
+        raise ValueError(f"a run has a seed from 0 to {RUNS - 1} and at most {_GROUPS} groups, got {run} and {count}")
     first = (1 + SPLITS.index(split)) * _SPAN + run * _GROUPS
     return tuple(Group(first + k, size, look_alike[k % len(look_alike)], first + k // at_a_site) for k in range(count))
 

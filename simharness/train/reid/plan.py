@@ -16,6 +16,7 @@ _TRAINING_DIALS = (0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 _AT_A_SITE = 10  # training groups
+_SAMPLE = 10  # groups
 
 # Cameras of training differ by less and by more than the usual, and people are hidden a little more.
 _TRAINING = Recipe(casts=(0.5, 1.5), most_hidden=0.6)
@@ -63,6 +64,12 @@ class Plan:
         """Crops of distinctly dressed people, all at one site, at one moment each."""
         people = groups("held-out", self.seed, self.held_out, size=4)
         return Order(tuple(replace(group, site=people[0].site + site) for group in people), Recipe(moments=1))
+
+    @property
+    def sample_order(self) -> Order:
+        """A few of the crops at the first of those sites, soon rendered again."""
+        whole = self.held_out_order(0)
+        return replace(whole, groups=whole.groups[:_SAMPLE])
 
     def curve_order(self, dial: float) -> Order:
         """Crops of the same people of some scenes, the more alike the higher the dial."""

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from mvpose.networks.session import Session
 from simharness.train.reid import assessment, card
-from simharness.train.reid.crops import Crops
-from simharness.train.reid.evaluation import Pairs, distributions
+from simharness.train.reid.judging import judged
 from simharness.train.reid.network import DIMENSIONS, parameters
-from simharness.train.reid.plan import DIALS, Plan
+from simharness.train.reid.plan import Plan
 from simharness.train.reid.rendering import rendered
 from simharness.train.reid.training import Progress, export, train
 
@@ -37,6 +36,7 @@ def run(
         command: that made it, for the card.
         say: called with a line of progress now and then.
     """
+    output.parent.mkdir(parents=True, exist_ok=True)  # now, not after an hour
     clock = time.perf_counter()
     crops = rendered(plan.training_order, cache, workers=workers)
     rendering = time.perf_counter() - clock
@@ -48,6 +48,7 @@ def run(
     clock = time.perf_counter()
     network = train(crops, seed=plan.seed, epochs=plan.epochs, threads=threads, report=report)
     training = time.perf_counter() - clock
+    card.card_path(output).unlink(missing_ok=True)  # that of a former training is not this file's
     export(network, output)
 
     session = Session(output)
@@ -56,16 +57,7 @@ def run(
     card.stamp(output, midpoint=midpoint, slope=slope, plan=plan, command=command)
     say(f"a distance of {midpoint:.3f} is as likely of one person as of two; slope {slope:.3f}")
 
-    session = Session(output)  # as anyone will read it
-    strangers = [rendered(plan.held_out_order(site), cache, workers=workers) for site in range(plan.sites)]
-    results = assessment.held_out(session, strangers)
-    say(f"held out: {results['network']}")
-    say(f"by colours alone: {results['histogram_balanced']}")
-    curve, met = {}, {}
-    for dial in DIALS:
-        alike = rendered(plan.curve_order(dial), cache, workers=workers)
-        curve[f"{dial:g}"], met[f"{dial:g}"] = assessment.in_scenes(session, alike)
-        say(f"look_alike {dial:g}: {curve[f'{dial:g}']}")
+    judgement = judged(Session(output), plan, cache=cache, workers=workers, say=say)  # as anyone will read it
     content: dict[str, object] = {
         "name": card.NAME,
         "command": command,
@@ -80,7 +72,7 @@ def run(
             "plan": card.of_plan(plan),
             "training": card.of_crops(crops),
             "validation": card.of_crops(validation),
-            "held_out": card.of_crops(Crops.joined(strangers)),
+            **judgement.data,
         },
         "training": {
             "rendering_seconds": round(rendering),
@@ -90,15 +82,10 @@ def run(
         },
         "affinity": {"midpoint": round(midpoint, 4), "slope": round(slope, 4), "from": "validation people"},
         "results": {
-            "held_out": results,
-            "look_alike": curve,
+            **judgement.results,
             "milliseconds_a_crop_in_batches_of_20_on_one_thread": round(assessment.milliseconds(session), 2),
         },
-        "distances": {
-            **card.bins(),
-            "all": distributions(Pairs.joined(list(met.values()))),
-            "look_alike": {dial: distributions(pairs) for dial, pairs in met.items()},
-        },
+        "distances": judgement.distances,
     }
     card.write(output, content)
     say(f"{output} and {card.card_path(output)} are written")

@@ -1,3 +1,6 @@
+import json
+from dataclasses import fields
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,6 +42,21 @@ def test_defaults_are_left_out_and_come_back():
         ({"peak": 0}, "peak must be a positive number, got 0"),
         ({"padding": "1.25"}, "padding must be a positive number"),
         ({"outputs": "features"}, "outputs must be names in a tuple, got 'features'"),
+        ({"outputs": 5}, "outputs must be names in a tuple, got 5"),
+        ({"outputs": None}, "outputs must be names"),
+        ({"outputs": ("features", 5)}, "outputs must be names"),
+        ({"outputs": {"features": 1}}, "outputs must be names"),
+        ({"name": 5}, "name must be text, got 5"),
+        ({"name": None}, "name must be text"),
+        ({"padding": None}, "padding must be a positive number, got None"),
+        ({"peak": None}, "peak must be a positive number, got None"),
+        ({"peak": 10**400}, "peak must be a positive number"),
+        ({"midpoint": True, "slope": 1.0}, "midpoint must be a positive number"),
+        ({"mean": None}, "mean must be three numbers"),
+        ({"size": (True, 2)}, "size must be width and height"),
+        ({"size": (float("inf"), 2)}, "size must be width and height"),
+        ({"color_order": None}, "color_order must be one of"),
+        ({"cells": {}}, "cells must be one of"),
     ],
 )
 def test_what_cannot_be_is_refused(stated, message):
@@ -57,3 +75,25 @@ def test_what_cannot_be_is_refused(stated, message):
 def test_a_bad_entry_of_a_file_is_refused(metadata, message):
     with pytest.raises(ValueError, match=message):
         Card.from_metadata(metadata)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@given(st.sampled_from([field.name for field in fields(Card)]), json_values)
+def test_whatever_a_field_is_in_a_file_it_is_taken_or_refused_by_its_name(key, value):
+    message = ""
+    try:
+        card = Card.from_metadata({f"mvpose.{key}": json.dumps(value)})
+    except ValueError as error:
+        message = str(error)
+    if message:
+        assert message.startswith("card: ")
+        assert key in message
+    else:
+        assert value is not None or key in ("midpoint", "slope", "size")
+        assert Card.from_metadata(card.to_metadata()) == card

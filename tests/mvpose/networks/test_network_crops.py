@@ -85,16 +85,27 @@ def test_a_padded_crop_keeps_the_aspect_and_holds_the_box(x, y, w, h, padding):
     assert extent.max() >= padding - 1e-9
 
 
-def test_a_box_is_in_view_where_it_has_an_area_inside_its_image():
+def seen_in(images, view, boxes, least=0.0, size=(8, 16)):
+    return in_view(images, np.array(view), stretched(np.array(boxes, float), size), size, least=least).tolist()
+
+
+def test_a_crop_is_in_view_where_it_has_an_area_and_pixels_inside_its_image():
     images = [np.zeros((480, 640, 3), np.uint8), None, np.zeros((0, 0, 3), np.uint8)]
     boxes = {
         (0, 0, 640, 480): True, (-10, -10, 5, 500): False, (-10, -10, 10.5, 10.5): True, (639, 479, 5, 5): True,
+        (639.3, 479, 5, 5): False, (-10, -10, 9.7, 500): False, (1e308, 0, 1e308, 5): False,
         (640, 0, 10, 10): False, (0, 480, 10, 10): False, (5, 5, 0, 10): False, (5, 5, 10, 0): False,
-        (-1e9, -1e9, 3e9, 3e9): True,
+        (-20, -20, 700, 600): True, (-1e9, -1e9, 3e9, 3e9): False,
     }  # fmt: skip
     for box, seen in boxes.items():
-        array = np.array([box] * 3, float)
-        assert in_view(images, np.array([0, 1, 2]), array).tolist() == [seen, False, False], box
+        assert seen_in(images, [0, 1, 2], [box] * 3) == [seen, False, False], box
+
+
+@given(st.floats(-50, 90), st.floats(-30, 50), st.floats(1, 120), st.floats(1, 90), st.floats(0, 1))
+def test_the_share_in_view_is_that_of_pixels_that_are_not_filled(x, y, w, h, least):
+    white = np.full((61, 97, 3), 255, np.uint8)
+    share = (crop(white, (x, y, w, h), (8, 16)) == 255).all(axis=2).mean()
+    assert seen_in([white], [0], [(x, y, w, h)], least) == [0 < share >= least]
 
 
 @pytest.mark.parametrize("box", [(-1e9, -1e9, 3e9, 3e9), (10, 10, 1e-6, 1e-6), (639.4, 479.4, 3, 3)])

@@ -1,3 +1,5 @@
+import hashlib
+import json
 import pickle
 import subprocess
 import sys
@@ -8,10 +10,11 @@ import onnxruntime
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from onnx import TensorProto, helper, save
+from onnx import TensorProto, helper, load, save
 from onnx_graphs import Graph, mean_color
 
 from mvpose.networks import Card, Session
+from mvpose.networks.reid import DEFAULT
 
 
 def crops(count=5, size=(32, 64), seed=1):
@@ -262,3 +265,112 @@ def test_providers_and_counts(tmp_path):
     if "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
         with pytest.raises(ValueError, match=r"provider 'cuda': this onnxruntime has only .*; install onnxruntime-gpu"):
             Session(path, provider="cuda")
+
+
+@pytest.mark.filterwarnings("ignore:Specified provider")
+def test_cuda_that_does_not_come_up_is_refused_where_it_is_asked_for(tmp_path, monkeypatch):
+    """Onnxruntime lists what it was built with, and takes the CPU where that does not start."""
+    path = mean_color(tmp_path / "net.onnx")
+    if "CUDAExecutionProvider" in onnxruntime.get_available_providers():
+        pytest.skip("CUDA is there")
+    monkeypatch.setattr(
+        onnxruntime, "get_available_providers", lambda: ["CUDAExecutionProvider", "CPUExecutionProvider"]
+    )
+    with pytest.raises(ValueError, match=r"provider 'cuda': CUDA does not come up here, .* on CPUExecutionProvider; "):
+        Session(path, provider="cuda")
+    assert Session(path, provider="auto").providers == ["CPUExecutionProvider"]
+
+
+def apart(path):
+    """A network whose weights lie in a file of their own."""
+    model = load(mean_color(path))
+    save(model, path, save_as_external_data=True, location="weights.bin", size_threshold=0)
+    return path, path.with_name("weights.bin")
+
+
+def test_weights_that_are_missing_or_cut_off_are_named(tmp_path):
+    path, weights = apart(tmp_path / "net.onnx")
+    np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)
+    weights.write_bytes(weights.read_bytes()[:-1])
+    for _ in range(2):
+        with pytest.raises(ValueError, match="its weights lie in a file of their own, which is missing or cut off"):
+            Session(path)
+        weights.unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("newer", ["opset", "format"])
+def test_a_file_of_a_newer_onnx_says_so_wherever_it_lies(tmp_path, newer):
+    folder = tmp_path / "external data"
+    folder.mkdir()
+    model = load(mean_color(folder / "net.onnx"))
+    if newer == "opset":
+        model.opset_import[0].version = 99
+    else:
+        model.ir_version = 99
+    save(model, folder / "net.onnx")
+    with pytest.raises(
+        ValueError, match=r"it is of a newer ONNX than onnxruntime .* reads\. Install a newer onnxruntime"
+    ):
+        Session(folder / "net.onnx")
+
+
+def test_an_input_that_is_open_everywhere_is_fed_colours_first_and_says_so_where_that_fails(tmp_path):
+    card = Card(size=(32, 64))
+    for channels_last in (False, True):
+        graph = Graph(("n", "a", "b", "c"))
+        graph.undo_normalisation(Card(), channels_last)
+        graph.add("ReduceMean", axes=[1, 2] if channels_last else [2, 3], keepdims=0)
+        graph.output("features", ("n", 3))
+        path = graph.save(tmp_path / "net.onnx")
+        if not channels_last:
+            np.testing.assert_allclose(Session(path, card=card)(crops())[0], mean(crops()), atol=1e-5)
+        else:
+            with pytest.raises(
+                ValueError, match=r"if it takes \(n, height, width, 3\), export it with that shape stated"
+            ):
+                Session(path, card=card)
+
+
+# The card beside a file.
+
+
+def carded(path):
+    """A network with a card beside it."""
+    digest = hashlib.sha256(mean_color(path).read_bytes()).hexdigest()
+    path.with_suffix(".json").write_text(json.dumps({"name": "ours", "sha256": digest}))
+    return path, digest
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.floats(0, 1, exclude_max=True), st.integers(1, 255))
+def test_one_byte_that_is_not_of_the_card_is_refused(tmp_path, where, change):
+    path, digest = carded(tmp_path / "net.onnx")
+    assert Session(path).size == (32, 64)
+    content = bytearray(path.read_bytes())
+    content[int(where * len(content))] ^= change
+    got = hashlib.sha256(broken(path, bytes(content)).read_bytes()).hexdigest()
+    card = path.with_suffix(".json")
+    with pytest.raises(
+        ValueError, match=f"{path}: is not the file of this card: {card} .* {digest}, the file has {got} "
+    ):
+        Session(path)
+
+
+def test_the_shipped_network_cut_off_within_its_card_is_refused(tmp_path):
+    for suffix in (".onnx", ".json"):
+        (tmp_path / "reid").with_suffix(suffix).write_bytes(DEFAULT.with_suffix(suffix).read_bytes())
+    path = tmp_path / "reid.onnx"
+    assert Session(path).card.midpoint == Session(DEFAULT).card.midpoint
+    for missing in (1, 100, 392):
+        broken(path, DEFAULT.read_bytes()[:-missing])
+        with pytest.raises(ValueError, match="is not the file of this card"):
+            Session(path)
+
+
+@pytest.mark.parametrize(
+    "beside", ["", "[1]", "5", "not JSON", "{}", '{"sha256": null}', '{"sha256": 7}', '{"task": "pose"}', "\xff"]
+)
+def test_json_that_states_no_digest_is_no_card(tmp_path, beside):
+    path = mean_color(tmp_path / "net.onnx")
+    path.with_suffix(".json").write_bytes(beside.encode("latin-1"))
+    np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)

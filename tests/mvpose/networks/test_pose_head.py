@@ -269,3 +269,16 @@ def test_bad_input_is_refused_at_the_border(heads):
         head.detect([image], [3], np.ones((1, 4)))
     with pytest.raises(ValueError, match="image of view 0 must be"):
         head.detect([image / 255.0], [0], np.ones((1, 4)))
+
+
+@pytest.mark.parametrize("simcc", [False, True])
+def test_a_crop_without_a_pixel_in_the_image_has_no_keypoint(tmp_path, simcc):
+    """A head sees black there and would put keypoints into it; with pixels it says itself how sure it is."""
+    head = PoseHead((simcc_dots if simcc else dots)(tmp_path / "net.onnx"))
+    image = np.full((480, 640, 3), 255, np.uint8)
+    boxes = [[639.4, 100, 60, 80], [-1e9, -1e9, 3e9, 3e9], [1e308, 0, 1e308, 5], [630, 100, 60, 80], [5, 5, 60, 80]]
+    inner = PoseHead(Session(head.session.path, card=Card(padding=0.5)))  # of the fourth it sees no pixel
+    for each, nothing in ((head, [True, True, True, False, False]), (inner, [True, True, True, True, False])):
+        found = each.detect([image], [0] * 5, boxes)
+        assert np.isnan(found.keypoints).all(axis=(1, 2)).tolist() == nothing
+        assert (found.scores[nothing] == 0).all()

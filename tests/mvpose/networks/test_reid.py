@@ -62,6 +62,22 @@ def test_a_box_of_nothing_has_no_descriptor_and_harms_no_other(reid, box):
     assert np.isnan(reid.descriptors([image], [0], [box])).all()
 
 
+@given(
+    st.sampled_from(["left", "right", "top", "bottom"]), st.floats(0.002, 0.9), st.floats(40, 200), st.floats(40, 200)
+)
+def test_strangers_of_whom_a_sliver_is_in_the_image_do_not_match(reid, side, share, w, h):
+    """With less than a good part of the box there is no descriptor; with more it is not that of the fill."""
+    x, y = {
+        "left": (-0.5 - w * (1 - share), 100), "right": (639.5 - w * share, 100),
+        "top": (100, -0.5 - h * (1 - share)), "bottom": (100, 479.5 - h * share),
+    }[side]  # fmt: skip
+    people = [np.full((480, 640, 3), color, np.uint8) for color in ((230, 10, 10), (10, 230, 10))]
+    one, other = reid.descriptors(people, [0, 1], [(x, y, w, h)] * 2)
+    assert np.isnan(one).all() == np.isnan(other).all()
+    assert np.isnan(one).all() == (share < 0.3) or abs(share - 0.3) < 0.04  # it is counted in pixels of the crop
+    assert not one @ other > 0.95
+
+
 def test_beyond_the_image_is_the_mean_color_of_the_training(reid):
     """A box half outside a red picture is half red, half what normalises to zero."""
     image = np.full((480, 640, 3), (255, 0, 0), np.uint8)

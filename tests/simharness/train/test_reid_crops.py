@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -6,7 +8,7 @@ import pytest
 from simharness.rendering.outlines import NO_EDGES, boxes
 from simharness.rendering.raster import RasterRenderer
 from simharness.scenario.cameras import Sensor
-from simharness.train.reid import histogram
+from simharness.train.reid import histogram, sources
 from simharness.train.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, developed, jittered, picture_group
 from simharness.train.reid.evaluation import euclidean, retrieve
 from simharness.train.reid.identities import Group, figures, groups
@@ -195,3 +197,37 @@ def test_training_sees_nobody_who_is_judged():
     assert min(map(len, (learnt, scaled, judged, curve))) > 0
     assert not (learnt | scaled) & (judged | curve)
     assert not learnt & scaled
+
+
+def test_the_sources_of_crops_are_all_that_is_imported_to_render_them():
+    """Whatever of ours a fresh process has loaded to render is part of the key of the cache."""
+    code = (
+        "import sys, simharness.train.reid.rendering\n"
+        "ours = [m.__file__ for k, m in sys.modules.items() if k.partition('.')[0] in ('mvpose', 'simharness')]\n"
+        "print(*filter(None, ours), sep='\\n')"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split("\n")
+    known = {str(path) for path in sources.files().values()}
+    assert len(known) > 50
+    assert {*filter(None, loaded)} <= known
+    names = set(sources.files())
+    assert {"simharness/humans/data/anny.npz", "mvpose/networks/crops.py", "simharness/random.py"} <= names
+    # Cards and networks come from crops, and training that learns from them makes none.
+    assert not [name for name in names if name.startswith("mvpose/networks/data") or name.endswith("training.py")]
+
+
+@pytest.mark.parametrize("name", ["simharness/rendering/sensor.py", "simharness/humans/data/anny.npz"])
+def test_crops_of_other_code_are_not_taken_from_the_cache(tmp_path, monkeypatch, name):
+    order = Order(groups("held-out", 5, 1, size=1), Recipe(moments=1, views=2))
+    before = order.name
+    files = sources.files()
+    changed = tmp_path / "changed"
+    changed.write_bytes(files[name].read_bytes() + b"\n")
+    monkeypatch.setattr(sources, "files", lambda: {**files, name: changed})
+    sources.digest.cache_clear()
+    try:
+        assert order.name != before
+    finally:
+        monkeypatch.undo()
+        sources.digest.cache_clear()
+    assert order.name == before

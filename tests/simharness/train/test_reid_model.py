@@ -1,21 +1,26 @@
 """The network that comes with mvpose, and the command that makes one."""
 
 import json
+import sys
+from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pytest
 
 from mvpose.networks.reid import DEFAULT, ReId
 from mvpose.networks.session import Session
-from simharness.train.reid import assessment, card
+from simharness.train.reid import assessment, card, judging
 from simharness.train.reid.__main__ import main
 from simharness.train.reid.crops import SIZE, Recipe, picture_group
 from simharness.train.reid.crops import Crops as All
 from simharness.train.reid.identities import groups, split_of
 from simharness.train.reid.plan import Plan
 from simharness.train.reid.poses import plan_poses
+from simharness.train.reid.rendering import rendered
 
 ELSEWHERE = 999  # seed of a run whose people nobody has trained on or judged by
+
+TIME = "milliseconds_a_crop_in_batches_of_20_on_one_thread"
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +80,20 @@ def test_strangers_among_three_hundred_were_told_apart_better_than_by_colours(co
     assert (np.diff(hidden) < 0).all()
 
 
+@pytest.mark.slow
+def test_crops_rendered_now_are_those_that_the_card_judges_by(content, tmp_path):
+    """Where this fails what is rendered has changed: judge anew (python -m simharness.train.reid --judge FILE)."""
+    plan = Plan(**{field.name: content["data"]["plan"][field.name] for field in fields(Plan)})
+    found, stated = card.of_sample(rendered(plan.sample_order, tmp_path)), content["data"]["held_out_sample"]
+    assert [found[key] for key in ("identities", "group_seeds")] == [
+        stated[key] for key in ("identities", "group_seeds")
+    ]
+    # Another machine rounds otherwise, which may move a pixel here and there.
+    assert found["crops"] == pytest.approx(stated["crops"], abs=1)
+    assert found["hidden_mean"] == pytest.approx(stated["hidden_mean"], abs=1e-3)
+    np.testing.assert_allclose(found["mean_color"], stated["mean_color"], atol=0.3)
+
+
 def test_a_crop_is_described_in_time(content):
     assert content["results"]["milliseconds_a_crop_in_batches_of_20_on_one_thread"] < 4.0
     assert assessment.milliseconds(Session(DEFAULT), rounds=3) < 20.0  # a busy machine
@@ -120,7 +139,9 @@ def test_strangers_are_told_apart_in_crops_rendered_anew():
 def test_one_command_trains_a_toy(tmp_path, capsys):
     pytest.importorskip("torch")
     pytest.importorskip("onnx")
-    model = tmp_path / "toy.onnx"
+    model = tmp_path / "new" / "toy.onnx"
+    model.parent.mkdir()
+    card.card_path(model).write_text('{"sha256": "of a former training"}')
     assert main(["--quick", "--seed", "3", "--output", str(model), "--cache", str(tmp_path / "cache")]) == 0
     content = card.read(model)
     assert content["data"]["plan"]["seed"] == 3
@@ -197,7 +218,92 @@ def test_a_plan_for_a_toy_is_less_of_everything():
     assert toy.epochs < whole.epochs
 
 
+@pytest.fixture
+def small(tmp_path, content):
+    """The network that comes with mvpose, with the card of a toy's plan, whose figures are none."""
+    model = tmp_path / "models" / "reid.onnx"
+    model.parent.mkdir()
+    model.write_bytes(DEFAULT.read_bytes())
+    plan = {**content["data"]["plan"], **asdict(replace(Plan.quick(), validation=1, held_out=2))}
+    kept = {key: content[key] for key in ("name", "command", "sha256", "network", "training", "affinity")}
+    data = {**content["data"], "plan": plan, "held_out": None, "validation": None}
+    results = {"held_out": None, "look_alike": None, TIME: 1.25}
+    card.write(model, {**kept, "data": data, "results": results, "distances": None})
+    return model
+
+
+@pytest.mark.slow
+def test_judging_again_renews_the_figures_and_leaves_the_training(small, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "torch", None)  # nothing is trained
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    monkeypatch.setattr(judging, "DIALS", (0.0, 1.0))
+    before, bytes_before = card.read(small), small.read_bytes()
+    command = ["--judge", str(small), "--cache", str(tmp_path / "cache")]
+    assert main(command) == 0
+    after = card.read(small)  # it is still the card of this file
+    assert small.read_bytes() == bytes_before
+    for key in ("name", "command", "sha256", "network", "training", "affinity"):
+        assert after[key] == before[key]
+    assert [after["data"][key] for key in ("plan", "training")] == [before["data"][key] for key in ("plan", "training")]
+    assert after["results"][TIME] == 1.25
+    assert after["judged"]["command"] == f"python -m simharness.train.reid --judge {small.as_posix()}"
+    assert after["results"]["held_out"]["identities"] == [after["data"]["held_out"]["identities"]]
+    assert after["data"]["held_out_sample"]["crops"] == after["data"]["held_out"]["crops"]  # of all, as they are few
+    assert set(after["results"]["look_alike"]) == set(after["distances"]["look_alike"]) == {"0", "1"}
+    assert main(command) == 0
+    assert card.read(small) == after
+    assert "midpoint and slope" in capsys.readouterr().out
+
+
+def test_what_cannot_be_judged_again_is_said_in_a_line(tmp_path, capsys):
+    model = tmp_path / "reid.onnx"
+    command = ["--judge", str(model), "--cache", str(tmp_path / "cache")]
+
+    def said():
+        assert main(command) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    assert f"no network at {model}" in said()
+    model.write_bytes(DEFAULT.read_bytes())
+    assert "no card at" in said()
+    card.write(model, {"sha256": card.digest(model)})
+    assert "states no plan" in said()
+    card.write(model, {"sha256": "0"})
+    assert "card of another file" in said()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--seed", "-1"], "--seed must be 0 to 999999, got -1"),
+        (["--seed", "1000000"], "--seed must be 0 to 999999"),
+        (["--workers", "0"], "--workers must be at least 1, got 0"),
+        (["--threads", "-2"], "--threads must be at least 1, got -2"),
+        (["--output", "{folder}"], "--output must be an ONNX file"),
+        (["--output", "{folder}/reid.json"], "--output must be an ONNX file"),
+        (["--output", "{folder}/file/reid.onnx"], "--output: cannot write to"),
+        (["--cache", "{folder}/file"], "--cache: cannot write to"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_line_before_anything_is_rendered(tmp_path, capsys, arguments, message):
+    (tmp_path / "file").touch()
+    given = [argument.format(folder=tmp_path) for argument in arguments]
+    assert main(["--output", str(tmp_path / "a.onnx"), "--cache", str(tmp_path / "cache"), "--quick", *given]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_folders_that_are_not_there_are_made_before_anything_is_rendered(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "torch", None)  # it ends there
+    output, cache = tmp_path / "new" / "models" / "reid.onnx", tmp_path / "also" / "new"
+    assert main(["--output", str(output), "--cache", str(cache)]) == 2
+    assert "simharness[train]" in capsys.readouterr().err
+    assert output.parent.is_dir()
+    assert list(cache.iterdir()) == []
+
+
 def test_without_torch_the_command_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    monkeypatch.setitem(sys.modules, "torch", None)
     assert main(["--quick"]) == 2
     assert "simharness[train]" in capsys.readouterr().err
