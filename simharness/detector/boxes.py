@@ -18,7 +18,7 @@ from mvpose import COCO17
 from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.correlation import LIMBS, Chances, Key, logistic
-from simharness.detector.found import Found
+from simharness.detector.found import Found, Origin
 from simharness.detector.truth import KeypointError
 from simharness.rendering.views import Views
 from simharness.rendering.visibility import Visibility
@@ -69,6 +69,8 @@ def in_boxes(people: Found, views: Views, rig: Rig, config: Boxes, chances: Chan
     rounds = 2 if (split | twice).any() else 1  # of the P slots
     blocks = {field.name: np.concatenate([getattr(people, field.name)] * rounds, axis=2) for field in fields(Found)}
     blocks["there"] = np.concatenate([found, split | twice][:rounds], axis=2)
+    second = np.where(split, Origin.LOWER, Origin.AGAIN).astype(np.int8)
+    blocks["origin"] = np.concatenate([people.origin, second][:rounds], axis=2)
     boxes, share = (np.concatenate([each] * rounds, axis=2) for each in (views.boxes, visible.mean(axis=-1)))
     result = Found(**blocks)
     t, v, p = np.nonzero(split)

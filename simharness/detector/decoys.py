@@ -13,7 +13,7 @@ from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.correlation import Chances
 from simharness.detector.figments import LEAST, box_about, reported, sureness
-from simharness.detector.found import Found
+from simharness.detector.found import Found, Origin
 from simharness.detector.postures import DRAWS, postures, seen_from
 from simharness.rendering.views import Views
 from simharness.scenario.detector import DecoyHits
@@ -41,7 +41,8 @@ def decoy_hits(views: Views, rig: Rig, config: DecoyHits, chances: Chances) -> F
         return Found.nothing(len(views), len(rig), 0)
     hits = [hit for slot in range(len(names)) for hit in _of_one(views, config, chances, slot)]
     frame, view, slot, keypoints, scores = (np.concatenate(column) for column in zip(*hits, strict=True))
-    return reported(rig, len(views), (frame, view, slot), keypoints, scores)
+    where = (frame, view, slot)
+    return reported(rig, len(views), where, keypoints, scores, origin=Origin.DECOY, number=slot)
 
 
 def _of_one(views: Views, config: DecoyHits, chances: Chances, decoy: int) -> Iterator[tuple[NDArray, ...]]:

@@ -4,6 +4,10 @@ A descriptor is a unit vector in the direction of
 
     who (as alike as the scene's people are)  +  from where (what front, side and back show)  +  noise
 
+Seen from bearings that are t apart, a person's signals have the cosine a + b cos t + c cos 2t, a + b + c = 1: what b
+stands for differs most between front and back, what c stands for between either and the sides, as outlines do. All
+three are positive, so there are vectors like that for any set of bearings.
+
 How much of each there is, and in how many dimensions, follows from the distances that were measured when the network
 was trained and that its card states: of one person and of two, by the angle between the bearings from which the two
 crops see their people, by how much of the person is hidden, and by the ``look_alike`` dial.
@@ -13,7 +17,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,11 +26,13 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
+from mvpose.networks.session import check_content
 from simharness.random import stream
 
 Floats = NDArray[np.float64]
 
 _FEWEST, _MOST = 6, 256  # dimensions
+_PARTS = 5  # of a person's signal: one for who it is, two for each wave of the bearing
 
 
 @dataclass(frozen=True)
@@ -35,12 +41,14 @@ class Look:
 
     Attributes:
         who: share of a clear crop's variance that says who it is; the rest says from where it is seen.
+        facing: share of that rest that tells front from back; what is left tells both from the sides.
         alike: how much of who they are the people of a scene have in common.
         alike_sides: the same of what their sides look like.
         noise: how much noise there is, beside that at other values of the dial.
     """
 
     who: float
+    facing: float
     alike: float
     alike_sides: float
     noise: float
@@ -57,6 +65,8 @@ class DescriptorModel:
         covers: shares of hidden joints, ascending, (h,).
         noise: mean variance of the noise there at the first dial, in units of a clear crop's variance, (h,).
         uneven: how that differs from crop to crop: deviation of its logarithm.
+        common: share of the noise's variance that all crops have in common, as what hides people looks alike: hidden
+            crops of two people are as near as clear ones, though less of either is seen.
     """
 
     dimensions: int
@@ -65,19 +75,22 @@ class DescriptorModel:
     covers: tuple[float, ...]
     noise: tuple[float, ...]
     uneven: float
+    common: float
 
     @classmethod
     def of_network(cls, model: Path) -> Self:
         """The model of a network, from the card beside its file.
 
         Raises:
-            ValueError: there is no card, or it states no distances.
+            ValueError: there is no card, it states no distances, or it is that of another network.
         """
         path = model.with_suffix(".json")
+        if model.is_file():  # distances can be drawn without the network, but not with another's card
+            check_content(model)
         try:
             card = json.loads(path.read_text(encoding="utf-8"))
             return cls.fitted(card["distances"])
-        except (OSError, json.JSONDecodeError, KeyError) as error:
+        except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise ValueError(
                 f"{path}: no card with the distances of {model.name} ({error}); they are measured by "
                 "python -m simharness.train.reid. For a network without them take descriptors from pictures"
@@ -91,10 +104,11 @@ class DescriptorModel:
         cosines of one person's pairs spread.
         """
         edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
-        turns = np.deg2rad(_middles(np.array(distances["view_difference_degrees"])))
+        turns = _waves(np.deg2rad(distances["view_difference_degrees"]))
         measured = {float(dial): kinds for dial, kinds in distances["look_alike"].items()}
         dials = sorted(measured)
         covers = len(edges) - 1
+        better = _better(measured, covers)
         cells = [
             (d, kind == "same", v, h, bin_["cosine"], bin_["pairs"] / measured[dial][kind]["all"]["pairs"])
             for d, dial in enumerate(dials)
@@ -104,44 +118,45 @@ class DescriptorModel:
             if bin_["pairs"]
         ]
         d, same, v, h, cosine, weight = (np.array(column) for column in zip(*cells, strict=True))
-        same, turn = same.astype(bool), np.cos(turns)[v]
+        same, turn = same.astype(bool), turns[v]
         # Two people's cosines spread as those of random directions do: that tells in how many dimensions they live.
         strangers = measured[dials[0]]["other"]["all"]
         free = (1 - strangers["cosine"] ** 2) / _cosine_deviation(strangers, distances["quantiles"])
         dimensions = int(np.clip(round(free**2), _FEWEST, _MOST))
         spread = np.array([_cosine_deviation(measured[dial]["same"]["all"], distances["quantiles"]) for dial in dials])
 
-        def parts(x: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, float]:
-            who, alike, sides = (1 / (1 + np.exp(-x[: 3 * len(dials)]))).reshape(3, -1)
-            louder = np.exp(np.append(0.0, x[3 * len(dials) : 4 * len(dials) - 1]))
-            return who, alike, sides, louder, np.cumsum(np.exp(x[4 * len(dials) - 1 : -1])), float(abs(x[-1]))
+        def parts(x: Floats) -> tuple[Floats, Floats, Floats, float, float]:
+            shares = (1 / (1 + np.exp(-x[: 4 * len(dials)]))).reshape(4, -1)
+            louder = np.exp(np.append(0.0, x[4 * len(dials) : 5 * len(dials) - 1]))
+            noise = np.cumsum(np.exp(x[5 * len(dials) - 1 : -2]))
+            return shares, louder, noise, float(abs(x[-2])), float(1 / (1 + np.exp(-x[-1])))
 
         def misfit(x: Floats) -> Floats:
-            who, alike, sides, louder, noise, uneven = parts(x)
-            signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * (1 - who[d]) * turn
-            once, twice = _kept(louder[:, None] * noise, uneven)
-            mean = signal * once[d, h] * once[d, 0]
+            (who, facing, alike, sides), louder, noise, uneven, common = parts(x)
+            turned = (1 - who[d]) * (facing[d] * turn[:, 0] + (1 - facing[d]) * turn[:, 1])
+            signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * turned
+            once, twice, lost = _kept(louder[:, None] * noise, uneven)
+            kept = signal * once[d, h] * (once @ better)[d, h]
+            mean = kept + common * lost[d, h] * (lost @ better)[d, h]
             # The law of total variance: within bins that of unlike noise and of few dimensions, and between them.
-            variance = (
-                signal**2 * (twice[d, h] * twice[d, 0] - (once[d, h] * once[d, 0]) ** 2)
-                + (1 - mean**2) ** 2 / dimensions
-            )
+            variance = signal**2 * (twice[d, h] * (twice @ better)[d, h]) - kept**2 + (1 - mean**2) ** 2 / dimensions
             share = weight * same / len(dials)
             total = np.array([(share * (d == k)).sum() for k in range(len(dials))])
             center = np.array([(share * (d == k) * mean).sum() for k in range(len(dials))]) / total
             second = np.array([(share * (d == k) * (variance + mean**2)).sum() for k in range(len(dials))]) / total
             return np.concatenate([np.sqrt(weight) * (mean - cosine), np.sqrt(second - center**2) - spread])
 
-        start = np.concatenate([np.full(len(dials), 1.5), np.linspace(-2, 2, len(dials)), np.zeros(len(dials))])
-        start = np.concatenate([start, np.zeros(len(dials) - 1), np.log(np.full(covers, 0.1)), [0.5]])
-        who, alike, sides, louder, noise, uneven = parts(least_squares(misfit, start).x)
-        looks = tuple(Look(*map(float, each)) for each in zip(who, alike, sides, louder, strict=True))
+        none, up = np.zeros(len(dials)), np.linspace(-2, 2, len(dials))
+        start = np.concatenate([none + 1.5, none, up, none])
+        start = np.concatenate([start, np.zeros(len(dials) - 1), np.log(np.full(covers, 0.1)), [0.5, -3.0]])
+        shares, louder, noise, uneven, common = parts(least_squares(misfit, start).x)
+        looks = tuple(Look(*map(float, each)) for each in zip(*shares, louder, strict=True))
         middles = tuple(map(float, _middles(edges)))
-        return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven)
+        return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven, common)
 
     def look(self, look_alike: ArrayLike) -> Floats:
-        """Who, alike, alike_sides, noise (see :class:`Look`) at values of the dial (...), interpolated, (..., 4)."""
-        table = np.array([[look.who, look.alike, look.alike_sides, look.noise] for look in self.looks])
+        """The numbers of a :class:`Look`, in their order, at values of the dial (...), interpolated, (..., 5)."""
+        table = np.array([astuple(look) for look in self.looks])
         dial = np.asarray(look_alike, float)
         return np.stack([np.interp(dial, self.dials, column) for column in table.T], axis=-1)
 
@@ -172,26 +187,38 @@ class DescriptorModel:
         """
         size, count = self.dimensions, len(who)
         bearing, hidden = np.asarray(bearing, float), np.asarray(hidden, float)
-        looks = self.look(np.broadcast_to(np.asarray(look_alike, float), count))
-        common, keys = _drawn(seed, ("all",), size), dict.fromkeys(who)
-        drawn = np.array([_drawn(seed, key, size) for key in keys]).reshape(-1, 3, size)
+        shares = self.look(np.broadcast_to(np.asarray(look_alike, float), count))
+        is_who, facing, alike, alike_sides, louder = shares.T
+        everyone, keys = _drawn(seed, ("all",), size), dict.fromkeys(who)
+        drawn = np.array([_drawn(seed, key, size) for key in keys]).reshape(-1, _PARTS, size)
         place = {key: k for k, key in enumerate(keys)}
         own = drawn[np.array([place[key] for key in who], int)]
-        shared = looks[:, [1, 2, 2], None]
-        people = np.sqrt(shared) * common + np.sqrt(1 - shared) * own
-        direction = np.stack([np.ones(count), np.cos(bearing), np.sin(bearing)], axis=-1)
-        amount = direction * np.sqrt(np.stack([looks[:, 0], 1 - looks[:, 0], 1 - looks[:, 0]], axis=-1))
-        spoilt = (
-            looks[:, 3] * np.interp(hidden, self.covers, self.noise) * _unevenly(np.asarray(unease, float), self.uneven)
-        )
+        shared = np.stack([alike, *[alike_sides] * (_PARTS - 1)], axis=-1)[..., None]
+        people = np.sqrt(shared) * everyone + np.sqrt(1 - shared) * own
+        direction = [np.ones(count), *(wave(k * bearing) for k in (1, 2) for wave in (np.cos, np.sin))]
+        back, side = (1 - is_who) * facing, (1 - is_who) * (1 - facing)
+        amount = np.stack(direction, axis=-1) * np.sqrt(np.stack([is_who, back, back, side, side], axis=-1))
+        spoilt = louder * np.interp(hidden, self.covers, self.noise)
+        spoilt = spoilt * _unevenly(np.asarray(unease, float), self.uneven)
         strength = np.sqrt(spoilt / size)[:, None]
-        result = np.einsum("nk,nkd->nd", amount, people) + strength * np.asarray(noise, float)
-        return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
+        signal = np.einsum("nk,nkd->nd", amount, people)  # of unit length but for what chance adds in few dimensions
+        cover = stream(seed, "descriptor", "cover").standard_normal(size)
+        spoiling = np.sqrt(self.common) * cover + np.sqrt(1 - self.common) * np.asarray(noise, float)
+        return _unit(_unit(signal) + strength * spoiling)
 
 
 def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
-    """Who, what front and back, and what left and right look like: vectors of about unit length, (3, D)."""
-    return stream(seed, "descriptor", *key).standard_normal((3, size)) / np.sqrt(size)
+    """Who it is, and how that looks by cos t, sin t, cos 2t and sin 2t: vectors of about unit length, (5, D)."""
+    return stream(seed, "descriptor", *key).standard_normal((_PARTS, size)) / np.sqrt(size)
+
+
+def _waves(edges: Floats) -> Floats:
+    """Means of cos t and cos 2t between edges (b + 1,), (b, 2)."""
+    return np.stack([np.diff(np.sin(k * edges)) / (k * np.diff(edges)) for k in (1, 2)], axis=-1)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _unevenly(normal: Floats, uneven: float) -> Floats:
@@ -199,12 +226,25 @@ def _unevenly(normal: Floats, uneven: float) -> Floats:
     return np.exp(uneven * normal - 0.5 * uneven**2)
 
 
-def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats]:
-    """Of a unit vector with noise of variances (...): the mean share that is signal, and the mean of its square."""
+def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats, Floats]:
+    """Of a unit vector with noise of variances (...): mean length and square of the signal, mean length of noise."""
     nodes, weights = hermegauss(15)
     variance = noise[..., None] * _unevenly(nodes, uneven)
     weights = weights / weights.sum()
-    return (1 / np.sqrt(1 + variance)) @ weights, (1 / (1 + variance)) @ weights
+    kept = 1 / (1 + variance)
+    return np.sqrt(kept) @ weights, kept @ weights, np.sqrt(1 - kept) @ weights
+
+
+def _better(measured: Mapping[float, Any], covers: int) -> Floats:
+    """Where the better of two crops is, whose worse one is in some bin of hidden shares: columns add up to 1, (h, h).
+
+    As if both crops of a pair were hidden independently: then the worse one's distribution is the square of either's.
+    """
+    rows = [row for kinds in measured.values() for kind in ("same", "other") for row in kinds[kind]["bins"]]
+    pairs = np.array([[bin_["pairs"] for bin_ in row] for row in rows], float).sum(axis=0)
+    single = np.diff(np.sqrt(np.cumsum(pairs) / pairs.sum()), prepend=0.0)
+    chances = np.triu(np.broadcast_to(single[:, None], (covers, covers)), 1) * 2 + np.diag(single)
+    return np.asarray(chances / np.maximum(chances.sum(axis=0), 1e-9))
 
 
 def _middles(edges: Floats) -> Floats:

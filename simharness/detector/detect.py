@@ -22,7 +22,7 @@ from simharness.detector.correlation import Chances
 from simharness.detector.decoys import decoy_hits
 from simharness.detector.delivery import delivered
 from simharness.detector.describing import Describer, Looks
-from simharness.detector.found import Found
+from simharness.detector.found import Found, Origin
 from simharness.detector.heatmaps import Peaks, in_crops
 from simharness.detector.keypoints import find_keypoints
 from simharness.detector.phantoms import phantoms
@@ -75,9 +75,7 @@ def detect(
     found = delivered(found, views.source)
     describe = None
     if looks is not None:
-        others = sum(part.there.shape[2] for part in parts[:2])
-        life = config.correlation.scatter_life
-        describe = Describer(sequence, views, rig, looks, chances, first_decoy=others, life=life)
+        describe = Describer(sequence, views, rig, looks, chances, life=config.correlation.scatter_life)
     return _frames(found, sequence, views, config, describe)
 
 
@@ -90,13 +88,16 @@ def find_people(sequence: Sequence, views: Views, rig: Rig, config: Detector, ch
     )
     scores = score_keypoints(keypoints, conditions, config.scores, config.correlation, chances)
     shape = scores.shape[:3]
+    number = np.broadcast_to(np.arange(shape[2]), shape)
     people = Found(
         there=np.any(scores > 0, axis=-1),
         keypoints=keypoints.pixels,
         scores=scores,
         boxes=views.boxes,
         box_scores=np.ones(shape),
-        person=np.broadcast_to(np.arange(shape[2]), shape),
+        person=number,
+        origin=np.full(shape, Origin.PERSON, np.int8),
+        number=number,
         error=keypoints.error,
         rivals=keypoints.rivals,
     )
@@ -109,12 +110,12 @@ def _frames(
     """Blocks to frames."""
     frame, view, slot = np.nonzero(found.there)
     order = np.lexsort((slot, -found.box_scores[frame, view, slot], view, frame))
-    frame, view, slot = frame[order], view[order], slot[order]
+    where = frame, view, slot = frame[order], view[order], slot[order]
     chosen = {
-        key: getattr(found, key)[frame, view, slot]
+        key: getattr(found, key)[where]
         for key in ("keypoints", "scores", "boxes", "box_scores", "person", "error", "rivals")
     }
-    descriptors = None if describe is None else describe(frame, view, slot, chosen["person"])
+    descriptors = None if describe is None else describe(frame, view, found.origin[where], found.number[where])
     heat = config.heatmaps.size != "none"
     result = []
     for t, (start, end) in enumerate(itertools.pairwise(np.searchsorted(frame, np.arange(len(sequence) + 1)))):

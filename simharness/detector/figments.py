@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from simharness.detector.correlation import logistic
-from simharness.detector.found import Found
+from simharness.detector.found import Found, Origin
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,7 +47,16 @@ def inside(rig: Rig, view: Ints, keypoints: Floats) -> NDArray[np.bool_]:
     return np.all((keypoints >= -0.5) & (keypoints < size - 0.5), axis=-1)
 
 
-def reported(rig: Rig, frames: int, where: tuple[Ints, Ints, Ints], keypoints: Floats, scores: Floats) -> Found:
+def reported(
+    rig: Rig,
+    frames: int,
+    where: tuple[Ints, Ints, Ints],
+    keypoints: Floats,
+    scores: Floats,
+    *,
+    origin: Origin,
+    number: Ints,
+) -> Found:
     """Put false detections where they belong.
 
     What lies off the image is absent; a box spans the others and is as sure as they are on average.
@@ -58,6 +67,8 @@ def reported(rig: Rig, frames: int, where: tuple[Ints, Ints, Ints], keypoints: F
         where: frame, view and slot of each, (r,).
         keypoints: pixels, (r, J, 2), NaN where absent.
         scores: (r, J).
+        origin: of all.
+        number: of each among those of this origin, (r,).
     """
     _, view, slot = where
     found = Found.nothing(frames, len(rig), int(slot.max(initial=-1)) + 1)
@@ -67,6 +78,7 @@ def reported(rig: Rig, frames: int, where: tuple[Ints, Ints, Ints], keypoints: F
     count = seen.sum(axis=-1)
     found.there[where] = count > 0
     found.keypoints[where], found.scores[where] = keypoints, scores
+    found.origin[where], found.number[where] = origin, number
     found.boxes[where] = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=-1), 0.0)
     found.box_scores[where] = scores.sum(axis=-1) / np.maximum(count, 1)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, Self
 
 import numpy as np
@@ -12,6 +13,22 @@ from numpy.typing import NDArray
 from simharness.detector.truth import KeypointError
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Origin(IntEnum):
+    """What a detection comes from: with a number (:attr:`Found.number`) it names who or what is detected."""
+
+    PERSON = 0
+    """A person by number, or of one found in two the upper half, or of two in one who gives most."""
+    AGAIN = 1
+    """The same person once more."""
+    LOWER = 2
+    """The lower half of a person who is found in two."""
+    PHANTOM = 3
+    """A phantom: its number is drawn with it, and it has the same in all views that show it."""
+    DECOY = 4
+    """A decoy by number among the lookalikes."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +44,8 @@ class Found:
         boxes: x, y, width, height in pixels, (T, V, S, 4).
         box_scores: 0 to 1, (T, V, S).
         person: whom it shows, (T, V, S); -1 for nobody.
+        origin: :class:`Origin`, (T, V, S).
+        number: which one of its origin, (T, V, S): the same however many others there are, unlike its slot.
         error: :class:`KeypointError`, (T, V, S, J).
         rivals: where a second peak competes in the heat map, pixels, (T, V, S, J, 2), NaN where none does.
     """
@@ -36,7 +55,9 @@ class Found:
     scores: Floats
     boxes: Floats
     box_scores: Floats
-    person: NDArray[np.int64]
+    person: Ints
+    origin: NDArray[np.int8]
+    number: Ints
     error: NDArray[np.int8]
     rivals: Floats
 
@@ -51,6 +72,8 @@ class Found:
             boxes=np.zeros((*shape, 4)),
             box_scores=np.zeros(shape),
             person=np.full(shape, -1),
+            origin=np.full(shape, Origin.PHANTOM, np.int8),
+            number=np.full(shape, -1),
             error=np.full((*shape, joints), KeypointError.MISS, np.int8),
             rivals=np.full((*shape, joints, 2), np.nan),
         )

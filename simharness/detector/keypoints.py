@@ -118,8 +118,8 @@ class _Finder:
         """Pixels (T, V, J, 2), errors, which are guessed (T, V, J), and rivals of one person."""
         config, conditions = self._config, self._conditions
         true, unit, seen = self._target[:, :, person], conditions.unit[:, :, person], conditions.seen[:, :, person]
-        offset = self._offsets(person)
-        found = true + unit[..., None] * offset
+        scatter = unit[..., None] * self._offsets(person)
+        found = true + scatter
 
         harder = self._harder(person)
         jitter = self._happens("jitter", person, config.quality * self._jitter * harder)
@@ -148,14 +148,14 @@ class _Finder:
         place = np.where(swapped[..., None], neighbour, other)
         moved = swapped | inverted
         if moved.any():
-            found = np.where(moved[..., None], place + unit[..., None] * offset, found)
+            found = np.where(moved[..., None], place + scatter, found)
         error = self._labels(found, person, inverted, swapped)
         guessed &= ~moved
         outside = seen == OUTSIDE
         gone = outside | self._happens("drop", person, self._drop[np.where(outside, VISIBLE, seen), self._every])
         error[gone] = KeypointError.ABSENT
         found = np.where(gone[..., None], np.nan, found)
-        return found, error, guessed & ~gone, self._rivals(true, other, error, seen)
+        return found, error, guessed & ~gone, self._rivals(true + scatter, other + scatter, error, seen)
 
     def _happens(self, what: str, person: int, share: Floats | float) -> Bools:
         """Which joints (T, V, J) an error takes, of which ``share`` is the chance."""
@@ -260,7 +260,14 @@ class _Finder:
 
     @staticmethod
     def _rivals(true: Floats, other: Floats, error: NDArray[np.int8], seen: NDArray[np.int8]) -> Floats:
-        """Second peaks (T, V, J, 2): the true place of what is found elsewhere, the counterpart of what is not seen."""
+        """Second peaks (T, V, J, 2): the true place of what is found elsewhere, the counterpart of what is not seen.
+
+        Args:
+            true: the joints' own places, as far off as a good keypoint would be: a peak is no better, (T, V, J, 2).
+            other: those of their left-right counterparts, likewise.
+            error: what is wrong with the keypoints, (T, V, J).
+            seen: how the joints are seen, (T, V, J).
+        """
         elsewhere = (error == KeypointError.INVERSION) | (error == KeypointError.SWAP) | (error == KeypointError.MISS)
         unsure = ~elsewhere & (error != KeypointError.ABSENT) & (seen != VISIBLE) & PAIRED
         return np.where(elsewhere[..., None], true, np.where(unsure[..., None], other, np.nan))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Rig
 from simharness.detector.correlation import Chances
 from simharness.detector.figments import LEAST, box_about, reported, sureness
-from simharness.detector.found import Found
+from simharness.detector.found import Found, Origin
 from simharness.detector.lives import Lives, alive, anew, slots
 from simharness.detector.postures import DRAWS, postures, seen_from, turned
 from simharness.rendering.optics import appear
@@ -39,7 +39,7 @@ def phantoms(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Foun
 
     Their mean number in a view and frame, over all views, is ``config.rate``, of which ``config.views`` are figures in
     space. The number of those in one picture alone is Poisson distributed. More of a rate adds phantoms and changes
-    none; each keeps its slot, which a figure has in all views alike.
+    none; each keeps its slot and its number, which a figure has in all views alike.
 
     Figures are projected by ``rig`` into the pictures: where cameras drift away from it, they stand a little beside
     where they would.
@@ -54,6 +54,15 @@ def phantoms(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Foun
     if config.rate == 0.0:
         return Found.nothing(frames, len(rig), 0)
     return Found.joined([_standing(rig, config, chances), _alone(views, rig, config, chances)])
+
+
+def _reported(
+    rig: Rig, frames: int, rows: list[tuple[Ints, ...]], keypoints: list[Floats], scores: list[Floats]
+) -> Found:
+    """Phantoms of all views, from each view's frames, views, slots, numbers, keypoints and scores."""
+    frame, view, slot, number = (np.concatenate(column) for column in zip(*rows, strict=True))
+    poses, sure = np.concatenate(keypoints), np.concatenate(scores)
+    return reported(rig, frames, (frame, view, slot), poses, sure, origin=Origin.PHANTOM, number=number)
 
 
 # ---- Figures in space.
@@ -87,12 +96,11 @@ def _standing(rig: Rig, config: Phantoms, chances: Chances) -> Found:
     keypoints, scores = [], []
     for view, camera in enumerate(rig):
         mine = contained[kept][event, view]
-        rows.append((frame[mine], np.full(mine.sum(), view), slot[event[mine]]))
+        rows.append((frame[mine], np.full(mine.sum(), view), slot[event[mine]], lives.name[thing[event[mine]]]))
         keypoints.append(appear(camera, joints[mine]))
         apart = anew(chances, *lives.key, "score", view, number=number[mine], frame=frame[mine], size=1)
         scores.append(sureness(config.score, config.deviation, together[event[mine]], apart[..., 0]))
-    at, seen, slot = (np.concatenate(column) for column in zip(*rows, strict=True))
-    return reported(rig, len(chances.time), (at, seen, slot), np.concatenate(keypoints), np.concatenate(scores))
+    return _reported(rig, len(chances.time), rows, keypoints, scores)
 
 
 def _placed(rig: Rig, figures: Floats, draws: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -147,9 +155,9 @@ def _alone(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Found:
         low, high = box_about(poses)
         keypoints.append(poses + _JITTER * (high - low)[:, None, 1:] * noise[..., :2])
         scores.append(sureness(config.score, config.deviation, lives.normal("score")[thing][event], noise[..., 2]))
-        rows.append((frame, np.full(len(frame), view), slots(lives.born[thing], lives.last[thing])[event]))
-    at, seen, slot = (np.concatenate(column) for column in zip(*rows, strict=True))
-    return reported(rig, len(views), (at, seen, slot), np.concatenate(keypoints), np.concatenate(scores))
+        slot = slots(lives.born[thing], lives.last[thing])
+        rows.append((frame, np.full(len(frame), view), slot[event], lives.name[thing[event]]))
+    return _reported(rig, len(views), rows, keypoints, scores)
 
 
 def _poses(lives: Lives, thing: Ints, size: tuple[int, int], plausible: float) -> Floats:

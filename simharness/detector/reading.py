@@ -14,11 +14,11 @@ from simharness.detector.detect import Detected
 
 
 def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:
-    """The same boxes with the keypoints that a pose head reads in them; their classes are by distance.
+    """The same boxes, with their descriptors and the keypoints that a pose head reads; their classes are by distance.
 
     Args:
         head: a top-down head for COCO-17.
-        detected: one frame: of the simulated detections only the boxes are used.
+        detected: one frame: of the simulated detections all but the boxes and their descriptors is replaced.
         images: of each view (h, w, 3) uint8, or None where none arrives.
     """
     boxes = detected.detections
@@ -29,7 +29,7 @@ def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detect
     target = np.where(real[:, None, None], truth.pixels[boxes.view, truth.person], np.nan)
     error = classify(read.keypoints, target, oks_units(shown))
     error[~real] = np.where(read.scores[~real] > 0, truth.error[~real], error[~real])
-    return Detected(read, replace(truth, error=error))
+    return Detected(replace(read, descriptors=boxes.descriptors), replace(truth, error=error))
 
 
 def read_descriptors(network: ReId, detected: Detected, images: Images) -> Detected:

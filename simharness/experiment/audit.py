@@ -110,7 +110,8 @@ def check_calibration(faults: Faults, shots: Shots) -> None:
                  faults.rotation + faults.rotation_drift * minutes),
                 ("position, metres", float(np.abs(true.center - believed.center).max()),
                  faults.translation + faults.translation_drift * minutes),
-                ("focal length, as a share", abs(true.K[0, 0] / believed.K[0, 0] - 1), faults.focal),
+                ("focal length, logarithm of the ratio",
+                 abs(float(np.log(true.K[0, 0] / believed.K[0, 0]))), faults.focal),
                 ("principal point, pixels", float(np.abs(true.K[:2, 2] - believed.K[:2, 2]).max()), faults.center),
             ):  # fmt: skip
                 if off > _SIGMAS * allowed + 1e-6:

@@ -1,6 +1,8 @@
 """Drawn descriptors against the distances of the network that they stand for."""
 
 import json
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from simharness.detector.describing import Looks
 from simharness.detector.descriptors import DescriptorModel
 from simharness.detector.detect import detect
 from simharness.detector.viewing import bearings, hidden_shares
+from simharness.rendering.views import LookalikeViews
 from simharness.rendering.visibility import Visibility
 from simharness.scenario.detector import Detector
 
@@ -89,6 +92,60 @@ def test_what_is_hidden_moves_one_person_apart_as_in_the_network(model, card):
         assert drawn[:, : VIEWS - 1].mean() == pytest.approx(measured, abs=0.05)
 
 
+@pytest.mark.parametrize("dial", ["0", "0.25", "0.5", "0.75", "1"])
+def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, card, dial):
+    """In every bin that the network's pairs fill: within 0.05, and the standard error of what was measured."""
+    turns, covers = card["view_difference_degrees"], card["hidden_share_of_the_joints_of_the_worse_crop"]
+    hidden, rng = as_measured(card, "same"), np.random.default_rng(0)
+    who = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
+    same = np.arange(len(who))[:, None] // VIEWS == np.arange(len(who)) // VIEWS
+    once = np.triu(np.ones(same.shape, bool), 1)
+    total, count = np.zeros((2, 2, len(turns) - 1, len(covers) - 1))
+    for seed in range(200):
+        bearing, cover = rng.uniform(-np.pi, np.pi, len(who)), hidden(rng, len(who))
+        noise, unease = rng.standard_normal((len(who), model.dimensions)), rng.standard_normal(len(who))
+        drawn = model.draw(
+            who, bearing=bearing, hidden=cover, noise=noise, unease=unease, look_alike=float(dial), seed=seed
+        )
+        distance = np.linalg.norm(drawn[:, None] - drawn, axis=-1)
+        turn = np.degrees(np.arccos(np.cos(bearing[:, None] - bearing)))
+        worse = np.maximum(cover[:, None], cover)
+        for k, pair in enumerate((once & same, once & ~same)):
+            total[k] += np.histogram2d(turn[pair], worse[pair], [turns, covers], weights=distance[pair])[0]
+            count[k] += np.histogram2d(turn[pair], worse[pair], [turns, covers])[0]
+    for k, kind in enumerate(("same", "other")):
+        bins = card["look_alike"][dial][kind]["bins"]
+        filled = [(v, h, bin_) for v, row in enumerate(bins) for h, bin_ in enumerate(row) if bin_["pairs"] >= 100]
+        assert len(filled) > 15
+        for v, h, bin_ in filled:
+            error = bin_["deviation"] / np.sqrt(bin_["pairs"])
+            assert total[k, v, h] / count[k, v, h] == pytest.approx(bin_["mean"], abs=0.05 + error), (kind, v, h)
+
+
+def test_front_and_back_are_nearer_than_either_and_the_side(model, card):
+    """Seen from behind an outline is the same: so it is in the network, too."""
+    clear = [row[0]["mean"] for row in card["look_alike"]["0"]["same"]["bins"]]
+    assert clear[-1] < max(clear[2:4])
+    rng = np.random.default_rng(1)
+    count = 6000
+    side, back = (
+        np.linalg.norm(drawn[::2] - drawn[1::2], axis=1)
+        for drawn in (
+            model.draw(
+                [("person", k // 2) for k in range(count)],
+                bearing=np.where(np.arange(count) % 2, turn, 0.0),
+                hidden=np.zeros(count),
+                noise=rng.standard_normal((count, model.dimensions)),
+                unease=rng.standard_normal(count),
+                look_alike=0.0,
+                seed=2,
+            )
+            for turn in (np.pi / 2, np.pi)
+        )
+    )
+    assert side.mean() - back.mean() > 5 * np.hypot(side.std(), back.std()) / np.sqrt(count / 2)
+
+
 def test_two_views_of_one_side_are_nearer_than_front_and_back(model):
     rng = np.random.default_rng(1)
     count = 4000
@@ -124,12 +181,28 @@ def test_bearings_turn_with_the_body_and_the_camera():
     assert hidden_shares(seen.astype(np.int8)) == 0.5
 
 
+def with_decoys(where):
+    """The world with a poster and the mirror image of its first person."""
+    names = ("poster0", "mirror0/person0")
+    pixels = where.views.boxes[:, :, :1, None, :2] if where.views.boxes.shape[2] else np.full((1, 1, 1, 1, 2), 100.0)
+    shape = (*where.views.source.shape, len(names), 17)
+    spread = np.random.default_rng(7).random((*shape[1:], 2)) * [80, 200]
+    seen = LookalikeViews(names, np.broadcast_to(pixels, (*shape, 2)) + spread, np.ones(shape, bool))
+    return replace(where, views=replace(where.views, lookalikes=seen))
+
+
+def joined(base, dial):
+    """Sections with some dials turned."""
+    merged = {key: {**base.get(key, {}), **value} for key, value in dial.items() if isinstance(value, dict)}
+    return {**base, **dial, **merged}
+
+
 class TestInDetections:
     """Descriptors of a whole sequence."""
 
     @staticmethod
-    def described(model, *, look_alike=0.0, alike=0, **sections):
-        where = world(frames=40, people=4)
+    def described(model, *, look_alike=0.0, alike=0, people=4, frames=40, **sections):
+        where = with_decoys(world(frames=frames, people=people))
         config = Detector.model_validate(sections)
         looks = Looks(model, look_alike, alike)
         return detect(where.sequence, where.views, where.rig, config, seed=3, looks=looks)
@@ -151,6 +224,80 @@ class TestInDetections:
         assert np.mean(near["one"]) < np.mean(near["two"]) - 0.25
         assert np.mean(near["phantom"]) > np.mean(near["one"]) + 0.25
 
+    @pytest.mark.parametrize(
+        "dial",
+        [
+            {"boxes": {"duplicates": 0.3}},
+            {"boxes": {"split": 0.3}},
+            {"boxes": {"missed": 0.3}},
+            {"phantoms": {"rate": 1.6}},
+            {"decoys": {"share": 0.5}},
+            {"people": 5},
+        ],
+        ids=str,
+    )
+    def test_one_dial_leaves_the_descriptors_of_all_others_alone(self, model, dial):
+        base = {"phantoms": {"rate": 1.0, "life": 0.4, "views": 0.4}, "people": 4}
+        before, after = (
+            self.by_detection(self.described(model, **sections)) for sections in (base, joined(base, dial))
+        )
+        for real in (False,) if "people" in dial else (False, True):  # the world's people turn where there are more
+            both = [key for key in before[real] if key in after[real]]
+            assert len(both) > 0.35 * len(before[real]) > 30
+            for key in both:
+                np.testing.assert_allclose(before[real][key], after[real][key])
+
+    @staticmethod
+    def by_detection(frames):
+        """Descriptors of nobody (False) and of people (True) by frame, view, keypoints and their scores."""
+        result = {False: {}, True: {}}
+        for t, frame in enumerate(frames):
+            found = frame.detections
+            for d, person in enumerate(frame.truth.person):
+                key = (t, int(found.view[d]), found.keypoints[d].tobytes(), found.scores[d].tobytes())
+                result[bool(person >= 0)][key] = found.descriptors[d]
+        return result
+
+    @pytest.mark.parametrize("dial", ["duplicates", "split"])
+    def test_who_is_found_twice_has_the_same_look_and_other_noise(self, model, dial):
+        apart = []
+        for frame in self.described(model, boxes={dial: 0.3}):
+            drawn, found = frame.detections.descriptors, np.column_stack([frame.detections.view, frame.truth.person])
+            same = (found[:, None] == found).all(axis=-1) & np.triu(np.ones((len(found),) * 2, bool), 1)
+            apart += np.linalg.norm(drawn[:, None] - drawn, axis=-1)[same].tolist()
+        assert len(apart) > 50
+        assert min(apart) > 0.2
+        assert np.mean(apart) < 1.0
+
+    def test_a_figure_in_the_room_has_one_look_in_all_views(self, model):
+        def apart(views):
+            """Distances of phantoms in two views, in moments in which no view has more than one."""
+            result = []
+            for frame in self.described(model, phantoms={"rate": 0.3, "life": 0.4, "views": views}, frames=1000):
+                ghost = frame.truth.person < 0
+                drawn, view = frame.detections.descriptors[ghost], frame.detections.view[ghost]
+                if len(np.unique(view)) == len(view) > 1:
+                    result.append(np.linalg.norm(drawn[0] - drawn[-1]))
+            assert len(result) > 30
+            return np.array(result)
+
+        room, alone = apart(1.0), apart(0.0)
+        assert np.median(room) < 0.9  # as of one person seen from one side
+        assert np.mean(alone) > 1.2
+
+    def test_two_figures_have_two_looks(self, model):
+        drawn = []
+        for frame in self.described(model, phantoms={"rate": 2.0, "life": 0.4, "views": 1.0}):
+            last = (frame.truth.person < 0) & (frame.detections.view == 2)
+            drawn.append(frame.detections.descriptors[last])
+        apart = [np.linalg.norm(each[0] - each[1]) for each in drawn if len(each) > 1]
+        assert len(apart) > 5
+        assert np.mean(apart) > 1.2
+
+    def test_nobody_is_described_where_nobody_is(self, model):
+        frames = self.described(model, people=0, phantoms={"rate": 1.0})
+        assert sum(len(frame.detections.descriptors) for frame in frames) > 50
+
     def test_some_may_look_alike(self, model):
         frames = self.described(model, look_alike=1.0, alike=2)
 
@@ -164,7 +311,7 @@ class TestInDetections:
         assert apart(0, 1) < apart(2, 3) - 0.1
 
     def test_without_looks_there_are_none_and_nothing_else_changes(self, model):
-        where = world(frames=40, people=4)
+        where = with_decoys(world(frames=40, people=4))
         sections = {"keypoints": {"scatter": 0.3}, "phantoms": {"rate": 0.5}}
         plain = detect(where.sequence, where.views, where.rig, Detector.model_validate(sections), seed=3)
         for one, other in zip(plain, self.described(model, **sections), strict=True):
@@ -175,4 +322,19 @@ class TestInDetections:
 def test_a_network_without_measured_distances_is_refused(tmp_path):
     (tmp_path / "other.onnx").write_bytes(b"x")
     with pytest.raises(ValueError, match=r"other\.json: no card with the distances of other\.onnx"):
+        DescriptorModel.of_network(tmp_path / "other.onnx")
+
+
+@pytest.mark.parametrize("content", ["[1]", "{}", '{"distances": 3}', "no JSON"])
+def test_a_card_that_states_no_distances_is_said(tmp_path, content):
+    (tmp_path / "other.json").write_text(content)
+    with pytest.raises(ValueError, match=r"other\.json: no card with the distances of other\.onnx"):
+        DescriptorModel.of_network(tmp_path / "other.onnx")
+
+
+def test_distances_of_another_networks_card_are_refused(tmp_path):
+    shutil.copy(DEFAULT.with_suffix(".json"), tmp_path / "other.json")
+    DescriptorModel.of_network(tmp_path / "other.onnx")  # they can be drawn without the network
+    (tmp_path / "other.onnx").write_bytes(DEFAULT.read_bytes()[:-1])
+    with pytest.raises(ValueError, match="is not the file of"):
         DescriptorModel.of_network(tmp_path / "other.onnx")

@@ -317,3 +317,33 @@ def test_overlap_of_boxes():
 def test_nobody():
     found = find(world(people=0), scatter=0.4, miss=0.5)
     assert found.pixels.shape == (60, 3, 0, 17, 2)
+
+
+class TestRivals:
+    """A second peak is no better than the keypoint would be that is found there."""
+
+    SCATTER = 0.5
+
+    @pytest.mark.parametrize("dial", ["miss", "inversion", "swap"])
+    def test_what_is_found_elsewhere_has_its_rival_where_it_is_found_otherwise(self, dial):
+        where = world(frames=100, together=dial == "swap")
+        plain, wrong = find(where, scatter=self.SCATTER), find(where, scatter=self.SCATTER, **{dial: 0.2})
+        elsewhere = wrong.error == CLASSES[dial]
+        assert elsewhere.sum() > 100
+        np.testing.assert_allclose(wrong.rivals[elsewhere], plain.pixels[elsewhere])
+        assert (units(where, plain)[elsewhere] > 0.05).mean() > 0.9
+
+    def test_an_unsure_joint_has_its_rival_as_far_from_its_counterpart_as_itself_from_the_joint(self):
+        where = world(frames=100, visibility=Visibility.SELF_OCCLUDED)
+        found, true = find(where, scatter=self.SCATTER), where.views.pixels
+        paired = np.arange(17) != MIRROR
+        off, beside = (found.pixels - true)[..., paired, :], (found.rivals - true[..., MIRROR, :])[..., paired, :]
+        np.testing.assert_allclose(beside, off, atol=1e-9)
+        assert (np.linalg.norm(beside, axis=-1) > 0).mean() > 0.99
+        assert np.isnan(found.rivals[..., ~paired, :]).all()
+
+    def test_without_scatter_rivals_are_exact(self):
+        where = world()
+        found = find(where, miss=0.3)
+        missed = found.error == KeypointError.MISS
+        np.testing.assert_array_equal(found.rivals[missed], where.views.pixels[missed])

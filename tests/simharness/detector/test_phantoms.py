@@ -250,6 +250,35 @@ def lent(found, views):
     return found.there & (off < 0.04 * 300)
 
 
+class TestNumbers:
+    """What tells phantoms apart, for whatever is drawn about each."""
+
+    DIALS = {"life": 0.5, "views": 0.5}  # noqa: RUF012
+
+    @staticmethod
+    def numbers(found):
+        """The number of each by where and when it is."""
+        places = np.argwhere(found.there).tolist()
+        return {(t, v, found.keypoints[t, v, s].tobytes()): int(found.number[t, v, s]) for t, v, s in places}
+
+    def test_more_phantoms_change_no_number(self):
+        few, many = (self.numbers(drawn(ring(), rate=rate, **self.DIALS)) for rate in (0.4, 1.5))
+        assert len(many) > len(few) > 100
+        assert few.items() <= many.items()
+
+    def test_a_figure_has_one_in_all_views_and_no_two_in_a_picture_have_the_same(self):
+        found = drawn(ring(), rate=1.5, life=0.5, views=1.0)
+        alone = drawn(ring(), rate=1.5, life=0.5)
+        for each in (found, alone):
+            for t, v in np.argwhere(each.there.sum(axis=-1) > 1):
+                mine = each.number[t, v][each.there[t, v]]
+                assert len(np.unique(mine)) == len(mine)
+        shared = np.where(found.there, found.number, -1)
+        assert all(len(np.unique(slot[slot >= 0])) <= 1 for slot in shared.swapaxes(1, 2).reshape(-1, 4))
+        views = [np.unique(np.where(alone.there, alone.number, -1)[:, v]) for v in range(4)]
+        assert len(np.unique(np.concatenate(views))) == sum(len(each) - 1 for each in views) + 1
+
+
 class TestParts:
     def test_the_share_made_of_parts_is_the_asked_one(self):
         views = filmed(1000)

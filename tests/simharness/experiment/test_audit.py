@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mvpose import Rig
 from simharness.experiment.audit import AuditError, audit, check_calibration, check_clocks
 from simharness.experiment.trial import prepare
 from simharness.experiment.work import Filming
@@ -122,3 +123,18 @@ def test_a_calibration_that_is_not_as_asked_is_found(ready, done, said):
         AuditError, match=f"calibration: camera .* is off in its .*{said if said != 'position' else ''}"
     ):
         check_calibration(Faults(), shots)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
+def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, share):
+    """The error is log-normal: three deviations up are more than three down."""
+    time = np.arange(3) / 10.0
+    faults = Faults(focal=share)
+    for seed in range(150):
+        check_calibration(faults, shoot(ready.shots.true, faults, time, seed=seed))
+    shots = shoot(ready.shots.true, Faults(), time, seed=0)
+    for length in np.exp([7 * share, -7 * share]):
+        scale = np.diag([length, length, 1.0])
+        wide = Rig([replace(camera, K=camera.K @ scale) for camera in shots.believed])
+        with pytest.raises(AuditError, match="focal length"):
+            check_calibration(faults, replace(shots, believed=wide))
