@@ -63,7 +63,12 @@ class Check:
             f"{worse} regression{'s' * (worse > 1)}" if worse else "",
             f"{len(self.failed)} of {self.trials} trials could not be run" if self.failed else "",
         ]
-        return ", ".join(filter(None, said)) or "no regression"
+        verdict = ", ".join(filter(None, said)) or "no regression"
+        if undecided := self.comparison.undecided:
+            seeds = max(change.n for change in undecided)
+            losses = f"{len(undecided)} loss{'es' * (len(undecided) > 1)} beyond tolerance"
+            verdict += f", but {losses} that {seeds} seeds are too few to judge"
+        return verdict
 
     @property
     def pointer(self) -> str:

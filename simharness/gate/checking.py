@@ -9,6 +9,7 @@ from pathlib import Path
 from simharness.gate.baseline import Measurement, read_baseline
 from simharness.gate.check import Check
 from simharness.gate.comparing import Comparison, compare
+from simharness.gate.seeds import require_seeds
 from simharness.gate.suite import SuiteRun, fingerprint, run_suite
 from simharness.gate.trials import Trial, command_of, name_of, scenes_of
 from simharness.scenario.study import Study
@@ -18,8 +19,10 @@ def baseline_of(study: Study, path: Path) -> Measurement:
     """Read the baseline of a suite.
 
     Raises:
-        ValueError: there is none, it is damaged, or it is of another suite.
+        ValueError: there is none, it is damaged, or it is of another suite; or the suite has so few seeds that nothing
+            could differ from a baseline significantly.
     """
+    require_seeds(study)
     baseline = read_baseline(path)
     now = fingerprint(study)
     if baseline.fingerprint != now:

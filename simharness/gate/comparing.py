@@ -1,18 +1,27 @@
-"""Is it worse? Two measurements of one suite, compared trial by trial.
+"""Is it worse? Two measurements of one suite, compared seed by seed.
 
 Every headline score of every variant is compared over the whole suite, and then over each case alone, which sees what
 the whole dilutes. A change counts where it is larger in the mean than its tolerance *and* significant: a paired,
 one-sided sign-flip test, Holm's correction over all tests that are made.
 
+The cases are conditions of the same scenes: a change that helps at a seed in one case tends to help there in the
+others, so trials of one seed are no independent evidence. The whole suite is therefore compared by seed: before and
+after, each the mean over the cases that have the score on both sides at that seed.
+
 Which tests are made: those of which the mean size of the differences, whatever their signs, exceeds the tolerance. No
 other could be a change that counts; and as the test is of the signs alone, given the sizes, choosing by size takes
 nothing from its level. A change to one case makes a handful of tests, for trials that did not change differ by nothing.
-Twelve seeds that all fall have p = 1 / 4096, below 0.05 even after 200 tests; eleven cases and two variants make 146
-tests at most. A bug that changes everything shows in the whole suite, with p = 1 / 20,001.
 
-Time is compared by the ratio of each trial's time in units of the reference kernel, now to before. Of those ratios the
-middle half counts, for a trial during which the machine was held up says nothing: their geometric mean must exceed the
-allowed slow-down, and the ratios must be significant by the same test of their logarithms.
+How small a suite may be: n seeds that all fall have p = 2^-n, times the number of tests. One test alone needs 5 seeds
+at level 0.05; a suite with fewer is refused, for it could never find anything. Of v variants and c cases at most
+v (6 (1 + c) + 1) tests are made, v 7 where there are no cases, and a bug that changes everything makes them all: it is
+found from 8 seeds without cases, from 9 with two cases, and from 12 with eleven cases and two variants (146 tests,
+146 / 4096 = 0.036). A loss beyond its tolerance that so few seeds could not have shown to be one is ``undecided``.
+
+Time is compared by the ratio of each trial's time in units of the reference kernel, now to before, in logarithms. Of
+a seed's ratios the middle half counts, for a trial during which the machine was held up says nothing, and then the
+middle half of the seeds: their geometric mean must exceed the allowed slow-down, and the seeds must be significant by
+the same test.
 """
 
 from __future__ import annotations
@@ -26,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.gate.baseline import TIME, Measurement
+from simharness.gate.seeds import least_p
 from simharness.gate.trials import Trial
 from simharness.scenario.gate import Gate
 from simharness.scoring.bootstrap import block_weights, interval
@@ -44,13 +54,14 @@ class Change:
         score: its key in the catalogue, or ``TIME``.
         variant: of the method.
         case: None for the whole suite.
-        before, after: means over the pairs; of ``TIME``, geometric means of the middle half.
+        before, after: means over the seeds; of ``TIME``, geometric means of the middle half.
         difference: after - before with its 95 % interval; of ``TIME``, after / before.
         low, high: the interval's ends.
-        n: how many pairs.
+        n: how many seeds.
         p: of a change in the direction that it went, after Holm's correction; 1 where no test was made.
         loss: how much worse, in tolerances; negative where better.
         verdict: what it comes to.
+        undecided: larger than its tolerance, but not even if all seeds agreed could it be significant.
         worst: the trial that lost most.
     """
 
@@ -66,6 +77,7 @@ class Change:
     p: float
     loss: float
     verdict: Verdict
+    undecided: bool
     worst: Trial
 
 
@@ -85,6 +97,11 @@ class Comparison:
         """Changes of a verdict: of the whole suite first, those that lost most first."""
         found = (change for change in self.changes if change.verdict == verdict)
         return tuple(sorted(found, key=lambda change: (change.case is not None, -abs(change.loss))))
+
+    @property
+    def undecided(self) -> tuple[Change, ...]:
+        """Losses beyond their tolerances of which so few seeds cannot tell whether they are by chance."""
+        return tuple(change for change in self.changes if change.undecided and change.loss > 0)
 
     def of(self, variant: str, case: str | None = None) -> tuple[Change, ...]:
         """Changes of a variant over the whole suite or one case."""
@@ -112,13 +129,15 @@ def compare(before: Measurement, after: Measurement, gate: Gate) -> Comparison:
     cases = before.cases if len(before.cases) > 1 else ()
     tested = list(_all_tests(before, after, gate, cases))
     worse, better = _corrected(tested, 1), _corrected(tested, -1)
+    made = sum(each.made for each in tested)
     changes = []
     for each, p_worse, p_better in zip(tested, worse, better, strict=True):
         loss, p = each.change.loss, p_worse if each.change.loss > 0 else p_better
         verdict: Verdict = "same"
         if abs(loss) > 1 and p <= gate.level:
             verdict = "worse" if loss > 0 else "better"
-        changes.append(replace(each.change, p=p, verdict=verdict))
+        undecided = abs(loss) > 1 and verdict == "same" and made * least_p(each.change.n) > gate.level
+        changes.append(replace(each.change, p=p, verdict=verdict, undecided=undecided))
     return Comparison(tuple(changes), cases)
 
 
@@ -144,6 +163,12 @@ class _Pairs:
     before: Floats
     after: Floats
 
+    @property
+    def seeds(self) -> tuple[NDArray[np.intp], ...]:
+        """Which trials are of each seed: the pairs that are independent of each other."""
+        seeds = np.array([trial.seed for trial in self.trials])
+        return tuple(np.flatnonzero(seeds == seed) for seed in np.unique(seeds))
+
 
 def _pairs(score: str, variant: str, case: str | None, before: Measurement, after: Measurement) -> _Pairs:
     found = {
@@ -161,15 +186,16 @@ def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tes
     if not pairs.trials:
         return None
     bad = -1 if SCORES[score].better == "higher" else 1
-    change = pairs.after - pairs.before
-    test = paired(pairs.before, pairs.after, alternative=_side(change.sum()))
+    before, after = (np.array([each[at].mean() for at in pairs.seeds]) for each in (pairs.before, pairs.after))
+    change = after - before
+    test = paired(before, after, alternative=_side(change.sum()))
     loss = bad * test.difference
     result = Change(
         score=score,
         variant=pairs.variant,
         case=case,
-        before=float(pairs.before.mean()),
-        after=float(pairs.after.mean()),
+        before=float(before.mean()),
+        after=float(after.mean()),
         difference=test.difference,
         low=test.low,
         high=test.high,
@@ -177,7 +203,8 @@ def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tes
         p=test.p,
         loss=loss / tolerance if tolerance else math.copysign(math.inf, loss) if loss else 0.0,
         verdict="same",
-        worst=pairs.trials[int(np.argmax(bad * change))],
+        undecided=False,
+        worst=pairs.trials[int(np.argmax(bad * (pairs.after - pairs.before)))],
     )
     return _Tested(result, bool(np.abs(change).mean() > tolerance))
 
@@ -186,7 +213,10 @@ def _test_time(pairs: _Pairs, tolerance: float) -> _Tested | None:
     """Compare times; ``tolerance`` is of the logarithm of their ratio."""
     if not pairs.trials:
         return None
-    before, after = np.log(pairs.before), np.log(pairs.after)
+    ratios = np.log(pairs.after / pairs.before)
+    # The middle half of a seed is the same trials with before and after exchanged: the test asks for no more.
+    counted = [at[_middle(np.argsort(ratios[at], kind="stable"))] for at in pairs.seeds]
+    before, after = (np.array([np.log(each[at]).mean() for at in counted]) for each in (pairs.before, pairs.after))
     change = after - before
     middle = _middle(np.argsort(change, kind="stable"))
     ratio = float(change[middle].mean())
@@ -205,7 +235,8 @@ def _test_time(pairs: _Pairs, tolerance: float) -> _Tested | None:
         p=test.p,
         loss=ratio / tolerance,
         verdict="same",
-        worst=pairs.trials[int(np.argmax(change))],
+        undecided=False,
+        worst=pairs.trials[int(np.argmax(ratios))],
     )
     return _Tested(result, bool(_middle(np.sort(np.abs(change))).mean() > tolerance))
 
@@ -217,7 +248,7 @@ def _middle(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _middle_ends(change: Floats) -> tuple[float, float]:
-    """The 95 % interval of the mean of the middle half, over trials."""
+    """The 95 % interval of the mean of the middle half, over seeds."""
     if len(change) < 2:
         return math.nan, math.nan
     weights = block_weights(np.arange(len(change))).astype(int)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from xml.etree import ElementTree
 
 from simharness.gate.baseline import TIME
@@ -20,14 +20,13 @@ def junit(check: Check) -> str:
     """The report, XML.
 
     A regression is a failure of its case, with all that got worse; a trial that could not be run is an error of its
-    case.
+    case. What was lost of which too few seeds cannot tell whether it is by chance fails nothing, and is said.
     """
     suite = ElementTree.Element("testsuite", name=check.suite, time=f"{check.seconds:.1f}")
-    worse = check.comparison.that_are("worse")
-    _add(suite, check, WHOLE, [change for change in worse if change.case is None and change.score != TIME])
+    _add(suite, check, WHOLE, _of(None))
     for case in check.comparison.cases:
-        _add(suite, check, case, [change for change in worse if change.case == case])
-    _add(suite, check, SPEED, [change for change in worse if change.score == TIME])
+        _add(suite, check, case, _of(case))
+    _add(suite, check, SPEED, lambda change: change.score == TIME)
     for kind in ("failure", "error"):
         suite.set(f"{kind}s", str(len(suite.findall(f"testcase/{kind}"))))
     suite.set("tests", str(len(suite)))
@@ -37,8 +36,15 @@ def junit(check: Check) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _add(suite: ElementTree.Element, check: Check, name: str, worse: Sequence[Change]) -> None:
-    """Add a test case."""
+def _of(case: str | None) -> Callable[[Change], bool]:
+    """Whether a change is of a score, not of time, in a case; None: over the whole suite."""
+    return lambda change: change.case == case and change.score != TIME
+
+
+def _add(suite: ElementTree.Element, check: Check, name: str, belongs: Callable[[Change], bool]) -> None:
+    """Add a test case, of the changes that belong there."""
+    worse = list(filter(belongs, check.comparison.that_are("worse")))
+    undecided = list(filter(belongs, check.comparison.undecided))
     case = ElementTree.SubElement(suite, "testcase", classname=f"simharness.{_clean(check.suite)}", name=_clean(name))
     # Without cases of its own the suite is one case, and what failed in it belongs there.
     failed = [each for each in check.failed if each.case == name or (name == WHOLE and not check.comparison.cases)]
@@ -46,7 +52,14 @@ def _add(suite: ElementTree.Element, check: Check, name: str, worse: Sequence[Ch
         said = "\n".join(f"seed {each.seed}: {each.error}" for each in failed)
         _problem(case, "error", f"{len(failed)} trials could not be run", said)
     elif worse:
-        _problem(case, "failure", sentence(worse[0], check.gate), "\n".join(sentence(c, check.gate) for c in worse))
+        _problem(case, "failure", sentence(worse[0], check.gate), _sentences(worse, check))
+    if undecided:
+        said = f"worse, but too few seeds to judge\n{_sentences(undecided, check)}"
+        ElementTree.SubElement(case, "system-out").text = _clean(said)
+
+
+def _sentences(changes: Sequence[Change], check: Check) -> str:
+    return "\n".join(sentence(change, check.gate) for change in changes)
 
 
 def _problem(case: ElementTree.Element, kind: str, message: str, text: str) -> None:

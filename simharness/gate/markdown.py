@@ -19,11 +19,13 @@ def markdown(check: Check) -> str:
 def _lines(check: Check) -> Iterator[str]:
     yield f"## {check.suite}: {check.verdict}"
     yield ""
-    yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline pair by pair."
+    yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline seed by seed."
     yield from _list("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed])
     for heading, verdict in (("Worse", "worse"), ("Better", "better")):
         changes = check.comparison.that_are(verdict)  # type: ignore[arg-type]
         yield from _list(heading, [sentence(change, check.gate) for change in changes])
+    undecided = [sentence(change, check.gate) for change in check.comparison.undecided]
+    yield from _list("Worse, but too few seeds to judge", undecided)
     for variant in check.variants:
         yield from _table(check, variant)
     yield ""

@@ -50,7 +50,7 @@ def sentence(change: Change, gate: Gate) -> str:
     before, after = (number(change.score, value) for value in (change.before, change.after))
     return (
         f"{change.variant}, {place(change)}: {title(change.score)}: {before} before, {after} now: "
-        f"{difference(change)}, allowed {allowed(change, gate)}, p = {change.p:.2g} over {change.n} pairs"
+        f"{difference(change)}, allowed {allowed(change, gate)}, p = {change.p:.2g} over {change.n} seeds"
     )
 
 

@@ -25,6 +25,9 @@ COLUMNS: tuple[ScoreInfo, ...] = tuple(
 SURE = 0.05
 """Adjusted p under which a difference is shown as one."""
 
+_OF_A_VARIANT = ("variant", "seconds", "scenario")  # columns that say nothing of the setting; scores do not, either
+_OTHER = ", the other variant's"  # no column of a study is called so
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -64,7 +67,11 @@ def ends(interval: Interval, score: ScoreInfo) -> str:
 
 
 def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
-    """A row for each variant, a cell for each of :data:`COLUMNS`."""
+    """A row for each variant, a cell for each of :data:`COLUMNS`.
+
+    A mean is over the settings where the score applies to that variant, which need not be those of another one: how
+    two variants differ is what :func:`compared` says, not the difference of their means.
+    """
     rows = {}
     for variant in variants:
         mine = trials.filter(pl.col("variant") == variant)
@@ -73,7 +80,10 @@ def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
 
 
 def every(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
-    """Every score that applies to any variant: a row each, a cell for each variant."""
+    """Every score that applies to any variant: a row each, a cell for each variant.
+
+    Means are over the settings where the score applies to that variant, as in :func:`headline`.
+    """
     rows = []
     for info in SCORES.values():
         means = [
@@ -92,7 +102,7 @@ def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, 
 
 
 def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
-    """How each further variant differs from the first, paired by seed.
+    """How each further variant differs from the first: at each seed over the settings where both have the score.
 
     A difference is strong where Holm's adjusted p over all cells is under :data:`SURE`; time is left out, for other
     work on the machine shifts it.
@@ -100,13 +110,14 @@ def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
     found: list[tuple[str, ScoreInfo, Any]] = []
     first, *others = variants
     base = trials.filter(pl.col("variant") == first)
+    where = [column for column in trials.columns if column not in (*SCORES, *_OF_A_VARIANT)]  # setting and seed
     for variant in others:
         mine = trials.filter(pl.col("variant") == variant)
+        pairs = base.join(mine, on=where, suffix=_OTHER, nulls_equal=True, maintain_order="left")
         for info in COLUMNS:
-            before, after = by_seed(base, info.key), by_seed(mine, info.key)
-            seeds = sorted(before.keys() & after.keys())
-            pair = paired([before[seed] for seed in seeds], [after[seed] for seed in seeds])
-            found.append((variant, info, pair))
+            both = pairs.drop_nulls([info.key, f"{info.key}{_OTHER}"])
+            before, after = by_seed(both, info.key), by_seed(both, f"{info.key}{_OTHER}")
+            found.append((variant, info, paired(list(before.values()), list(after.values()))))
     tested = [each for each in found if each[1].key != "time_ms"]
     adjusted = dict(zip([(each[0], each[1].key) for each in tested], holm([each[2].p for each in tested]), strict=True))
     rows: dict[str, list[Cell]] = {variant: [] for variant in others}

@@ -1,7 +1,9 @@
 """What scores over many scenes say: means, paired differences, and where a score breaks.
 
-A scene (a trial: one setting at one seed) is the unit, never a frame: frames of a scene have its people, its cameras
-and its clutter in common. A score that does not apply to a scene is NaN or None there, and is left out.
+A scene is the unit, never a frame: frames of a scene have its people, its cameras and its clutter in common. Settings
+at one seed have much of their scene in common, too, and what helps in one helps in the next: where a study has several
+settings, average them at each seed first, and give the mean of each seed as one scene. A score that does not apply to
+a scene is NaN or None there, and is left out.
 """
 
 from __future__ import annotations
@@ -107,6 +109,7 @@ def paired(
 
     Pairs that do not differ are the same flipped: among ``EXACT`` others the test is exact, with p down to
     2^-12 = 0.00024; of more pairs ``DRAWS`` flips are drawn, and p is at least 1 / 20,001 (Phipson & Smyth, 2010).
+    The signs are flipped one by one, so that p holds only where the pairs are independent of each other.
 
     Args:
         before: the score of each scene.

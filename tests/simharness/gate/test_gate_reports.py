@@ -18,7 +18,7 @@ from simharness.scoring.catalogue import HEADLINE, SCORES
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"
 
 
-def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")):
+def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd"), seeds=12):
     """A check of three cases whose scores changed by what ``change`` says."""
     usual = {
         "pcp": 90.0,
@@ -29,7 +29,7 @@ def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")
         "ghosts": 0.3,
         TIME: 1.0,
     }
-    trials = [Trial(case, seed, variant) for case in cases for seed in range(12) for variant in ("full", "fast")]
+    trials = [Trial(case, seed, variant) for case in cases for seed in range(seeds) for variant in ("full", "fast")]
     before = Measurement("ci", "0" * 10, "1", {trial: dict(usual) for trial in trials})
     after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
     comparison = compare(before, Measurement("ci", "0" * 10, "1", after), Gate())
@@ -91,6 +91,14 @@ class TestJUnit:
         assert list(cases) == [WHOLE, SPEED]
         assert cases[WHOLE].find("error") is not None
 
+    def test_what_cannot_be_judged_fails_nothing_and_is_said(self):
+        suite, cases = cases_of(made(crowded, seeds=5))
+        assert (suite.get("failures"), suite.get("errors")) == ("0", "0")
+        assert [name for name, case in cases.items() if len(case)] == [WHOLE, "crowd"]
+        said = cases["crowd"].find("system-out").text
+        assert "too few seeds" in said
+        assert "PCP" in said
+
     def test_what_improved_fails_nothing(self):
         suite, _ = cases_of(made(better))
         assert suite.get("failures") == "0"
@@ -112,6 +120,10 @@ class TestMarkdown:
         assert places == sorted(places)
         assert markdown(made()).startswith("## ci: no regression\n")
 
+    def test_what_cannot_be_judged_is_listed(self):
+        assert "### Worse, but too few seeds to judge\n\n- full, " in markdown(made(crowded, seeds=5))
+        assert "too few" not in markdown(made(crowded)) + markdown(made(seeds=5))
+
     def test_the_command_can_be_copied(self):
         assert f"\n```sh\n{COMMAND}\n```\n" in markdown(made())
 
@@ -132,6 +144,11 @@ class TestMarkdown:
         (made(), True, "no regression"),
         (made(better), True, "no regression"),
         (made(slower), False, "1 regression"),
+        (
+            made(crowded, seeds=5),
+            True,
+            "no regression, but 4 losses beyond tolerance that 5 seeds are too few to judge",
+        ),
         (made(failed=[Failed("base", 0, "no")]), False, "1 of 36 trials could not be run"),
         (made(slower, failed=[Failed("base", 0, "no")]), False, "1 regression, 1 of 36 trials could not be run"),
     ],

@@ -1,0 +1,59 @@
+"""How small a suite may be."""
+
+import numpy as np
+import pytest
+
+from simharness.gate.baseline import KEPT, Measurement, write_baseline
+from simharness.gate.checking import baseline_of
+from simharness.gate.seeds import least_p, least_seeds
+from simharness.gate.suite import fingerprint
+from simharness.gate.trials import Trial, name_of, scenes_of
+from simharness.scenario.study import load_study
+from simharness.scoring.statistics import paired
+
+
+@pytest.mark.parametrize("seeds", [1, 2, 5, 12, 13, 20])
+def test_no_test_comes_below_the_least_p(seeds):
+    p = paired(np.zeros(seeds), -np.arange(1.0, seeds + 1), alternative="less").p
+    assert least_p(seeds) <= p < 4 * least_p(seeds)
+    assert p == least_p(seeds) or seeds > 12
+
+
+@pytest.mark.parametrize("level", [0.5, 0.05, 0.01, 1e-3, 1e-4])
+def test_the_least_seeds_are_enough_and_one_fewer_are_not(level):
+    seeds = least_seeds(level)
+    assert least_p(seeds) <= level < least_p(seeds - 1)
+
+
+def test_some_levels_no_number_of_seeds_reaches():
+    assert least_seeds(1e-6) is None
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Read the baseline of a suite of so many seeds, judged at a level."""
+
+    def baseline(seeds, level=0.05):
+        path = tmp_path / "few.toml"
+        path.write_text(f'name = "few"\nseeds = {seeds}\n[gate]\nlevel = {level}\n')
+        study = load_study(path)
+        trials = [Trial(name_of(setting, study), seed, name) for setting, seed in scenes_of(study) for name in KEPT]
+        scores = {trial: dict.fromkeys(KEPT, 1.0) for trial in trials}
+        write_baseline(Measurement("few", fingerprint(study), "1", scores), tmp_path / "few.json")
+        return baseline_of(study, tmp_path / "few.json")
+
+    return baseline
+
+
+def test_a_suite_that_could_find_nothing_is_refused(read):
+    with pytest.raises(ValueError, match=r"few\.toml: no regression could ever be found: 4 seeds .* at least 5 seeds"):
+        read(4)
+    with pytest.raises(ValueError, match=r"1 seed that .* at least 5 seeds, or a higher level"):
+        read(1)
+    with pytest.raises(ValueError, match=r"gate\.level is 1e-06; give it a higher level"):
+        read(20, level=1e-6)
+
+
+def test_a_suite_that_can_find_something_is_not(read):
+    assert len(read(5).scores) == len(read(5, level=0.04).scores)
+    assert read(1, level=0.5).suite == "few"
