@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from simharness.cli.border import REGRESSION, after_reading, border
+from simharness.cli.border import BAD_INPUT, REGRESSION, after_reading, border
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -49,13 +49,20 @@ def check(
     suite, or a method that takes longer beside a reference kernel. Trials that cannot be run fail the check, too.
     """
     with border():
+        from simharness.gate.baseline import check_place
         from simharness.scenario.study import load_study
 
+        reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
+        if update and reports:
+            raise ValueError(
+                f"{next(iter(reports))}: with --update-baseline nothing is compared: leave one of them out"
+            )
+        for option, path in ({"--baseline": baseline} if update else reports).items():
+            check_place(path, option=option)
         study = load_study(suite)
         if update:
             _update(study, baseline, workers)
             return
-        from simharness.gate.baseline import write_text
         from simharness.gate.checking import baseline_of
         from simharness.gate.checking import check as check_suite
 
@@ -63,23 +70,36 @@ def check(
         with after_reading(), _progress(study) as advance:
             result = check_suite(study, before, workers=workers, progress=advance)
         _print(result, Console())
-        if junit is not None:
-            from simharness.gate.junit import junit as as_junit
-
-            write_text(as_junit(result), junit, option="--junit")
-        if summary is not None:
-            from simharness.gate.markdown import markdown
-
-            write_text(markdown(result), summary, option="--summary")
+        unwritten = _write(result, reports)
     if not result.passed:
         raise typer.Exit(REGRESSION)
+    if unwritten:
+        raise typer.Exit(BAD_INPUT)
+
+
+def _write(result: Check, reports: Mapping[str, Path]) -> bool:
+    """Write the reports, each whatever becomes of the other; whether one could not be written, which is said."""
+    from simharness.gate.baseline import write_text
+    from simharness.gate.junit import junit
+    from simharness.gate.markdown import markdown
+
+    unwritten = False
+    for option, path in reports.items():
+        try:
+            write_text({"--junit": junit, "--summary": markdown}[option](result), path, option=option)
+        except ValueError as error:
+            unwritten = True
+            Console(stderr=True).print(f"error: {error}", soft_wrap=True, highlight=False, markup=False)
+    return unwritten
 
 
 def _update(study: Study, path: Path, workers: int) -> None:
     """Measure a suite and write what it scored."""
     from simharness.gate.baseline import write_baseline
+    from simharness.gate.seeds import require_seeds
     from simharness.gate.suite import run_suite
 
+    require_seeds(study)
     with after_reading(), _progress(study) as advance:
         done = run_suite(study, workers=workers, progress=advance)
     if done.failed:

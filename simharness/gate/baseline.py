@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,20 @@ def write_text(text: str, path: Path, *, option: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text.encode())
+    except OSError as error:
+        raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
+
+
+def check_place(path: Path, *, option: str) -> None:
+    """Refuse, before the work, a place where :func:`write_text` could not write; makes its folder.
+
+    Raises:
+        ValueError: as :func:`write_text`.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
     except OSError as error:
         raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
 

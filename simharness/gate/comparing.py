@@ -1,8 +1,9 @@
 """Is it worse? Two measurements of one suite, compared seed by seed.
 
-Every headline score of every variant is compared over the whole suite, and then over each case alone, which sees what
-the whole dilutes. A change counts where it is larger in the mean than its tolerance *and* significant: a paired,
-one-sided sign-flip test, Holm's correction over all tests that are made.
+Every headline score of every variant, and its time, is compared over the whole suite, and then over each case alone,
+which sees what the whole dilutes: a step that became quadratic in people, say. A change counts where it is larger in
+the mean than its tolerance *and* significant: a paired, one-sided sign-flip test, Holm's correction over all tests that
+are made.
 
 The cases are conditions of the same scenes: a change that helps at a seed in one case tends to help there in the
 others, so trials of one seed are no independent evidence. The whole suite is therefore compared by seed: before and
@@ -14,9 +15,9 @@ nothing from its level. A change to one case makes a handful of tests, for trial
 
 How small a suite may be: n seeds that all fall have p = 2^-n, times the number of tests. One test alone needs 5 seeds
 at level 0.05; a suite with fewer is refused, for it could never find anything. Of v variants and c cases at most
-v (6 (1 + c) + 1) tests are made, v 7 where there are no cases, and a bug that changes everything makes them all: it is
-found from 8 seeds without cases, from 9 with two cases, and from 12 with eleven cases and two variants (146 tests,
-146 / 4096 = 0.036). A loss beyond its tolerance that so few seeds could not have shown to be one is ``undecided``.
+7 v (1 + c) tests are made, 7 v where there are no cases, and a bug that changes everything makes them all: it is
+found from 8 seeds without cases, from 9 with two cases, and from 12 with eleven cases and two variants (168 tests,
+168 / 4096 = 0.041). A loss beyond its tolerance that so few seeds could not have shown to be one is ``undecided``.
 
 Time is compared by the ratio of each trial's time in units of the reference kernel, now to before, in logarithms. Of
 a seed's ratios the middle half counts, for a trial during which the machine was held up says nothing, and then the
@@ -83,10 +84,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All changes of a suite: those of the whole, then case by case, then of time.
+    """All changes of a suite: scores of the whole, then case by case; then time, likewise.
 
     Attributes:
-        changes: of each score and variant over the whole suite and, where there are several, each case.
+        changes: of each score and of time, by variant, over the whole suite and, where there are several, each case.
         cases: the names of the cases, where there are several.
     """
 
@@ -148,10 +149,11 @@ def _all_tests(before: Measurement, after: Measurement, gate: Gate, cases: tuple
                 tested = _test(score, _pairs(score, variant, case, before, after), case, getattr(gate.tolerance, score))
                 if tested is not None:
                     yield tested
-    for variant in before.variants:
-        tested = _test_time(_pairs(TIME, variant, None, before, after), math.log(gate.slowdown))
-        if tested is not None:
-            yield tested
+    for case in (None, *cases):
+        for variant in before.variants:
+            tested = _test_time(_pairs(TIME, variant, case, before, after), case, math.log(gate.slowdown))
+            if tested is not None:
+                yield tested
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,7 @@ def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tes
     return _Tested(result, bool(np.abs(change).mean() > tolerance))
 
 
-def _test_time(pairs: _Pairs, tolerance: float) -> _Tested | None:
+def _test_time(pairs: _Pairs, case: str | None, tolerance: float) -> _Tested | None:
     """Compare times; ``tolerance`` is of the logarithm of their ratio."""
     if not pairs.trials:
         return None
@@ -225,7 +227,7 @@ def _test_time(pairs: _Pairs, tolerance: float) -> _Tested | None:
     result = Change(
         score=TIME,
         variant=pairs.variant,
-        case=None,
+        case=case,
         before=math.exp(before[middle].mean()),
         after=math.exp(after[middle].mean()),
         difference=math.exp(ratio),

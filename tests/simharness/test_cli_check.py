@@ -205,6 +205,7 @@ class TestBadInput:
             raise AssertionError("ran")
 
         monkeypatch.setattr("simharness.gate.checking.run_suite", run)
+        monkeypatch.setattr("simharness.gate.suite.run_suite", run)
 
     @pytest.fixture
     def there(self, tmp_path):
@@ -246,7 +247,20 @@ class TestBadInput:
 
     def test_a_suite_of_so_few_seeds_that_it_could_find_nothing(self, check, there, tmp_path):
         (tmp_path / "few.toml").write_text(SMALL.replace("seeds = 12", "seeds = 4"))
-        refused(check(file="few.toml"), "few.toml: no regression could ever be found: 4 seeds", "at least 5 seeds")
+        said = ("few.toml: no regression could ever be found: 4 seeds", "at least 5 seeds")
+        refused(check(file="few.toml"), *said)
+        refused(check("--update-baseline", file="few.toml"), *said)
+
+    @pytest.mark.parametrize("option", ["--junit", "--summary"])
+    def test_a_report_that_cannot_be_written(self, check, there, option):
+        refused(check(option, "small.toml/out"), f"{option} small.toml/out: cannot be written")
+
+    def test_a_baseline_that_cannot_be_written(self, check, there):
+        refused(check("--update-baseline", baseline="small.toml/b.json"), "--baseline small.toml/b.json: cannot be")
+
+    @pytest.mark.parametrize("option", ["--junit", "--summary"])
+    def test_a_report_of_a_comparison_that_is_not_made(self, check, there, option):
+        refused(check("--update-baseline", option, "out"), f"{option}: with --update-baseline nothing is compared")
 
     def test_no_suite(self, check):
         refused(check(file="none.toml"), "none.toml: no such file")

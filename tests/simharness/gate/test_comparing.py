@@ -43,7 +43,7 @@ def named(changes):
 
 def test_nothing_changed():
     comparison = compare(measured(), measured(), GATE)
-    assert len(comparison.changes) == 2 * (6 * (1 + 11) + 1)
+    assert len(comparison.changes) == 2 * 7 * (1 + 11)
     assert {change.verdict for change in comparison.changes} == {"same"}
     assert {change.difference for change in comparison.changes if change.score != TIME} == {0.0}
     assert {change.p for change in comparison.changes} == {1.0}
@@ -208,7 +208,7 @@ def test_a_study_of_one_case_is_not_compared_twice():
 
 def test_time_is_compared_by_the_middle_of_its_ratios():
     slower = regressions(lambda trial: {TIME: math.log(2.0)} if trial.variant == "full" else {})
-    assert named(slower) == {(TIME, "full", None)}
+    assert named(slower) == {(TIME, "full", case) for case in (None, *CASES)}
     assert slower[0].difference == pytest.approx(2.0, rel=1e-3)
     assert slower[0].after / slower[0].before == pytest.approx(2.0, rel=1e-3)
     assert not regressions(lambda trial: {TIME: math.log(1.4)})
@@ -216,6 +216,11 @@ def test_time_is_compared_by_the_middle_of_its_ratios():
     busy = {(case, seed): held_up[12 * index + seed] for index, case in enumerate(CASES) for seed in range(12)}
     assert not regressions(lambda trial: {TIME: math.log(20.0) if busy[trial[:2]] else 0.0})
     assert not regressions(lambda trial: {TIME: math.log(2.0)}, Gate(slowdown=2.5))
+
+
+def test_what_is_slow_in_one_case_alone_is_found_there():
+    slower = regressions(lambda trial: {TIME: math.log(3.0) if trial.case == CASES[4] else 0.0})
+    assert named(slower) == {(TIME, variant, CASES[4]) for variant in ("fast", "full")}
 
 
 def test_the_interval_of_time_holds_the_ratio():

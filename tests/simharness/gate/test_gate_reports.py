@@ -143,14 +143,14 @@ class TestMarkdown:
     [
         (made(), True, "no regression"),
         (made(better), True, "no regression"),
-        (made(slower), False, "1 regression"),
+        (made(slower), False, "4 regressions"),  # over the whole suite, and in each case
         (
             made(crowded, seeds=5),
             True,
             "no regression, but 4 losses beyond tolerance that 5 seeds are too few to judge",
         ),
         (made(failed=[Failed("base", 0, "no")]), False, "1 of 36 trials could not be run"),
-        (made(slower, failed=[Failed("base", 0, "no")]), False, "1 regression, 1 of 36 trials could not be run"),
+        (made(slower, failed=[Failed("base", 0, "no")]), False, "4 regressions, 1 of 36 trials could not be run"),
     ],
 )
 def test_the_verdict(check, passed, verdict):
