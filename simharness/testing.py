@@ -12,7 +12,9 @@ Any score of :data:`simharness.scoring.catalogue.SCORES` can be asserted.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING
@@ -47,12 +49,13 @@ def assert_robust(
     Raises:
         AssertionError: a mean is past its threshold, or a score applies to no trial. The message has the numbers, the
             worst case, and the command that runs the worst trial.
-        ValueError: no threshold, a score that does not exist, or a scenario file with mistakes.
+        ValueError: no threshold, one that is no finite number, a score that does not exist, or a scenario file with
+            mistakes.
         RunError: a trial could not be run.
     """
     from simharness.scenario.study import load_study
 
-    _check_names(thresholds)
+    _check(thresholds)
     study = load_study(scenario, seeds=seeds, variants=[variant])
 
     from simharness.experiment.execution import RunError
@@ -68,14 +71,17 @@ def assert_robust(
         raise AssertionError("\n".join([f"{scenario}, {variant}, {study.trials} trials", *wrong]))
 
 
-def _check_names(thresholds: Mapping[str, float]) -> None:
+def _check(thresholds: Mapping[str, float]) -> None:
+    """Refuse thresholds that nothing can be held against: better now than after the run."""
     if not thresholds:
         raise ValueError("assert_robust needs a threshold, for example pcp=95")
-    for key in thresholds:
+    for key, limit in thresholds.items():
         if key not in SCORES:
             near = difflib.get_close_matches(key, SCORES, n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(SCORES)}"
             raise ValueError(f"no score {key!r}; {hint}")
+        if not isinstance(limit, Real) or isinstance(limit, bool) or not math.isfinite(limit):
+            raise ValueError(f"{key}={limit!r}: expected a finite number, for example {key}=95")
 
 
 def _wrong(key: str, limit: float, scores: Mapping[Trial, Mapping[str, float | None]], study: Study) -> str:

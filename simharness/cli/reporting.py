@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -91,11 +92,12 @@ def _thresholds(given: list[str]) -> dict[str, float]:
     for each in given:
         score, sign, value = each.partition("=")
         try:
-            if not sign:
+            number = float(value)
+            if not sign or not math.isfinite(number):  # nothing passes infinity, or what is no number
                 raise ValueError
-            thresholds[score.strip()] = float(value)
         except ValueError:
             raise ValueError(f"--threshold {each}: expected SCORE=NUMBER, for example --threshold pcp=90") from None
+        thresholds[score.strip()] = number
     return thresholds
 
 

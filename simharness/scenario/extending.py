@@ -49,9 +49,12 @@ def read_document(path: Path | str, *, overrides: Sequence[str] = (), folder: Pa
     places: Places = {}
     for file, said in reversed(chain):
         locate_files(said, file.parent if folder is None or file is not path else folder)
+        short = "variants" in said
         _take_variants(said, file)
         for key in leaves(said):
             set_place(places, key, str(file))
+        if short:  # as it is written, for messages
+            set_place(places, ("variants",), str(file))
         data = layered(data, said)
     data = overridden(data, overrides, places)
     return Document(path, data, places, tuple(dict.fromkeys(file.parent for file, _ in chain)))

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from simharness.scenario.document import ScenarioFile
 
+_VARIANTS = ("method", "variants")  # for which a file may also say variants
 _SHOWN = 60  # characters of a refused value that a message repeats
 
 
@@ -28,7 +29,7 @@ def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file
     """
     location = tuple(mistake["loc"])
     place = place_of(location, places, file)
-    key = _dotted(location)
+    key = _written(location, places)
     if mistake["type"] == "extra_forbidden":
         return f"{place}: {_unknown(location)}"
     if mistake["type"] == "missing":
@@ -38,6 +39,7 @@ def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file
         expected = f"a section [{key}] with keys {', '.join(sorted(section.model_fields)) or 'of your own'}"
     else:
         said = mistake["msg"].replace(" should match ", " should be text that matches ")
+        said = re.sub(r" items? after validation, not \d+$", "", said).replace("at least 1", "at least one")
         expected = re.sub(r"^(?:\w+ should(?: be| have)?|Value error,) ", "", said)
     field = _field(location)
     about = f" ({field.description})" if field is not None and field.description else ""
@@ -74,6 +76,14 @@ def section_at(location: Sequence[str | int]) -> type[BaseModel] | None:
 def _dotted(location: Sequence[str | int]) -> str:
     """``("cameras", "size", 1)`` as ``cameras.size[1]``."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+
+
+def _written(location: tuple[str | int, ...], places: dict[tuple[str, ...], str]) -> str:
+    """A location as whoever set it last wrote it: as ``variants`` or as ``method.variants``, which are the same."""
+    last = next((key for key in reversed(places) if key in (_VARIANTS, _VARIANTS[1:])), _VARIANTS)
+    if location[: len(_VARIANTS)] == _VARIANTS:
+        location = (*last, *location[len(_VARIANTS) :])
+    return _dotted(location)
 
 
 def _unknown(location: Sequence[str | int]) -> str:

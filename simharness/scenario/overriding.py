@@ -35,6 +35,8 @@ def overridden(data: dict[str, Any], overrides: Sequence[str], places: Places) -
                 raise ScenarioError(f"--set {override}: {'.'.join(key[:depth])} is a value, not a section")
         section[key[-1]] = value
         set_place(places, key, f"--set {override}")
+        if override.partition("=")[0].strip() == "variants":  # as it is written, for messages
+            set_place(places, ("variants",), f"--set {override}")
     return data
 
 

@@ -18,7 +18,7 @@ from simharness.study.plan import Planned, plan
 from simharness.study.progress import Quiet, Watch
 from simharness.study.provenance import provenance
 from simharness.study.results import Results, read_study, write_study
-from simharness.study.scheduling import Failure, Measure, Unit, work_off
+from simharness.study.scheduling import Failure, Measure, Success, Unit, told, work_off
 from simharness.study.store import Entry, Store, StoreError
 from simharness.study.tables import tables
 
@@ -33,7 +33,7 @@ class FailedTrial:
         factors: of its setting.
         seed: its own.
         variants: that are missing.
-        error: why.
+        error: why; with the names of the variants where it is not that of all.
     """
 
     trial: str
@@ -52,7 +52,7 @@ class Tally:
         trials: how many there are; those that two settings share count once.
         kept: how many were finished before.
         run: how many were finished now.
-        failed: the others.
+        failed: the others. Of some of them there are variants that were measured, and kept.
         damaged: entries of the store that were found damaged and run again.
         seconds: that it took.
     """
@@ -179,13 +179,14 @@ def _run(
         with closing(work_off(units, measure, workers=workers, scheduler=scheduler)) as results:
             for result in results:
                 each = different[result.unit.trial]
+                for part in result.parts:
+                    if isinstance(part, Success):
+                        _keep(store, each, part)
+                    else:
+                        _note(store, each, part)
                 if isinstance(result, Failure):
                     failed[each.trial] = result
-                    _note(store, each, result)
                 else:
-                    for variant, measured in result.measured.items():
-                        entry = Entry(each.trial, variant, measured, result.seconds / len(result.measured))
-                        store.write(each.entries[variant], entry)
                     run += 1
                 watch.advance(isinstance(result, Failure))
     except KeyboardInterrupt:  # which may come between a trial's last entry and its count: the store knows
@@ -208,6 +209,12 @@ def _missing(store: Store, planned: Planned) -> tuple[str, ...]:
     return tuple(variant for variant, identity in planned.entries.items() if not store.has(identity))
 
 
+def _keep(store: Store, planned: Planned, success: Success) -> None:
+    for variant, measured in success.measured.items():
+        entry = Entry(planned.trial, variant, measured, success.seconds / len(success.measured))
+        store.write(planned.entries[variant], entry)
+
+
 def _note(store: Store, planned: Planned, failure: Failure) -> None:
     for variant in failure.unit.variants:
         noted = {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback}
@@ -215,13 +222,14 @@ def _note(store: Store, planned: Planned, failure: Failure) -> None:
 
 
 def _failed(planned: Planned, failure: Failure) -> FailedTrial:
+    lost = [part for part in failure.parts if isinstance(part, Failure)]
     return FailedTrial(
         trial=planned.trial,
         case=planned.setting.case,
         factors=dict(planned.setting.factors),
         seed=planned.seed,
-        variants=failure.unit.variants,
-        error=failure.error,
+        variants=tuple(variant for part in lost for variant in part.unit.variants),
+        error=told(lost, planned.entries),
     )
 
 

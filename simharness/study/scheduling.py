@@ -1,7 +1,8 @@
 """Trials shared out: in this process, among processes of this machine, or on a Dask cluster.
 
 What fails is tried again, for a worker may die of what it has no fault in, and given up after :data:`ATTEMPTS`; the
-others go on. What the scenario is to blame for is given up at once: it would fail the same way again.
+others go on. What the scenario is to blame for is given up at once: it would fail the same way again. Variants that
+failed together are tried once more one by one, so that one that fails costs no other its result.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import secrets
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 ATTEMPTS = 3
 """How often a trial may fail before it is given up."""
 
-_PATIENCE = 30.0  # seconds to wait for a scheduler, and for its first worker
+_PATIENCE = 30.0  # seconds to wait for a scheduler
+_FIRST_WORKER = 30.0  # seconds to wait for the first worker of one that has none
 
 Measure = Callable[[Scenario, Sequence[str]], Mapping[str, Measured]]
 """What is done with a trial, in whatever process: :func:`simharness.study.measure.measure`. It must be picklable, and
@@ -63,6 +65,11 @@ class Success:
     measured: Mapping[str, Measured]
     seconds: float
 
+    @property
+    def parts(self) -> tuple[Success]:
+        """It is one whole."""
+        return (self,)
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -74,6 +81,7 @@ class Failure:
         traceback: of it; empty where there is none.
         final: whether it would fail the same way again.
         deaths: how many workers died over it.
+        alone: what each variant did by itself, in the unit's order, where the unit has several; at least one failed.
     """
 
     unit: Unit
@@ -81,6 +89,12 @@ class Failure:
     traceback: str
     final: bool = False
     deaths: int = 0
+    alone: tuple[Success | Failure, ...] = ()
+
+    @property
+    def parts(self) -> tuple[Success | Failure, ...]:
+        """What is known of its variants: each by itself, or that all failed together."""
+        return self.alone or (self,)
 
 
 def work_off(
@@ -88,10 +102,13 @@ def work_off(
 ) -> Generator[Success | Failure, None, None]:
     """Measure units, each until it is done or has failed for good, and yield them as they come.
 
+    A unit of several variants that has failed :data:`ATTEMPTS` times is divided: each variant is tried by itself, and
+    given up at once if it fails as all did together. What comes of that is one result, too.
+
     Closing the iterator, or an error in whoever iterates, ends all work.
 
     Args:
-        units: in the order in which they are begun.
+        units: in the order in which they are begun, no two of one trial.
         measure: what to do with each.
         workers: processes; 1 works in this one, where a crash cannot be survived. They are spawned, so a script that
             calls this needs its ``if __name__ == "__main__"``.
@@ -121,13 +138,60 @@ def attempt(measure: Measure, unit: Unit) -> Success | Failure:
     return Success(unit, measured, perf_counter() - start)
 
 
+def told(failures: Iterable[Failure], variants: Collection[str]) -> str:
+    """The errors of failures in a line, with whose they are, but where all variants have the same one.
+
+    Args:
+        failures: of variants of one trial.
+        variants: all of the trial.
+    """
+    whose: dict[str, list[str]] = {}
+    for each in failures:
+        whose.setdefault(each.error, []).extend(each.unit.variants)
+    if len(whose) == 1 and set(*whose.values()) == set(variants):
+        return next(iter(whose))
+    return "; ".join(f"{', '.join(names)}: {error}" for error, names in whose.items())
+
+
+def _divided(failure: Failure) -> list[Unit]:
+    """The variants of a unit that has failed for good, each a unit; none where that would tell nothing new."""
+    if failure.final or len(failure.unit.variants) < 2:
+        return []
+    return [replace(failure.unit, variants=(variant,)) for variant in failure.unit.variants]
+
+
+def _joined(together: Failure, alone: Iterable[Success | Failure]) -> Success | Failure:
+    """What came of a unit that failed: what its variants did one by one."""
+    unit = together.unit
+    alone = tuple(sorted(alone, key=lambda each: unit.variants.index(each.unit.variants[0])))
+    done = [each for each in alone if isinstance(each, Success)]
+    lost = [each for each in alone if isinstance(each, Failure)]
+    if lost:
+        return Failure(unit, told(lost, unit.variants), lost[0].traceback, alone=alone)
+    measured = {variant: each for part in done for variant, each in part.measured.items()}
+    return Success(unit, measured, sum(each.seconds for each in done))
+
+
 def _work_here(units: Iterable[Unit], measure: Measure) -> Generator[Success | Failure, None, None]:
     for unit in units:
-        for _ in range(ATTEMPTS):
-            result = attempt(measure, unit)
-            if isinstance(result, Success) or result.final:
-                break
+        result = _persist(unit, measure)
+        if isinstance(result, Failure) and (parts := _divided(result)):
+            result = _joined(result, [_persist(part, measure, together=result) for part in parts])
         yield result
+
+
+def _persist(unit: Unit, measure: Measure, together: Failure | None = None) -> Success | Failure:
+    """Attempt a unit until it is done or has failed for good; ``together``: the failure that it is a part of."""
+    for _ in range(ATTEMPTS):
+        result = attempt(measure, unit)
+        if isinstance(result, Success) or result.final or _again(result, together):
+            break
+    return result
+
+
+def _again(failure: Failure, together: Failure | None) -> bool:
+    """Whether a variant fails by itself as it did, :data:`ATTEMPTS` times, with the others."""
+    return together is not None and failure.error == together.error
 
 
 def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Generator[Success | Failure, None, None]:
@@ -137,7 +201,10 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
     then there is no doubt, and one that needs much memory has the machine to itself.
     """
     waiting, suspects, alone = iter(units), deque[Unit](), False
-    failed: Counter[str] = Counter()
+    parts = deque[Unit]()  # of units that are divided; they come before what waits
+    together: dict[str, Failure] = {}  # by trial, how they failed
+    finished: dict[str, list[Success | Failure]] = {}  # by trial, what came of its parts so far
+    failed: Counter[tuple[str, tuple[str, ...]]] = Counter()
     running: dict[Future[Any], Unit] = {}
     completed = _completed()
 
@@ -149,7 +216,7 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
 
     while True:
         while not alone and len(running) < max(1, sum(client.nthreads().values())):
-            unit = next(waiting, None)
+            unit = parts.popleft() if parts else next(waiting, None)
             if unit is None:
                 alone = not running
                 break
@@ -160,17 +227,26 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
             return
         future = next(completed)
         unit = running.pop(future)
-        result = _result(future, unit)
-        if isinstance(result, Success):
+        result, whole = _result(future, unit), together.get(unit.trial)
+        if isinstance(result, Failure):
+            tried = unit.trial, unit.variants
+            failed[tried] += max(1, result.deaths) if alone else 1
+            if not (result.final or failed[tried] >= ATTEMPTS or _again(result, whole)):
+                if result.deaths:
+                    suspects.append(unit)
+                else:
+                    submit(unit)
+                continue
+            if whole is None and (divided := _divided(result)):
+                together[unit.trial], finished[unit.trial] = result, []
+                (suspects if alone or result.deaths else parts).extend(divided)
+                continue
+        if whole is None:
             yield result
             continue
-        failed[unit.trial] += max(1, result.deaths) if alone else 1
-        if result.final or failed[unit.trial] >= ATTEMPTS:
-            yield result
-        elif result.deaths:
-            suspects.append(unit)
-        else:
-            submit(unit)
+        finished[unit.trial].append(result)
+        if len(finished[unit.trial]) == len(whole.unit.variants):
+            yield _joined(whole, finished.pop(unit.trial))
 
 
 def _completed() -> Any:
@@ -239,7 +315,7 @@ def _connected(scheduler: str) -> Iterator[Client]:
         raise ValueError(f"--scheduler {scheduler}: no Dask scheduler answers there: {error}") from None
     with client:
         try:
-            client.wait_for_workers(1, timeout=_PATIENCE)
+            client.wait_for_workers(1, timeout=_FIRST_WORKER)
         except TimeoutError:
             raise ValueError(f"--scheduler {scheduler}: it has no workers; start some by: dask worker") from None
         for address, theirs in client.run(code, on_error="return").items():

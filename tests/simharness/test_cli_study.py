@@ -50,6 +50,16 @@ def assert_refused(result, *said: str):
     assert result.stdout == ""
 
 
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999", "much", ""])
+def test_a_threshold_that_is_not_finite_is_refused_before_anything_is_written(simharness, tmp_path, reports, value):
+    page = tmp_path / "report.html"
+    page.write_text("a good one")
+    result = simharness("report", str(tmp_path), "--threshold", "recall=90", "--threshold", f"pcp={value}")
+    assert_refused(result, f"--threshold pcp={value}: expected SCORE=NUMBER")
+    assert page.read_text() == "a good one"
+    assert not reports
+
+
 @pytest.mark.parametrize("command", ["study", "merge"])
 def test_help_is_there(simharness, command):
     result = simharness(command, "--help")

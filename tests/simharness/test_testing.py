@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 from suites import SMALL, remember_scenes
 
@@ -46,6 +47,20 @@ def test_a_score_that_does_not_exist(small):
         assert_robust(small, pcpp=90)
     with pytest.raises(ValueError, match="needs a threshold"):
         assert_robust(small)
+
+
+@pytest.mark.parametrize("limit", [float("nan"), float("inf"), "95", None, True, [95], 95j])
+def test_a_threshold_that_is_no_number_is_refused_before_the_run(small, monkeypatch, limit):
+    monkeypatch.setattr(suite, "run_suite", None)  # not callable
+    with pytest.raises(ValueError, match=r"^pcp=.*: expected a finite number, for example pcp=95$"):
+        assert_robust(small, recall=0, pcp=limit)
+
+
+@pytest.mark.parametrize("limit", [90, np.float32(90), np.int64(90)])
+def test_a_threshold_may_be_any_number(small, monkeypatch, limit):
+    monkeypatch.setattr(suite, "run_suite", lambda study, workers: (_ for _ in ()).throw(RunError("it is run")))
+    with pytest.raises(RunError, match="it is run"):
+        assert_robust(small, pcp=limit)
 
 
 def test_a_file_or_a_variant_that_does_not_exist(small, tmp_path):

@@ -94,6 +94,25 @@ class TestValues:
         assert load(scenario_file('name = "x"\n[cameras]\nfov = 80')).cameras.fov == 80.0
 
 
+class TestTooFew:
+    """Lists that are too short are told by the key that was written."""
+
+    @pytest.mark.parametrize("key", ["variants", "method.variants", "people.activities"])
+    def test_in_a_file(self, scenario_file, key):
+        path = scenario_file(f'name = "x"\n{key} = []')
+        message = refusal(path)
+        assert message.startswith(f"{path}: {key} (")
+        assert message.endswith(": expected at least one, got []")
+
+    @pytest.mark.parametrize("key", ["variants", "method.variants"])
+    @pytest.mark.parametrize("below", ["variants", "method.variants"])
+    def test_over_a_file_that_says_it_too(self, scenario_file, key, below):
+        base = scenario_file(f'name = "x"\n{below} = ["full"]')
+        assert refusal(base, overrides=[f"{key}=[]"]).startswith(f"--set {key}=[]: {key} (")
+        top = scenario_file(f'extends = "{base.name}"\nname = "y"\n{key} = []', "top.toml")
+        assert refusal(top).startswith(f"{top}: {key} (")
+
+
 class TestFiles:
     def test_a_syntax_error_names_file_and_line(self, scenario_file):
         path = scenario_file('name = "x"\n\n[people\ncount = 3')
@@ -108,6 +127,40 @@ class TestFiles:
         message = refusal(path.with_name("kitchn.toml"))
         assert "no such file" in message
         assert f"did you mean {path}?" in message
+        assert message.endswith(f"{path.parent} has kitchen.toml")
+
+    def test_of_many_files_beside_it_those_named_like_it_are_listed(self, scenario_file, tmp_path):
+        for number in range(30):
+            scenario_file('name = "x"', f"unlike-{number}.toml")
+        near = {scenario_file('name = "x"', f"kitchen{letter}.toml").name for letter in "abcde"}
+        message = refusal(tmp_path / "kitchen.toml")
+        listed, _, more = message.partition(" has ")[2].partition(" and ")
+        assert more == "25 more"
+        assert len(listed.split(", ")) == 10
+        assert set(listed.split(", ")[:5]) == near
+
+    @pytest.mark.parametrize("files", [0, 3, 30])
+    @pytest.mark.parametrize("path", ["none.toml", ".", "../here", "../here/none.toml"])
+    def test_the_folder_is_named_once(self, tmp_path, monkeypatch, path, files):
+        (tmp_path / "here").mkdir()
+        monkeypatch.chdir(tmp_path / "here")
+        for number in range(files):
+            Path(f"{number}.toml").touch()
+        message = refusal(path)
+        assert message.startswith(f"{path}: ")
+        assert " . " not in message
+        assert not message.endswith(" .")
+        if path == "../here":
+            assert message.count(path) == 1
+        assert (f"{files - 10} more" in message) == (files > 10)
+
+    def test_a_mark_of_byte_order_is_no_mistake(self, tmp_path):
+        """Editors of Windows begin a file with one."""
+        path = tmp_path / "x.toml"
+        path.write_bytes(b'\xef\xbb\xbfname = "x"\n[people]\ncount = 3\n')
+        assert load(path).people.count == 3
+        path.write_bytes(b'\xef\xbb\xbfname = "x"\n[people\n')
+        assert refusal(path).startswith(f"{path}, line 2, column ")
 
     def test_a_folder_is_not_a_scenario(self, tmp_path):
         assert "is a folder" in refusal(tmp_path)

@@ -183,10 +183,9 @@ class TestPairing:
         assert len(many.real) > len(few.real)
 
     def test_phantoms_change_no_bit_of_what_is_seen_of_people(self):
-        rate, life = "detector.phantoms.rate", "detector.phantoms.life"
         few, lasting, shared = (
-            see(setting("phantoms", {rate: value, life: seconds}, case))
-            for value, seconds, case in ((0.5, 0.0, "one_view"), (4.0, 2.0, "one_view"), (4.0, 2.0, "all_views"))
+            see(setting("phantoms", {"detector.phantoms.rate": rate}, case))
+            for rate, case in ((0.5, "transient"), (4.0, "persistent"), (4.0, "persistent_in_all_views"))
         )
         assert few.real == lasting.real == shared.real
         assert 0 < few.false < min(lasting.false, shared.false)

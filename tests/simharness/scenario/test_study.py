@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from hypothesis import strategies as st
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.planning import read_plan
 from simharness.scenario.study import StudyTooLarge, load_study
+from simharness.scenario.sweeping import Sweep
 from simharness.study.document import document
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
@@ -395,12 +395,11 @@ class TestMistakes:
 class TestLargeStudies:
     TEXT = "seeds = 100\n[sweep]\npeople.count = { from = 1, to = 100, steps = 100 }\npeople.area = [%s]"
 
-    def test_a_million_trials_are_counted_and_not_made(self, study_file):
+    def test_a_million_trials_are_counted_and_not_made(self, study_file, monkeypatch):
+        monkeypatch.setattr(Sweep, "settings", None)  # not callable
         path = study_file(self.TEXT % ", ".join(f"{k}.0" for k in range(1, 101)))
-        start = time.perf_counter()
         with pytest.raises(StudyTooLarge, match=r"makes 1,000,000 trials \(10,000 x 100, settings x seeds\).*--yes"):
             load_study(path)
-        assert time.perf_counter() - start < 2.0
         assert read_plan(path).trials == 1_000_000
 
     def test_seeds_are_counted_too(self, study_file):

@@ -23,6 +23,8 @@ from simharness.scoring.catalogue import SCORES
 from simharness.study.measured import Measured
 
 ALWAYS = 99
+PATIENCE = 120.0  # seconds that a call waits for others, or for its end by them
+FOR_EVER = 600.0  # seconds; an end all the same, should whoever has started it be gone
 
 
 @dataclass(frozen=True)
@@ -34,28 +36,43 @@ class Fake:
         harm: what happens at a seed, and how often: "raise", "refuse" (the scenario's fault), "kill".
         seconds: that each call takes.
         large: the seed from which tables are of a megabyte.
+        stuck: the seed from which calls never end.
+        together: how many calls must have begun before one kills. The first of every other seed waits to be killed.
     """
 
     calls: Path
     harm: Mapping[int, tuple[str, int]] = field(default_factory=dict)
     seconds: float = 0.0
     large: int = ALWAYS
+    stuck: int = ALWAYS
+    together: int = 0
 
     def __call__(self, scenario, variants):
-        self.calls.mkdir(exist_ok=True)
-        call = f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}"
-        (self.calls / f"{time.time_ns()} {secrets.token_hex(4)}").write_text(call)
+        self._note(f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}")
         what, times = self.harm.get(scenario.seed, ("", 0))
-        if sum(each.startswith(f"{scenario.seed} ") for each in called(self.calls)) <= times:
+        begun = sum(each.startswith(f"{scenario.seed} ") for each in called(self.calls))
+        if begun <= times:
             if what == "kill":
-                time.sleep(0.3)  # whatever else this process has to do has begun by then
+                end = time.monotonic() + PATIENCE
+                while len(called(self.calls)) < self.together and time.monotonic() < end:
+                    time.sleep(0.02)
                 os.kill(os.getpid(), signal.SIGKILL)
             raise ValueError("nobody fits") if what == "refuse" else ZeroDivisionError("by zero")
-        time.sleep(self.seconds)
+        if scenario.seed >= self.stuck:
+            time.sleep(FOR_EVER)
+        time.sleep(PATIENCE if self.together and begun == 1 else self.seconds)
         return {
             variant: made_up(scenario, variant, rows=3 if scenario.seed < self.large else 130_000)
             for variant in variants
         }
+
+    def _note(self, call):
+        """Leave the file of a call, all at once: others read the folder meanwhile."""
+        self.calls.mkdir(exist_ok=True)
+        name = f"{time.time_ns()} {secrets.token_hex(4)}"
+        written = self.calls.with_name(f"{self.calls.name}, {name}")
+        written.write_text(call)
+        written.replace(self.calls / name)
 
 
 def made_up(scenario, variant, *, rows=3):
@@ -96,7 +113,7 @@ def program(folder: Path, **options) -> list[str]:
 
 def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
     """Run it to its end."""
-    return subprocess.run(program(folder, **options), capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(program(folder, **options), capture_output=True, text=True, timeout=300, check=False)
 
 
 def main():
@@ -107,7 +124,9 @@ def main():
     options = json.loads(sys.argv[1])
     folder = Path(options["folder"])
     harm = {int(seed): tuple(what) for seed, what in options.get("harm", {}).items()}
-    fake = Fake(folder / "calls", harm, options.get("seconds", 0.0), options.get("large", ALWAYS))
+    fake = Fake(
+        folder / "calls", harm, **{key: options[key] for key in ("seconds", "large", "stuck") if key in options}
+    )
     study_of(folder, cameras=(3, 4), seeds=3)
     run_study = running.run_study
     running.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)

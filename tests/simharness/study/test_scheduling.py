@@ -1,5 +1,7 @@
 """Trials shared out, and those that fail."""
 
+from dataclasses import replace
+
 import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
@@ -39,7 +41,7 @@ class TestHere:
         assert results[1].error == "ZeroDivisionError: by zero"
         assert "ZeroDivisionError" in results[1].traceback
         assert results[2].error == "nobody fits"
-        assert times(fake.calls) == {0: 1, 1: 3, 2: 1, 3: 1}
+        assert times(fake.calls) == {0: 1, 1: 3 + 2, 2: 1, 3: 1}  # three times together, then each variant once
 
     def test_work_is_begun_when_it_is_asked_for(self, tmp_path):
         fake = Fake(tmp_path / "calls")
@@ -77,8 +79,9 @@ class TestClusters:
         import dask
         from distributed import LocalCluster
 
-        # One process of two threads: the trial that kills it takes along whatever runs beside.
-        units, fake = units_of(tmp_path, 2), Fake(tmp_path / "calls", {0: ("kill", ALWAYS)}, seconds=1.0)
+        # One process of two threads: the trial that kills it takes along what runs beside, once both have begun.
+        units = [replace(unit, variants=("full",)) for unit in units_of(tmp_path, 2)]
+        fake = Fake(tmp_path / "calls", {0: ("kill", ALWAYS)}, together=2)
         with (
             dask.config.set({"distributed.scheduler.allowed-failures": 0}),
             LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster,
@@ -87,7 +90,9 @@ class TestClusters:
         assert isinstance(results[0], Failure)
         assert "worker process died" in results[0].error
         assert isinstance(results[1], Success)
-        assert times(fake.calls) == {0: 3, 1: 2}
+        calls = times(fake.calls)
+        assert calls[0] == 3
+        assert 2 <= calls[1] <= 3  # with a worker may die a result that is on its way
 
     @pytest.mark.slow
     def test_one_that_is_there_does_the_same(self, tmp_path):
@@ -99,7 +104,7 @@ class TestClusters:
             assert {seed for seed, result in results.items() if isinstance(result, Failure)} == {2}
             again = list(work_off(units[:1], fake, scheduler=cluster.scheduler_address))
         assert len(again) == 1
-        assert times(fake.calls) == {0: 2, 1: 2, 2: 3, 3: 1, 4: 1}
+        assert times(fake.calls) == {0: 2, 1: 2, 2: 3 + 2, 3: 1, 4: 1}
 
     @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
     def test_one_that_is_not_there_is_said(self, tmp_path, monkeypatch, address):
@@ -110,13 +115,13 @@ class TestClusters:
     def test_one_without_workers_or_with_others_is_said(self, tmp_path, monkeypatch):
         from distributed import LocalCluster
 
-        monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)
+        monkeypatch.setattr(scheduling, "_FIRST_WORKER", 0.5)
         unit, fake = units_of(tmp_path, 1), Fake(tmp_path / "calls")
         with LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster:
             with pytest.raises(ValueError, match="it has no workers"):
                 next(work_off(unit, fake, scheduler=cluster.scheduler_address))
             cluster.scale(1)
-            monkeypatch.setattr(scheduling, "_PATIENCE", 10)
+            monkeypatch.setattr(scheduling, "_FIRST_WORKER", 60)
             monkeypatch.setattr(scheduling, "code", object)  # of which no two are equal
             with pytest.raises(ValueError, match="another version of simharness"):
                 next(work_off(unit, fake, scheduler=cluster.scheduler_address))

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import polars as pl
 import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
@@ -9,7 +10,7 @@ from fakes import ALWAYS, Fake, called, made_up, study_of, times
 from simharness.scenario.study import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.identity import entry_identity, trial_identity
-from simharness.study.results import read_study
+from simharness.study.results import TABLES, read_study
 from simharness.study.running import FailedTrial, Interrupted, run_shard, run_study
 from simharness.study.store import Store
 
@@ -62,6 +63,35 @@ class TestTables:
         assert again.info == results.info
         for table in ("trials", "frames", "people", "failures"):
             assert getattr(again, table).equals(getattr(results, table))
+
+    @pytest.mark.parametrize("table", TABLES)
+    def test_arrow_reads_them(self, tmp_path, run, table):
+        """What the page of a study says of its Parquet files."""
+        results = run(study_of(tmp_path, cameras=(3, 5)))
+        rows, file = getattr(results, table).rows(), str(results.folder / f"{table}.parquet")
+        arrow = pytest.importorskip("pyarrow.parquet").read_table(file)
+        assert [tuple(row.values()) for row in arrow.to_pylist()] == rows
+        assert arrow.column_names == getattr(results, table).columns
+
+    @pytest.mark.parametrize("table", TABLES)
+    def test_pandas_reads_them(self, tmp_path, run, table):
+        pytest.importorskip("pyarrow")
+        frame = pytest.importorskip("pandas").read_parquet(
+            run(study_of(tmp_path, cameras=(3, 5))).folder / f"{table}.parquet", engine="pyarrow"
+        )
+        expected = getattr(read_study(tmp_path / "out" / "views"), table)
+        assert list(frame.columns) == expected.columns
+        for column in expected.columns:
+            values = [list(each) if isinstance(each, np.ndarray) else each for each in frame[column]]
+            assert values == expected[column].to_list()
+
+    @pytest.mark.parametrize("table", TABLES)
+    def test_duckdb_reads_them(self, tmp_path, run, table):
+        duckdb = pytest.importorskip("duckdb")
+        results = run(study_of(tmp_path, cameras=(3, 5)))
+        read = duckdb.sql(f"SELECT * FROM '{results.folder / f'{table}.parquet'}'")
+        assert read.columns == getattr(results, table).columns
+        assert read.fetchall() == getattr(results, table).rows()
 
     def test_settings_that_are_the_same_trial_are_run_once_and_stand_in_the_table_twice(self, tmp_path, run):
         more = "[cases.one]\npeople.count = 2\n[cases.same]\npeople.count = 2\n[cases.other]\npeople.count = 3\n"
@@ -162,17 +192,17 @@ class TestFailures:
             )
         )
         assert sorted(results.trials["seed"].unique()) == [0, 2]
-        assert times(run.calls)[1] == 2 * 3
+        assert times(run.calls)[1] == 2 * (3 + 2)  # three times together, then each variant once
 
     def test_they_are_noted_with_their_traceback_and_tried_again_next_time(self, tmp_path, run):
         study = study_of(tmp_path)
-        failed = run(study, harm={1: ("raise", 3)}).info["failed"]
+        failed = run(study, harm={1: ("raise", 3 + 2)}).info["failed"]
         identity = entry_identity(failed[0]["trial"], "full")
         noted = Store(run.store).failure(identity)
         assert noted["error"] == "ZeroDivisionError: by zero"
         assert noted["traceback"].startswith("Traceback")
         assert "fakes.py" in noted["traceback"]
-        results = run(study, harm={1: ("raise", 3)})
+        results = run(study, harm={1: ("raise", 3 + 2)})
         assert counts(results) == (2, 1, 1, 0)
         assert Store(run.store).failure(identity) is None
 

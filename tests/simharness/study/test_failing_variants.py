@@ -1,0 +1,178 @@
+"""Variants that fail where others do not: the others keep their results."""
+
+import os
+import signal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from fakes import made_up, study_of
+
+from simharness.experiment.execution import RunError
+from simharness.gate import suite
+from simharness.study.identity import entry_identity
+from simharness.study.plan import plan
+from simharness.study.running import run_study
+from simharness.study.scheduling import ATTEMPTS, Failure, Success, Unit, work_off
+from simharness.study.store import Store
+
+VARIANTS = ("full", "fast", "no-3dps")
+
+
+@dataclass(frozen=True)
+class Broken:
+    """In the place of ``measure``: variants that fail at odd seeds, and with them all that are measured together.
+
+    Attributes:
+        errors: of the variants that fail: what they raise, or "kill".
+        calls: a file that gets a line, "SEED VARIANTS", for each call.
+        least: how many variants must be together for one to fail.
+    """
+
+    errors: Mapping[str, Exception | str]
+    calls: Path = field(default=Path(os.devnull))
+    least: int = 1
+
+    def __call__(self, scenario, variants):
+        with self.calls.open("a") as file:
+            file.write(f"{scenario.seed} {'+'.join(variants)}\n")
+        for variant in variants:
+            if variant in self.errors and scenario.seed % 2 and len(variants) >= self.least:
+                if self.errors[variant] == "kill":
+                    os.kill(os.getpid(), signal.SIGKILL)
+                raise self.errors[variant]
+        return {variant: made_up(scenario, variant) for variant in variants}
+
+
+def units_of(folder, seeds, variants=VARIANTS):
+    return [Unit(each.trial, each.scenario, variants) for each in plan(study_of(folder, seeds=seeds))]
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run a made-up study of which variants fail at odd seeds."""
+
+    def run(errors, **options):
+        study = study_of(tmp_path, variants=VARIANTS, seeds=options.pop("seeds", 3))
+        return run_study(study, out=tmp_path / "out", measure=Broken(errors, run.calls), **options)
+
+    run.calls = tmp_path / "calls"
+    return run
+
+
+class TestOneByOne:
+    @pytest.mark.slow
+    @pytest.mark.parametrize("error", [RunError("boom"), "kill"], ids=["raises", "kills its worker"])
+    def test_whoever_fails_among_workers_is_lost_alone(self, tmp_path, error):
+        self.check(work_off(units_of(tmp_path, 2), Broken({"fast": error}), workers=2))
+
+    def test_whoever_fails_in_this_process_is_lost_alone(self, tmp_path):
+        self.check(work_off(units_of(tmp_path, 2), Broken({"fast": RunError("boom")})))
+
+    @staticmethod
+    def check(results):
+        results = list(results)
+        assert sorted(result.unit.scenario.seed for result in results) == [0, 1]  # each once
+        for result in results:
+            assert isinstance(result, Failure if result.unit.scenario.seed % 2 else Success)
+            assert result.unit.variants == VARIANTS
+            measured = {}
+            for part in result.parts:
+                if isinstance(part, Success):
+                    measured |= part.measured
+                    assert part.seconds >= 0
+                else:
+                    assert part.unit.variants == ("fast",)
+                    assert result.error == f"fast: {part.error}"
+            there = {"full", "no-3dps"} if isinstance(result, Failure) else set(VARIANTS)
+            assert set(measured) == there
+            for variant in there:
+                assert measured[variant].scores == made_up(result.unit.scenario, variant).scores
+
+    def test_what_fails_only_together_is_whole_in_the_end(self, tmp_path):
+        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken({"fast": MemoryError()}, least=2))
+        assert isinstance(result, Success)
+        assert tuple(result.measured) == VARIANTS
+
+    def test_it_costs_one_attempt_more_for_each_variant(self, tmp_path):
+        list(work_off(units_of(tmp_path, 2)[1:], Broken({"fast": RunError("boom")}, tmp_path / "calls")))
+        together = f"1 {'+'.join(VARIANTS)}"
+        assert (tmp_path / "calls").read_text().splitlines() == [
+            *[together] * ATTEMPTS,
+            *(f"1 {variant}" for variant in VARIANTS),
+        ]
+
+    def test_what_the_scenario_is_to_blame_for_is_tried_once(self, tmp_path):
+        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken({"fast": ValueError("nobody fits")}, tmp_path / "calls"))
+        assert (result.error, result.parts) == ("nobody fits", (result,))
+        assert len((tmp_path / "calls").read_text().splitlines()) == 1
+
+    def test_a_variant_that_was_alone_is_not_tried_more_often(self, tmp_path):
+        unit = units_of(tmp_path, 2, variants=("fast",))[1:]
+        (result,) = work_off(unit, Broken({"fast": RunError("boom")}, tmp_path / "calls"))
+        assert result.error == "boom"
+        assert len((tmp_path / "calls").read_text().splitlines()) == ATTEMPTS
+
+    @pytest.mark.parametrize(
+        ("errors", "said"),
+        [
+            (dict.fromkeys(VARIANTS, RunError("dark")), "dark"),
+            (dict.fromkeys(VARIANTS[:2], RunError("dark")), "full, fast: dark"),
+            ({"full": RunError("dark"), "no-3dps": RunError("lost")}, "full: dark; no-3dps: lost"),
+        ],
+    )
+    def test_errors_are_told_with_whose_they_are(self, tmp_path, errors, said):
+        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken(errors))
+        assert result.error == said
+
+
+class TestStudies:
+    def test_the_others_are_kept_and_the_trial_counts_as_failed_once(self, tmp_path, run):
+        class Seen:
+            def begin(self, trials, kept):
+                seen.append((trials, kept))
+
+            def advance(self, failed):
+                seen.append(failed)
+
+        seen = []
+        results = run({"fast": RunError("boom")}, watch=Seen())
+        assert [results.info[key] for key in ("trials", "kept", "run")] == [3, 0, 2]
+        assert seen[0] == (3, 0)
+        assert sorted(seen[1:]) == [False, False, True]
+        (failed,) = results.info["failed"]
+        assert (failed["seed"], failed["variants"], failed["error"]) == (1, ["fast"], "fast: boom")
+        there = {(seed, variant) for seed in range(3) for variant in VARIANTS} - {(1, "fast")}
+        assert set(results.trials.select("seed", "variant").iter_rows()) == there
+        assert results.frames.select("trial", "variant").n_unique() == len(there)
+
+        store = Store(tmp_path / "out" / "store")
+        noted = {variant: store.failure(entry_identity(failed["trial"], variant)) for variant in VARIANTS}
+        assert {variant for variant, note in noted.items() if note} == {"fast"}
+        assert noted["fast"]["error"] == "boom"
+        assert noted["fast"]["traceback"].startswith("Traceback")
+
+    def test_the_next_run_tries_what_is_missing_and_no_more(self, tmp_path, run):
+        run({"fast": RunError("boom")})
+        run.calls.unlink()
+        again = run({"fast": RunError("boom")}).info["failed"]
+        assert set(run.calls.read_text().splitlines()) == {"1 fast"}
+        assert [(each["variants"], each["error"]) for each in again] == [(["fast"], "fast: boom")]
+        whole = run({})
+        assert [whole.info[key] for key in ("kept", "run", "failed")] == [2, 1, []]
+        assert len(whole.trials) == 3 * len(VARIANTS)
+
+    def test_whoever_fails_in_different_ways_is_told_once(self, run):
+        (failed,) = run({"fast": RunError("boom"), "full": RunError("bang")}).info["failed"]
+        assert failed["variants"] == ["full", "fast"]
+        assert failed["error"] == "full: bang; fast: boom"
+
+
+def test_a_suite_counts_such_a_trial_once(tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr(suite, "measure_beside_reference", Broken({"fast": RunError("boom")}))
+    done = suite.run_suite(study_of(tmp_path, variants=VARIANTS, seeds=3), progress=seen.append)
+    assert [(each.seed, each.error) for each in done.failed] == [(1, "fast: boom")]
+    assert seen == [1, 1, 1]
+    assert {trial.seed for trial in done.scores} == {0, 2}
