@@ -30,7 +30,7 @@ def report(
         list[str] | None,
         typer.Option(
             metavar="SCORE=VALUE",
-            help="Tell where a score passes a value. Repeatable. [dim]\\[default: pcp=90][/]",
+            help="Tell where a score passes a value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
         ),
     ] = None,
     rerun: Annotated[

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ class Factor:
         numeric: whether they are numbers.
         rows: of the study's trials: of a grid all, of a sweep one at a time those that vary this key and the base.
         along: keys that change together with this one.
+        over: what else differs among the trials of one value, so that a score is the mean over it: other keys of a
+            grid, and ``case`` where those of several are together; with the values of each.
     """
 
     key: str
@@ -34,6 +36,7 @@ class Factor:
     numeric: bool
     rows: pl.DataFrame = field(repr=False)
     along: tuple[str, ...] = ()
+    over: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     def table(self, variant: str, score: str) -> Floats:
         """A variant's score by seed and value, (n, k): the mean over everything else that varies; NaN where none."""
@@ -52,16 +55,26 @@ class Factor:
         return [mean_interval(column) for column in self.table(variant, score).T]
 
 
-def factors(results: Results) -> list[Factor]:
+def cases_of(results: Results) -> tuple[str, ...]:
+    """The names of a study's cases, in its order; none where it has no cases."""
+    return tuple(case for case in dict.fromkeys(results.trials["case"]) if case)
+
+
+def factors(results: Results, case: str | None = None) -> list[Factor]:
     """What a study sweeps, in its order.
 
     Keys that change together are one factor, of the first. Those of which only one value has finished are left out.
+
+    Args:
+        results: the study.
+        case: whose trials count; None: those of all cases together, of which every score is then the mean.
     """
+    trials = results.trials if case is None else results.trials.filter(pl.col("case") == case)
     keys = list(results.info["factors"])
     found: list[Factor] = []
     taken: set[str] = set()
     for key in keys:
-        rows = results.trials
+        rows = trials
         if results.info["one_at_a_time"]:
             rows = rows.filter(pl.col("varied").is_in([key, ""]))
         values = list(dict.fromkeys(rows[key]))
@@ -71,7 +84,27 @@ def factors(results: Results) -> list[Factor]:
         taken.update(along)
         numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
         found.append(Factor(key, tuple(sorted(values) if numeric else values), numeric, rows, along))
+    pooled = {"case": cases_of(results)} if case is None and len(cases_of(results)) > 1 else {}
+    grid_of = {} if results.info["one_at_a_time"] else {each.key: each.values for each in found}
+    return [replace(each, over={**_without(grid_of, each.key), **pooled}) for each in found]
+
+
+def factors_by_case(results: Results) -> dict[str, list[Factor]]:
+    """What a study sweeps, of every case by itself; of a study without cases one list, of ``""``."""
+    return {case: factors(results, case) for case in cases_of(results) or ("",)}
+
+
+def panels(by_case: Mapping[str, Sequence[Factor]]) -> dict[str, dict[str, Factor]]:
+    """The factors of :func:`factors_by_case` by key and then by case: what stands beside each other."""
+    found: dict[str, dict[str, Factor]] = {}
+    for case, swept in by_case.items():
+        for factor in swept:
+            found.setdefault(factor.key, {})[case] = factor
     return found
+
+
+def _without(values: Mapping[str, tuple[Any, ...]], key: str) -> dict[str, tuple[Any, ...]]:
+    return {other: each for other, each in values.items() if other != key}
 
 
 def _together(rows: pl.DataFrame, key: str, other: str) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +16,21 @@ import polars as pl
 
 from simharness.experiment.atomic import appearing
 from simharness.report import study_plots, tables
-from simharness.report.curves import Factor, breaking, factors
-from simharness.report.markdown import duration, origin, table
+from simharness.report.curves import Factor, breaking, cases_of, factors, factors_by_case, panels
+from simharness.report.digest_text import HEADS, PRINTED, markdown
+from simharness.report.failure_rates import failure_rates
 from simharness.report.sheet import sheet
 from simharness.report.study import THRESHOLDS
-from simharness.scoring.catalogue import AP_MM, SCORES
+from simharness.scoring.catalogue import SCORES
 from simharness.scoring.statistics import Interval, mean_interval
 from simharness.study.provenance import PROVENANCE
 from simharness.study.results import Results
 
-HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
-"""The scores of a digest's first table."""
-PRINTED = (*(f"ap{limit}" for limit in AP_MM), "map", "recall", "mpjpe_mm", "pcp", "ghosts")
-"""The scores of one variant at every value of a factor, in the form in which papers print Panoptic."""
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
 """The scores of a digest."""
 
 _CURVES = (("pcp", "map"), ("recall", "ghosts"))  # as they stand in the picture
+_ACROSS = 3  # panels of cases beside each other
 _STAGES = ("affinity", "matching", "reconstruction")
 
 
@@ -68,14 +66,14 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
 
     Beside the keys of :data:`simharness.study.provenance.PROVENANCE`, of which ``seconds`` are those of all trials, one
     after the other: ``means`` of the variants and, where there are
-    any, of ``cases`` by name; ``factors`` with the scores at every value; ``breaking`` points; ``failures`` in 100
-    frames by kind and by stage, and the share of them that the right matching of the real detections would have mended;
-    ``time_ms`` of each stage.
+    any, of ``cases`` by name; ``factors`` with the scores at every value and with what these are means over;
+    ``breaking`` points; ``by_case``, of a study with cases, the factors and breaking points of each by itself, where
+    those above are of the means over all cases; ``failures`` as :func:`simharness.report.failure_rates.failure_rates`
+    has them; ``time_ms`` of each stage.
     """
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
-    swept = factors(results)
-    cases = [case for case in dict.fromkeys(trials["case"]) if case]
+    cases = cases_of(results)
     return {
         "name": info["name"],
         "description": info["description"],
@@ -85,6 +83,67 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         "one_at_a_time": info["one_at_a_time"],
         "means": _means(trials, names),
         "cases": {case: _means(trials.filter(pl.col("case") == case), names) for case in cases},
+        **_swept(factors(results), names, thresholds),
+        "by_case": {case: _swept(factors(results, case), names, thresholds) for case in cases},
+        "failures": {variant: failure_rates(results, variant) for variant in names},
+        "time_ms": {variant: _times(trials.filter(pl.col("variant") == variant)) for variant in names},
+    }
+
+
+def curves(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> str:
+    """The curves of a study, a picture of its own (SVG): for every factor PCP, mAP, recall and ghosts.
+
+    Of a study with cases every score has a row, or rows, of a panel for each case, on one scale.
+    """
+    names = results.info["variants"]
+
+    def plots(index: int, by_case: Mapping[str, Factor], score: str) -> list[str]:
+        lines = {case: {variant: factor.line(variant, score) for variant in names} for case, factor in by_case.items()}
+        every = [line for each in lines.values() for line in each.values()]
+        return [
+            study_plots.curve(
+                "-".join(filter(None, ("curve", str(index), score, case))),
+                factor=factor.key,
+                values=factor.values,
+                numeric=factor.numeric,
+                lines=lines[case],
+                score=SCORES[score],
+                threshold=thresholds.get(score),
+                title=case,
+                notes=_notes(factor),
+                beside=every,
+            )
+            for case, factor in by_case.items()
+        ]
+
+    rows: list[list[str]] = []
+    for index, by_case in enumerate(panels(factors_by_case(results)).values()):
+        for pair in _CURVES:
+            if "" in by_case:
+                rows.append([plot for score in pair for plot in plots(index, by_case, score)])
+            else:
+                rows += [row for score in pair for row in _in_rows(plots(index, by_case, score))]
+    return sheet(rows)
+
+
+def _in_rows(plots: Sequence[str]) -> list[list[str]]:
+    """Plots in as few rows as there must be, about as many in each."""
+    count = -(-len(plots) // _ACROSS)
+    across = -(-len(plots) // count)
+    return [list(plots[start : start + across]) for start in range(0, len(plots), across)]
+
+
+def _notes(factor: Factor) -> list[str]:
+    """What is said below the axis of a factor: what goes with it, and what a mean is over."""
+    along = (
+        f"together with {', '.join(factor.along)}" if len(factor.along) < 3 else f"and {len(factor.along)} other keys"
+    )
+    return [text for text in (along if factor.along else "", study_plots.mean_over(factor.over)) if text]
+
+
+def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[str, float]) -> dict[str, Any]:
+    """Factors with their scores, and where these break."""
+    return {
         "factors": [_factor(factor, names) for factor in swept],
         "breaking": [
             {
@@ -103,117 +162,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
             if factor.numeric
             for each in breaking(factor, names, score, threshold)
         ],
-        "failures": {variant: _failures(results, variant) for variant in names},
-        "time_ms": {variant: _times(trials.filter(pl.col("variant") == variant)) for variant in names},
     }
-
-
-def curves(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> str:
-    """The curves of a study, a picture of its own (SVG): for every factor PCP, mAP, recall and ghosts."""
-    names = results.info["variants"]
-
-    def plot(index: int, factor: Factor, score: str) -> str:
-        return study_plots.curve(
-            f"curve-{index}-{score}",
-            factor=factor.key,
-            values=factor.values,
-            numeric=factor.numeric,
-            lines={variant: factor.line(variant, score) for variant in names},
-            score=SCORES[score],
-            threshold=thresholds.get(score),
-        )
-
-    swept = list(enumerate(factors(results)))
-    return sheet([[plot(index, factor, score) for score in row] for index, factor in swept for row in _CURVES])
-
-
-def markdown(told: Mapping[str, Any]) -> str:
-    """A digest as a text to read."""
-    return "\n".join(_lines(told)) + "\n"
-
-
-def _lines(told: Mapping[str, Any]) -> Iterator[str]:
-    names = list(told["means"])
-    seeds, took = told["seeds"], duration(told["seconds"])
-    yield f"# {told['name']}"
-    yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {took} of one core."
-    yield f"\n    {told['command']}"
-    yield f"\n{origin(told)}"
-    yield "\nMeans over seeds, each the mean over its settings, with 95 % intervals over seeds.\n"
-    heads = [_head(key) for key in HEADS]
-    for case, means in {"": told["means"], **told["cases"]}.items():
-        if case:
-            yield f"\nCase {case}:\n"
-        yield from table(["variant", *heads], [[name, *(_said(means[name][k], k) for k in HEADS)] for name in names])
-    for factor in told["factors"]:
-        along = f" (with {', '.join(factor['along'])})" if factor["along"] else ""
-        yield f"\nPCP, %, against `{factor['key']}`{along}:\n"
-        rows = [
-            [study_plots.short(value), *(_said(factor["scores"][name]["pcp"][row], "pcp") for name in names)]
-            for row, value in enumerate(factor["values"])
-        ]
-        yield from table([factor["key"], *names], rows)
-        first = names[0]
-        yield f"\n`{first}`, all scores, against `{factor['key']}`{along}:\n"
-        rows = [
-            [study_plots.short(value), *(_mean(factor["scores"][first][key][row], key) for key in PRINTED)]
-            for row, value in enumerate(factor["values"])
-        ]
-        yield from table([factor["key"], *(_head(key) for key in PRINTED)], rows)
-    if told["breaking"]:
-        yield "\nBreaking points: where the mean passes the threshold.\n"
-        rows = [
-            [
-                f"`{each['factor']}`",
-                each["variant"],
-                f"{SCORES[each['score']].title} {each['threshold']:g}",
-                _broken(each),
-            ]
-            for each in told["breaking"]
-        ]
-        yield from table(["factor", "variant", "score", "at"], rows)
-    yield "\nFailures in 100 frames, and the share that right matching of the real detections would mend.\n"
-    kinds, stages = list(study_plots.KIND_COLORS), list(study_plots.BLAME_COLORS)
-    if not any("method" in failed["stages"] for failed in told["failures"].values()):
-        stages.remove("method")  # which only methods from elsewhere are blamed as
-    rows = [
-        [
-            name,
-            *(f"{failed['kinds'].get(kind, 0):.1f}" for kind in kinds),
-            *(f"{failed['stages'].get(stage, 0):.1f}" for stage in stages),
-            "–" if failed["matching_alone"] is None else f"{failed['matching_alone']:.0f} %",
-        ]
-        for name, failed in told["failures"].items()
-    ]
-    heads = [kind.replace("_", " ") for kind in kinds]
-    yield from table(["variant", *heads, *(f"by {stage}" for stage in stages), "matching alone"], rows)
-
-
-def _head(score: str) -> str:
-    info = SCORES[score]
-    return f"{info.title}, {info.unit}" if info.unit else info.title
-
-
-def _mean(ends: Sequence[float] | None, score: str) -> str:
-    return "–" if ends is None else f"{ends[0]:.{SCORES[score].digits}f}"
-
-
-def _said(ends: Sequence[float] | None, score: str) -> str:
-    """A mean and its interval."""
-    if ends is None:
-        return "–"
-    digits = SCORES[score].digits
-    mean, low, high = (None if end is None else f"{end:.{digits}f}" for end in ends)
-    return f"{mean}" if low is None else f"{mean} ({low} to {high})"
-
-
-def _broken(each: Mapping[str, Any]) -> str:
-    if each["why"] == "never":
-        return "not within the range"
-    if each["why"] == "at once":
-        return "at once"
-    low, high = ("beyond" if end is None else f"{end:.3g}" for end in (each["low"], each["high"]))
-    return f"{each['worse_when']} than {each['value']:.3g} ({low} to {high})"
 
 
 def _means(trials: pl.DataFrame, names: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -230,6 +179,7 @@ def _factor(factor: Factor, names: Sequence[str]) -> dict[str, Any]:
     return {
         "key": factor.key,
         "along": list(factor.along),
+        "over": {key: list(values) for key, values in factor.over.items()},
         "values": list(factor.values),
         "scores": {
             name: {score: [_ends(each) for each in factor.line(name, score)] for score in SCORED} for name in names
@@ -242,22 +192,6 @@ def _ends(interval: Interval) -> list[float | None] | None:
     if not interval.n:
         return None
     return [round(end, 4) if math.isfinite(end) else None for end in (interval.mean, interval.low, interval.high)]
-
-
-def _failures(results: Results, variant: str) -> dict[str, Any]:
-    frames = {variant: len(results.frames.filter(pl.col("variant") == variant))}
-    mine = results.failures.filter(pl.col("variant") == variant)
-    known = mine["matching_alone"].drop_nulls()
-    return {
-        **{
-            f"{column}s": {
-                key: round(amount, 3)
-                for key, amount in sorted(tables.failure_amounts(mine, frames, [variant], column)[variant].items())
-            }
-            for column in ("kind", "stage")
-        },
-        "matching_alone": round(100 * float(known.sum()) / len(known), 1) if len(known) else None,
-    }
 
 
 def _times(mine: pl.DataFrame) -> dict[str, float]:

@@ -110,8 +110,9 @@ def paper_tables(inputs: Mapping[str, Mapping[str, Any]], *, command: str | None
     Returns:
         ``comparison`` (table 1), by data set a list of rows: ``method``, ``of`` ("paper", "voxelpose", "2019", "twin"),
         ``actors`` (None of twins) and ``average``. ``ablation`` (table 2), by data set, variant and column ("paper",
-        "voxelpose", "2019", "twin"): ``pcp`` and ``against_full``; None where a variant was not run. ``inputs``: their
-        provenance, and what they are of.
+        "voxelpose", "2019", "twin"): ``pcp``, ``against_full`` and, of recorded data, ``same_as``: without descriptors
+        "full" and "geometry" are one measurement, and no difference of them is told; None where a variant was not run.
+        ``inputs``: their provenance, and what they are of, ``skipped`` the seeds between theirs that were passed over.
     """
     return {
         "command": command,
@@ -160,13 +161,13 @@ def _comparison(data: str, inputs: Mapping[str, Mapping[str, Any]]) -> Iterator[
 
 
 def _ablation(data: str, inputs: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    columns = {"paper": {name: row.average for name, row in ABLATION[data].items()}}
-    if data == "shelf":
-        columns |= {head: {name: scores["pcp"] for name, scores in inputs[head]["variants"].items()} for head in HEADS}
+    printed = {name: row.average for name, row in ABLATION[data].items()}
+    recorded = {head: inputs[head]["variants"] for head in HEADS} if data == "shelf" else {}
     twin = inputs[data]
     return {
         name: {
-            **{column: _alone(pcp, name) for column, pcp in columns.items()},
+            "paper": _alone(printed, name),
+            **{head: _recorded(variants, name) for head, variants in recorded.items()},
             "twin": {
                 "pcp": _ends(twin["pcp"][name]),
                 "against_full": None if name == "full" else _ends(twin["ahead_of_full"][name]),
@@ -184,6 +185,20 @@ def _alone(pcp: Mapping[str, float], name: str) -> dict[str, Any] | None:
     return {"pcp": [pcp[name], None, None], "against_full": against}
 
 
+def _recorded(variants: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Any] | None:
+    """A cell of recorded data."""
+    cell = _alone({each: scores["pcp"] for each, scores in variants.items()}, name)
+    if cell is None:
+        return None
+    same = {"full": "geometry", "geometry": "full"}.get(name) if _without_descriptors(variants) else None
+    return {**cell, "same_as": same, "against_full": None if same else cell["against_full"]}
+
+
+def _without_descriptors(variants: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether recorded detections carry no descriptors: nothing that needs them was run, and "full" is "geometry"."""
+    return NEED_DESCRIPTORS.isdisjoint(variants) and variants["full"]["pcp"] == variants["geometry"]["pcp"]
+
+
 def _ends(score: Mapping[str, float]) -> list[float]:
     return [score["pcp"], score["low"], score["high"]]
 
@@ -191,7 +206,9 @@ def _ends(score: Mapping[str, float]) -> list[float]:
 def _described(told: Mapping[str, Any]) -> dict[str, Any]:
     """Where an input comes from. Recorded data have no seeds."""
     kept = {key: told[key] for key in PROVENANCE}
-    kept |= {"seeds": list(told["seeds"] or ()), "variants": list(told["variants"])}
+    seeds = list(told["seeds"] or ())
+    skipped = sorted(set(range(min(seeds), max(seeds))) - set(seeds)) if seeds else []
+    kept |= {"seeds": seeds, "skipped": skipped, "variants": list(told["variants"])}
     return {**kept, "frames": told["frames"], "detector": told.get("detector"), "head": told["head"]}
 
 

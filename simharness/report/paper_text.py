@@ -15,6 +15,8 @@ _OF = {
     "twin": "twin",
 }
 
+_PLACED = {"campus": "people", "shelf": "people or the rack"}  # what a twin may find no place for: no scene then
+
 _TRIANGULATED = (
     "The twin's detector leaves joints out, and the paper's gives every joint of whom it finds. A joint that fewer "
     "than two cameras have cannot be triangulated, while the pictorial structure puts it where the bones let it be: "
@@ -37,14 +39,16 @@ _WHY: dict[str, dict[str, str]] = {
     "appearance": {
         "campus": "Other descriptors: the paper's network was trained on real people, ours on rendered ones, and reads "
         "rendered people here.",
-        "shelf": "In the paper actor 2 looks like another person, and most of the loss is his. People of the twin are "
-        "dressed independently of each other.",
+        "shelf": "In the paper actor 2 looks like another person, and most of the loss is his. Two people of the twin "
+        "wear the same, too, but our descriptors are other ones: of a network that was trained on rendered people, and "
+        "reads rendered people here.",
     },
     "geometry": {
         "campus": "The measure is not why: an epipolar distance in pixels, as the paper's, loses as little on this "
         "twin. Its cameras are calibrated to 0.2 degrees, so that rays agree and leave little to decide.",
-        "shelf": "Not the simulation: on real Shelf this code scores by geometry alone what stands above, with other "
-        "detections than the paper's and affinities on another scale, metres between rays.",
+        "shelf": "On real Shelf this code goes by geometry alone and scores what the table says, with other detections "
+        "than the paper's and affinities on another scale, metres between rays. What descriptors would add there was "
+        "not measured.",
     },
     "no-3dps": {"campus": _TRIANGULATED, "shelf": _TRIANGULATED},
     "no-matching": {"campus": _UNMATCHED, "shelf": _UNMATCHED},
@@ -72,13 +76,15 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
         yield f"\n### {title}\n"
         yield from _comparison(told["comparison"][data], title, _seeds(told, data))
         yield "\nSimulated people are not the actors: twins have no column for each."
+        if _same(told["ablation"][data]):
+            yield "On real Shelf this code goes by geometry alone: the detections carry no descriptors."
         yield from _sources(told, data)
     yield "\n## Table 2: variants of the method"
     yield "\nBeside each PCP: points against `full` on the same detections, of twins seed by seed."
     for data, title in _DATA.items():
         yield f"\n### {title}\n"
         yield from _ablation(told["ablation"][data], title, _seeds(told, data))
-        yield from _notes(data)
+        yield from _notes(data, told["ablation"][data])
         yield from _differences(told["ablation"][data], data)
         yield from _sources(told, data)
     yield from _origins(told)
@@ -102,18 +108,31 @@ def _ablation(variants: Mapping[str, Mapping[str, Any]], title: str, seeds: int)
         row = [f"`{name}`"]
         for column in columns:
             cell = cells[column]
-            row += ["–", "–"] if cell is None else [_said(cell["pcp"]), _against(cell["against_full"])]
+            row += ["–", "–"] if cell is None else [_said(cell["pcp"]), _beside_full(name, cell)]
         rows.append(row)
     yield from table([title, *(each for head in heads for each in (head, "against `full`"))], rows)
 
 
-def _notes(data: str) -> Iterator[str]:
+def _beside_full(name: str, cell: Mapping[str, Any]) -> str:
+    """What stands in the column "against `full`": of two variants that are one measurement no difference."""
+    if same := cell.get("same_as"):
+        return f"as `{same}`" if name == "full" else "–"
+    return _against(cell["against_full"])
+
+
+def _same(variants: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether "full" goes by geometry alone in any column."""
+    return any(cell is not None and cell.get("same_as") for cell in variants["full"].values())
+
+
+def _notes(data: str, variants: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     yield "\n`hungarian` and `fast` are not the paper's."
     if data == "campus":
         yield "There are no detections of real Campus to run on."
-    else:
+    elif _same(variants):
         yield "The detections of real Shelf carry no descriptors: there `appearance` cannot be run, and `full` goes by"
-        yield "geometry alone."
+        yield "geometry alone. So `full` and `geometry` are one measurement, and what stands against `full` in these"
+        yield "columns stands against `geometry`."
 
 
 def _differences(variants: Mapping[str, Mapping[str, Any]], data: str) -> Iterator[str]:
@@ -128,7 +147,11 @@ def _differences(variants: Mapping[str, Mapping[str, Any]], data: str) -> Iterat
             alike.append(f"`{name}`")
             continue
         what = f"`{name}`" if name == "full" else f"`{name}` against `full`"
-        values = "; ".join(f"{_OF[column]} {said(cell[key])}" for column, cell in cells.items() if cell is not None)
+        values = "; ".join(
+            f"{_OF[column]} {said(cell[key])}"
+            for column, cell in cells.items()
+            if cell is not None and cell[key] is not None
+        )
         apart.append(f"- {what}: {values}. {_WHY[name][data]}")
     if apart:
         twin = f"the twin of {_DATA[data]}"
@@ -149,6 +172,9 @@ def _sources(told: Mapping[str, Any], data: str) -> Iterator[str]:
             f"- {what} {made['frames']} frames; code {made['code']} ({digests}); {duration(made['seconds'])}: "
             f"`{made['command']}`"
         )
+        if skipped := made["skipped"]:
+            seeds = f"seed {skipped[0]}" if len(skipped) == 1 else f"seeds {_and(skipped)}"
+            yield f"  Passed over: {seeds}, at which {_PLACED[key]} find no place."
 
 
 def _origins(told: Mapping[str, Any]) -> Iterator[str]:
@@ -167,8 +193,14 @@ def _seeds(told: Mapping[str, Any], data: str) -> int:
     return len(told["inputs"][data]["seeds"])
 
 
+def _and(seeds: Sequence[int]) -> str:
+    """Two seeds or more."""
+    *others, last = map(str, seeds)
+    return f"{', '.join(others)} and {last}"
+
+
 def _listed(seeds: Sequence[int]) -> str:
-    """Seeds in few words: those at which people did not fit are missing in between."""
+    """Seeds in few words: those at which nothing could be built are missing in between."""
     whole = len(seeds) == seeds[-1] - seeds[0] + 1
     return f"{seeds[0]} to {seeds[-1]}" if whole and len(seeds) > 2 else ", ".join(map(str, seeds))
 

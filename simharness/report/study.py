@@ -12,15 +12,15 @@ from markupsafe import Markup
 
 from simharness.experiment.atomic import write_whole
 from simharness.report import plots, study_plots, tables
-from simharness.report.curves import Factor, breaking, factors, grid
+from simharness.report.curves import Factor, breaking, factors_by_case, grid, panels
 from simharness.report.templating import fill
 from simharness.report.worst import Shown, show, worst_frames
 from simharness.scenario.cameras import Cameras
 from simharness.scoring.catalogue import SCORES
 from simharness.study.results import Results
 
-THRESHOLDS: Mapping[str, float] = {"pcp": 90.0}
-"""The scores that must not pass a value, where nobody says otherwise."""
+THRESHOLDS: Mapping[str, float] = {"pcp": 90.0, "precision": 90.0}
+"""The scores that must not pass a value, where nobody says otherwise: PCP does not see ghosts, precision does."""
 
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")
 """The scores that have robustness curves."""
@@ -84,7 +84,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
     """
     info, trials = results.info, results.trials
     variants = [name for name in info["variants"] if name in set(trials["variant"])]
-    swept = factors(results) if variants else []
+    swept = factors_by_case(results) if variants else {}
     seeds = trials["seed"].n_unique()
     return fill(
         "study.html",
@@ -100,8 +100,13 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         every=tables.every(trials, variants),
         cases=tables.cases(trials, variants),
         tabs=[SCORES[key] for key in CURVES],
-        curves=[_curve(index, factor, variants, thresholds) for index, factor in enumerate(swept)],
-        heats=_heat(swept, variants, one_at_a_time=info["one_at_a_time"]),
+        curves=[
+            curve
+            for index, by_case in enumerate(panels(swept).values())
+            for curve in _curves(index, by_case, variants, thresholds)
+        ],
+        factors=len(panels(swept)),
+        heats=_heats(swept, variants, one_at_a_time=info["one_at_a_time"]),
         threshold_told=any(score in thresholds for score in CURVES),
         breaking=_breaking(swept, variants, thresholds),
         failures=_failures(results, variants),
@@ -160,45 +165,65 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def _curve(index: int, factor: Factor, variants: Sequence[str], thresholds: Mapping[str, float]) -> dict[str, Any]:
-    """The plots of a factor and the numbers in them, by score."""
-    drawn, numbers = {}, {}
+def _curves(
+    index: int, by_case: Mapping[str, Factor], variants: Sequence[str], thresholds: Mapping[str, float]
+) -> list[dict[str, Any]]:
+    """The plots of a factor, of each case on one scale, and the numbers in them, by score."""
+    told: list[dict[str, Any]] = [
+        {
+            "key": factor.key,
+            "case": case,
+            "along": factor.along,
+            "over": study_plots.mean_over(factor.over),
+            "plots": {},
+            "numbers": {},
+        }
+        for case, factor in by_case.items()
+    ]
     for score in CURVES:
         info = SCORES[score]
-        lines = {variant: factor.line(variant, score) for variant in variants}
-        svg = study_plots.curve(
-            f"curve-{index}-{score}",
-            factor=factor.key,
-            values=factor.values,
-            numeric=factor.numeric,
-            lines=lines,
-            score=info,
-            threshold=thresholds.get(score),
-        )
-        drawn[score] = Markup(svg)
-        numbers[score] = [
-            (study_plots.short(value), [tables.cell(lines[variant][row], info) for variant in variants])
-            for row, value in enumerate(factor.values)
-        ]
-    return {"key": factor.key, "along": factor.along, "plots": drawn, "numbers": numbers}
+        lines = {case: {each: factor.line(each, score) for each in variants} for case, factor in by_case.items()}
+        every = [line for each in lines.values() for line in each.values()]
+        for each, (case, factor) in zip(told, by_case.items(), strict=True):
+            svg = study_plots.curve(
+                "-".join(filter(None, ("curve", str(index), score, case))),
+                factor=factor.key,
+                values=factor.values,
+                numeric=factor.numeric,
+                lines=lines[case],
+                score=info,
+                threshold=thresholds.get(score),
+                beside=every,
+            )
+            each["plots"][score] = Markup(svg)
+            each["numbers"][score] = [
+                (study_plots.short(value), [tables.cell(lines[case][variant][row], info) for variant in variants])
+                for row, value in enumerate(factor.values)
+            ]
+    return told
 
 
-def _heat(swept: Sequence[Factor], variants: Sequence[str], *, one_at_a_time: bool) -> list[dict[str, Any]]:
-    """A grid of two factors as heat maps by score, of the first two variants; nothing for other studies."""
-    if len(swept) != 2 or one_at_a_time:
+def _heats(
+    swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], *, one_at_a_time: bool
+) -> list[dict[str, Any]]:
+    """A grid of two factors as heat maps by score, of the first two variants in each case; nothing of other studies."""
+    if one_at_a_time or not swept or any(len(factors) != 2 for factors in swept.values()):
         return []
-    down, along = swept
-    maps: list[dict[str, Any]] = [{"variant": variant, "plots": {}} for variant in variants[:2]]
+    shown = [(case, down, along, variant) for case, (down, along) in swept.items() for variant in variants[:2]]
+    maps: list[dict[str, Any]] = [
+        {"variant": variant, "case": case, "down": down.key, "along": along.key, "plots": {}}
+        for case, down, along, variant in shown
+    ]
     for score in CURVES:
-        means = [grid(down, along, each["variant"], score) for each in maps]
+        means = [grid(down, along, variant, score) for _, down, along, variant in shown]
         whole = [each for each in means if each is not None]
         if len(whole) < len(means):
             return []
         known = np.concatenate([each[np.isfinite(each)] for each in whole])
         span = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-        for each, values in zip(maps, whole, strict=True):
+        for each, (case, down, along, variant), values in zip(maps, shown, whole, strict=True):
             svg = study_plots.heat_map(
-                f"heat-{each['variant']}-{score}",
+                "-".join(filter(None, ("heat", variant, score, case))),
                 down=(down.key, down.values),
                 along=(along.key, along.values),
                 means=values,
@@ -206,27 +231,31 @@ def _heat(swept: Sequence[Factor], variants: Sequence[str], *, one_at_a_time: bo
                 span=span,
             )
             each["plots"][score] = Markup(svg)
-    return [{**each, "down": down.key, "along": along.key} for each in maps]
+    return maps
 
 
 def _breaking(
-    swept: Sequence[Factor], variants: Sequence[str], thresholds: Mapping[str, float]
+    swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], thresholds: Mapping[str, float]
 ) -> list[dict[str, Any]]:
-    rows = []
-    for score, threshold in thresholds.items():
-        info = SCORES[score]
-        for factor in swept:
-            if factor.numeric:
+    """Where every variant breaks: by factor a row for each case and score."""
+    told = []
+    for key, by_case in panels(swept).items():
+        rows = []
+        for case, factor in by_case.items():
+            for score, threshold in thresholds.items() if factor.numeric else ():
+                info = SCORES[score]
                 found = {each.variant: each for each in breaking(factor, variants, score, threshold)}
                 past = "under" if info.better == "higher" else "over"
                 rows.append(
                     {
-                        "factor": factor.key,
+                        "case": case,
                         "broken": f"{info.title} {past} {threshold:g}{f' {info.unit}' if info.unit else ''}",
                         "cells": [tables.breaking_cell(found.get(variant)) for variant in variants],
                     }
                 )
-    return rows
+        if rows:
+            told.append({"factor": key, "rows": rows})
+    return told
 
 
 def _failures(results: Results, variants: Sequence[str]) -> dict[str, Any]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from simharness.report.factor_names import axis_label
 from simharness.report.figure import FAINT, INK, LINE, VARIANT_COLORS, Color, figure, legend
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.scoring.statistics import Interval
@@ -34,7 +36,8 @@ _SPARE = "#8b93a1"
 
 _SIZE = (4.5, 3.0)  # inches of 72 px: a phone's width
 _WIDE_RANGE = 30.0  # numbers that differ by this factor are better told apart on a logarithmic axis
-_FEW_TICKS = 7  # so many values of a factor have a tick each
+_MOST_LISTED = 6  # values of a key, in a line about what a mean is over
+_LINE, _LINE_HEIGHT = 62, 0.15  # letters below an axis; inches
 _LETTER = 0.025  # of the axis: the width of a label's letter, and between two labels
 _DARK = 0.55  # luma of a cell under which its number is written in white
 
@@ -48,19 +51,28 @@ def curve(
     lines: Mapping[str, Sequence[Interval]],
     score: ScoreInfo,
     threshold: float | None = None,
+    title: str = "",
+    notes: Sequence[str] = (),
+    beside: Sequence[Sequence[Interval]] = (),
 ) -> str:
     """A score against the values of a factor: a line for each variant, with its interval.
 
     Args:
         name: unlike that of any other plot of the page.
-        factor: what varies.
+        factor: the key that varies; below the axis stands its name and its unit, too.
         values: of it, k.
         numeric: whether they are numbers.
         lines: k means of each variant.
         score: what is plotted.
         threshold: where it breaks: a dashed line.
+        title: above the plot.
+        notes: what is said below the axis, wrapped.
+        beside: lines of the plots that this one is compared with: the scale has room for them, too.
     """
-    with figure(name, size=_SIZE) as (axes, written):
+    label = axis_label(factor) if axis_label(factor).startswith(factor) else f"{axis_label(factor)} ({factor})"
+    below = [line for each in (label, *notes) for line in textwrap.wrap(each, _LINE, break_long_words=False)]
+    height = _SIZE[1] + _LINE_HEIGHT * (len(below) - 1 + 1.5 * bool(title))
+    with figure(name, size=(_SIZE[0], height)) as (axes, written):
         places = np.array(values, float) if numeric else np.arange(len(values), dtype=float)
         apart = 0.0 if numeric else min(0.16, 0.6 / max(1, len(lines)))
         for index, ((variant, intervals), color) in enumerate(
@@ -77,19 +89,21 @@ def curve(
             else:
                 axes.vlines(at, low, high, color=color, lw=1.6, alpha=0.55, zorder=3)
                 axes.plot(at, mean, "o", color=color, ms=4.6, label=variant, zorder=4, clip_on=False)
-        _limits(axes, lines, score, threshold)
+        _limits(axes, [*lines.values(), *beside], score, threshold)
         if threshold is not None:
             axes.axhline(threshold, color=FAINT, lw=0.9, ls=(0, (4, 3)), zorder=1)
-        axes.set(xlabel=factor, ylabel=f"{score.title}, {score.unit}" if score.unit else score.title)
+        axes.set(xlabel="\n".join(below), ylabel=f"{score.title}, {score.unit}" if score.unit else score.title)
+        if title:
+            axes.figure.suptitle(title, fontsize=10, fontweight="bold")
         _ticks(axes, values, places, numeric)
         axes.grid(axis="y")
         legend(axes, columns=min(4, len(lines)))
     return written[0]
 
 
-def _limits(axes: Axes, lines: Mapping[str, Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
+def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
     """Room for everything that is known; shares end at 100, and what has no upper bound begins at 0."""
-    ends = [end for line in lines.values() for each in line for end in (each.mean, each.low, each.high)]
+    ends = [end for line in lines for each in line for end in (each.mean, each.low, each.high)]
     known = np.array([*ends, *([] if threshold is None else [threshold])])
     known = known[np.isfinite(known)]
     if not len(known):
@@ -117,13 +131,8 @@ def _ticks(axes: Axes, values: Sequence[Any], places: Floats, numeric: bool) -> 
     if places.min() > 0 and places.max() / places.min() >= _WIDE_RANGE:
         axes.set_xscale("log")
         axes.minorticks_off()
-    if len(places) <= _FEW_TICKS:
-        across = np.log(places) if axes.get_xscale() == "log" else places
-        axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))
-    elif axes.get_xscale() == "linear":
-        axes.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS, integer=bool((places % 1 == 0).all())))
-    if axes.get_xscale() == "log":
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+    across = np.log(places) if axes.get_xscale() == "log" else places
+    axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))  # values that were tried, no others
 
 
 def _spaced(places: Floats, labels: Sequence[str]) -> list[str]:
@@ -153,7 +162,7 @@ def heat_map(
 
     Args:
         name: unlike that of any other plot of the page.
-        down: a factor and its values, k1.
+        down: the key of a factor and its values, k1.
         along: another and its values, k2.
         means: the scores, (k1, k2).
         score: what is plotted.
@@ -173,7 +182,8 @@ def heat_map(
             axes.text(column + 0.5, row + 0.5, told, ha="center", va="center", color=ink, fontsize=8.5)
         axes.set_xticks(np.arange(means.shape[1]) + 0.5, [short(value) for value in along[1]])
         axes.set_yticks(np.arange(means.shape[0]) + 0.5, [short(value) for value in down[1]])
-        axes.set(xlabel=along[0], ylabel=down[0])
+        beside = textwrap.wrap(axis_label(down[0]), 10 + 5 * len(down[1]), break_long_words=False)
+        axes.set(xlabel=axis_label(along[0]), ylabel="\n".join(beside))
         axes.invert_yaxis()
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
@@ -185,6 +195,19 @@ def short(value: Any) -> str:
     if value is None:
         return "–"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def mean_over(over: Mapping[str, Sequence[Any]]) -> str:
+    """What a mean is over, in words: keys with their values; nothing where it is over nothing."""
+    said = []
+    for key, values in over.items():
+        told = ", ".join(map(short, values))
+        if len(values) > _MOST_LISTED:
+            numbers = all(isinstance(value, int | float) for value in values)
+            ends = f"{short(values[0])} to {short(values[-1])}, " if numbers else ""
+            told = f"({ends}{len(values)} values)"
+        said.append(f"{key} {told}")
+    return f"mean over {' and '.join(said)}" if said else ""
 
 
 def failure_bars(

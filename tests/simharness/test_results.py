@@ -122,8 +122,9 @@ class TestFindings:
     def value(named: str) -> float:
         """What a file says.
 
-        ``FOLDER/FILE.json:key.key``; or ``STUDY VARIANT SCORE``, of all, at ``KEY=VALUE`` or in ``case=NAME``; or
-        ``STUDY VARIANT breaks KEY``, where its PCP passes 90; or ``STUDY VARIANT matching_alone``.
+        ``FOLDER/FILE.json:key.key``; or ``STUDY VARIANT SCORE``, of all, at ``KEY=VALUE``, in ``case=NAME`` or both; or
+        ``STUDY VARIANT breaks KEY``, where its PCP passes 90, with ``case=NAME`` of a study that has cases; or
+        ``STUDY VARIANT matching_alone``.
         """
         if ".json:" in named:
             file, path = named.split(":")
@@ -132,21 +133,24 @@ class TestFindings:
             return functools.reduce(operator.getitem, keys, told)
         study, variant, what, *where = named.split()
         told = json.loads((ROOT / "results" / study / "digest.json").read_text(encoding="utf-8"))
+        case = next((each.removeprefix("case=") for each in where if each.startswith("case=")), None)
+        where = [each for each in where if not each.startswith("case=")]
         if what == "breaks":
+            assert (case is None) == (not told["cases"]), "every case breaks by itself"
             (point,) = (
                 each["value"]
-                for each in told["breaking"]
+                for each in (told if case is None else told["by_case"][case])["breaking"]
                 if (each["factor"], each["variant"], each["score"], each["threshold"]) == (*where, variant, "pcp", 90.0)
             )
             return point
         if what == "matching_alone":
             return told["failures"][variant][what]
         if not where:
-            return told["means"][variant][what][0]
+            return (told["means"] if case is None else told["cases"][case])[variant][what][0]
         key, _, at = where[0].partition("=")
-        if key == "case":
-            return told["cases"][at][variant][what][0]
-        (factor,) = (each for each in told["factors"] if each["key"] == key)
+        (factor,) = (
+            each for each in (told if case is None else told["by_case"][case])["factors"] if each["key"] == key
+        )
         return factor["scores"][variant][what][[str(value) for value in factor["values"]].index(at)][0]
 
     def test_there_are_ten(self):

@@ -1,9 +1,11 @@
 """The page of a study in a real browser: no errors, nothing wider than the screen, and what turns does turn."""
 
+import contextlib
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 
 import pytest
@@ -78,22 +80,40 @@ def page(ran, shown):
     return render_study(ran, shown=[picture for picture, _ in shown])
 
 
+def run_browser(browser, folder, *arguments):
+    """Its output and its log. It is many processes: all of them end with it, whatever happens."""
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+    with subprocess.Popen(
+        [browser, *options, f"--user-data-dir={folder / 'profile'}", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            output, log = process.communicate(timeout=400)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 0, log
+    return output, log
+
+
 def browse(browser, page, folder, *, width, dark=False):
     """What the probe found, and the browser's log."""
     file = folder / "frame.html"
     file.write_text(FRAME.replace("WIDTH", str(width)), encoding="utf-8")
     (folder / "page.html").write_text(page.replace("<head>", "<head>" + PROBE, 1), encoding="utf-8")
     options = [
-        *("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run"),
-        f"--user-data-dir={folder / 'profile'}",
+        *("--hide-scrollbars", "--no-first-run"),
         "--window-size=1400,1000",
         f"--blink-settings=preferredColorScheme={0 if dark else 1}",
         *("--virtual-time-budget=5000", "--enable-logging=stderr", "--v=0", "--dump-dom"),
     ]
-    result = subprocess.run([browser, *options, file.as_uri()], capture_output=True, text=True, timeout=120, check=True)
-    found = re.search(r'data-probed="([^"]*)"', result.stdout)
-    assert found, result.stderr
-    return json.loads(found.group(1).replace("&quot;", '"').replace("&amp;", "&")), result.stderr
+    output, log = run_browser(browser, folder, *options, file.as_uri())
+    found = re.search(r'data-probed="([^"]*)"', output)
+    assert found, log
+    return json.loads(found.group(1).replace("&quot;", '"').replace("&amp;", "&")), log
 
 
 @pytest.mark.parametrize(("width", "dark"), [(360, False), (1280, True)])
@@ -124,9 +144,8 @@ def test_without_scripts_the_posters_are_there(browser, page, tmp_path):
     style = re.search(r"<style>.*?</style>", still, re.DOTALL).group(0)
     file, picture = tmp_path / "still.html", tmp_path / "still.png"
     file.write_text(f"<!doctype html>{style}<main><div class=turnable>{poster}</div></main>", encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={tmp_path / 'p'}"]
-    command = [browser, *options, "--window-size=800,600", f"--screenshot={picture}", file.as_uri()]
-    subprocess.run(command, capture_output=True, timeout=120, check=True)
+    options = ["--hide-scrollbars", "--window-size=800,600", f"--screenshot={picture}"]
+    run_browser(browser, tmp_path, *options, file.as_uri())
     with Image.open(picture) as opened:
         pixels = np.asarray(opened.convert("RGB")).reshape(-1, 3).astype(int)
     assert len(np.unique(pixels, axis=0)) > 50

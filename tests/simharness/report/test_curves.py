@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 from made_study import make_study
 
-from simharness.report.curves import breaking, factors, grid
+from simharness.report.curves import breaking, factors, factors_by_case, grid, panels
 
 VARIANTS = ("full", "fast")
 SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # what four seeds add to PCP on average
@@ -43,6 +43,37 @@ def test_one_at_a_time_leaves_the_other_factor_at_its_base(tmp_path):
         [each.mean for each in second.line("full", "pcp")], 60 + 5 * (np.array([1, 2, 6]) + 2) + SEEDS_ADD
     )
     assert grid(first, second, "full", "pcp") is None
+
+
+def test_a_mean_says_what_it_is_over(tmp_path):
+    keys = {"cameras.count": [2, 4], "people.count": [1, 2, 6], "detector.profile": ["poor", "good"]}
+    first, second, third = factors(make_study(tmp_path, factors=keys))
+    assert first.over == {"people.count": (1, 2, 6), "detector.profile": ("poor", "good")}
+    assert second.over == {"cameras.count": (2, 4), "detector.profile": ("poor", "good")}
+    assert third.over == {"cameras.count": (2, 4), "people.count": (1, 2, 6)}
+    assert all(each.over == {} for each in factors(make_study(tmp_path, factors=keys, one_at_a_time=True)))
+    assert factors(make_study(tmp_path, factors={"cameras.count": [2, 4]}))[0].over == {}
+
+
+def test_a_case_has_its_own_curves(tmp_path):
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5], "people.count": [1, 4]}, cases=("a", "b"))
+    more = pl.when(pl.col("case") == "b").then(10.0).otherwise(0.0)
+    results = type(results)(
+        results.info, results.trials.with_columns(pcp=pl.col("pcp") + more), *(results.frames,) * 3, results.folder
+    )
+    by_case = factors_by_case(results)
+    assert {key: list(each) for key, each in panels(by_case).items()} == {
+        "cameras.count": ["a", "b"],
+        "people.count": ["a", "b"],
+    }
+    for case, add in (("a", 0.0), ("b", 10.0)):
+        count, _ = by_case[case]
+        assert "case" not in count.over
+        expected = 60 + 5 * (np.array([2, 3, 5]) + 2.5) + SEEDS_ADD + add
+        np.testing.assert_allclose([each.mean for each in count.line("full", "pcp")], expected)
+    pooled, _ = factors(results)
+    assert pooled.over["case"] == ("a", "b")
+    assert pooled.line("full", "pcp")[0].mean == pytest.approx(60 + 5 * 4.5 + SEEDS_ADD + 5.0)
 
 
 def test_keys_that_change_together_are_one_factor(tmp_path):

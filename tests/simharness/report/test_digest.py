@@ -1,18 +1,21 @@
 """What is kept of a study beside the code: right numbers, where they come from, and a picture that stands by itself."""
 
 import json
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
+import polars as pl
 import pytest
 from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.digest import curves, digest, markdown, write_digest
+from simharness.report.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.report.sheet import sheet
 from simharness.report.study_plots import BLAME_COLORS, KIND_COLORS
+from simharness.scoring.catalogue import SCORES
 from simharness.study.provenance import PROVENANCE
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -60,11 +63,65 @@ def test_every_failure_has_a_kind_and_a_stage(study):
 
 
 def test_a_whole_method_is_to_blame_only_where_one_from_elsewhere_is(study):
-    assert "| by reconstruction | matching alone |" in markdown(digest(study))
+    def owners(told):
+        return re.findall(r"^\| by (\w+) \|", markdown(told), re.MULTILINE)
+
+    assert owners(digest(study)) == ["detection", "matching", "reconstruction"]
     stages = study.failures["stage"].replace({"matching": "method"})
     told = digest(replace(study, failures=study.failures.with_columns(stages)))
-    assert "| by reconstruction | by method | matching alone |" in markdown(told)
+    assert owners(told) == ["detection", "matching", "reconstruction", "method"]
     assert told["failures"]["full"]["stages"]["method"] > 0
+
+
+def test_failures_have_intervals_over_seeds(study):
+    told = digest(study)["failures"]
+    for failed in told.values():
+        ends = failed["intervals"]
+        rates = [(failed[column][key], *ends[column][key]) for column in ("kinds", "stages") for key in failed[column]]
+        for rate, low, high in [*rates, (failed["matching_alone"], *ends["matching_alone"])]:
+            assert 0 <= low <= rate <= high
+        assert any(low < high for _, low, high in rates)
+        assert ends["matching_alone"][1] <= 100
+    alone = replace(study, **{name: study_of_seed(study, name, 0) for name in ("trials", "frames", "failures")})
+    (ends,) = {str(end) for each in digest(alone)["failures"].values() for end in each["intervals"]["kinds"].values()}
+    assert ends == "[None, None]"
+
+
+def study_of_seed(study, name, seed):
+    """A table of a study, of one seed alone."""
+    trials = study.trials.filter(pl.col("seed") == seed)["trial"].unique()
+    return getattr(study, name).filter(pl.col("trial").is_in(trials.implode()))
+
+
+def test_seeds_that_fail_alike_leave_no_doubt(study):
+    failures = study.failures.clear().vstack(
+        pl.DataFrame(
+            [
+                {"trial": trial, "variant": "full", "frame": 0, "person": 0, "kind": "missed", "stage": "matching"}
+                | {"matching_alone": True, "joints": [], "error_mm": None}
+                for trial in study.trials["trial"].unique()
+            ],
+            schema=study.failures.schema,
+        )
+    )
+    full = digest(replace(study, failures=failures))["failures"]["full"]
+    assert full["kinds"] == {"missed": 20.0}  # one in the five frames of each trial
+    assert full["intervals"] == {
+        "kinds": {"missed": [20.0, 20.0]},
+        "stages": {"matching": [20.0, 20.0]},
+        "matching_alone": [100.0, 100.0],
+    }
+
+
+def test_the_text_says_what_its_words_mean(study):
+    text = markdown(digest(study))
+    for table in (text.split("## Failures")[1], text.split("## Breaking points")[1].split("## ")[0]):
+        cells = set(re.findall(r"\| (?:by )?([a-z][a-z ]*?) (?=\|)", table)) - {"failures", "factor", "broken", "full"}
+        explained = set(re.findall(r"\*([a-z ]+)\*:", table))
+        assert cells - {"fast"} <= explained
+        assert explained
+    for kind in KIND_COLORS:
+        assert SCORES[f"failures_{kind}"].about in text
 
 
 def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
@@ -74,9 +131,28 @@ def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
     assert rows[0][1:7] == [f"AP {limit}, %" for limit in (25, 50, 75, 100, 125, 150)]
     assert [row[0] for row in rows[1:]] == [str(count) for count in COUNTS]
     pcp = rows[0].index("PCP, %")
-    assert [float(row[pcp]) for row in rows[1:]] == pytest.approx(
+    assert [float(row[pcp].split()[0]) for row in rows[1:]] == pytest.approx(
         [np.mean([pcp_of("full", {"cameras.count": n}, seed, 10.0) for seed in range(4)]) for n in COUNTS], abs=0.05
     )
+    (factor,) = told["factors"]
+    for number, row in enumerate(rows[1:]):
+        for key, cell in zip(PRINTED, row[1:], strict=True):
+            _, *ends = factor["scores"]["full"][key][number]
+            low, high = (f"{end:.{SCORES[key].digits}f}" for end in ends)
+            assert cell.endswith(f"({low} to {high})")
+
+
+@pytest.mark.parametrize("score", ["pcp", "map", "ghosts"])
+def test_every_variant_has_its_score_at_every_value(study, score):
+    told = digest(study)
+    title = f"{SCORES[score].title}, {SCORES[score].unit}, against `cameras.count`:\n\n"
+    block = markdown(told).split(title)[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()]
+    assert rows[0] == ["cameras.count", "full", "fast"]
+    (factor,) = told["factors"]
+    for column, variant in enumerate(("full", "fast"), 1):
+        means = [ends[0] for ends in factor["scores"][variant][score]]
+        assert [float(row[column].split()[0]) for row in rows[2:]] == pytest.approx(means, abs=0.051)
 
 
 def test_it_says_where_it_comes_from(study):
@@ -95,7 +171,7 @@ def test_a_table_has_as_many_cells_as_headings(tmp_path):
     told = digest(make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("a", "b")))
     tables = [[line for line in block.splitlines() if line.startswith("|")] for block in markdown(told).split("\n\n")]
     tables = [table for table in tables if table]
-    assert len(tables) == 3 + 2 * 2 + 1 + 1  # all and two cases, two factors twice, breaking points, failures
+    assert len(tables) == 3 + 2 * 2 * 4 + 1 + 1  # all and two cases, two factors in each, breaking points, failures
     for table in tables:
         assert len(table) > 2
         assert len({line.count("|") for line in table}) == 1
@@ -117,6 +193,86 @@ def test_the_picture_is_one_document_with_every_plot_inside(tmp_path):
         assert 0 <= y < y + height <= high
         for u, v, w, h in places[:number]:
             assert x >= u + w or u >= x + width or y >= v + h or v >= y + height
+
+
+@pytest.fixture
+def cases(tmp_path):
+    """Two cases of which one has 5 points of PCP more, and 90 points of precision more."""
+    study = make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("poor", "good"))
+    more = pl.when(pl.col("case") == "good")
+    trials = study.trials.with_columns(
+        pcp=more.then(pl.col("pcp") + 5).otherwise(pl.col("pcp")), precision=more.then(95.0).otherwise(5.0)
+    )
+    return replace(study, trials=trials)
+
+
+def of_case(study, case):
+    """A study without cases, of the trials of one."""
+    trials = study.trials.filter(pl.col("case") == case)
+    kept = {name: getattr(study, name) for name in ("frames", "people", "failures")}
+    kept = {name: rows.filter(pl.col("trial").is_in(trials["trial"].implode())) for name, rows in kept.items()}
+    return replace(study, trials=trials.with_columns(case=pl.lit("")), **kept)
+
+
+def test_each_case_breaks_by_itself(cases):
+    told = digest(cases)
+    assert list(told["by_case"]) == ["poor", "good"]
+    for case, part in told["by_case"].items():
+        alone = digest(of_case(cases, case))
+        assert part == {"factors": alone["factors"], "breaking": alone["breaking"]}
+    poor, good = (
+        next(
+            each["value"] for each in part["breaking"] if (each["factor"], each["variant"]) == ("cameras.count", "full")
+        )
+        for part in told["by_case"].values()
+    )
+    assert (poor, good) == pytest.approx((3.425, 2.425))  # 60.375 + 5 (n + 2.5) is 90, and 85
+    rows = [line for line in markdown(told).splitlines() if line.startswith("| `cameras.count` |")]
+    assert [row.split("|")[2].strip() for row in rows] == ["poor", "poor", "good", "good"]  # PCP and precision
+    for (row, *_), value in zip((rows[:2], rows[2:]), (poor, good), strict=True):
+        assert f"below {value:.3g} (" in row
+    assert digest(of_case(cases, "good"))["by_case"] == {}
+
+
+def test_a_mean_over_cases_or_other_keys_is_told_as_one(cases):
+    told = digest(cases)
+    pooled, _ = told["factors"]
+    assert pooled["over"] == {"people.count": [1, 4], "case": ["poor", "good"]}
+    for part in told["by_case"].values():
+        assert [factor["over"] for factor in part["factors"]] == [{"people.count": [1, 4]}, {"cameras.count": COUNTS}]
+    drawn, text = curves(cases), markdown(told)
+    for said in ("mean over people.count 1, 4", "mean over cameras.count 2, 3, 5"):
+        assert drawn.count(f">{said}<") == 2 * 4  # cases and scores
+        assert text.count(said) == 2 * 4  # cases and tables
+    assert "over case" not in text
+
+
+def test_every_case_has_its_panels_on_one_scale(cases):
+    drawn = ElementTree.fromstring(curves(cases))
+    panels = drawn.findall(SVG + "svg")
+    assert len(panels) == 2 * 2 * 4
+    for left, right in zip(panels[::2], panels[1::2], strict=True):
+        assert left.get("y") == right.get("y")
+        texts = [[text.text for text in panel.iter(SVG + "text")] for panel in (left, right)]
+        assert ("poor" in texts[0], "good" in texts[0], "poor" in texts[1], "good" in texts[1]) == (1, 0, 0, 1)
+        one, other = (sorted(set(each) - {"poor", "good"}) for each in texts)
+        assert one == other  # the same ticks on both axes, and the same words
+
+
+def test_many_cases_stand_in_few_even_rows(tmp_path):
+    study = make_study(tmp_path, factors={"cameras.count": COUNTS}, cases=("a", "b", "c", "d"))
+    panels = ElementTree.fromstring(curves(study)).findall(SVG + "svg")
+    tops = [panel.get("y") for panel in panels]
+    assert [tops.count(top) for top in dict.fromkeys(tops)] == [2] * 2 * 4
+
+
+def test_ghosts_break_precision_where_they_cannot_break_pcp(tmp_path):
+    study = make_study(tmp_path, factors={"detector.phantoms.rate": [0.0, 1.0, 2.0]}, slope=0.0)
+    ghostly = study.trials.with_columns(pcp=99.0, precision=100 - 8 * pl.col("detector.phantoms.rate"))
+    points = {(each["variant"], each["score"]): each for each in digest(replace(study, trials=ghostly))["breaking"]}
+    assert points["full", "pcp"]["why"] == "never"
+    assert points["full", "precision"]["value"] == pytest.approx(1.25)
+    assert points["full", "precision"]["worse_when"] == "greater"
 
 
 def test_what_has_no_size_is_refused():

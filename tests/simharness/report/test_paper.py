@@ -121,6 +121,44 @@ def test_table_2_has_every_variant_beside_full(inputs):
                 assert float(against) == pytest.approx(scores[name]["pcp"] - scores["full"]["pcp"], abs=0.0501)
 
 
+def test_without_descriptors_full_is_geometry_and_no_difference_is_told(inputs):
+    """As on real Shelf: by one head mapping here, while by the other they are two measurements."""
+    variants = inputs["voxelpose"]["variants"]
+    variants["geometry"] = variants["full"]
+    told = paper_tables(inputs)
+    *_, shelf = tables(markdown(told))
+    rows = {row[0]: row for row in shelf}
+    assert rows["`full`"][4] == "as `geometry`"
+    assert rows["`geometry`"][4] == "–"
+    assert rows["`full`"][6] == ""
+    assert float(rows["`geometry`"][6]) == pytest.approx(
+        inputs["2019"]["variants"]["geometry"]["pcp"] - inputs["2019"]["variants"]["full"]["pcp"], abs=0.0501
+    )
+    assert told["ablation"]["shelf"]["geometry"]["voxelpose"]["against_full"] is None
+    inputs["shelf"]["ahead_of_full"]["geometry"] = {"pcp": 0.0, "low": -0.1, "high": 0.1}  # the paper is outside
+    (line,) = re.findall(
+        r"^- `geometry` against .*", markdown(paper_tables(inputs)).split("### Shelf")[-1], re.MULTILINE
+    )
+    assert "VoxelPose" not in line
+    assert "2019 head" in line
+
+
+def test_with_descriptors_full_is_no_geometry(inputs):
+    variants = inputs["voxelpose"]["variants"]
+    variants["geometry"] = variants["appearance"] = variants["full"]  # equal by chance
+    *_, shelf = tables(markdown(paper_tables(inputs)))
+    assert {row[0]: row[4] for row in shelf}["`geometry`"] == "0.0"
+
+
+def test_seeds_that_were_passed_over_are_told(inputs):
+    assert markdown(paper_tables(inputs)).count("Passed over: seeds 3 and 4, at which people") == 4
+    inputs["shelf"]["seeds"] = [0, 1, 2, 4]
+    inputs["campus"]["seeds"] = [4, 5, 6, 7]
+    text = markdown(paper_tables(inputs))
+    assert re.findall(r"Passed over: (.*), at which", text) == ["seed 3"] * 2  # in both tables
+    assert "people or the rack" in text
+
+
 def test_the_numbers_are_all_in_the_json(inputs):
     told = json.loads(json.dumps(paper_tables(inputs), allow_nan=False))
     assert told["ablation"]["shelf"]["geometry"]["twin"]["against_full"] == [

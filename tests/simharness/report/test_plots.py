@@ -106,3 +106,40 @@ def test_labels_along_an_axis_do_not_run_into_each_other(values):
         assert beside - x > 5.5 * (len(text) + len(other)) / 2  # a letter of 9 px is 5.5 wide
     if values == list(range(values[0], values[0] + len(values))):
         assert [text for _, text in along] == labels
+
+
+@pytest.mark.parametrize(
+    ("values", "left_out"),
+    [([5.0, 10.0, 20.0, 40.0, 60.0, 90.0, 120.0, 180.0], 0), ([1, 2, 4, 8, 16, 32, 64, 128, 256, 512], 0)],
+)
+def test_ticks_are_the_values_that_were_tried(values, left_out):
+    """On a logarithmic axis, too, and of more than a few."""
+    drawn = study_plots.curve(
+        "ticks",
+        factor="cameras.spread",
+        values=values,
+        numeric=True,
+        lines={"full": [Interval(90.0, 80.0, 95.0, 3)] * len(values)},
+        score=SCORES["pcp"],
+    )
+    written = re.findall(r"text-anchor: middle[^>]*>([\d.]+)</text>", drawn)
+    assert set(written) <= {f"{value:g}" for value in values}
+    assert len(written) == len(values) - left_out
+
+
+def test_an_axis_has_name_unit_and_key():
+    lines = {"full": [Interval(90.0, 80.0, 95.0, 3)] * 2}
+    said = {"values": [0.0, 1.0], "numeric": True, "lines": lines, "score": SCORES["pcp"]}
+    assert ">error of camera positions, m (faults.translation)<" in study_plots.curve(
+        "named", factor="faults.translation", **said
+    )
+    assert ">sensor.shutter, s<" in study_plots.curve("unnamed", factor="sensor.shutter", **said)
+
+
+def test_what_a_mean_is_over_is_short():
+    said = study_plots.mean_over(
+        {"cameras.count": (2, 4), "cameras.spread": (5.0, 10.0, 20.0, 40.0, 60.0, 90.0, 180.0)}
+    )
+    assert said == "mean over cameras.count 2, 4 and cameras.spread (5 to 180, 7 values)"
+    assert study_plots.mean_over({"detector.profile": tuple("abcdefg")}) == "mean over detector.profile (7 values)"
+    assert study_plots.mean_over({}) == ""

@@ -158,7 +158,8 @@ def test_breaking_points_are_told_for_the_thresholds_that_are_asked_for(tmp_path
 
 
 def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page):
-    assert page.count("Both together") == 2
+    assert page.count("Both together") == 2 * 2  # cases and variants
+    assert render_study(make_study(tmp_path, factors=GRID)).count("Both together") == 2
     assert "Both together" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
 
 
@@ -167,6 +168,24 @@ def test_every_case_has_a_row_for_each_variant(page, tmp_path):
         rows = re.search(rf'<th scope="rowgroup" colspan="9">{case}</th></tr>(.*?)</tbody>', page, re.DOTALL).group(1)
         assert re.findall(r'<th scope="row">([^<]*)</th>', rows) == ["full", "fast"]
     assert "<h2>Cases</h2>" not in render_study(make_study(tmp_path))
+
+
+def test_curves_and_breaking_points_are_of_one_case_each(tmp_path):
+    results = make_study(tmp_path, factors=GRID, cases=("crowd", "empty"))
+    more = pl.when(pl.col("case") == "empty").then(10.0).otherwise(0.0)
+    page = render_study(dataclasses.replace(results, trials=results.trials.with_columns(pcp=pl.col("pcp") + more)))
+    figures = re.findall(r"<h3><code>([^<]*)</code>, case (\w+)</h3>\s*<figcaption>([^<]*)</figcaption>", page)
+    over = {
+        "cameras.count": "Mean over detector.profile poor, good.",
+        "detector.profile": "Mean over cameras.count 2, 3, 5.",
+    }
+    assert figures == [(key, case, over[key]) for key in GRID for case in ("crowd", "empty")]
+    breaks = page[page.index("<h2>Where it breaks</h2>") :]
+    group, rest = re.search(r'colspan="4"><code>([^<]*)</code>(.*?)</tbody>', breaks, re.DOTALL).groups()
+    assert group == "cameras.count"
+    rows = re.findall(r'<th scope="row">PCP under 90 %</th><td>(\w+)</td><td[^>]*>([^<]*)', rest)
+    assert rows == [("crowd", "already at 5"), ("empty", "below 3.92")]  # (90 - 10 - 60.375) / 5
+    assert "<td>crowd</td>" not in render_study(make_study(tmp_path, factors=GRID))
 
 
 def test_what_people_write_is_text(tmp_path):
