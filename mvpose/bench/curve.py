@@ -10,7 +10,7 @@ from mvpose.bench.scenes import frames
 from mvpose.bench.tasks import STAGES, estimating, prepare
 
 PRESETS = ("fast", "full")
-_BAR = 9  # columns
+_BAR = 7  # columns
 COSTS = ("total", *STAGES)
 SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {
     "views": tuple((views, 5) for views in (2, 3, 5, 8, 12, 20, 31)),

@@ -228,6 +228,7 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
         future = next(completed)
         unit = running.pop(future)
         result, whole = _result(future, unit), together.get(unit.trial)
+        del future  # what is held would be measured anew, were the worker that has it to die
         if isinstance(result, Failure):
             tried = unit.trial, unit.variants
             failed[tried] += max(1, result.deaths) if alone else 1

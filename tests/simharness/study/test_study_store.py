@@ -170,7 +170,7 @@ def hammer(folder, entry, start, results):
     """Write and read a few entries over and over."""
     start.wait()
     seen = set()
-    for turn in range(60):
+    for turn in range(20):
         store, identity = Store(folder), f"{turn % 4:02x}" * 16
         store.write(identity, entry)
         found = store.read(identity)
@@ -183,11 +183,12 @@ def hammer(folder, entry, start, results):
 def test_two_processes_at_one_store_do_no_harm(tmp_path, entry):
     spawn = multiprocessing.get_context("spawn")
     start, results = spawn.Event(), spawn.Queue()
-    processes = [spawn.Process(target=hammer, args=(tmp_path / "new", entry, start, results)) for _ in range(2)]
+    arguments = tmp_path / "new", entry, start, results
+    processes = [spawn.Process(target=hammer, args=arguments, daemon=True) for _ in range(2)]
     for process in processes:
         process.start()
     start.set()
-    assert [results.get(timeout=60) for _ in processes] == [{True}, {True}]
+    assert [results.get(timeout=300) for _ in processes] == [{True}, {True}]
     for process in processes:
         process.join()
     assert len(list(Store(tmp_path / "new"))) == 4
