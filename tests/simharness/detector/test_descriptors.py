@@ -122,48 +122,31 @@ def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, car
             assert total[k, v, h] / count[k, v, h] == pytest.approx(bin_["mean"], abs=0.05 + error), (kind, v, h)
 
 
+def apart(model, turn, *, pairs):
+    """Distances of two clear crops of one person from bearings ``turn`` apart, (pairs,), the same draws at any turn."""
+    rng, count = np.random.default_rng(1), 2 * pairs
+    drawn = model.draw(
+        [("person", k // 2) for k in range(count)],
+        bearing=np.where(np.arange(count) % 2, turn, 0.0),
+        hidden=np.zeros(count),
+        noise=rng.standard_normal((count, model.dimensions)),
+        unease=rng.standard_normal(count),
+        look_alike=0.0,
+        seed=2,
+    )
+    return np.linalg.norm(drawn[::2] - drawn[1::2], axis=1)
+
+
 def test_front_and_back_are_nearer_than_either_and_the_side(model, card):
     """Seen from behind an outline is the same: so it is in the network, too."""
     clear = [row[0]["mean"] for row in card["look_alike"]["0"]["same"]["bins"]]
     assert clear[-1] < max(clear[2:4])
-    rng = np.random.default_rng(1)
-    count = 6000
-    side, back = (
-        np.linalg.norm(drawn[::2] - drawn[1::2], axis=1)
-        for drawn in (
-            model.draw(
-                [("person", k // 2) for k in range(count)],
-                bearing=np.where(np.arange(count) % 2, turn, 0.0),
-                hidden=np.zeros(count),
-                noise=rng.standard_normal((count, model.dimensions)),
-                unease=rng.standard_normal(count),
-                look_alike=0.0,
-                seed=2,
-            )
-            for turn in (np.pi / 2, np.pi)
-        )
-    )
-    assert side.mean() - back.mean() > 5 * np.hypot(side.std(), back.std()) / np.sqrt(count / 2)
+    side, back = apart(model, np.pi / 2, pairs=3000), apart(model, np.pi, pairs=3000)
+    assert side.mean() - back.mean() > 5 * np.hypot(side.std(), back.std()) / np.sqrt(3000)
 
 
 def test_two_views_of_one_side_are_nearer_than_front_and_back(model):
-    rng = np.random.default_rng(1)
-    count = 4000
-    who = [("person", k // 2) for k in range(count)]
-
-    def apart(turn):
-        drawn = model.draw(
-            who,
-            bearing=np.where(np.arange(count) % 2, turn, 0.0),
-            hidden=np.zeros(count),
-            noise=rng.standard_normal((count, model.dimensions)),
-            unease=rng.standard_normal(count),
-            look_alike=0.0,
-            seed=2,
-        )
-        return np.linalg.norm(drawn[::2] - drawn[1::2], axis=1)
-
-    one_side, front_and_back = apart(0.0), apart(np.pi)
+    one_side, front_and_back = apart(model, 0.0, pairs=2000), apart(model, np.pi, pairs=2000)
     error = np.hypot(*(each.std() / np.sqrt(len(each)) for each in (one_side, front_and_back)))
     assert front_and_back.mean() - one_side.mean() > 5 * error
     assert front_and_back.mean() < 1.2  # and still nearer than strangers

@@ -73,6 +73,17 @@ def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
         assert (after.truth.error > 0).mean() > 0.5
 
 
+def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
+    dots(tmp_path / "head.onnx")
+    path, head = scenario('[appearance]\nsource = "drawn"\n'), f"detector.onnx={tmp_path / 'head.onnx'}"
+    simulated, read = (look(prepare(load(path, overrides=changed)))[1] for changed in ([], [head]))
+    for before, after in zip(simulated, read, strict=True):
+        assert len(before.detections.descriptors)
+        np.testing.assert_array_equal(before.detections.descriptors, after.detections.descriptors)
+    record = read_run(run(load(path, overrides=[head]), out=tmp_path / "runs"))
+    assert set(record.estimates) == {"full", "appearance", "geometry"}
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
