@@ -57,15 +57,15 @@ paper-shelf: $(RUN)
 # What a frame costs, beside the paper and the code of others: a minute, on a machine that has nothing else to do.
 .PHONY: results-time
 results-time: $(RUN)
-	$(BIN)/python -m mvpose.bench --only published reid curve --json results/time/bench.json
-	$(BIN)/python -m simharness.bench.plot results/time/bench.json results/time
+	$(BIN)/python -m benchmarks.method --only published reid curve --json results/time/bench.json
+	$(BIN)/python -m benchmarks.simulator.plot results/time/bench.json results/time
 
 # The picture in the README: a frame of a run, and the curve of the study of views.
 .PHONY: results-overview
 results-overview: results-views
 	rm -rf results/runs/overview
 	$(BIN)/simharness run scenarios/overview.toml --out results/runs/overview
-	$(BIN)/python -m simharness.report.overview results/runs/overview/overview-* results/views/digest.json results/overview.svg
+	$(BIN)/python -m tools.readme_picture.picture results/runs/overview/overview-* results/views/digest.json results/overview.svg
 
 $(VENV):
 	$(PYTHON) -m venv $(VENV)

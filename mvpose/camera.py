@@ -14,10 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array, as_points
 from mvpose.lens import distort, undistort
-
-Floats = NDArray[np.float64]
 
 _ORTHONORMAL_TOLERANCE = 1e-3  # published calibrations carry about six digits
 _SINGLE_DIGITS = 1e-6  # what is left of zeros and ones that went through single precision

@@ -8,11 +8,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
-
-Floats = NDArray[np.float64]
 
 _FARTHEST = 1e9  # pixels: no image is so large, and squares of these are far from overflow
 _LEAST_SCORE = 1e-6  # no detector is so exact, and products of these are far from underflow

@@ -12,9 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array, as_points
-
-Floats = NDArray[np.float64]
 
 _HIGHEST = 2.0  # peaks of networks trained towards 1 overshoot it, but not twofold
 _LEAST_SHARE = 0.05  # of the peak that a neighbour counts at least: the logarithm of 0 makes no parabola

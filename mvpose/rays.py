@@ -12,13 +12,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
 from mvpose.lens import undistort
-
-Floats = NDArray[np.float64]
-
 
 _MODES = 3  # of a heat map that are looked at: a joint, its mirror image, and a neighbour's
 

@@ -10,11 +10,11 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mvpose.arrays import Floats
 from mvpose.checks import as_points
 
-Floats = NDArray[np.float64]
 HeadMapping = Literal["voxelpose", "2019"]
 
 

@@ -6,19 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simharness.detector.truth import KeypointError, Truth
-    from simharness.rendering.views import Views
-    from simharness.rendering.visibility import Visibility
-    from simharness.scenario.models import Scenario
-    from simharness.scene.sequence import Sequence
+    from simharness.scenario.sections.scenario import Scenario
+    from simharness.types.sequence import Sequence
+    from simharness.types.truth import KeypointError, Truth
+    from simharness.types.views import Views
+    from simharness.types.visibility import Visibility
 
 _HOMES = {
-    "KeypointError": "simharness.detector.truth",
-    "Scenario": "simharness.scenario.models",
-    "Sequence": "simharness.scene.sequence",
-    "Truth": "simharness.detector.truth",
-    "Views": "simharness.rendering.views",
-    "Visibility": "simharness.rendering.visibility",
+    "KeypointError": "simharness.types.truth",
+    "Scenario": "simharness.scenario.sections.scenario",
+    "Sequence": "simharness.types.sequence",
+    "Truth": "simharness.types.truth",
+    "Views": "simharness.types.views",
+    "Visibility": "simharness.types.visibility",
 }
 
 __all__ = ["KeypointError", "Scenario", "Sequence", "Truth", "Views", "Visibility"]

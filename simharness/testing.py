@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 
 if TYPE_CHECKING:
-    from simharness.gate.trials import Trial
-    from simharness.scenario.study import Study
+    from simharness.gate.trial_command import Trial
+    from simharness.scenario.study_definition import Study
 
 __all__ = ["assert_robust"]
 
@@ -53,13 +53,13 @@ def assert_robust(
             mistakes.
         RunError: a trial could not be run.
     """
-    from simharness.scenario.study import load_study
+    from simharness.scenario.study_definition import load_study
 
     _check(thresholds)
     study = load_study(scenario, seeds=seeds, variants=[variant])
 
-    from simharness.experiment.execution import RunError
     from simharness.gate.suite import run_suite
+    from simharness.runtime.frame_pool import RunError
 
     done = run_suite(study, workers=workers)
     if done.failed:
@@ -86,7 +86,7 @@ def _check(thresholds: Mapping[str, float]) -> None:
 
 def _wrong(key: str, limit: float, scores: Mapping[Trial, Mapping[str, float | None]], study: Study) -> str:
     """What is wrong with a score; nothing where it is on the good side of its threshold."""
-    from simharness.gate.trials import command_of
+    from simharness.gate.trial_command import command_of
 
     info = SCORES[key]
     known = {trial: value for trial, each in scores.items() if (value := each[key]) is not None}

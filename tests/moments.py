@@ -9,9 +9,9 @@ import numpy as np
 
 from mvpose import Detections, Estimate
 from mvpose.estimate import Matching
-from simharness.detector.truth import KeypointError, Truth
-from simharness.rendering.visibility import Visibility
-from simharness.scoring.recording import Recording
+from simharness.types.recording import Recording
+from simharness.types.truth import KeypointError, Truth
+from simharness.types.visibility import Visibility
 
 sys.path.append(str(Path(__file__).parent / "mvpose"))
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from simharness.experiment import trial
-from simharness.study import measure
+from simharness.trial import measure
+from simharness.trial.stages import build as trial
 
 QUICKSTART = Path(__file__).parents[1] / "scenarios" / "quickstart.toml"
 

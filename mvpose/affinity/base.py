@@ -7,13 +7,11 @@ from typing import Protocol
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays
-
-Floats = NDArray[np.float64]
 
 LANES = 8  # kernels pad the joints to full vector registers, so that no loop has a scalar remainder
 FASTMATH = {"reassoc", "contract", "arcp", "nsz"}  # sums may be vectorised; NaN and infinity keep their meaning

@@ -27,10 +27,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.matching.projection import block_starts, project_block
 from mvpose.threads import one_thread
-
-Floats = NDArray[np.float64]
 
 _BALANCE = 10.0  # residuals further apart than this change rho (Boyd et al. 2011, section 3.4.1)
 _BALANCE_EVERY = 10  # iterations; a step size that changes more often can cycle

@@ -17,7 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mvpose.arrays import Floats
+
 Pixels = NDArray[np.uint8]
 Images = Sequence[NDArray[np.uint8] | None]
 

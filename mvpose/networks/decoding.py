@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.heatmaps import Heatmaps
 from mvpose.networks.crops import Placement
 
-Floats = NDArray[np.float64]
 Values = NDArray[np.float32]
 
 _SPACING = 2.0  # pixels of the input between cells of an outer product: SimCC's Gaussians are twice as wide or more

@@ -9,6 +9,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
@@ -16,8 +17,6 @@ from mvpose.networks.crops import Images, Placement, check_images, cut, in_view,
 from mvpose.networks.decoding import Cells, Values, in_image, outer_product, simcc_modes
 from mvpose.networks.session import Session, as_session
 from mvpose.skeleton import COCO17, Skeleton
-
-Floats = NDArray[np.float64]
 
 _HIGHEST = 2.0  # heat maps beyond this are on another scale
 _BLACK = (0, 0, 0)  # beyond the image, as in the training of every head named below

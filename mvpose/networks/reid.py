@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mvpose.affinity import AppearanceAffinity
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.detections import Detections
 from mvpose.networks.crops import Images, check_images, cut, in_view, stretched
 from mvpose.networks.session import Session, as_session
-
-Floats = NDArray[np.float64]
 
 DEFAULT = Path(__file__).parent / "data" / "reid.onnx"
 """The network that comes with mvpose."""

@@ -18,11 +18,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
 
 STATURE = 1.70  # metres
 STATURE_DEVIATION = 0.055

@@ -14,9 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
 
 # Nine clips of recorded motion (the CMU database's subjects 02 and 03: walk, run, jump, balance; dance and mime from
 # elsewhere) have mean cosines of 0.98, 0.89, 0.72, 0.83 and 0.83, so concentrations of 50, 9, 4, 6 and 6. Half of the

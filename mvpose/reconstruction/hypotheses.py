@@ -12,16 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import bone_lengths
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.triangulation import pair_point
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Hypotheses(NamedTuple):

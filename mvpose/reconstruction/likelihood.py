@@ -18,12 +18,10 @@ from functools import cache
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import check_numbers, seal
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
 
 _FASTMATH = {"contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 

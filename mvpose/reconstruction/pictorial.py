@@ -24,8 +24,6 @@ from mvpose.reconstruction.sampling import rescore
 from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class PictorialStructure:

@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
+from mvpose.arrays import Floats
 
 NOBODY = 1e-9
 """Score up to which no view vouches for a joint: it is missing, whatever a prior says of it."""

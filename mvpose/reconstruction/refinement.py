@@ -12,17 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.rays import Rays
 from mvpose.reconstruction.hanging import how_it_hangs
 from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
 from mvpose.reconstruction.poses import NOBODY, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Tree(NamedTuple):

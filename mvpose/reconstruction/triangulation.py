@@ -31,7 +31,6 @@ from mvpose.reconstruction.poses import NOBODY, Poses, clear, gather
 from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
-Floats = NDArray[np.float64]
 Method = Literal["robust", "dlt", "best-pair"]
 _METHODS: tuple[Method, ...] = ("robust", "dlt", "best-pair")
 

@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.checks import check_numbers
 from mvpose.rays import Rays
 from mvpose.reconstruction.bones import bone_lengths
@@ -31,9 +31,6 @@ from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses
 from mvpose.reconstruction.refinement import refine
 from mvpose.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _SHARED = 3  # joints of a detection that a person must explain to have it
 

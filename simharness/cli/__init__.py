@@ -6,19 +6,19 @@ traceback), 130 interrupted. Nothing heavy is imported before a command needs it
 
 from __future__ import annotations
 
-from simharness.cli import evaluating, exporting, fitting, gating, reporting, running, scenarios, studying
+from simharness.cli import check, evaluate, export, fit_detector, report, run, scenarios, study
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
 
-running.add_to(app)
-exporting.add_to(app)
+run.add_to(app)
+export.add_to(app)
 scenarios.add_to(app)
-gating.add_to(app)
-reporting.add_to(app)
-studying.add_to(app)
-app.add_typer(evaluating.app, name="evaluate")
-app.add_typer(fitting.app, name="fit-detector")
+check.add_to(app)
+report.add_to(app)
+study.add_to(app)
+app.add_typer(evaluate.app, name="evaluate")
+app.add_typer(fit_detector.app, name="fit-detector")
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.border import border
+from simharness.cli.exit_codes import border
 from simharness.cli.options import Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ def add_to(app: typer.Typer) -> None:
 def scenarios() -> None:
     """List what ships: scenarios, and the rigs and detectors that a scenario may begin with."""
     with border():
-        from simharness.scenario.planning import read_plan
         from simharness.scenario.presets import PROFILES, RIGS, SCENARIOS, about
+        from simharness.scenario.resolution import read_plan
 
         plans = [read_plan(path) for path in sorted(SCENARIOS.glob("*.toml"))]
         rows = [
@@ -55,7 +55,7 @@ def show(
     """Print a scenario with all that it leaves unsaid, as TOML; of a study how many trials it makes, and its base."""
     with border():
         from simharness.scenario.outline import outline
-        from simharness.scenario.study import StudyTooLarge, load_study, read_plan
+        from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
 
         plan = read_plan(scenario, overrides=overrides or (), seed=seed)
         note = ""

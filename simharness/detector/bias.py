@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.scenario.detector import Bias
-
-Floats = NDArray[np.float64]
+from simharness.scenario.sections.detector import Bias
 
 _LEFT_SHOULDER, _RIGHT_SHOULDER, _LEFT_HIP, _RIGHT_HIP = 5, 6, 11, 12
 SIDE = np.array([1, *[1, -1] * 8])

@@ -15,17 +15,15 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from mvpose import COCO17
+from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.correlation import LIMBS, Chances, Key, logistic
-from simharness.detector.found import Found, Origin
-from simharness.detector.truth import KeypointError
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Boxes
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from simharness.detector.detection_block import Found, Origin
+from simharness.scenario.sections.detector import Boxes
+from simharness.types.truth import KeypointError
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
 
 UPPER = LIMBS < 2
 """The joints of the upper half of somebody who is found in two, (17,): face and arms. The others are the lower half."""

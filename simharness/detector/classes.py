@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose import COCO17
-from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mvpose.arrays import Bools, Floats
+from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 
 MIRROR = np.array(COCO17.mirror)
 """The left-right counterpart of each of COCO-17, (17,)."""

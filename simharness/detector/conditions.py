@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import COCO17
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from mvpose.arrays import Bools, Floats
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
 
 BOX_SHARE = 0.53
 """Of a person's box is the person (Ronchi & Perona): OKS areas where no mask is given."""

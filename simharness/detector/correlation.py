@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
 
-from simharness.random import stream
+from mvpose.arrays import Floats
+from simharness.types.random_streams import stream
 
-Floats = NDArray[np.float64]
 Key = str | int
 
 LIMBS = np.repeat([0, 1, 2], [5, 6, 6])

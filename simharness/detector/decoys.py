@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from mvpose import COCO17
+from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE
 from simharness.detector.correlation import Chances
-from simharness.detector.figments import LEAST, box_about, reported, sureness
-from simharness.detector.found import Found, Origin
-from simharness.detector.postures import DRAWS, postures, seen_from
-from simharness.rendering.views import Views
-from simharness.scenario.detector import DecoyHits
-
-Floats = NDArray[np.float64]
+from simharness.detector.detection_block import Found, Origin
+from simharness.detector.false_positives import LEAST, box_about, reported, sureness
+from simharness.detector.phantom_poses import DRAWS, postures, seen_from
+from simharness.scenario.sections.detector import DecoyHits
+from simharness.types.views import Views
 
 _SCATTER = 0.2  # deviation of keypoints that are the thing's own, in units of OKS sigma x sqrt(area)
 

@@ -20,17 +20,17 @@ from simharness.detector.boxes import in_boxes
 from simharness.detector.conditions import Conditions
 from simharness.detector.correlation import Chances
 from simharness.detector.decoys import decoy_hits
-from simharness.detector.delivery import delivered
-from simharness.detector.describing import Describer, Looks
-from simharness.detector.found import Found, Origin
+from simharness.detector.detection_block import Found, Origin
+from simharness.detector.drawn_descriptors import Describer, Looks
 from simharness.detector.heatmaps import Peaks, in_crops
 from simharness.detector.keypoints import find_keypoints
 from simharness.detector.phantoms import phantoms
+from simharness.detector.picture_delivery import delivered
 from simharness.detector.scores import score_keypoints
-from simharness.detector.truth import Truth
-from simharness.rendering.views import Views
-from simharness.scenario.detector import Bias, Detector
-from simharness.scene.sequence import Sequence
+from simharness.scenario.sections.detector import Bias, Detector
+from simharness.types.sequence import Sequence
+from simharness.types.truth import Truth
+from simharness.types.views import Views
 
 
 @dataclass(frozen=True)

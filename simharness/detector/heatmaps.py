@@ -12,16 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mvpose.arrays import Bools, Floats
 from mvpose.checks import seal
 from mvpose.heatmaps import Heatmaps
-from simharness.detector.found import Found
-from simharness.detector.truth import KeypointError
-from simharness.scenario.detector import HeatmapHead
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from simharness.detector.detection_block import Found
+from simharness.scenario.sections.detector import HeatmapHead
+from simharness.types.truth import KeypointError
 
 ASPECT = 3 / 4
 """Width of a crop over its height: that of the maps."""

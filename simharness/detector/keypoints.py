@@ -17,18 +17,16 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from mvpose import COCO17
+from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.detector.classes import MIRROR, PAIRED
 from simharness.detector.conditions import HIDDEN, OUTSIDE, OWN, VISIBLE, Conditions
 from simharness.detector.correlation import Chances
-from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError
-from simharness.detector.viewing import image_axes
-from simharness.rendering.views import Views
-from simharness.scenario.detector import Correlation, Keypoints
-from simharness.scene.sequence import Sequence
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from simharness.detector.view_geometry import image_axes
+from simharness.scenario.sections.detector import Correlation, Keypoints
+from simharness.types.sequence import Sequence
+from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
+from simharness.types.views import Views
 
 _SMALL = 64.0  # pixels, sqrt(area) of a person from which on `small` makes it harder
 _HARDEST = 4.0  # times as many errors that smallness makes at most

@@ -10,19 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
+from simharness.capture.rendering.optics import appear
+from simharness.detector.birth_death import Lives, alive, anew, slots
 from simharness.detector.correlation import Chances
-from simharness.detector.figments import LEAST, box_about, reported, sureness
-from simharness.detector.found import Found, Origin
-from simharness.detector.lives import Lives, alive, anew, slots
-from simharness.detector.postures import DRAWS, postures, seen_from, turned
-from simharness.rendering.optics import appear
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Phantoms
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from simharness.detector.detection_block import Found, Origin
+from simharness.detector.false_positives import LEAST, box_about, reported, sureness
+from simharness.detector.phantom_poses import DRAWS, postures, seen_from, turned
+from simharness.scenario.sections.detector import Phantoms
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
 
 _JITTER, _JITTER_SPACE = 0.004, 0.004  # how still they sit: as a share of the pose's height, and metres
 _HEIGHTS = 0.25, 0.75  # of poses, as shares of the image's
@@ -57,7 +55,7 @@ def phantoms(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Foun
 
 
 def _reported(
-    rig: Rig, frames: int, rows: list[tuple[Ints, ...]], keypoints: list[Floats], scores: list[Floats]
+    rig: Rig, frames: int, rows: list[tuple[Integers, ...]], keypoints: list[Floats], scores: list[Floats]
 ) -> Found:
     """Phantoms of all views, from each view's frames, views, slots, numbers, keypoints and scores."""
     frame, view, slot, number = (np.concatenate(column) for column in zip(*rows, strict=True))
@@ -92,7 +90,7 @@ def _standing(rig: Rig, config: Phantoms, chances: Chances) -> Found:
     number = lives.number[thing[event]]
     joints = figures[kept][event] + _JITTER_SPACE * anew(chances, *lives.key, number=number, frame=frame, size=3)
     slot, together = slots(lives.born[thing], lives.last[thing]), lives.normal("score")[thing]
-    rows: list[tuple[Ints, ...]] = []
+    rows: list[tuple[Integers, ...]] = []
     keypoints, scores = [], []
     for view, camera in enumerate(rig):
         mine = contained[kept][event, view]
@@ -141,7 +139,7 @@ def focus(rig: Rig) -> tuple[Floats, float]:
 def _alone(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Found:
     """Those of every view by itself."""
     rate = config.rate * (1 - config.views)
-    rows: list[tuple[Ints, ...]] = []
+    rows: list[tuple[Integers, ...]] = []
     keypoints, scores = [], []
     for view in range(len(rig)):
         lives = Lives(chances, ("phantoms", "view", view), config.life, most=rate)
@@ -160,7 +158,7 @@ def _alone(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Found:
     return _reported(rig, len(views), rows, keypoints, scores)
 
 
-def _poses(lives: Lives, thing: Ints, size: tuple[int, int], plausible: float) -> Floats:
+def _poses(lives: Lives, thing: Integers, size: tuple[int, int], plausible: float) -> Floats:
     """Poses by themselves, (n, 17, 2) pixels: upright people, or joints anywhere in their boxes.
 
     At most a quarter of a box's width and height is beyond the image's border, so there is always something to be seen.
@@ -177,7 +175,7 @@ def _poses(lives: Lives, thing: Ints, size: tuple[int, int], plausible: float) -
     return place[:, None] + scale[:, None, None] * np.where(upright[:, None, None], poses, anywhere)
 
 
-def _of_parts(views: Views, view: int, lives: Lives, thing: Ints, frame: Ints, otherwise: Floats) -> Floats:
+def _of_parts(views: Views, view: int, lives: Lives, thing: Integers, frame: Integers, otherwise: Floats) -> Floats:
     """Poses (r, 17, 2) made of parts of the people in pictures; ``otherwise`` where too little of anybody is there.
 
     The head, trunk and arms of one, and the legs of whoever is nearest, if that is within the height of a person;

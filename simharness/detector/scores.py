@@ -6,16 +6,14 @@ So detectors' scores behave (Ronchi & Perona, ICCV 2017).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from mvpose.arrays import Floats
 from simharness.detector.conditions import VISIBLE, Conditions
 from simharness.detector.correlation import Chances, logistic
 from simharness.detector.keypoints import Keypoints2D
-from simharness.detector.truth import KeypointError
-from simharness.scenario.detector import Correlation, Scores
-
-Floats = NDArray[np.float64]
+from simharness.scenario.sections.detector import Correlation, Scores
+from simharness.types.truth import KeypointError
 
 LEAST = 0.02
 """The least score of a joint that is reported."""

@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from mvpose import Detections, Rig
 from mvpose.skeleton import PANOPTIC19
-from simharness.experiment.atomic import appearing
-from simharness.experiment.looking import look
-from simharness.experiment.progress import Reporter, Silence
-from simharness.experiment.trial import Trial
-from simharness.experiment.work import studio_of
 from simharness.export.cameras import hd_names, renamed, write_cameras
 from simharness.export.layout import Layout, check_place
 from simharness.export.manifest import manifest
 from simharness.export.openpose import people_file
-from simharness.export.poses import body_scene, confidences
-from simharness.scenario.dump import dumps
-from simharness.scene.playback import Playback
+from simharness.formats.panoptic_poses import body_scene, confidences
+from simharness.runtime.atomic_files import appearing
+from simharness.runtime.progress import Reporter, Silence
+from simharness.scenario.toml_writer import dumps
+from simharness.trial.looking import look
+from simharness.trial.stages.build import Trial
+from simharness.trial.stages.frame_tasks import studio_of
+from simharness.world.scene.playback import Playback
 
 _QUALITY = 95  # of JPEG
 _FINER = 2  # samples a pixel each way, for smooth outlines

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from mvpose.skeleton import PANOPTIC19
-from simharness.datasets.openpose import BODY_25
-from simharness.experiment.trial import Trial
 from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
-from simharness.export.poses import CONFIDENCES
-from simharness.humans.population import is_child
-from simharness.motion.choreography import roles
-from simharness.rigs.shots import Shots
-from simharness.study.provenance import provenance
+from simharness.formats.openpose import BODY_25
+from simharness.formats.panoptic_poses import CONFIDENCES
+from simharness.trial.provenance import provenance
+from simharness.trial.stages.build import Trial
+from simharness.world.humans.population import is_child
+from simharness.world.motion.choreography import roles
+from simharness.world.rigs.shots import Shots
 
 _UNITS = {
     "calibration": "x_cam = R X + t; t in centimetres; K in pixels, of which integers are the centres; distCoef k1 k2 "

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose import COCO17
-from simharness.datasets.openpose import BODY_25, BODY_25_OF_COCO17
+from simharness.formats.openpose import BODY_25, BODY_25_OF_COCO17
 
 _VERSION = 1.3  # of OpenPose's files
 _OTHERS = ("face", "hand_left", "hand_right")

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simharness.experiment.atomic import write_whole
-from simharness.gate.trials import Trial
+from simharness.gate.trial_command import Trial
+from simharness.runtime.atomic_files import write_whole
 from simharness.scoring.catalogue import HEADLINE
 
 TIME = "time_ratio"

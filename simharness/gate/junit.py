@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from xml.etree import ElementTree
 
 from simharness.gate.baseline import TIME
-from simharness.gate.check import Check
-from simharness.gate.comparing import Change
-from simharness.gate.wording import sentence
+from simharness.gate.change_text import sentence
+from simharness.gate.compare import Change
+from simharness.gate.gate_result import Check
 
 WHOLE, SPEED = "whole suite", "time of the method"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from simharness.gate.check import Check
-from simharness.gate.comparing import Change
-from simharness.gate.wording import allowed, difference, number, sentence, title
+from simharness.gate.change_text import allowed, difference, number, sentence, title
+from simharness.gate.compare import Change
+from simharness.gate.gate_result import Check
 
 _LISTED = 20  # of each kind: a bug that breaks everything breaks a hundred scores
 

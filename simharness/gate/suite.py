@@ -7,17 +7,17 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from simharness.experiment.estimators import estimators_of
 from simharness.gate.baseline import TIME, Measurement
-from simharness.gate.check import Failed
-from simharness.gate.reference import time_reference
-from simharness.gate.trials import Trial, name_of, scenes_of
+from simharness.gate.gate_result import Failed
+from simharness.gate.reference_kernel import time_reference
+from simharness.gate.trial_command import Trial, name_of, scenes_of
 from simharness.scenario.load import code_version
-from simharness.scenario.models import Scenario
-from simharness.scenario.study import Study
-from simharness.study.identity import trial_identity
-from simharness.study.measure import Measured, measure
-from simharness.study.scheduling import Success, Unit, work_off
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.study_definition import Study
+from simharness.study.scheduler import Success, Unit, work_off
+from simharness.trial.identity import trial_identity
+from simharness.trial.measure import Measured, measure
+from simharness.trial.stages.estimators import estimators_of
 
 Scores = Mapping[str, float | None]
 

@@ -8,9 +8,9 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from simharness.scenario.models import Scenario
-from simharness.scenario.planning import read_plan
-from simharness.scenario.reading import ScenarioError
+from simharness.scenario.resolution import read_plan
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.toml_reader import ScenarioError
 
 
 def load(
@@ -19,8 +19,8 @@ def load(
     """Read a scenario file.
 
     Args:
-        path: a TOML file; what its keys mean is written in :mod:`simharness.scenario.models`. It begins with the file
-            that it extends, its cameras with the rig and its detector with the profile that they name.
+        path: a TOML file; what its keys mean is written in :mod:`simharness.scenario.sections.scenario`. It begins
+            with the file that it extends, its cameras with the rig and its detector with the profile that they name.
         overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the file's; a value that
             is not TOML is taken as a bare word, so ``rendering.renderer=gl`` needs no quotes.
         seed: replaces the scenario's seed.

@@ -7,10 +7,10 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from simharness.scenario.dump import dumps
 from simharness.scenario.layers import leaves
-from simharness.scenario.planning import Plan
-from simharness.scenario.sweeping import Axis
+from simharness.scenario.resolution import Plan
+from simharness.scenario.sweep import Axis
+from simharness.scenario.toml_writer import dumps
 
 _WIDTH = 96  # of a line of values
 _MOST = 12  # values of one factor

@@ -18,13 +18,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from simharness.scenario.cameras import Cameras
-from simharness.scenario.detector import Detector
-from simharness.scenario.files import locate_files
 from simharness.scenario.layers import Places, over
-from simharness.scenario.mistakes import explain
-from simharness.scenario.reading import ScenarioError, read_toml
-from simharness.scenario.section import Section
+from simharness.scenario.named_files import locate_files
+from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.section import Section
+from simharness.scenario.toml_reader import ScenarioError, read_toml
+from simharness.scenario.validation_messages import explain
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 """Where the scenarios are that come with the project, and its presets beneath them."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from simharness.scenario.detector import Detector
 from simharness.scenario.presets import PROFILES, file_of, read_preset
+from simharness.scenario.sections.detector import Detector
 
 SHIPPED = PROFILES.shipped
 """Where the profiles are that come with the project."""

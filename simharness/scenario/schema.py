@@ -11,8 +11,8 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from simharness.scenario.document import ScenarioFile
-from simharness.scenario.sweeping import NOT_VARIED
+from simharness.scenario.file_model import ScenarioFile
+from simharness.scenario.sweep import NOT_VARIED
 
 Schema = dict[str, Any]
 

@@ -11,7 +11,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
-from simharness.rendering.visibility import Visibility
+from mvpose.arrays import Floats
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.bones import bone_errors
 from simharness.scoring.catalogue import AP_MM, PCK_MM
@@ -21,11 +21,11 @@ from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, c
 from simharness.scoring.pck import joint_errors, pck, pck_area
 from simharness.scoring.pcp import Part
 from simharness.scoring.pose import Pairing
-from simharness.scoring.recording import Recording
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
+from simharness.types.recording import Recording
+from simharness.types.visibility import Visibility
 
-Floats = NDArray[np.float64]
 Labels = NDArray[np.int64]
 Scores = dict[str, float | None]
 

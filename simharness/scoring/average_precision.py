@@ -14,9 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from simharness.scoring.distance import mean_where_shared
-
-Floats = NDArray[np.float64]
 
 
 def nearest_people(truth: Floats, estimate: Floats, frame: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mvpose.arrays import Floats
 
 
 def mean_distances(truth: Floats, estimate: Floats) -> Floats:

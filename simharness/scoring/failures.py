@@ -31,16 +31,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Estimate, Rig
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
-from simharness.detector.truth import Truth
-from simharness.rendering.visibility import Visibility
 from simharness.scoring.distance import mean_distances
 from simharness.scoring.pose import LIMIT, pair
-from simharness.scoring.recording import Recording
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from simharness.types.recording import Recording
+from simharness.types.truth import Truth
+from simharness.types.visibility import Visibility
 
 DISPLACED = 0.15
 """Metres from which a joint is wrong: PCK@150 mm, as MPI-INF-3DHP (Mehta et al., 3DV 2017) and others score 3D pose."""

@@ -6,9 +6,9 @@ Every joint of every true person counts. One that was not placed, or whose perso
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from mvpose.arrays import Floats
 
 
 def joint_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:

@@ -13,10 +13,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from simharness.scoring.distance import mean_distances
-
-Floats = NDArray[np.float64]
 
 ALPHA = 0.5
 

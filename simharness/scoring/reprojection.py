@@ -11,12 +11,10 @@ calibration is part of their error, as it is of an overlay that somebody looks a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from simharness.rendering.visibility import Visibility
-from simharness.scoring.recording import Recording
-
-Floats = NDArray[np.float64]
+from mvpose.arrays import Floats
+from simharness.types.recording import Recording
+from simharness.types.visibility import Visibility
 
 
 def reprojection_errors(recording: Recording, placed: Floats) -> tuple[Floats, Floats]:

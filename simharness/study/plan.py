@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from simharness.scenario.models import Scenario
-from simharness.scenario.study import Setting, Study
-from simharness.study.identity import entry_identity, own_code, trial_identity
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.study_definition import Setting, Study
+from simharness.trial.identity import entry_identity, own_code, trial_identity
 
 
 @dataclass(frozen=True)

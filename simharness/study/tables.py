@@ -8,11 +8,11 @@ from typing import Any
 
 import polars as pl
 
-from simharness.scenario.study import Value
+from simharness.scenario.study_definition import Value
 from simharness.scoring.catalogue import SCORES
 from simharness.study.plan import Planned
-from simharness.study.results import Tables
-from simharness.study.store import Entry
+from simharness.study.result_folder import Tables
+from simharness.study.trial_store import Entry
 
 _FIRST = ("trial", "case", "varied", "seed", "variant")
 

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.experiment.execution import RunError
+from simharness.runtime.frame_pool import RunError
 from simharness.scenario.profiles import read_profile
-from simharness.study.provenance import PROVENANCE
+from simharness.trial.provenance import PROVENANCE
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [
@@ -134,7 +134,7 @@ def test_an_error_of_ours_shows_its_traceback(simharness, monkeypatch, tmp_path,
     def broken(*_args, **_options):
         raise error
 
-    monkeypatch.setattr("simharness.experiment.run.detect", broken)
+    monkeypatch.setattr("simharness.report.run.result_folder.detect", broken)
     result = simharness("run", QUICKSTART, *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr

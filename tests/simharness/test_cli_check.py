@@ -17,8 +17,8 @@ import mvpose.pipeline
 from mvpose.affinity import GeometricAffinity
 from mvpose.reconstruction.likelihood import Noise
 from simharness.cli import app
-from simharness.experiment.execution import RunError
 from simharness.gate import suite
+from simharness.runtime.frame_pool import RunError
 from simharness.scenario.load import load
 
 
@@ -204,7 +204,7 @@ class TestBadInput:
         def run(*_, **__):
             raise AssertionError("ran")
 
-        monkeypatch.setattr("simharness.gate.checking.run_suite", run)
+        monkeypatch.setattr("simharness.gate.runner.run_suite", run)
         monkeypatch.setattr("simharness.gate.suite.run_suite", run)
 
     @pytest.fixture
@@ -212,8 +212,8 @@ class TestBadInput:
         """A baseline as a file, of a suite that need not be run for it."""
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
-        from simharness.gate.trials import Trial, name_of, scenes_of
-        from simharness.scenario.study import load_study
+        from simharness.gate.trial_command import Trial, name_of, scenes_of
+        from simharness.scenario.study_definition import load_study
 
         (tmp_path / "small.toml").write_text(SMALL)
         study = load_study(tmp_path / "small.toml")

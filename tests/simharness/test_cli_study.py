@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.study.results import read_study
+from simharness.study.result_folder import read_study
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")
 TINY = [
@@ -36,7 +36,7 @@ def reports(monkeypatch):
         asked.append(results)
         return results.folder / "report.html"
 
-    monkeypatch.setattr("simharness.report.study.write_report", write_report)
+    monkeypatch.setattr("simharness.report.study.page.write_report", write_report)
     return asked
 
 

@@ -20,8 +20,8 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.datasets.voxelpose import write_calibration
-from simharness.scenario.study import load_study
+from simharness.formats.calibration.voxelpose import write_calibration
+from simharness.scenario.study_definition import load_study
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -85,8 +85,8 @@ IN_PARTS = {
     "simharness study my-lab.toml": f"{LAB} --seeds 2",
 }
 MAKE = ("make demo", "make test", "make lint", "make results")
-HELPFUL = ("python -m mvpose.bench", "python -m simharness.bench", "python -m simharness.train.reid")
-BAKE = "python -m simharness.humans.bake"  # takes no arguments: it would go and bake
+HELPFUL = ("python -m benchmarks.method", "python -m benchmarks.simulator", "python -m tools.reid")
+BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
 PYTEST = '.venv/bin/python -m pytest -m "not slow"'
 KNOWN = {
     *ALONE,
@@ -234,7 +234,7 @@ def test_what_somebody_brings_along(workplace, file):
         write_calibration(workplace / file, ring)
         small += " --set people.area=1.0"
     elif file == "clip.bvh":
-        made = runpy.run_path(str(ROOT / "tests" / "simharness" / "motion" / "test_mocap_retarget.py"))
+        made = runpy.run_path(str(ROOT / "tests" / "simharness" / "world" / "motion" / "test_mocap_retarget.py"))
         (workplace / file).write_text(made["bvh"](**made["HANG"]), encoding="utf-8")
     assert "full" in done(BROUGHT[file], f"{small} --set clutter.boxes=0 --set clutter.shelves=0")
 
@@ -256,7 +256,7 @@ def test_the_check(easy_workplace):
 @pytest.mark.slow
 def test_the_gate_of_your_own(easy_workplace):
     for name in ("wrapped.py", "program.py"):
-        (easy_workplace / name).symlink_to(ROOT / "tests" / "simharness" / "experiment" / "foreign" / name)
+        (easy_workplace / name).symlink_to(ROOT / "tests" / "simharness" / "trial" / "foreign" / name)
     (easy_workplace / "my-ci.toml").write_text(named("my-ci.toml"), encoding="utf-8")
     first, again = OWN_GATE
     done(first)
@@ -347,7 +347,7 @@ def test_pytest_leaves_out_what_is_slow():
 
 
 def test_the_example_of_simharness(monkeypatch):
-    (example,) = (block for block in blocks("python") if "simharness.study.measure" in block)
+    (example,) = (block for block in blocks("python") if "simharness.trial.measure" in block)
     monkeypatch.chdir(ROOT)
     less = "'duration=0.4', 'people.count=6'"
     names: dict = {}
@@ -358,7 +358,7 @@ def test_the_example_of_simharness(monkeypatch):
 
 
 def test_the_foreign_program_is_the_one_that_is_tested():
-    wrapped = (ROOT / "tests/simharness/experiment/foreign/wrapped.py").read_text(encoding="utf-8")
+    wrapped = (ROOT / "tests/simharness/trial/foreign/wrapped.py").read_text(encoding="utf-8")
     (shown,) = (block for block in blocks("python") if "subprocess" in block)
     assert wrapped.endswith(shown)
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from simharness.report.digest import SCORED, markdown
-from simharness.report.paper import INPUTS, paper_tables, read_inputs
-from simharness.report.paper_text import markdown as paper_text
+from simharness.report.study.digest import SCORED, markdown
 from simharness.scenario.load import load
-from simharness.scenario.study import load_study
-from simharness.study.provenance import PROVENANCE
+from simharness.scenario.study_definition import load_study
+from simharness.trial.provenance import PROVENANCE
+from tools.paper_tables.tables import INPUTS, paper_tables, read_inputs
+from tools.paper_tables.text import markdown as paper_text
 
 ROOT = Path(__file__).parents[2]
 DIGESTS = sorted(path.parent.name for path in (ROOT / "results").glob("*/digest.json"))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from suites import SMALL, remember_scenes
 
-from simharness.experiment.execution import RunError
 from simharness.gate import suite
-from simharness.scenario.reading import ScenarioError
+from simharness.runtime.frame_pool import RunError
+from simharness.scenario.toml_reader import ScenarioError
 from simharness.testing import assert_robust
 
 
@@ -82,7 +82,7 @@ def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
 def test_a_score_that_applies_to_nothing_does_not_pass(small, monkeypatch):
     class Nothing:
         def __init__(self, variant):
-            from simharness.gate.trials import Trial
+            from simharness.gate.trial_command import Trial
             from simharness.scoring.catalogue import SCORES
 
             self.failed = ()

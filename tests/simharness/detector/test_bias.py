@@ -4,9 +4,9 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Camera, Rig
 from simharness.detector.bias import body_axes, offsets, shifts
-from simharness.humans.body import make_body
-from simharness.humans.shape import Shape
-from simharness.scenario.detector import Bias
+from simharness.scenario.sections.detector import Bias
+from simharness.world.humans.body import make_body
+from simharness.world.humans.shape import Shape
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ from mvpose.duplicates import Duplicates
 from simharness.detector.boxes import AGAIN, PALER, UPPER, in_boxes
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.correlation import LIMBS, Chances
-from simharness.detector.found import Found
-from simharness.detector.truth import KeypointError
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Boxes
+from simharness.detector.detection_block import Found
+from simharness.scenario.sections.detector import Boxes
+from simharness.types.truth import KeypointError
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
 
 IMAGE = (1600, 700)
 SIZE = np.array([120.0, 300.0])

@@ -9,10 +9,10 @@ from scipy.stats import binom
 from mvpose import Camera, Rig
 from simharness.detector.correlation import Chances
 from simharness.detector.decoys import decoy_hits
-from simharness.detector.figments import LEAST
-from simharness.detector.truth import KeypointError
-from simharness.rendering.views import LookalikeViews, Views
-from simharness.scenario.detector import DecoyHits
+from simharness.detector.false_positives import LEAST
+from simharness.scenario.sections.detector import DecoyHits
+from simharness.types.truth import KeypointError
+from simharness.types.views import LookalikeViews, Views
 
 STEP = 0.1  # seconds
 NAMES = ("poster0", "mirror0/person0")

@@ -9,13 +9,13 @@ import pytest
 from worlds import world
 
 from mvpose.networks.reid import DEFAULT
-from simharness.detector.describing import Looks
-from simharness.detector.descriptors import DescriptorModel
+from simharness.detector.descriptor_model import DescriptorModel
 from simharness.detector.detect import detect
-from simharness.detector.viewing import bearings, hidden_shares
-from simharness.rendering.views import LookalikeViews
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Detector
+from simharness.detector.drawn_descriptors import Looks
+from simharness.detector.view_geometry import bearings, hidden_shares
+from simharness.scenario.sections.detector import Detector
+from simharness.types.views import LookalikeViews
+from simharness.types.visibility import Visibility
 
 PEOPLE, VIEWS = 12, 5
 

@@ -9,14 +9,14 @@ from worlds import within, world
 from mvpose import Pipeline
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
-from simharness.detector.truth import MISS_FROM, KeypointError
-from simharness.experiment.trial import prepare
-from simharness.experiment.work import Filming
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Detector
 from simharness.scenario.load import load
 from simharness.scenario.profiles import SHIPPED, read_profile
-from simharness.scene.simulation import simulate
+from simharness.scenario.sections.detector import Detector
+from simharness.trial.stages.build import prepare
+from simharness.trial.stages.frame_tasks import Filming
+from simharness.types.truth import MISS_FROM, KeypointError
+from simharness.types.visibility import Visibility
+from simharness.world.scene.simulation import simulate
 
 
 def run(where, *, seed=3, **sections):

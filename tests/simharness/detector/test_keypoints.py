@@ -9,9 +9,9 @@ from mvpose import COCO17
 from simharness.detector.conditions import BOX_SHARE, Conditions, overlaps
 from simharness.detector.correlation import Chances
 from simharness.detector.keypoints import find_keypoints
-from simharness.detector.truth import GOOD_BELOW, MISS_FROM, KeypointError
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import Correlation, Keypoints
+from simharness.scenario.sections.detector import Correlation, Keypoints
+from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
+from simharness.types.visibility import Visibility
 
 MIRROR = np.array(COCO17.mirror)
 

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
+from simharness.detector.birth_death import Lives, alive, slots
 from simharness.detector.correlation import Chances
-from simharness.detector.lives import Lives, alive, slots
+from simharness.detector.phantom_poses import DRAWS, postures, seen_from
 from simharness.detector.phantoms import focus, phantoms
-from simharness.detector.postures import DRAWS, postures, seen_from
-from simharness.detector.truth import KeypointError
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-from simharness.rigs.layouts import build_rig
-from simharness.scenario.detector import Phantoms
-from simharness.scenario.models import Cameras
+from simharness.scenario.sections.detector import Phantoms
+from simharness.scenario.sections.scenario import Cameras
+from simharness.types.truth import KeypointError
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
+from simharness.world.rigs.layouts import build_rig
 
 STEP = 0.1  # seconds
 

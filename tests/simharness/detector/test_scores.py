@@ -7,9 +7,9 @@ from simharness.detector.conditions import Conditions
 from simharness.detector.correlation import Chances
 from simharness.detector.keypoints import find_keypoints
 from simharness.detector.scores import LEAST, score_keypoints
-from simharness.detector.truth import KeypointError
-from simharness.rendering.visibility import Visibility
-from simharness.scenario.detector import KINDS, Correlation, Keypoints, Scores
+from simharness.scenario.sections.detector import KINDS, Correlation, Keypoints, Scores
+from simharness.types.truth import KeypointError
+from simharness.types.visibility import Visibility
 
 USUAL = {"good": 0.9, "jitter": 0.7, "miss": 0.4, "inversion": 0.6, "swap": 0.5}
 

@@ -4,10 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import Camera, Detections, Pipeline, Rig
-from simharness.detector.found import Found
+from simharness.detector.detection_block import Found
 from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, in_crops
-from simharness.detector.truth import KeypointError
-from simharness.scenario.detector import HeatmapHead
+from simharness.scenario.sections.detector import HeatmapHead
+from simharness.types.truth import KeypointError
 
 SIZES = ("64x48", "96x72")
 

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.humans.landmarks import LANDMARKS
-from simharness.rendering.views import Views
-from simharness.rendering.visibility import Visibility
-from simharness.scene.sequence import Sequence
+from simharness.types.landmarks import LANDMARKS
+from simharness.types.sequence import Sequence
+from simharness.types.views import Views
+from simharness.types.visibility import Visibility
 
 RATE = 10.0  # Hz
 

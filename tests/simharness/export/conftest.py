@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from simharness.experiment.trial import prepare
 from simharness.export.export import Export, export
-from simharness.scenario.models import Cameras, Clutter, Faults, People, Rendering, Scenario
+from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
+from simharness.trial.stages.build import prepare
 
 
 def tiny(**sections) -> Scenario:

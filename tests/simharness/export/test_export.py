@@ -14,17 +14,17 @@ import pytest
 
 from mvpose import COCO17
 from mvpose.skeleton import PANOPTIC19
-from simharness.datasets.openpose import read_frame
-from simharness.datasets.panoptic import read_calibration
-from simharness.experiment.looking import look
-from simharness.experiment.trial import prepare
-from simharness.experiment.work import studio_of
 from simharness.export.export import Export, export
-from simharness.rendering.visibility import Visibility
+from simharness.formats.calibration.panoptic import read_calibration
+from simharness.formats.openpose import read_frame
 from simharness.scenario.load import load
-from simharness.scenario.models import Cameras, Faults, People, Room
-from simharness.scene.playback import Playback
-from simharness.study.provenance import PROVENANCE
+from simharness.scenario.sections.scenario import Cameras, Faults, People, Room
+from simharness.trial.looking import look
+from simharness.trial.provenance import PROVENANCE
+from simharness.trial.stages.build import prepare
+from simharness.trial.stages.frame_tasks import studio_of
+from simharness.types.visibility import Visibility
+from simharness.world.scene.playback import Playback
 
 SHARED = [joint for joint in PANOPTIC19.joints if joint in COCO17.joints]
 OF_19 = [PANOPTIC19.index(joint) for joint in SHARED]
@@ -303,7 +303,7 @@ class TestWholeOrNotAtAll:
             done.extend(tmp_path.rglob("body3DScene*.json"))
             raise OSError("the disk is full")
 
-        monkeypatch.setattr("simharness.rendering.picture.Studio.picture", fail)
+        monkeypatch.setattr("simharness.capture.picture.Studio.picture", fail)
         with pytest.raises(OSError, match="disk is full"):
             export(trial, Export(tmp_path / "tiny"))
         assert done
@@ -312,7 +312,7 @@ class TestWholeOrNotAtAll:
     def test_an_error_leaves_an_earlier_export_as_it_was(self, trial, tmp_path, monkeypatch):
         made, _ = exported(trial, tmp_path / "tiny", pictures=False)
         before = {file: file.read_bytes() for file in made.rglob("*.json")}
-        monkeypatch.setattr("simharness.rendering.picture.Studio.picture", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("simharness.capture.picture.Studio.picture", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             export(trial, Export(made))
         assert {file: file.read_bytes() for file in made.rglob("*.json")} == before
@@ -339,9 +339,9 @@ class TestWholeOrNotAtAll:
         code = (
             "import os, pathlib, sys\n"
             "from conftest import tiny\n"
-            "from simharness.experiment.trial import prepare\n"
+            "from simharness.trial.stages.build import prepare\n"
             "from simharness.export.export import Export, export\n"
-            "from simharness.rendering.picture import Studio\n"
+            "from simharness.capture.picture import Studio\n"
             "Studio.picture = lambda *_, **__: os._exit(9)\n"
             "export(prepare(tiny()), Export(pathlib.Path(sys.argv[1])))\n"
         )

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
-from simharness.gate.trials import Trial
+from simharness.gate.trial_command import Trial
 
 VALUES = st.none() | st.floats(-1e6, 1e6)
 TRIALS = st.builds(Trial, st.text(min_size=1), st.integers(0, 99), st.sampled_from(["full", "fast"]))

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from simharness.gate.baseline import TIME, Measurement
-from simharness.gate.comparing import compare
-from simharness.gate.trials import Trial
-from simharness.scenario.gate import Gate
+from simharness.gate.compare import compare
+from simharness.gate.trial_command import Trial
+from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 
 GATE = Gate()

@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 import pytest
 
 from simharness.gate.baseline import TIME, Measurement
-from simharness.gate.check import Check, Failed
-from simharness.gate.comparing import compare
+from simharness.gate.compare import compare
+from simharness.gate.gate_result import Check, Failed
 from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
-from simharness.gate.trials import Trial
-from simharness.scenario.gate import Gate
+from simharness.gate.trial_command import Trial
+from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from simharness.gate.baseline import KEPT, Measurement, write_baseline
-from simharness.gate.checking import baseline_of
-from simharness.gate.seeds import least_p, least_seeds
+from simharness.gate.required_seeds import least_p, least_seeds
+from simharness.gate.runner import baseline_of
 from simharness.gate.suite import fingerprint
-from simharness.gate.trials import Trial, name_of, scenes_of
-from simharness.scenario.study import load_study
-from simharness.scoring.statistics import paired
+from simharness.gate.trial_command import Trial, name_of, scenes_of
+from simharness.scenario.study_definition import load_study
+from simharness.statistics.comparison import paired
 
 
 @pytest.mark.parametrize("seeds", [1, 2, 5, 12, 13, 20])

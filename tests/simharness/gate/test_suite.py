@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from suites import SMALL, remember_scenes
 
-from simharness.experiment.execution import RunError
 from simharness.gate import suite
 from simharness.gate.baseline import KEPT, TIME
-from simharness.gate.reference import time_reference
+from simharness.gate.reference_kernel import time_reference
 from simharness.gate.suite import fingerprint, run_suite
-from simharness.scenario.study import load_study
+from simharness.runtime.frame_pool import RunError
+from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
 
 

@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from simharness.gate.trials import Trial, command_of, name_of, overrides, scenes_of
+from simharness.gate.trial_command import Trial, command_of, name_of, overrides, scenes_of
 from simharness.scenario.load import load
-from simharness.scenario.study import load_study
+from simharness.scenario.study_definition import load_study
 
 CI = Path(__file__).parents[3] / "scenarios" / "ci.toml"
 

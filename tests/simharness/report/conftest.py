@@ -24,8 +24,8 @@ cameras.count = [2, 3]
 def ran(tmp_path_factory):
     """Two settings at two seeds by two variants."""
     from simharness.scenario.profiles import SHIPPED
-    from simharness.scenario.study import load_study
-    from simharness.study.running import run_study
+    from simharness.scenario.study_definition import load_study
+    from simharness.study.runner import run_study
 
     folder = tmp_path_factory.mktemp("ran")
     file = folder / "tiny.toml"
@@ -36,6 +36,6 @@ def ran(tmp_path_factory):
 @pytest.fixture(scope="session")
 def shown(ran):
     """The worst frames of that study, with the trials that they are from."""
-    from simharness.report.worst import show, worst_frames
+    from simharness.report.study.worst_frames import show, worst_frames
 
     return list(show(ran, worst_frames(ran)))

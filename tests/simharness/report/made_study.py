@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from simharness.random import stream
-from simharness.scenario.models import Scenario
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
-from simharness.study.blame import FAILURE_SCHEMA
-from simharness.study.results import Results
+from simharness.scoring.stage_blame import FAILURE_SCHEMA
+from simharness.study.result_folder import Results
+from simharness.types.random_streams import stream
 
 FRAMES, PEOPLE = 5, 2
 KINDS = ("missed", "ghost", "merged", "displaced_joint")

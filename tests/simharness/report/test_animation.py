@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from simharness.report.animation import animate, animated_frames
+from simharness.report.run.film import animate, animated_frames
 
 
 @given(st.integers(1, 100_000))

@@ -10,7 +10,7 @@ import subprocess
 
 import pytest
 
-from simharness.report.study import render_study
+from simharness.report.study.page import render_study
 
 pytestmark = pytest.mark.slow
 

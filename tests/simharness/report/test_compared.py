@@ -5,7 +5,7 @@ import polars as pl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.report.tables import COLUMNS, compared
+from simharness.report.study.tables import COLUMNS, compared
 
 KEYS = [info.key for info in COLUMNS]
 AT = KEYS.index("mpjpe_mm")

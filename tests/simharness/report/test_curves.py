@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 from made_study import make_study
 
-from simharness.report.curves import breaking, factors, factors_by_case, grid, panels
+from simharness.report.study.curves import breaking, factors, factors_by_case, grid, panels
 
 VARIANTS = ("full", "fast")
 SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # what four seeds add to PCP on average

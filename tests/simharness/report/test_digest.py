@@ -12,11 +12,11 @@ from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.digest import PRINTED, curves, digest, markdown, write_digest
-from simharness.report.sheet import sheet
-from simharness.report.study_plots import BLAME_COLORS, KIND_COLORS
+from simharness.report.figures.svg_sheet import sheet
+from simharness.report.study.digest import PRINTED, curves, digest, markdown, write_digest
+from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS
 from simharness.scoring.catalogue import SCORES
-from simharness.study.provenance import PROVENANCE
+from simharness.trial.provenance import PROVENANCE
 
 SVG = "{http://www.w3.org/2000/svg}"
 COUNTS = [2, 3, 5]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.report.factor_names import NAMES, axis_label, unit_of
+from simharness.report.study.factor_names import NAMES, axis_label, unit_of
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 

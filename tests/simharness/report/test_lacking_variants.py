@@ -6,9 +6,9 @@ import polars as pl
 import pytest
 from made_study import make_study
 
-from simharness.report.study import render_study
-from simharness.report.tables import compared
-from simharness.report.worst import worst_frames
+from simharness.report.study.page import render_study
+from simharness.report.study.tables import compared
+from simharness.report.study.worst_frames import worst_frames
 
 
 def lacking(results, variant, trials):

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from mvpose import Detections, Estimate, Matching
-from simharness.detector.truth import Truth
-from simharness.experiment.run import score_table
-from simharness.experiment.store import Record
-from simharness.report.page import joint_errors, person_errors, render
-from simharness.rigs.layouts import build_rig
-from simharness.scenario.models import Cameras, People, Scenario
+from simharness.report.run.page import joint_errors, person_errors, render
+from simharness.report.run.result_folder import score_table
+from simharness.scenario.sections.scenario import Cameras, People, Scenario
 from simharness.scoring.assessment import score_variant
-from simharness.scoring.recording import Recording
 from simharness.scoring.summary import summarize
+from simharness.trial.run_folder import Record
+from simharness.types.recording import Recording
+from simharness.types.truth import Truth
+from simharness.world.rigs.layouts import build_rig
 
 FRAMES = 4
 

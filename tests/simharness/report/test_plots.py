@@ -7,12 +7,13 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from simharness.report import plots, study_plots
-from simharness.report.figure import STAGE_COLORS
-from simharness.rigs.layouts import build_rig
-from simharness.scenario.models import Cameras
+from simharness.report.figures.svg_figure import STAGE_COLORS
+from simharness.report.run import plots
+from simharness.report.study import plots as study_plots
+from simharness.scenario.sections.scenario import Cameras
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.statistics import Interval
+from simharness.statistics.comparison import Interval
+from simharness.world.rigs.layouts import build_rig
 
 COLORS = ["#336699", "#996633", "#339966"]
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.rerun import write_rerun
+from simharness.report.study.rerun_recording import write_rerun
 
 MAGIC = b"RRF2"
 

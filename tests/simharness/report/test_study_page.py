@@ -12,8 +12,8 @@ from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.study import render_study, write_report
-from simharness.report.worst import worst_frames
+from simharness.report.study.page import render_study, write_report
+from simharness.report.study.worst_frames import worst_frames
 from simharness.scoring.catalogue import SCORES
 
 GRID = {"cameras.count": [2, 3, 5], "detector.profile": ["poor", "good"]}

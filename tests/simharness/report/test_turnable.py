@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mvpose import Camera, Estimate, Matching
-from simharness.report import turnable as module
-from simharness.report.turnable import turnable
+from simharness.report.figures import turnable as module
+from simharness.report.figures.turnable import turnable
 
 
 @pytest.fixture

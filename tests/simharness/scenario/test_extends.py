@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from simharness.scenario.layers import over
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.models import Scenario
+from simharness.scenario.sections.scenario import Scenario
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.dump import dumps
 from simharness.scenario.load import ScenarioError, fingerprint, load
-from simharness.scenario.models import Cameras, People, Scenario
-from simharness.scenario.planning import read_plan
+from simharness.scenario.resolution import read_plan
+from simharness.scenario.sections.scenario import Cameras, People, Scenario
+from simharness.scenario.toml_writer import dumps
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
 

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.detector import KINDS, Detector, Keypoints
-from simharness.scenario.dump import dumps
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.profiles import SHIPPED, read_profile
+from simharness.scenario.sections.detector import KINDS, Detector, Keypoints
+from simharness.scenario.toml_writer import dumps
 
 
 @pytest.fixture

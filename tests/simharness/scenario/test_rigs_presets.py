@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from simharness.rigs.layouts import build_rig
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.models import Cameras
 from simharness.scenario.presets import RIGS, about
-from simharness.scenario.study import load_study
+from simharness.scenario.sections.scenario import Cameras
+from simharness.scenario.study_definition import load_study
+from simharness.world.rigs.layouts import build_rig
 
 SHIPPED = sorted(RIGS.shipped.glob("*.toml"))
 CAMERAS = {

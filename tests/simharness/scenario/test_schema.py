@@ -9,7 +9,7 @@ import pytest
 
 from simharness.scenario.load import ScenarioError
 from simharness.scenario.schema import dumps, scenario_schema
-from simharness.scenario.study import load_study
+from simharness.scenario.study_definition import load_study
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHIPPED = sorted(SCENARIOS.glob("*.toml"))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from simharness.detector.detect import Detected
-from simharness.experiment.looking import look
-from simharness.experiment.trial import Trial, prepare, rig_of
-from simharness.rigs.faults import shoot
-from simharness.scenario.study import Setting, Study, load_study
-from simharness.scene.sequence import Sequence
-from simharness.study.measure import measure
+from simharness.scenario.study_definition import Setting, Study, load_study
+from simharness.trial.looking import look
+from simharness.trial.measure import measure
+from simharness.trial.stages.build import Trial, prepare, rig_of
+from simharness.types.sequence import Sequence
+from simharness.world.rigs.faults import shoot
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))

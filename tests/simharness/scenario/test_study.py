@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.planning import read_plan
-from simharness.scenario.study import StudyTooLarge, load_study
-from simharness.scenario.sweeping import Sweep
-from simharness.study.document import document
+from simharness.scenario.resolution import read_plan
+from simharness.scenario.study_definition import StudyTooLarge, load_study
+from simharness.scenario.sweep import Sweep
+from simharness.study.study_file import document
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from mvpose import COCO17, Camera, Detections, Estimate, Matching, Rig
-from simharness.detector.truth import Truth
-from simharness.scoring.recording import Recording
+from simharness.types.recording import Recording
+from simharness.types.truth import Truth
 
 # A standing person, metres.
 # fmt: off

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from recordings import NOBODY, PERSON, answer, record, with_ghost
 
 from mvpose import COCO17, Estimate, Matching
-from simharness.detector.truth import Truth
-from simharness.rendering.visibility import Visibility
 from simharness.scoring.assessment import assess, score_variant
 from simharness.scoring.catalogue import SCORES
 from simharness.scoring.pck import pck
-from simharness.scoring.recording import Recording
+from simharness.types.recording import Recording
+from simharness.types.truth import Truth
+from simharness.types.visibility import Visibility
 
 ASSESSED = [key for key in SCORES if not key.startswith(("failures_", "blame_"))]
 POSE_SHARES = [key for key in ASSESSED if key.startswith(("pcp", "ap", "pck"))] + ["recall", "precision", "map"]

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from moments import crowd, moment, recorded, ring, said
 
 from mvpose import COCO17, Detections
-from simharness.rendering.visibility import Visibility
 from simharness.scoring.failures import FailureKind, failures_of_frame, find_failures
 from simharness.scoring.pose import pair
+from simharness.types.visibility import Visibility
 
 RIG = ring(4)
 PEOPLE = crowd(3)

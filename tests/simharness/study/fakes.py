@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from simharness.scenario.study import Study, load_study
+from simharness.scenario.study_definition import Study, load_study
 from simharness.scoring.catalogue import SCORES
-from simharness.study.measured import Measured
+from simharness.trial.trial_result import Measured
 
 ALWAYS = 99
 PATIENCE = 120.0  # seconds that a call waits for others, or for its end by them
@@ -118,8 +118,8 @@ def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
 
 def main():
     """``simharness study`` of a made-up study."""
-    from simharness.cli import studying
-    from simharness.study import running
+    from simharness.cli import study as study_command
+    from simharness.study import runner
 
     options = json.loads(sys.argv[1])
     folder = Path(options["folder"])
@@ -128,9 +128,9 @@ def main():
         folder / "calls", harm, **{key: options[key] for key in ("seconds", "large", "stuck") if key in options}
     )
     study_of(folder, cameras=(3, 4), seeds=3)
-    run_study = running.run_study
-    running.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)
-    studying._report = lambda results: None
+    run_study = runner.run_study
+    runner.run_study = lambda *args, **given: run_study(*args, measure=fake, **given)
+    study_command._report = lambda results: None
     if limit := options.get("file_size"):
         import resource
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from fakes import made_up, study_of
 
-from simharness.experiment.execution import RunError
 from simharness.gate import suite
-from simharness.study.identity import entry_identity
+from simharness.runtime.frame_pool import RunError
 from simharness.study.plan import plan
-from simharness.study.running import run_study
-from simharness.study.scheduling import ATTEMPTS, Failure, Success, Unit, work_off
-from simharness.study.store import Store
+from simharness.study.runner import run_study
+from simharness.study.scheduler import ATTEMPTS, Failure, Success, Unit, work_off
+from simharness.study.trial_store import Store
+from simharness.trial.identity import entry_identity
 
 VARIANTS = ("full", "fast", "no-3dps")
 

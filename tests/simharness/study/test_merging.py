@@ -5,9 +5,9 @@ import json
 import pytest
 from fakes import Fake, called, study_of
 
-from simharness.study.merging import merge
-from simharness.study.running import run_shard, run_study
-from simharness.study.store import Store
+from simharness.study.merge import merge
+from simharness.study.runner import run_shard, run_study
+from simharness.study.trial_store import Store
 
 
 @pytest.fixture

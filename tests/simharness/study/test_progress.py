@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from simharness.study import progress
-from simharness.study.progress import Pace, _Lines, watching
+from simharness.study import study_progress as progress
+from simharness.study.study_progress import Pace, _Lines, watching
 
 
 @pytest.fixture

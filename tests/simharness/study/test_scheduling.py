@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
-from simharness.study import scheduling
+from simharness.study import scheduler as scheduling
 from simharness.study.plan import plan
-from simharness.study.scheduling import Failure, Success, Unit, work_off
+from simharness.study.scheduler import Failure, Success, Unit, work_off
 
 
 def units_of(folder, seeds):

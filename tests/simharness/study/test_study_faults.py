@@ -11,8 +11,8 @@ import pytest
 from fakes import Fake, called, made_up, program, run_program, study_of
 
 from simharness.study.plan import plan
-from simharness.study.running import run_study
-from simharness.study.store import Store
+from simharness.study.runner import run_study
+from simharness.study.trial_store import Store
 
 
 def store_is_clean(folder):

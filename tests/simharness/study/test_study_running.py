@@ -7,12 +7,12 @@ import polars as pl
 import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
-from simharness.scenario.study import load_study
+from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
-from simharness.study.identity import entry_identity, trial_identity
-from simharness.study.results import TABLES, read_study
-from simharness.study.running import FailedTrial, Interrupted, run_shard, run_study
-from simharness.study.store import Store
+from simharness.study.result_folder import TABLES, read_study
+from simharness.study.runner import FailedTrial, Interrupted, run_shard, run_study
+from simharness.study.trial_store import Store
+from simharness.trial.identity import entry_identity, trial_identity
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.study.plan import plan
-from simharness.study.store import Entry, Store, StoreError
+from simharness.study.trial_store import Entry, Store, StoreError
 
 ID, OTHER = "ab" * 16, "ac" * 16
 

@@ -1,0 +1,1 @@
+"""What the method and the simulator cost; never imported by the packages."""

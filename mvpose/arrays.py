@@ -1,0 +1,10 @@
+"""Array types for annotations. They give the element type; docstrings give shapes and units."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]

@@ -1,0 +1,1 @@
+"""What cameras record of the world: pictures, visibility, boxes."""

@@ -1,0 +1,197 @@
+"""What a ray from a lens meets first: MuJoCo's geoms of things, the capsules of people.
+
+MuJoCo's rays look at every geom of the model in turn, so a joint more costs the more the more people there are. People
+are met by a kernel of our own instead, which passes by whoever is out of the way; a test holds it to ``mj_multiRay``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats, Integers
+from mvpose.camera import Camera
+from simharness.capture.rendering.renderer import NEAR
+from simharness.world.humans.model import SKIN_GROUP
+
+if TYPE_CHECKING:
+    from simharness.world.scene.build import Scene
+    from simharness.world.scene.playback import State
+
+
+_THINGS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # groups of geoms that MuJoCo looks at
+
+
+class Caster:
+    """Casts rays into a scene. Has a state of its own, so it is not for sharing.
+
+    Args:
+        scene: people and things.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        model = scene.model
+        self._model, self._data = model, mujoco.MjData(model)
+        self._moving = np.array([model.body(solid.name).mocapid[0] for solid in scene.moving], int)
+        mujoco.mj_kinematics(model, self._data)
+        self._people = len(scene.bodies)
+        capsules = []
+        for person, body in enumerate(scene.bodies):
+            for bone, name in enumerate(body.bones):
+                for geom in np.flatnonzero(model.geom_bodyid == model.body(f"person{person}/{name}").id):
+                    if model.geom_group[geom] == SKIN_GROUP:
+                        capsules.append(
+                            (person, bone, *_ends(model, int(geom), body.heads[bone]), model.geom_size[geom, 0])
+                        )
+        self._person, self._bone = (np.array([c[k] for c in capsules], int) for k in (0, 1))
+        self._rest = np.reshape([c[2:4] for c in capsules], (-1, 2, 3))
+        self._radii = np.array([c[4] for c in capsules], float)
+        self._first = np.searchsorted(self._person, np.arange(self._people + 1))
+        self._placed = np.empty((len(capsules), 2, 3))
+        self._around = np.empty((self._people, 4))
+
+    def place(self, state: State) -> None:
+        """Put everyone and everything where a state says."""
+        bones = np.ascontiguousarray(state.bones)
+        _place(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)
+        if len(self._moving):
+            self._data.mocap_pos[self._moving] = state.placements[:, :3]
+            self._data.mocap_quat[self._moving] = state.placements[:, 3:]
+            mujoco.mj_kinematics(self._model, self._data)
+
+    def cast(self, camera: Camera, targets: Floats) -> tuple[Integers, Floats]:
+        """What a camera meets first on the way to targets (n, 3), from ``NEAR`` in front of it.
+
+        Returns:
+            Whose surface it is, (n,): 0 to P - 1 the people, P a thing, -1 nothing as near as the targets; and how far
+            in front of the target, (n,) metres, -inf where nothing is.
+        """
+        count = len(targets)
+        owner, distance = np.full(count, -1), np.full(count, np.inf)
+        if not count:
+            return owner, distance
+        way = targets - camera.center
+        length = np.sqrt((way * way).sum(axis=1))
+        way /= length[:, None]
+        near = NEAR / (way @ camera.R[2])
+        _meet(camera.center, way, near, length, self._placed, self._radii, self._first, self._around, owner, distance)
+        thing, away = self._things(camera.center, way, near, length)
+        first = thing & (away < distance)
+        return np.where(first, self._people, owner), length - np.where(first, away, distance)
+
+    def _things(self, start: Floats, way: Floats, near: Floats, length: Floats) -> tuple[NDArray[np.bool_], Floats]:
+        """Which rays meet a thing before their ends, and how far off."""
+        geom, distance = np.empty(len(way), np.int32), np.empty(len(way))
+        self._cast(start, way, geom, distance, float(length.max()))
+        for i in np.flatnonzero((geom >= 0) & (distance < near)):
+            self._cast(start + near[i] * way[i], way[i : i + 1], geom[i : i + 1], distance[i : i + 1], length[i])
+            distance[i] += near[i]
+        return (geom >= 0) & (distance < length), distance
+
+    def _cast(self, start: Floats, way: Floats, geom: NDArray[np.int32], distance: Floats, farthest: float) -> None:
+        mujoco.mj_multiRay(
+            self._model,
+            self._data,
+            pnt=start,
+            vec=way.ravel(),
+            geomgroup=_THINGS,
+            flg_static=1,
+            bodyexclude=-1,
+            geomid=geom,
+            dist=distance,
+            normal=None,
+            nray=len(way),
+            cutoff=farthest,
+        )
+
+
+def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Floats]:
+    """Ends (3,) of a capsule's axis in the rest body, of which ``head`` (3,) is where its bone begins."""
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    reach = model.geom_size[geom, 1] * turn.reshape(3, 3)[:, 2]
+    return head + model.geom_pos[geom] - reach, head + model.geom_pos[geom] + reach
+
+
+@njit(cache=True)
+def _place(rest, bone, radii, first, bones, placed, around):  # type: ignore[no-untyped-def]
+    """Carry capsules (c, 2, 3) by their bones' transforms (P, B, 3, 4) and put a ball around each person, (P, 4)."""
+    for person in range(len(bones)):
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for c in range(first[person], first[person + 1]):
+            transform = bones[person, bone[c]]
+            for end in range(2):
+                for k in range(3):
+                    at = transform[k, 3]
+                    for j in range(3):
+                        at += transform[k, j] * rest[c, end, j]
+                    placed[c, end, k] = at
+                    low[k], high[k] = min(low[k], at - radii[c]), max(high[k], at + radii[c])
+        around[person, :3] = (low + high) / 2
+        around[person, 3] = np.sqrt(((high - low) ** 2).sum()) / 2
+
+
+@njit(cache=True)
+def _meet(start, way, near, length, placed, radii, first, around, owner, distance):  # type: ignore[no-untyped-def]
+    """Who is nearest on each ray between ``near`` and its ``length``, and how far off; untouched where nobody is."""
+    for i in range(len(way)):
+        dx, dy, dz = way[i, 0], way[i, 1], way[i, 2]
+        x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz
+        best = length[i] - near[i]
+        for person in range(len(around)):
+            cx, cy, cz = around[person, 0] - x, around[person, 1] - y, around[person, 2] - z
+            if _misses(cx, cy, cz, around[person, 3], dx, dy, dz, best):
+                continue
+            for c in range(first[person], first[person + 1]):
+                ax, ay, az = placed[c, 0, 0] - x, placed[c, 0, 1] - y, placed[c, 0, 2] - z
+                bx, by, bz = placed[c, 1, 0] - x, placed[c, 1, 1] - y, placed[c, 1, 2] - z
+                ux, uy, uz = bx - ax, by - ay, bz - az
+                reach = radii[c] + 0.5 * np.sqrt(ux * ux + uy * uy + uz * uz)
+                if _misses((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2, reach, dx, dy, dz, best):
+                    continue
+                away = _enter(ax, ay, az, bx, by, bz, radii[c], dx, dy, dz)
+                if away < 0.0:  # it begins inside: what it meets is the other side, from within
+                    away = -_enter(ax, ay, az, bx, by, bz, radii[c], -dx, -dy, -dz)
+                if 0.0 <= away < best:
+                    best = away
+                    owner[i], distance[i] = person, away + near[i]
+
+
+@njit(cache=True)
+def _misses(cx, cy, cz, radius, dx, dy, dz, best):  # type: ignore[no-untyped-def]
+    """Whether a ray of length ``best`` from the origin passes by a ball."""
+    along = cx * dx + cy * dy + cz * dz
+    return along < -radius or along - radius > best or cx * cx + cy * cy + cz * cz - along * along > radius * radius
+
+
+@njit(cache=True)
+def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite where it passes by."""
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    square = ux * ux + uy * uy + uz * uz
+    aligned, begins = ux * dx + uy * dy + uz * dz, ux * ax + uy * ay + uz * az
+    seen, far = ax * dx + ay * dy + az * dz, ax * ax + ay * ay + az * az
+    # The endless cylinder first, in units of the axis' length squared.
+    p = square - aligned * aligned
+    q = square * seen - begins * aligned
+    r = square * far - begins * begins - radius * radius * square
+    cap_b = False
+    if p > 1e-12 * square:
+        inner = q * q - p * r
+        if inner < 0.0:
+            return np.inf
+        away = (q - np.sqrt(inner)) / p
+        height = away * aligned - begins
+        if 0.0 < height < square:
+            return away
+        cap_b = height >= square
+    else:
+        cap_b = aligned < 0.0  # along the axis: the cap that is met first
+    if cap_b:
+        seen, far = bx * dx + by * dy + bz * dz, bx * bx + by * by + bz * bz
+    inner = seen * seen - far + radius * radius
+    return seen - np.sqrt(inner) if inner >= 0.0 else np.inf

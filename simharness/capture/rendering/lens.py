@@ -1,0 +1,143 @@
+"""Lenses that bend: the picture of a pinhole camera that sees as much, warped as the lens would have it.
+
+The pinhole picture covers every direction that the lens images and is nowhere coarser than the bent one. Colours are
+interpolated; depth, ids and parts are those of the nearest pixel, which lies less than 0.75 pixels of the bent picture
+from where it should.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.camera import Camera
+from simharness.capture.rendering.renderer import Image
+
+_MOST = 16.0  # pixels of the pinhole picture for one of the bent
+_MARGIN = 1  # pixels around it, for interpolation
+_LONGEST_SIDE = 16384  # pixels; of what OpenGL draws
+_SAMPLES = 64  # places along each side where the magnification is taken; it changes smoothly
+_KEPT = 64  # lenses: as many as cameras in a rig
+
+
+@dataclass(frozen=True)
+class Lens:
+    """How to make the picture of one lens from that of a pinhole.
+
+    Attributes:
+        K: intrinsics of the pinhole.
+        size: of its picture, width and height.
+        columns, rows: where each pixel of the bent picture lies in it, (h, w) float32; far outside where the lens
+            images nothing.
+        nearest: index of the nearest pixel of the flattened pinhole picture, (h, w) intp; 0 where there is none.
+        dark: (h, w), where the lens images nothing; None where there is no such place.
+    """
+
+    K: NDArray[np.float64]
+    size: tuple[int, int]
+    columns: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    nearest: NDArray[np.intp]
+    dark: NDArray[np.bool_] | None
+
+    def pinhole(self, camera: Camera) -> Camera:
+        """The camera with a pinhole in place of this lens."""
+        return replace(camera, K=self.K, distortion=np.zeros(5), size=self.size)
+
+    def bent(self, image: Image) -> Image:
+        """The picture through the lens from that through the pinhole; black where it images nothing."""
+        rgb = cv2.remap(image.rgb, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        return Image(
+            rgb=rgb.astype(np.uint8, copy=False),
+            depth=self._picked(image.depth, np.inf),
+            ids=self._picked(image.ids, -1),
+            parts=None if image.parts is None else self._picked(image.parts, -1),
+        )
+
+    def _picked(self, values: NDArray, empty: float) -> NDArray:
+        result = values.ravel()[self.nearest]
+        if self.dark is not None:
+            result[self.dark] = empty
+        return result
+
+
+def through_lens(camera: Camera, picture: Callable[[Camera], Image]) -> Image:
+    """What a camera sees, from a way to picture what a pinhole camera sees.
+
+    Raises:
+        ValueError: see :func:`lens_of`.
+    """
+    if not camera.distortion.any():
+        return picture(camera)
+    lens = lens_of(camera)
+    return lens.bent(picture(lens.pinhole(camera)))
+
+
+def lens_of(camera: Camera) -> Lens:
+    """The lens of a camera; worked out once, wherever the camera stands.
+
+    Raises:
+        ValueError: it bends so much that the pinhole picture would be immense.
+    """
+    lens = _lens(camera.K.tobytes(), camera.distortion.tobytes(), camera.size)
+    if isinstance(lens, str):
+        raise ValueError(f"camera {camera.name!r}: {lens}")
+    return lens
+
+
+@lru_cache(maxsize=_KEPT)
+def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Lens | str:
+    """The lens, or what is wrong with it."""
+    K, distortion = np.frombuffer(K_bytes).reshape(3, 3), np.frombuffer(distortion_bytes)
+    camera = Camera(K, np.eye(3), np.zeros(3), distortion=distortion, size=size)
+    width, height = size
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
+    straight = camera.undistort(pixels)
+    imaged = np.isfinite(straight[..., 0] + straight[..., 1])
+    low, high = straight[imaged].min(axis=0), straight[imaged].max(axis=0)
+    few = straight[:: max(1, height // _SAMPLES), :: max(1, width // _SAMPLES)].reshape(-1, 2)
+    few = np.concatenate([few, straight[-1], straight[:, -1]])
+    finer = max(1.0, _magnification(camera, few[np.isfinite(few).all(axis=-1)]))
+    shape = np.ceil((high - low) * finer).astype(np.int64) + 1 + 2 * _MARGIN
+    if shape.prod() > _MOST * width * height or shape.max() > _LONGEST_SIDE:
+        return (
+            f"its lens, distortion {distortion.tolist()}, bends so much that a straight picture of what it sees would "
+            f"be {shape[0]} x {shape[1]} pixels for {width} x {height}: take weaker terms (cameras.distortion), or a "
+            "longer focal length (a smaller cameras.fov)"
+        )
+    enlarged = np.diag([finer, finer, 1.0]) @ K
+    enlarged[:2, 2] += _MARGIN - finer * low
+    places = np.where(imaged[..., None], (straight - low) * finer + _MARGIN, -100.0)
+    column, row = np.moveaxis(np.where(imaged[..., None], np.floor(places + 0.5), 0).astype(np.intp), -1, 0)
+    return Lens(
+        K=enlarged,
+        size=(int(shape[0]), int(shape[1])),
+        columns=np.ascontiguousarray(places[..., 0], np.float32),
+        rows=np.ascontiguousarray(places[..., 1], np.float32),
+        nearest=row * int(shape[0]) + column,
+        dark=None if imaged.all() else ~imaged,
+    )
+
+
+def _magnification(camera: Camera, straight: NDArray[np.float64]) -> float:
+    """By how much a lens magnifies where it does most: the largest singular value of its derivative.
+
+    Args:
+        camera: its K and distortion count.
+        straight: places in the picture of the pinhole with the same K, (n, 2).
+    """
+    step = 1e-3  # pixels
+
+    def bent(pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        return camera.project(np.concatenate([pixels, np.ones((len(pixels), 1))], axis=1) @ np.linalg.inv(camera.K).T)
+
+    a, c = ((bent(straight + [step, 0.0]) - bent(straight - [step, 0.0])) / (2 * step)).T
+    b, d = ((bent(straight + [0.0, step]) - bent(straight - [0.0, step])) / (2 * step)).T
+    squares, determinant = a * a + b * b + c * c + d * d, a * d - b * c
+    largest = (squares + np.sqrt(np.maximum(squares**2 - 4 * determinant**2, 0.0))) / 2
+    return float(np.sqrt(largest.max()))

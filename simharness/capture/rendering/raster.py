@@ -1,0 +1,103 @@
+"""The renderer that needs nothing: a z-buffer and one shading pass, compiled by numba.
+
+Depth and ids are exact at pixel centres: the ray of every pixel is met with every triangle in float64 (see
+:func:`simharness.capture.rendering.raster_kernels.rasterise`), no sampling pattern, no fixed-point grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.camera import Camera
+from simharness.capture.rendering.lens import through_lens
+from simharness.capture.rendering.raster_kernels import rasterise, resolve
+from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
+from simharness.capture.rendering.shading_kernels import shade
+from simharness.capture.rendering.triangle_soup import Soup
+from simharness.types.lighting import Lighting
+from simharness.types.mesh import Mesh
+
+_MOST_MESHES = np.iinfo(np.int16).max
+
+
+class RasterRenderer:
+    """Renders on one core of any machine. The last scene is kept: all views of a frame share its shadows."""
+
+    def __init__(self) -> None:
+        self._soup = Soup.of(())
+        self._inverse_depth, self._triangle = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
+
+    def render(
+        self,
+        camera: Camera,
+        meshes: Sequence[Mesh],
+        *,
+        color: bool = True,
+        lighting: Lighting = DAYLIGHT,
+        parts: bool = False,
+    ) -> Image:
+        """Picture ``meshes`` as ``camera`` sees them: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
+        check_count(meshes, most=_MOST_MESHES)
+        self._soup = Soup.of(meshes, self._soup)
+        return through_lens(camera, lambda pinhole: self._picture(pinhole, color, lighting, parts))
+
+    def _picture(self, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
+        soup, shape = self._soup, camera.size[::-1]
+        inverse_depth, triangle = self._buffers(shape)
+        q = rasterise(soup.vertices, soup.fabric.faces, camera.P, NEAR, inverse_depth, triangle)
+        depth, ids = resolve(inverse_depth, triangle, soup.fabric.mesh)
+        return Image(
+            rgb=_shaded(soup, camera, lighting, inverse_depth, triangle, q)
+            if color
+            else np.zeros((*shape, 3), np.uint8),
+            depth=depth,
+            ids=ids,
+            parts=soup.fabric.parts[triangle] if parts else None,
+        )
+
+    def _buffers(self, shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Empty inverse depth and face of every pixel; the memory of the last picture, which is near at hand."""
+        if self._triangle.shape != shape:
+            self._inverse_depth, self._triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
+        self._inverse_depth.fill(0)
+        self._triangle.fill(-1)
+        return self._inverse_depth, self._triangle
+
+
+def _shaded(
+    soup: Soup,
+    camera: Camera,
+    lighting: Lighting,
+    inverse_depth: NDArray[np.float32],
+    triangle: NDArray[np.int32],
+    q: NDArray[np.float64],
+) -> NDArray[np.uint8]:
+    empty = np.round(255 * np.array(lighting.background))
+    if not len(soup.fabric.faces):
+        return np.full((*triangle.shape, 3), empty, np.uint8)
+    fabric, shadows = soup.fabric, soup.shadows(lighting)
+    return shade(
+        triangle,
+        inverse_depth,
+        q,
+        fabric.faces,
+        fabric.colors,
+        fabric.smooth,
+        *soup.normals,
+        fabric.texture,
+        fabric.uv,
+        *fabric.pyramids,
+        camera.center,
+        np.ascontiguousarray(np.linalg.inv(camera.P[:, :3])),
+        np.array(lighting.direction),
+        np.array([lighting.key, lighting.sky, lighting.fill]),
+        255 * np.sqrt(lighting.tint),  # sRGB is about the root of light
+        empty,
+        shadows.P,
+        shadows.nearest,
+        shadows.blocks,
+        shadows.bias,
+    )

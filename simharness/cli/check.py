@@ -1,0 +1,180 @@
+"""``simharness check``: is the method worse than it was?"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import BAD_INPUT, REGRESSION, after_reading, border
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simharness.gate.gate_result import Check, Failed
+    from simharness.scenario.study_definition import Study
+
+_LISTED = 8  # of each kind: a bug that breaks everything breaks a hundred scores
+_VERDICTS = {"worse": "[red]worse[/]", "better": "[green]better[/]", "same": ""}
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(check)
+
+
+def check(
+    suite: Annotated[Path, typer.Argument(help="The suite: a scenario file.", metavar="FILE")],
+    baseline: Annotated[
+        Path, typer.Option(metavar="FILE", help="What the suite scored when it was last found good.", dir_okay=False)
+    ],
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report there, XML.", dir_okay=False)
+    ] = None,
+    summary: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a summary there, Markdown.", dir_okay=False)
+    ] = None,
+    update: Annotated[
+        bool, typer.Option("--update-baseline", help="Write the baseline anew instead of comparing with it.")
+    ] = False,
+    workers: Annotated[int, typer.Option(metavar="N", min=1, help="Processes that share the trials.")] = 1,
+) -> None:
+    r"""Run a suite and fail, exit code 1, where the method got worse than the baseline.
+
+    Worse is a change of a headline score that is significant and larger than its tolerance, section \[gate] of the
+    suite, or a method that takes longer beside a reference kernel. Trials that cannot be run fail the check, too.
+    """
+    with border():
+        from simharness.gate.baseline import check_place
+        from simharness.scenario.study_definition import load_study
+
+        reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
+        if update and reports:
+            raise ValueError(
+                f"{next(iter(reports))}: with --update-baseline nothing is compared: leave one of them out"
+            )
+        for option, path in ({"--baseline": baseline} if update else reports).items():
+            check_place(path, option=option)
+        study = load_study(suite)
+        if update:
+            _update(study, baseline, workers)
+            return
+        from simharness.gate.runner import baseline_of
+        from simharness.gate.runner import check as check_suite
+
+        before = baseline_of(study, baseline)
+        with after_reading(), _progress(study) as advance:
+            result = check_suite(study, before, workers=workers, progress=advance)
+        _print(result, Console())
+        unwritten = _write(result, reports)
+    if not result.passed:
+        raise typer.Exit(REGRESSION)
+    if unwritten:
+        raise typer.Exit(BAD_INPUT)
+
+
+def _write(result: Check, reports: Mapping[str, Path]) -> bool:
+    """Write the reports, each whatever becomes of the other; whether one could not be written, which is said."""
+    from simharness.gate.baseline import write_text
+    from simharness.gate.junit import junit
+    from simharness.gate.markdown import markdown
+
+    unwritten = False
+    for option, path in reports.items():
+        try:
+            write_text({"--junit": junit, "--summary": markdown}[option](result), path, option=option)
+        except ValueError as error:
+            unwritten = True
+            Console(stderr=True).print(f"error: {error}", soft_wrap=True, highlight=False, markup=False)
+    return unwritten
+
+
+def _update(study: Study, path: Path, workers: int) -> None:
+    """Measure a suite and write what it scored."""
+    from simharness.gate.baseline import write_baseline
+    from simharness.gate.required_seeds import require_seeds
+    from simharness.gate.suite import run_suite
+
+    require_seeds(study)
+    with after_reading(), _progress(study) as advance:
+        done = run_suite(study, workers=workers, progress=advance)
+    if done.failed:
+        said = f"{_list_failed(done.failed)}\n{path} was not written, for it would lack these trials"
+        Console(stderr=True).print(said, soft_wrap=True, highlight=False, markup=False)
+        raise typer.Exit(REGRESSION)
+    measured = done.measurement(study)
+    write_baseline(measured, path)
+    Console().print(
+        f"{path}: {len(measured.scores)} results of the suite {measured.suite} ({measured.fingerprint})",
+        soft_wrap=True,
+        highlight=False,
+        markup=False,
+    )
+
+
+@contextlib.contextmanager
+def _progress(study: Study) -> Iterator[Callable[[int], None]]:
+    """A bar over the trials."""
+    from simharness.runtime.progress import reporter
+
+    with reporter() as bars, bars.stage("check", study.trials) as advance:
+        yield advance
+
+
+def _print(check: Check, console: Console) -> None:
+    """What the check came to."""
+    from rich.text import Text
+
+    from simharness.gate.change_text import sentence
+
+    def say(text: str | Text) -> None:
+        console.print(text, soft_wrap=True, highlight=False, markup=False)
+
+    verdict = Text(check.verdict, "bold green" if check.passed else "bold red")
+    say(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
+    if check.failed:
+        say(_list_failed(check.failed))
+    for kind, style in (("worse", "red"), ("better", "green")):
+        changes = check.comparison.that_are(kind)  # type: ignore[arg-type]
+        for change in changes[:_LISTED]:
+            say(Text.assemble((f"{kind:<6}", style), " ", sentence(change, check.gate)))
+        if len(changes) > _LISTED:
+            say(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
+    for variant in check.variants:
+        console.print()
+        console.print(_table(check, variant))
+    say(f"\n{check.pointer}\n  {check.command}")
+
+
+def _table(check: Check, variant: str) -> Table:
+    """Headline scores of a variant over the whole suite."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.gate.change_text import allowed, difference, number, title
+
+    table = Table(title=variant, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
+    table.add_column("score", no_wrap=True)
+    for column in ("now", "baseline", "difference (95 %)", "allowed"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("")
+    for change in check.comparison.of(variant):
+        table.add_row(
+            title(change.score),
+            number(change.score, change.after),
+            number(change.score, change.before),
+            difference(change),
+            allowed(change, check.gate),
+            _VERDICTS[change.verdict],
+        )
+    return table
+
+
+def _list_failed(failed: Sequence[Failed]) -> str:
+    lines = [f"failed {each.case}, seed {each.seed}: {each.error}" for each in failed[:_LISTED]]
+    more = [f"failed and {len(failed) - _LISTED} more"] if len(failed) > _LISTED else []
+    return "\n".join([*lines, *more])

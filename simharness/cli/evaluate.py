@@ -1,0 +1,174 @@
+"""``simharness evaluate``: the method on real data, and on what stands for it."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import after_reading, border, write_json
+from simharness.cli.options import JsonFile, Overrides, ScenarioFile, command_line
+
+if TYPE_CHECKING:
+    from mvpose.pipeline import Estimator
+
+
+class HeadMapping(enum.StrEnum):
+    """The published rules of :func:`mvpose.skeleton.coco17_to_shelf14`."""
+
+    VOXELPOSE = "voxelpose"
+    Y2019 = "2019"
+
+
+app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
+
+
+def _made_by(command: str, which: str) -> Any:
+    """An option for a file that another command wrote."""
+    return typer.Option(metavar="FILE", help=f"What simharness {command} wrote, {which}.", dir_okay=False)
+
+
+@app.command()
+def shelf(
+    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    json_file: Annotated[
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write the summary there too.", dir_okay=False),
+    ] = None,
+    head: Annotated[
+        HeadMapping,
+        typer.Option(help="How the head of the 14 joints is made from COCO's: moves PCP by a point."),
+    ] = HeadMapping.VOXELPOSE,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="VARIANT",
+            help="A preset of mvpose.Pipeline, or a method of one's own, FILE.py:NAME. Repeatable. "
+            "[dim]\\[default: full][/]",
+        ),
+    ] = None,
+) -> None:
+    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.
+
+    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
+    """
+    with border():
+        start = perf_counter()
+        from mvpose.pipeline import NEED_DESCRIPTORS
+        from simharness.reality.evaluation import evaluate, print_evaluation
+        from simharness.reality.shelf import read_shelf
+        from simharness.runtime.progress import reporter
+
+        pipelines = {name: _estimator(name) for name in method or ["full"]}
+        if blind := NEED_DESCRIPTORS & pipelines.keys():
+            raise ValueError(
+                f"--method {', '.join(blind)}: goes by descriptors alone, and the detections of Shelf carry none; "
+                "choose another variant"
+            )
+        data = read_shelf(folder)
+        with (
+            after_reading(),
+            reporter() as bars,
+            bars.stage("evaluate", len(data) * len(pipelines)) as advance,
+        ):
+            evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
+        if json_file is not None:
+            _write(evaluation.summary(), json_file, seeds=(), variants=pipelines, start=start)
+    print_evaluation(evaluation, Console())
+
+
+@app.command()
+def twin(
+    folder: Annotated[Path, typer.Argument(help="The published files of Shelf.", metavar="FOLDER")],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SCENARIO", help="The simulated twin. [dim]\\[default: scenarios/shelf.toml][/]", dir_okay=False
+        ),
+    ] = None,
+    twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
+    json_file: JsonFile = None,
+) -> None:
+    """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
+    with border():
+        start = perf_counter()
+        from simharness.reality.shelf import read_shelf
+        from simharness.reality.twin import compare, print_comparison
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.load import load
+        from simharness.scenario.profiles import SHIPPED
+
+        loaded, recorded = load(scenario or SHIPPED.parent / "shelf.toml"), read_shelf(folder)
+        with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
+            comparison = compare(recorded, loaded, count=twins, progress=advance)
+        if json_file is not None:
+            _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
+    print_comparison(comparison, Console())
+
+
+@app.command("seeds")
+def evaluate_seeds(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="How many seeds.")] = 10,
+    json_file: JsonFile = None,
+) -> None:
+    """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
+    with border():
+        start = perf_counter()
+        from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at
+        from simharness.reality.seed_evaluation import print_seeds
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or ())
+        with reporter() as bars, bars.stage("evaluate", seeds) as advance:
+            result = evaluate_at(loaded, seeds, progress=advance)
+        if json_file is not None:
+            _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
+    print_seeds(result, Console())
+
+
+@app.command()
+def paper(
+    shelf: Annotated[Path, _made_by("evaluate shelf", "with the VoxelPose head")],
+    shelf_2019: Annotated[Path, _made_by("evaluate shelf", "with the 2019 head")],
+    campus_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/campus.toml")],
+    shelf_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/shelf.toml")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where tables.md and tables.json go.", file_okay=False)],
+) -> None:
+    """Tables 1 and 2 of the paper three ways: as printed, on real Shelf, on the twins of Campus and Shelf.
+
+    Reads what the other commands wrote, all variants of table 2 in each.
+    """
+    with border():
+        from tools.paper_tables.tables import paper_tables, read_inputs, write_tables
+
+        files = {"voxelpose": shelf, "2019": shelf_2019, "campus": campus_twin, "shelf": shelf_twin}
+        write_tables(paper_tables(read_inputs(files), command=command_line()), out)
+    typer.echo(f"tables: {out / 'tables.md'}")
+
+
+def _estimator(name: str) -> Estimator:
+    """A preset, or a method of one's own by its place."""
+    from mvpose import Pipeline
+    from simharness.trial.stages.estimators import OwnEstimator, load_estimator
+
+    if ":" not in name:
+        return Pipeline.preset(name)
+    load_estimator(name)  # better now than at the first frame
+    return OwnEstimator("--method", name)
+
+
+def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
+    """Write a summary with where it comes from; what it says of seeds and variants itself is more, and stands."""
+    from simharness.trial.provenance import provenance
+
+    seconds = perf_counter() - start
+    made = provenance(command=command_line(), seeds=seeds, variants=variants, seconds=seconds)
+    write_json({**made, **summary}, path)

@@ -1,0 +1,60 @@
+"""Where errors become exit codes, and files are written that a command was asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+REGRESSION = 1
+BAD_INPUT = 2
+FAILED = 3
+
+
+@contextlib.contextmanager
+def border() -> Iterator[None]:
+    """Where errors become exit codes.
+
+    A ValueError that gets here is the input's fault, for whatever works on checked input raises a RunError
+    instead: :func:`simharness.report.run.result_folder.run` and :func:`after_reading` see to that.
+    """
+    console = Console(stderr=True)
+    try:
+        yield
+    except ValueError as error:
+        console.print(Text.assemble(("error: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(BAD_INPUT) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        console.print(Text.assemble(("the run failed: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(FAILED) from None
+
+
+@contextlib.contextmanager
+def after_reading() -> Iterator[None]:
+    """From here on, an error is not the input's fault."""
+    from simharness.runtime.frame_pool import RunError
+
+    try:
+        yield
+    except Exception as error:
+        raise RunError(f"{type(error).__name__}: {error}") from error
+
+
+def write_json(summary: dict[str, Any], path: Path) -> None:
+    """A file that is there is whole."""
+    from simharness.runtime.atomic_files import write_whole
+
+    try:
+        write_whole(path, (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
+    except OSError as error:
+        raise ValueError(f"--json {path}: cannot be written: {error.strerror}") from None

@@ -1,0 +1,48 @@
+"""``simharness export``: a synthetic benchmark that other programs read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simharness.cli.exit_codes import after_reading, border
+from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(export)
+
+
+def export(
+    scenario: ScenarioFile,
+    folder: Annotated[Path, typer.Argument(help="Where the folder NAME of the sequence goes.", metavar="FOLDER")],
+    overrides: Overrides = None,
+    seed: Seed = None,
+    every: Annotated[int, typer.Option(metavar="N", help="Write one frame of N.")] = 1,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write what the cameras record.")] = True,
+) -> None:
+    """Write a scenario as a sequence of CMU Panoptic: pictures, true poses, calibration; and OpenPose detections.
+
+    It appears, when whole, in FOLDER/NAME, and replaces an earlier export there. manifest.json says what is in it.
+    """
+    with border():
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        from simharness.export.export import Export
+        from simharness.export.export import export as export_trial
+        from simharness.trial.stages.build import prepare
+
+        plan = Export(folder / loaded.name, every=every, pictures=pictures)
+        with reporter() as bars:
+            with bars.stage("build", 1):
+                trial = prepare(loaded)
+            with after_reading():
+                made = export_trial(trial, plan, reporter=bars, command=command_line())
+    files = [file for file in made.rglob("*") if file.is_file()]
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

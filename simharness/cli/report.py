@@ -1,0 +1,127 @@
+"""``simharness report``: the page of a study."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simharness.cli.exit_codes import after_reading, border
+
+if TYPE_CHECKING:
+    from simharness.report.study.worst_frames import Frame
+    from simharness.study.result_folder import Results
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(report)
+
+
+def report(
+    study: Annotated[Path, typer.Argument(help="The folder of a study.", metavar="STUDY")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page. [dim]\\[default: STUDY/report.html][/]", dir_okay=False),
+    ] = None,
+    threshold: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SCORE=VALUE",
+            help="Tell where a score passes a value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
+        ),
+    ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Instead of the page, write the worst trial for the viewer of rerun: an .rrd file.",
+            dir_okay=False,
+        ),
+    ] = None,
+    digest: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Instead of the page, write what is kept beside the code: numbers, a table, the curves.",
+            file_okay=False,
+        ),
+    ] = None,
+    trial: Annotated[
+        str | None, typer.Option(metavar="ID", help="With --rerun: this trial, not the worst; its first digits do.")
+    ] = None,
+) -> None:
+    """Write the page of a study: scores, curves, failures, the worst frames in pictures and in 3D.
+
+    The trials of the worst frames are run again for their pictures.
+    """
+    with border():
+        if trial is not None and rerun is None:
+            raise ValueError("--trial: says which trial --rerun writes; without --rerun it has no meaning")
+        if rerun is not None and digest is not None:
+            raise ValueError("--rerun and --digest: each is written instead of the page; give one of them")
+        thresholds = _thresholds(threshold or [])
+        from simharness.study.result_folder import read_study
+
+        results = read_study(study)
+        if rerun is not None:
+            _write_rerun(results, trial, rerun)
+            typer.echo(f"recording: {rerun}")
+            return
+        from simharness.report.study.page import THRESHOLDS, check_thresholds, write_report
+        from simharness.report.study.worst_frames import SHOWN
+        from simharness.runtime.progress import reporter
+
+        check_thresholds(thresholds)
+        if digest is not None:
+            from simharness.report.study.digest import write_digest
+
+            write_digest(results, digest, thresholds=thresholds or THRESHOLDS)
+            typer.echo(f"digest: {digest}")
+            return
+        with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:
+            page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance)
+    typer.echo(f"report: {page}")
+
+
+def _thresholds(given: list[str]) -> dict[str, float]:
+    """The values of ``--threshold`` by score."""
+    thresholds = {}
+    for each in given:
+        score, sign, value = each.partition("=")
+        try:
+            number = float(value)
+            if not sign or not math.isfinite(number):  # nothing passes infinity, or what is no number
+                raise ValueError
+        except ValueError:
+            raise ValueError(f"--threshold {each}: expected SCORE=NUMBER, for example --threshold pcp=90") from None
+        thresholds[score.strip()] = number
+    return thresholds
+
+
+def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
+    from simharness.report.study.replay import replay
+    from simharness.report.study.rerun_recording import require_sdk, write_rerun
+
+    require_sdk()
+    frame = _chosen(results, trial)
+    scenario = results.scenario_of(frame.trial)
+    with after_reading():
+        again = replay(scenario, frame.variant)
+    write_rerun(again, path)
+
+
+def _chosen(results: Results, trial: str | None) -> Frame:
+    """The worst frame of a trial, or of all."""
+    from simharness.report.study.worst_frames import worst_frames
+
+    frames = worst_frames(results, count=results.trials["trial"].n_unique())
+    chosen = [frame for frame in frames if frame.trial.startswith(trial or "")]
+    if len({frame.trial for frame in chosen}) > 1 and trial is not None:
+        raise ValueError(f"--trial {trial}: {len(chosen)} trials begin so; give more digits")
+    if not chosen:
+        what = "the study has no trial that finished" if trial is None else f"--trial {trial}: no such trial"
+        raise ValueError(f"{what}; the column trial of {results.folder / 'trials.parquet'} lists them")
+    return chosen[0]

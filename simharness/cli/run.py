@@ -1,0 +1,109 @@
+"""``simharness run`` and ``render``: one scenario."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import border
+from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(run)
+    app.command()(render)
+
+
+def run(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    workers: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, help="Processes that share the frames. The results are the same."),
+    ] = 1,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)] = Path(
+        "results/runs"
+    ),
+) -> None:
+    """Run a scenario: simulate, film, detect, estimate, score, report.
+
+    The results appear, when whole, in a folder NAME-HASH: report.html for people, the rest for programs.
+    """
+    with border():
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)  # before the slow imports, to answer at once
+        from simharness.report.run.result_folder import run as run_scenario
+
+        command = command_line()
+        with reporter() as bars:
+            folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    console = Console()
+    console.print(_headline(summary))
+    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
+
+
+def render(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    video: Annotated[bool, typer.Option("--video", help="MP4 films instead of PNG pictures.")] = False,
+    overlay: Annotated[
+        str,
+        typer.Option(metavar="LAYERS", help="Draw in [cyan]truth[/], [cyan]detections[/], [cyan]estimates[/]: a list."),
+    ] = "",
+    also: Annotated[
+        str,
+        typer.Option(metavar="CHANNELS", help="Write [cyan]depth[/], [cyan]ids[/], [cyan]parts[/] too: a list."),
+    ] = "",
+    every: Annotated[int, typer.Option(metavar="N", help="Render one frame of N.")] = 1,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the folder NAME goes.", file_okay=False)] = Path(
+        "results/renders"
+    ),
+) -> None:
+    """Render what the cameras of a scenario record, and a mosaic of them all.
+
+    The pictures appear, when whole, in FOLDER/NAME: CAMERA/0000.png, ... or CAMERA.mp4, and mosaic.
+    """
+    with border():
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.load import load
+
+        loaded = load(scenario, overrides=overrides or (), seed=seed)
+        from simharness.export.films import Footage
+        from simharness.export.films import render as render_scenario
+
+        layers, channels = (frozenset(filter(None, map(str.strip, given.split(",")))) for given in (overlay, also))
+        footage = Footage(video=video, overlay=layers, channels=channels, every=every)
+        with reporter() as bars:
+            folder = render_scenario(loaded, footage, out=out, reporter=bars)
+    typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
+
+
+def _headline(summary: dict[str, Any]) -> Table:
+    """The headline numbers of a run, a row for each variant."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.report.run.headline import COLUMNS
+
+    title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
+    table.add_column("variant", no_wrap=True)
+    for column in COLUMNS:
+        heading = f"{column.title}\n{column.unit}" if column.unit else column.title.replace(" ", "\n")
+        table.add_column(heading, justify="right", no_wrap=True)
+    for name, scores in summary["variants"].items():
+        table.add_row(name, *(column.number(scores) for column in COLUMNS))
+    return table

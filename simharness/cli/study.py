@@ -1,0 +1,206 @@
+"""``simharness study`` and ``merge``: many trials, kept as they finish."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from simharness.cli.exit_codes import FAILED, after_reading, border
+from simharness.cli.options import Overrides, ScenarioFile, command_line
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simharness.study.result_folder import Results
+
+INTERRUPTED = 130
+_LISTED = 10  # failed trials that are told one by one
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(study)
+    app.command()(merge)
+
+
+def study(
+    file: ScenarioFile,
+    overrides: Overrides = None,
+    seeds: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="How many seeds, instead of the file's.")
+    ] = None,
+    variant: Annotated[
+        list[str] | None,
+        typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline, instead of the file's. Repeatable."),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Processes that share the trials. The results are the same.")
+    ] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster does it: [cyan]tcp://host:8786[/].")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Run the I-th of N parts into the store; see [cyan]merge[/].")
+    ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Where finished trials are kept. [dim]\\[default: store, in --out][/]",
+            file_okay=False,
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)] = Path(
+        "results/studies"
+    ),
+    yes: Annotated[bool, typer.Option("--yes", help="Run it though it has more than 10,000 trials.")] = False,
+) -> None:
+    """Run a study: every setting of a scenario file's sweep at every seed.
+
+    Finished trials are kept and never run again, so a study that was interrupted goes on where it was. The results
+    appear, when all is run, in a folder NAME: report.html for people, Parquet tables for programs.
+    """
+    with border(), _stopping():
+        from simharness.scenario.study_definition import LIMIT, load_study
+
+        limits = None if yes else LIMIT
+        loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
+        part = _part(shard)
+        from simharness.study.runner import run_shard, run_study
+        from simharness.study.study_progress import watching
+
+        if part is not None:
+            kept_in = store or out / "store"
+            with watching() as watch:
+                tally = run_shard(loaded, part, store=kept_in, workers=workers, scheduler=scheduler, watch=watch)
+            info: dict[str, Any] = {**vars(tally), "failed": [vars(each) for each in tally.failed]}
+            _say(_counts(info, f"part {shard}"))
+            _say(f"store: {kept_in}")
+            _say("when all parts are run: simharness merge STORE... --into STORE, then the same study without --shard")
+        else:
+            command = command_line()
+            with watching() as watch:
+                results = run_study(
+                    loaded, out=out, store=store, workers=workers, scheduler=scheduler, watch=watch, command=command
+                )
+            info = dict(results.info)
+            if len(results.trials):
+                Console().print(_headline(results))
+            _say(_counts(info, loaded.name))
+            _report(results)
+    if info["failed"]:
+        raise typer.Exit(FAILED)
+
+
+def merge(
+    stores: Annotated[list[Path], typer.Argument(help="Stores of finished trials.", metavar="STORE...")],
+    into: Annotated[Path, typer.Option(metavar="STORE", help="The store that gets all of them.", file_okay=False)],
+) -> None:
+    """Copy the finished trials of stores into one: what the parts of a study left, by --shard, on several machines."""
+    with border(), _stopping():
+        from simharness.study.merge import merge as merge_stores
+
+        merged = merge_stores(stores, into)
+        _say(f"{merged.copied} entries copied into {into}, {merged.there} were there")
+        if merged.damaged:
+            _say(f"{len(merged.damaged)} are damaged and were left out:", err=True)
+            for damaged in merged.damaged[:_LISTED]:
+                _say(f"  {damaged}", err=True)
+
+
+@contextlib.contextmanager
+def _stopping() -> Iterator[None]:
+    """Say in one message why a study stopped before its end."""
+    from simharness.runtime.frame_pool import RunError
+
+    try:
+        yield
+    except KeyboardInterrupt as interruption:
+        _say(str(interruption) or "interrupted", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+    except RunError as error:
+        Console(stderr=True).print(Text.assemble(("the study stopped: ", "bold red"), str(error)), soft_wrap=True)
+        raise typer.Exit(FAILED) from None
+
+
+def _part(shard: str | None) -> tuple[int, int] | None:
+    if shard is None:
+        return None
+    if not (found := re.fullmatch(r"(\d+)/(\d+)", shard)):
+        raise ValueError(f"--shard {shard}: expected I/N, for example --shard 1/8")
+    return int(found[1]), int(found[2])
+
+
+def _headline(results: Results) -> Table:
+    """Mean scores and their intervals over seeds, a row for each variant; of a study of one factor, of each setting."""
+    import polars as pl
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.report.study.tables import by_seed
+    from simharness.scoring.catalogue import HEADLINE, SCORES
+    from simharness.statistics.comparison import mean_interval
+
+    factors = results.info["factors"] if len(results.info["factors"]) == 1 else []
+    keys = [*(("case",) if any(results.trials["case"]) else ()), *factors, "variant"]
+    table = Table(
+        title=Text(results.info["name"]), title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False
+    )
+    for key in keys:
+        table.add_column(key.replace(".", ".\n"), no_wrap=True)
+    for score in HEADLINE:
+        info = SCORES[score]
+        table.add_column(f"{info.title}\n{info.unit}", justify="right", no_wrap=True)
+    for group in results.trials.select(keys).unique(maintain_order=True).iter_rows():
+        mine = results.trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
+        cells = [_cell(mean_interval(list(by_seed(mine, score).values())), SCORES[score].digits) for score in HEADLINE]
+        table.add_row(*(Text("–" if value is None else str(value)) for value in group), *cells)
+    return table
+
+
+def _cell(interval: Any, digits: int) -> str:
+    if not interval.n:
+        return "–"
+    half = (interval.high - interval.low) / 2
+    return f"{interval.mean:.{digits}f}" + (f"\n±{half:.{digits}f}" if interval.n > 1 else "")
+
+
+def _counts(info: dict[str, Any], what: str) -> str:
+    """What became of the trials, the failed ones one by one."""
+    trials = "1 trial" if info["trials"] == 1 else f"{info['trials']} trials"
+    lines = [
+        f"{what}: {trials}: {info['kept']} kept from before, {info['run']} run, "
+        f"{info['trials'] - info['kept'] - info['run']} failed, {info['seconds']:.1f} s"
+    ]
+    if damaged := info["damaged"]:
+        lines.append(f"{len(damaged)} damaged entries of the store were run again: {', '.join(damaged[:_LISTED])}")
+    failed: Sequence[dict[str, Any]] = info["failed"]
+    for each in failed[:_LISTED]:
+        about = [each["case"], *(f"{key} = {value}" for key, value in each["factors"].items()), f"seed {each['seed']}"]
+        lines.append(f"failed: {', '.join(filter(None, about))}: {each['error']}")
+    if len(failed) > _LISTED:
+        lines.append(f"and {len(failed) - _LISTED} more failed, see study.json")
+    return "\n".join(lines)
+
+
+def _report(results: Results) -> None:
+    if not len(results.trials):
+        return
+    from simharness.report.study.page import write_report
+    from simharness.report.study.worst_frames import SHOWN
+    from simharness.runtime.progress import reporter
+
+    with after_reading(), reporter() as bars, bars.stage("report", SHOWN) as advance:
+        page = write_report(results, progress=advance)
+    _say(f"report: {page}")
+
+
+def _say(text: str, *, err: bool = False) -> None:
+    Console(stderr=err).print(text, soft_wrap=True, highlight=False, markup=False)

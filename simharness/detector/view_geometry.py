@@ -1,0 +1,46 @@
+"""From where and how well cameras see people."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose.arrays import Floats
+from mvpose.camera import Rig
+from simharness.detector.bias import body_axes
+from simharness.types.visibility import Visibility
+
+_HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
+
+
+def image_axes(centers: Floats, rig: Rig) -> Floats:
+    """Right and down in the pictures of V cameras, at right angles to the way to people's centers (T, P, 3).
+
+    Returns:
+        Unit vectors in the world, (T, V, P, 2, 3).
+    """
+    result = []
+    for camera in rig:
+        forward = centers - camera.center
+        forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+        right = np.cross(camera.R[1], forward)
+        right /= np.linalg.norm(right, axis=-1, keepdims=True)
+        result.append(np.stack([right, np.cross(forward, right)], axis=-2))
+    return np.stack(result, axis=1)
+
+
+def bearings(joints: ArrayLike, rig: Rig) -> Floats:
+    """From where V cameras see people (T, P, 17, 3), radians from straight ahead, to the left, (T, V, P)."""
+    joints = np.asarray(joints, float)
+    forward = body_axes(joints)[..., 0, :2]
+    hips = joints[..., 11:13, :2].mean(axis=-2)
+    result = []
+    for camera in rig:
+        toward = camera.center[:2] - hips
+        result.append(np.arctan2(toward[..., 1], toward[..., 0]) - np.arctan2(forward[..., 1], forward[..., 0]))
+    return np.stack(result, axis=1)
+
+
+def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
+    """Share of the joints (..., J) that something else hides or the border cuts off, (...)."""
+    return np.isin(visibility, _HIDDEN).mean(axis=-1)

@@ -1,1 +1,0 @@
-"""Trials: run, stored, reported."""

@@ -1,0 +1,1 @@
+"""Camera calibrations in the field's file formats."""

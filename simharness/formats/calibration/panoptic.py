@@ -1,0 +1,98 @@
+"""Calibrations of the CMU Panoptic Studio (panoptic-toolbox JSON).
+
+``cameras`` is a list, each with ``name type resolution K distCoef R t``: centimetres, ``x_cam = R X + t``, distCoef
+k1 k2 p1 p2 k3. The file's world has y down; ours is (x, y, z) = (X, Z, -Y) / 100, so the floor Y = 0 is z = 0.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mvpose import Camera, Rig
+from mvpose.checks import as_array
+from simharness.formats.calibration.entries import camera, check_names, image_size
+from simharness.formats.read_errors import read_json
+
+_KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
+_WHAT = "a Panoptic calibration: {'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
+_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # X = x, Y = -z, Z = y
+_CENTIMETRES = 100.0
+
+
+def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> Rig:
+    """Read a Panoptic calibration file.
+
+    Args:
+        path: the JSON file.
+        types: of the cameras to take: "hd", "vga", "kinect-color"; empty: all.
+
+    Returns:
+        The cameras in the order of the file, in metres, z up.
+
+    Raises:
+        ValueError: the file is missing or cut off, a camera lacks a key or has a wrong shape, or fewer than two
+            cameras are of these types.
+    """
+    path = Path(path)
+    entries = read_json(path, what=_WHAT).get("cameras")
+    if not isinstance(entries, list):
+        raise ValueError(f"{path}: no list 'cameras'; expected {_WHAT}")
+    try:
+        chosen = [
+            _camera(index, entry)
+            for index, entry in enumerate(entries)
+            if not types or not isinstance(entry, dict) or entry.get("type", "hd") in types
+        ]
+        if len(chosen) < 2:
+            found = sorted({str(entry.get("type")) for entry in entries if isinstance(entry, dict)})
+            raise ValueError(
+                f"{len(chosen)} of {len(entries)} cameras are of type {' or '.join(types) or 'any'}, expected at least "
+                f"2; there are {', '.join(found) or 'none'}: name cameras to take others"
+            )
+        return Rig(chosen)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def write_calibration(path: str | Path, rig: Rig, *, kind: str = "hd") -> None:
+    """Write a rig as a Panoptic calibration, all cameras of type ``kind``.
+
+    Raises:
+        ValueError: cameras without names of their own.
+    """
+    check_names(rig)
+    entries = [
+        {
+            "name": each.name,
+            "type": kind,
+            "resolution": list(each.size),
+            "K": each.K.tolist(),
+            "distCoef": each.distortion.tolist(),
+            "R": (each.R @ _AXES.T).tolist(),
+            "t": (_CENTIMETRES * each.t)[:, None].tolist(),
+        }
+        for each in rig
+    ]
+    Path(path).write_text(json.dumps({"cameras": entries}, indent=1) + "\n", encoding="utf-8")
+
+
+def _camera(index: int, entry: Any) -> Camera:
+    missing = [key for key in _KEYS if key not in entry] if isinstance(entry, dict) else list(_KEYS)
+    if missing:
+        raise ValueError(f"cameras[{index}] lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
+    name = str(entry["name"])
+    t = as_array(np.asarray(entry["t"], dtype=object).ravel(), (3,), f"camera {name!r}: t")
+    return camera(
+        name,
+        K=entry["K"],
+        R=entry["R"],
+        t=t / _CENTIMETRES,
+        terms=entry["distCoef"],
+        size=image_size(entry["resolution"], f"camera {name!r}: resolution"),
+        places=_AXES,
+    )

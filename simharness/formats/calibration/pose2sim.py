@@ -1,0 +1,98 @@
+"""Calibrations of Pose2Sim (``Calib.toml``), which Anipose and caliscope write much alike.
+
+One section a camera with ``name size matrix distortions rotation translation fisheye``: rotation is a Rodrigues vector,
+``x_cam = R X + T``, metres, z up. Pose2Sim itself writes the four distortion terms k1 k2 p1 p2 and loses k3; files with
+five are read as such.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose import Camera, Rig
+from simharness.formats.calibration.entries import camera, check_names, image_size
+from simharness.formats.read_errors import read_bytes
+
+_KEYS = ("size", "matrix", "distortions", "rotation", "translation")
+_METADATA = "metadata"
+_WHAT = "a Pose2Sim calibration: a TOML section for each camera, with " + ", ".join(_KEYS)
+
+
+def read_calibration(path: str | Path) -> Rig:
+    """Read a Pose2Sim calibration file.
+
+    Returns:
+        The cameras in the order of the file, named by their ``name`` or their section.
+
+    Raises:
+        ValueError: the file is missing or not TOML, a camera lacks a key, has a wrong shape or a fisheye lens, or the
+            cameras make no rig.
+    """
+    path = Path(path)
+    content = read_bytes(path, what=_WHAT)
+    try:
+        sections = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not TOML ({error}); expected {_WHAT}") from None
+    try:
+        return Rig([_camera(name, entry) for name, entry in sections.items() if name != _METADATA])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def write_calibration(path: str | Path, rig: Rig) -> None:
+    """Write a rig as a Pose2Sim calibration: four distortion terms, and the fifth where k3 is not 0.
+
+    Raises:
+        ValueError: cameras without names of their own, or one called "metadata", which is another section.
+    """
+    check_names(rig)
+    lines = []
+    for each in rig:
+        if each.name == _METADATA:
+            raise ValueError(f"a Pose2Sim calibration cannot hold a camera called {_METADATA!r}: give it another name")
+        terms = each.distortion if each.distortion[4] else each.distortion[:4]
+        lines += [
+            f"[{_quoted(each.name)}]",
+            f"name = {_quoted(each.name)}",
+            f"size = {[float(side) for side in each.size]}",
+            f"matrix = {each.K.tolist()}",
+            f"distortions = {terms.tolist()}",
+            f"rotation = {Rotation.from_matrix(each.R).as_rotvec().tolist()}",
+            f"translation = {each.t.tolist()}",
+            "fisheye = false",
+            "",
+        ]
+    Path(path).write_text(
+        "\n".join([*lines, f"[{_METADATA}]", "adjusted = false", "error = 0.0", ""]), encoding="utf-8"
+    )
+
+
+def _quoted(text: str) -> str:
+    # JSON's escapes are TOML's, but for the one control character that JSON lets stand.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _camera(section: str, entry: Any) -> Camera:
+    if not isinstance(entry, dict):
+        raise ValueError(f"{section!r} must be a section with {', '.join(_KEYS)}, got {json.dumps(entry, default=str)}")
+    missing = [key for key in _KEYS if key not in entry]
+    if missing:
+        raise ValueError(f"camera {section!r} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
+    if entry.get("fisheye"):
+        raise ValueError(f"camera {section!r} has a fisheye lens; expected pinhole with k1 k2 p1 p2: calibrate it so")
+    name = str(entry.get("name", section))
+    return camera(
+        name,
+        K=np.asarray(entry["matrix"], dtype=object),
+        R=entry["rotation"],
+        t=entry["translation"],
+        terms=entry["distortions"],
+        size=image_size(entry["size"], f"camera {name!r}: size"),
+    )

@@ -1,0 +1,100 @@
+"""Calibrations as VoxelPose publishes them for Shelf and Campus.
+
+One JSON object; a key for each camera with ``fx fy cx cy`` (pixels), ``R`` (3x3, world to camera), ``T``
+(3x1), ``k`` (k1 k2 k3) and ``p`` (p1 p2). ``T`` is the camera's centre in millimetres: ``x_cam = R (X - T)``.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mvpose import Camera, Rig
+from mvpose.checks import as_array
+from simharness.formats.calibration.entries import check_names
+from simharness.formats.read_errors import read_json
+
+_KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
+_WHAT = "a VoxelPose calibration: an object of cameras, each with " + ", ".join(_KEYS)
+_METRES = 50.0  # a rig whose centres all lie within 50 mm of the origin is one that was written in metres
+
+
+def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
+    """Read a VoxelPose calibration file.
+
+    Args:
+        path: the JSON file.
+        size: width and height of the images in pixels, which the file does not carry.
+
+    Returns:
+        The cameras in the order of the file, named by their keys; metres.
+
+    Raises:
+        ValueError: the file is missing or cut off, a camera lacks a key or has a wrong shape, the centres
+            cannot be in millimetres, or the cameras make no rig.
+    """
+    path = Path(path)
+    cameras = read_json(path, what=_WHAT)
+    try:
+        centers = np.array([_center(name, entry) for name, entry in cameras.items()]).reshape(-1, 3)
+        if len(centers) and np.abs(centers).max() < _METRES:
+            raise ValueError(
+                "the camera centres T look like metres, expected millimetres: the largest coordinate is "
+                f"{np.abs(centers).max():.3g}, a rig {np.ptp(centers, axis=0).max() / 1000:.2g} m across; "
+                "multiply every T by 1000"
+            )
+        return Rig([_camera(name, entry, size) for name, entry in cameras.items()])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def write_calibration(path: str | Path, rig: Rig) -> None:
+    """Write a rig as a VoxelPose calibration, which does not hold the size of its images.
+
+    Raises:
+        ValueError: a camera has a skew, or not a name of its own.
+    """
+    check_names(rig)
+    entries = {}
+    for camera in rig:
+        if camera.K[0, 1]:
+            raise ValueError(f"camera {camera.name!r}: a VoxelPose calibration has no skew, got {camera.K[0, 1]:g}")
+        k1, k2, p1, p2, k3 = camera.distortion.tolist()
+        entries[camera.name] = {
+            "fx": camera.K[0, 0],
+            "fy": camera.K[1, 1],
+            "cx": camera.K[0, 2],
+            "cy": camera.K[1, 2],
+            "R": camera.R.tolist(),
+            "T": (1000.0 * camera.center)[:, None].tolist(),
+            "k": [[k1], [k2], [k3]],
+            "p": [[p1], [p2]],
+        }
+    Path(path).write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+
+
+def _center(name: str, entry: Any) -> np.ndarray:
+    if not isinstance(entry, dict):
+        raise ValueError(f"camera {name!r} must be an object with {', '.join(_KEYS)}, got a {type(entry).__name__}")
+    missing = [key for key in _KEYS if key not in entry]
+    if missing:
+        raise ValueError(f"camera {name!r} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
+    return as_array(np.ravel(entry["T"]), (3,), f"camera {name!r}: T")
+
+
+def _camera(name: str, entry: dict[str, Any], size: tuple[int, int]) -> Camera:
+    fx, fy, cx, cy = (float(as_array(entry[key], (), f"camera {name!r}: {key}")) for key in ("fx", "fy", "cx", "cy"))
+    k1, k2, k3 = as_array(np.ravel(entry["k"]), (3,), f"camera {name!r}: k")
+    p1, p2 = as_array(np.ravel(entry["p"]), (2,), f"camera {name!r}: p")
+    R = as_array(entry["R"], (3, 3), f"camera {name!r}: R")
+    return Camera(
+        K=np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+        R=R,
+        t=-R @ _center(name, entry) / 1000.0,
+        distortion=np.array([k1, k2, p1, p2, k3]),  # OpenCV's order
+        size=size,
+        name=name,
+    )

@@ -1,0 +1,62 @@
+"""Changes in words, the same in a terminal, a summary and a test report."""
+
+from __future__ import annotations
+
+import math
+
+from simharness.gate.baseline import TIME
+from simharness.gate.compare import Change
+from simharness.scenario.sections.gate import Gate
+from simharness.scoring.catalogue import SCORES
+
+
+def title(score: str) -> str:
+    """What a score is called, with its unit."""
+    if score == TIME:
+        return "Time, × reference"
+    info = SCORES[score]
+    return f"{info.title}, {info.unit}" if info.unit else info.title
+
+
+def number(score: str, value: float) -> str:
+    """A value of a score."""
+    return f"{value:.{_digits(score)}f}"
+
+
+def difference(change: Change) -> str:
+    """A change with its interval; of time, its ratio."""
+    if change.score != TIME and change.difference == change.low == change.high == 0:
+        return "none"
+    ends = ""
+    if math.isfinite(change.low):
+        ends = f" ({_difference(change.score, change.low)} to {_difference(change.score, change.high)})"
+    return _difference(change.score, change.difference) + ends
+
+
+def allowed(change: Change, gate: Gate) -> str:
+    """How much worse the score may get."""
+    if change.score == TIME:
+        return _difference(TIME, gate.slowdown)
+    return f"{getattr(gate.tolerance, change.score):g}"
+
+
+def place(change: Change) -> str:
+    """Where a change is."""
+    return change.case or "whole suite"
+
+
+def sentence(change: Change, gate: Gate) -> str:
+    """A change in one line."""
+    before, after = (number(change.score, value) for value in (change.before, change.after))
+    return (
+        f"{change.variant}, {place(change)}: {title(change.score)}: {before} before, {after} now: "
+        f"{difference(change)}, allowed {allowed(change, gate)}, p = {change.p:.2g} over {change.n} seeds"
+    )
+
+
+def _digits(score: str) -> int:
+    return 2 if score == TIME else SCORES[score].digits
+
+
+def _difference(score: str, value: float) -> str:
+    return f"×{value:.2f}" if score == TIME else f"{value:+.{max(_digits(score), 1)}f}"

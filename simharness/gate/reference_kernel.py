@@ -1,0 +1,69 @@
+"""A kernel of fixed work, timed beside the method: how fast this machine is at this moment.
+
+Times of the method are given as ratios to it, so that they mean the same on a fast machine, a slow one and a busy one.
+It is made of what the method is made of: products of small matrices, likelihoods of points in views, small solves.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numba
+import numpy as np
+
+from mvpose.arrays import Floats
+
+CALLS = 9  # a call is about as long as a frame, so that a busy machine interrupts both alike
+_SIZE, _PRODUCTS = 40, 24  # of the matrices of a matching; how many of its steps
+_POINTS, _VIEWS = 4000, 5  # places that a joint might be at, and who looks
+
+
+def time_reference(calls: int = CALLS) -> Floats:
+    """Milliseconds of each of ``calls`` calls of the kernel, after one that is not timed."""
+    rng = np.random.default_rng(0)
+    matrix = rng.random((_SIZE, _SIZE)) / _SIZE
+    points, rays = rng.random((_POINTS, 3)), rng.random((_VIEWS, 6))
+    times = np.empty(calls)
+    _work(matrix, points, rays)
+    for call in range(calls):
+        start = time.perf_counter()
+        _work(matrix, points, rays)
+        times[call] = time.perf_counter() - start
+    return 1e3 * times
+
+
+@numba.njit(cache=True)
+def _work(matrix: Floats, points: Floats, rays: Floats) -> float:
+    """Some number that needs all of the work."""
+    size = len(matrix)
+    power, product = matrix.copy(), np.empty_like(matrix)
+    for _ in range(_PRODUCTS):
+        for i in range(size):
+            for j in range(size):
+                total = 0.0
+                for k in range(size):
+                    total += power[i, k] * matrix[k, j]
+                product[i, j] = min(max(total, 0.0), 1.0)
+        power, product = product, power
+    best = -np.inf
+    normal, side = np.zeros((3, 3)), np.zeros(3)
+    for point in points:
+        score = 0.0
+        for ray in rays:
+            x = ray[1] * (point[2] - ray[5]) - ray[2] * (point[1] - ray[4])
+            y = ray[2] * (point[0] - ray[3]) - ray[0] * (point[2] - ray[5])
+            z = ray[0] * (point[1] - ray[4]) - ray[1] * (point[0] - ray[3])
+            miss = x * x + y * y + z * z
+            score += np.log(0.05 + np.exp(-8.0 * miss) / (1.0 + np.sqrt(miss)))
+        best = max(best, score)
+        for i in range(3):
+            side[i] += score * point[i]
+            for j in range(3):
+                normal[i, j] += point[i] * point[j]
+    for k in range(3):  # elimination; the matrix is positive definite
+        for i in range(k + 1, 3):
+            share = normal[i, k] / normal[k, k]
+            side[i] -= share * side[k]
+            for j in range(3):
+                normal[i, j] -= share * normal[k, j]
+    return float(best + side[2] / normal[2, 2] + power[0, 0])

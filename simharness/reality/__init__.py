@@ -1,0 +1,1 @@
+"""Recorded data sets, their evaluation protocols, fitted detectors and simulated twins."""

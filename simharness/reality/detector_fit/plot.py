@@ -1,0 +1,111 @@
+"""Real beside simulated, per joint and class: the figure of a fitted detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Canvas
+
+from simharness.reality.detector_fit.figures import LIMB_KINDS
+from simharness.reality.detector_fit.measure import Measurement
+from simharness.scenario.sections.detector import KINDS
+
+_COLORS = ("#3b82c4", "#d9643a")
+_STYLE: dict[Any, Any] = {
+    "font.size": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "text.color": "#1f2430",
+    "axes.labelcolor": "#5d6574",
+    "axes.edgecolor": "#c9ced6",
+    "xtick.color": "#c9ced6",
+    "ytick.color": "#c9ced6",
+    "xtick.labelcolor": "#1f2430",
+    "ytick.labelcolor": "#5d6574",
+    "grid.color": "#e4e7ec",
+    "grid.linewidth": 0.6,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+_LEAST = 100  # joints, people or detections that a figure is of: of fewer, its interval says nothing
+_LIMBS = tuple(KINDS[kind] for kind in LIMB_KINDS)
+_PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
+    ("keypoints.drop.visible", "not reported, of visible joints, %", KINDS, 100),
+    ("keypoints.drop.self_occluded", "not reported, behind the own body, %", KINDS, 100),
+    ("keypoints.drop.occluded", "not reported, behind somebody else, %", KINDS, 100),
+    ("keypoints.jitter", "jitter, of visible joints, %", _LIMBS, 100),
+    ("keypoints.miss", "miss, of visible joints, %", _LIMBS, 100),
+    ("keypoints.inversion", "inversion, %", _LIMBS, 100),
+    ("keypoints.swap", "swap, %", _LIMBS, 100),
+    ("keypoints.scatter", "scatter of good keypoints, units", _LIMBS, 1),
+    ("bias.up", "bias upwards, mm", _LIMBS, 1000),
+    ("bias.outward", "bias outwards, mm", _LIMBS, 1000),
+    ("scores.joint", "score, beside that of elbows", KINDS, 1),
+)
+_REST: tuple[tuple[str, str], ...] = (
+    ("correlation.life", "life, s"),
+    ("correlation.views", "views"),
+    ("correlation.limb", "limb"),
+    ("correlation.scatter_life", "scatter\nlife, s"),
+    ("correlation.scatter_views", "scatter\nviews"),
+    ("scores.good", "score\ngood"),
+    ("scores.miss", "score\nmiss"),
+    ("boxes.missed", "missed"),
+    ("phantoms.rate", "false"),
+)
+
+
+def plot_comparison(measurements: Sequence[Measurement], path: str | Path) -> None:
+    """Write a PNG with up to two measurements beside each other, every figure with its 95 % interval.
+
+    Raises:
+        ValueError: the file cannot be written.
+    """
+    with mpl.rc_context(_STYLE):
+        canvas = Canvas(figsize=(13.5, 10), layout="constrained", dpi=110)
+        axes = canvas.subplots(4, 3).ravel()
+        for ax, (key, title, kinds, scale) in zip(axes, _PANELS, strict=False):
+            _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
+            ax.set_title(title)
+            ax.set_xticks(range(len(kinds)), kinds, fontsize=7.5)
+        _draw(axes[-1], measurements, [key for key, _ in _REST])
+        axes[-1].set_title("the rest")
+        axes[-1].set_xticks(range(len(_REST)), [label for _, label in _REST], fontsize=7)
+        handles, labels = axes[0].get_legend_handles_labels()
+        canvas.legend(handles, labels, loc="outside upper left", ncols=2, fontsize=10)
+        canvas.supxlabel(
+            f"Bars: 95 % intervals, block bootstrap over time. Figures of fewer than {_LEAST} are left out.",
+            fontsize=8.5,
+        )
+        try:
+            FigureCanvasAgg(canvas).print_png(str(path))
+        except OSError as error:
+            raise ValueError(f"--figure {path}: cannot be written: {error.strerror}") from None
+
+
+def _draw(ax: Axes, measurements: Sequence[Measurement], keys: Sequence[str], *, scale: float = 1) -> None:
+    ax.set_axisbelow(True)
+    ax.grid(axis="y")
+    for index, (measurement, color) in enumerate(zip(measurements, _COLORS, strict=False)):
+        figures = [measurement[key] for key in keys]
+        values, low, high = (
+            scale * np.array([getattr(each, end) if each.count >= _LEAST else np.nan for each in figures])
+            for end in ("value", "low", "high")
+        )
+        at = np.arange(len(keys)) + 0.22 * (index - (len(measurements) - 1) / 2)
+        ax.vlines(at, low, high, color=color, lw=3, alpha=0.45)
+        ax.plot(at, values, "o", color=color, ms=4, label=f"{measurement.name}, {measurement.frames} frames")
+    ax.set_xlim(-0.6, len(keys) - 0.4)
+    ax.tick_params(axis="x", length=0)
+    if keys[0].startswith("scores.joint"):
+        ax.set_ylim(0.7, 1.1)
+    elif all(measurement[key].low >= 0 for measurement in measurements for key in keys if measurement[key].known):
+        ax.set_ylim(bottom=0)

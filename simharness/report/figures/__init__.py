@@ -1,0 +1,1 @@
+"""Drawing shared by pages and tools: SVG figures, overlays, mosaics, colours."""

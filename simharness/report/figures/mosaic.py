@@ -1,0 +1,100 @@
+"""Several pictures as one: a grid of titled tiles, and a legend that fits into it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from simharness.report.figures.overlay import Overlay, text_mask
+from simharness.report.figures.palette import PAPER, Color
+
+Mark = Literal["skeleton", "limbs", "box", "none"]
+
+_TITLE = 24.0  # pixels high in a picture 600 high: still legible when three tiles share a page's width
+_ZIGZAG = ((0, 1), (1, 2))
+
+
+def mosaic(
+    images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None, gap: int | None = None
+) -> NDArray[np.uint8]:
+    """Lay out pictures row by row, each under its title; smaller ones keep their shape amid tiles of the largest size.
+
+    Args:
+        images: (h, w, 3) uint8 each.
+        titles: one for each picture.
+        columns: tiles in a row; by default as many as make the grid about square (five pictures: three and two).
+        gap: pixels between tiles and around them; by default a 60th of a picture's height.
+
+    Returns:
+        (H, W, 3) uint8.
+
+    Raises:
+        ValueError: no picture, or a title too few or too many.
+    """
+    if not images or len(images) != len(titles):
+        raise ValueError(f"a mosaic needs pictures and as many titles, got {len(images)} and {len(titles)}")
+    height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
+    gap = max(2, height // 60) if gap is None else gap
+    columns = math.ceil(math.sqrt(len(images))) if columns is None else columns
+    rows = math.ceil(len(images) / columns)
+    scale = height / 600
+    band = text_mask("", _TITLE * scale).shape[0] + round(8 * scale)
+    sheet = np.full(
+        (rows * (height + band) + (rows + 1) * gap, columns * width + (columns + 1) * gap, 3), PAPER, np.uint8
+    )
+    paper = Overlay(sheet, scale=scale)
+    for k, (picture, title) in enumerate(zip(images, titles, strict=True)):
+        top, left = gap + k // columns * (height + band + gap), gap + k % columns * (width + gap)
+        fitted = _fitted(picture, height, width)
+        down, right = top + band + (height - fitted.shape[0]) // 2, left + (width - fitted.shape[1]) // 2
+        paper.rgb[down : down + fitted.shape[0], right : right + fitted.shape[1]] = fitted
+        paper.text(title, at=(left + 2 * scale, top), size=_TITLE)
+    return paper.rgb
+
+
+def _fitted(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
+    """The picture as large as it can be within a tile."""
+    grow = min(height / picture.shape[0], width / picture.shape[1])
+    if grow == 1.0:
+        return picture
+    size = (min(width, round(grow * picture.shape[1])), min(height, round(grow * picture.shape[0])))
+    return cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR).astype(np.uint8, copy=False)
+
+
+def legend(entries: Sequence[tuple[Mark, Color, str]], *, size: tuple[int, int], title: str = "") -> NDArray[np.uint8]:
+    """Make a picture that explains the others.
+
+    Args:
+        entries: what is drawn ("skeleton": thin with a dark rim, "limbs": thick and translucent, "box", "none":
+            text alone), its colour, and what it means.
+        size: width and height of the picture, pixels.
+        title: a heading.
+    """
+    width, height = size
+    paper = Overlay(np.full((height, width, 3), PAPER, np.uint8))
+    scale = paper.scale
+    left, indent, line = 30.0, 72.0, min(56.0, 520.0 / (len(entries) + 2))
+    room = width / scale - 2 * left - indent
+    longest = max((text_mask(meaning, 100).shape[1] / 100 for _, _, meaning in entries), default=1.0)
+    letters = min(_TITLE, 0.55 * line, room / longest)
+    y = 36.0
+    if title:
+        paper.text(title, at=(left * scale, y * scale), size=1.2 * _TITLE)
+        y += 1.5 * line
+    for mark, color, meaning in entries:
+        middle = y + line / 2
+        ends = np.array([[left, middle + 7], [left + 26, middle - 7], [left + 52, middle + 5]]) * scale
+        if mark == "skeleton":
+            paper.skeleton(ends, color=color, edges=_ZIGZAG, outline=1.0, width=2, dots=3)
+        elif mark == "limbs":
+            paper.skeleton(ends, color=color, edges=_ZIGZAG, width=9, dots=0, opacity=0.55)
+        elif mark == "box":
+            paper.box(np.array([left + 6, middle - 12, 40, 24]) * scale, color=color, width=2.5)
+        paper.text(meaning, at=((left + indent) * scale, (middle - 0.62 * letters) * scale), size=letters)
+        y += line
+    return paper.rgb

@@ -1,0 +1,188 @@
+"""Drawing on pictures for people to look at: skeletons, boxes, labels; smooth at any resolution.
+
+Everything is painted through coverage masks drawn four times as large and averaged, so that lines may have any
+width and fall between pixels, and so that a translucent figure is evenly translucent where its limbs meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+from typing import TYPE_CHECKING, Self
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simharness.report.figures.palette import INK, OUTLINE, PAPER, Color
+
+if TYPE_CHECKING:
+    from PIL.ImageFont import FreeTypeFont, ImageFont
+
+Edges = Sequence[tuple[int, int]]
+
+# How a person is drawn, which is not the tree that a method infers on: both sides of the trunk, no line through it.
+COCO17_FACE: Edges = ((0, 1), (0, 2), (1, 3), (2, 4))
+COCO17_BODY: Edges = (
+    *((5, 6), (5, 11), (6, 12), (11, 12)),  # trunk
+    *((5, 7), (7, 9), (6, 8), (8, 10)),  # arms
+    *((11, 13), (13, 15), (12, 14), (14, 16)),  # legs
+)
+COCO17_LIMBS: Edges = (*COCO17_FACE, *COCO17_BODY)
+
+_FINER = 4  # masks are drawn this much larger
+_SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates
+_RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
+_USUAL_HEIGHT = 600.0  # pixels; widths below are right at this height
+
+
+class Overlay:
+    """A picture to draw on. Widths and sizes are pixels of a picture 600 high and grow with the picture.
+
+    Args:
+        rgb: (h, w, 3) uint8; copied.
+        scale: what widths are multiplied by; by default the height / 600.
+
+    Attributes:
+        rgb: the picture so far, (h, w, 3) uint8.
+    """
+
+    def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None) -> None:
+        if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
+            raise ValueError(f"rgb must be (h, w, 3) uint8, got {rgb.shape} {rgb.dtype}")
+        self.rgb = rgb.copy()
+        self.scale = rgb.shape[0] / _USUAL_HEIGHT if scale is None else scale
+
+    def skeleton(
+        self,
+        joints: ArrayLike,
+        *,
+        color: Color,
+        edges: Edges = COCO17_LIMBS,
+        width: float = 1.6,
+        dots: float = 2.2,
+        opacity: float = 1.0,
+        outline: float = 0.0,
+    ) -> Self:
+        """Draw limbs and joints.
+
+        Args:
+            joints: pixels, (J, 2); what is NaN, and limbs to it, are left out.
+            color: of all of it.
+            edges: pairs of joints to join.
+            width: of the limbs.
+            dots: radius of the joints; 0 leaves them out.
+            opacity: 0 to 1.
+            outline: width of a dark rim around it all, which makes a thin pale line stand out on any ground.
+        """
+        joints = np.asarray(joints, float)
+        seen = np.isfinite(joints).all(axis=1)
+        lines = [joints[[a, b]] for a, b in edges if seen[a] and seen[b]]
+        points = joints[seen]
+        if outline:
+            mask = self._mask(lines, points, width + 2 * outline, dots + outline if dots else 0)
+            self._paint(mask, OUTLINE, 0.75 * opacity)
+        self._paint(self._mask(lines, points, width, dots), color, opacity)
+        return self
+
+    def box(self, box: ArrayLike, *, color: Color, width: float = 1.5, label: str = "", opacity: float = 1.0) -> Self:
+        """Draw a box x, y, width, height in pixels with a tag on its upper left corner; not if it has NaN."""
+        x, y, w, h = np.asarray(box, float)
+        if not np.isfinite([x, y, w, h]).all():
+            return self
+        corners = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h], [x, y]])
+        self._paint(self._mask([corners], np.zeros((0, 2)), width, 0), color, opacity)
+        if label:
+            self.tag(label, at=(x - width * self.scale / 2, y), color=color)
+        return self
+
+    def tag(self, text: str, *, at: tuple[float, float], color: Color, size: float = 15.0) -> Self:
+        """Draw text on a patch of colour whose lower left corner is ``at``, moved so that it stays on the picture."""
+        glyphs = text_mask(text, size * self.scale)
+        pad_x, pad_y = round(4 * self.scale), round(2 * self.scale)
+        height, width = glyphs.shape[0] + 2 * pad_y, glyphs.shape[1] + 2 * pad_x
+        left = int(np.clip(round(at[0]), 0, max(0, self.rgb.shape[1] - width)))
+        top = int(np.clip(round(at[1]) - height, 0, max(0, self.rgb.shape[0] - height)))
+        self._paint((top, left, np.ones((height, width), np.float32)), color, 0.9)
+        self._paint((top + pad_y, left + pad_x, glyphs), readable_on(color), 1.0)
+        return self
+
+    def text(self, text: str, *, at: tuple[float, float], size: float = 15.0, color: Color = INK) -> Self:
+        """Write a line whose upper left corner is ``at``."""
+        self._paint((max(0, round(at[1])), max(0, round(at[0])), text_mask(text, size * self.scale)), color, 1.0)
+        return self
+
+    def _mask(
+        self, lines: Sequence[NDArray], points: NDArray, width: float, radius: float
+    ) -> tuple[int, int, NDArray[np.float32]]:
+        """Coverage 0..1 of lines and dots over the rectangle that holds them: its top, its left and the mask."""
+        width, radius = width * self.scale, radius * self.scale
+        ends = np.concatenate([np.zeros((0, 2)), *lines, points if radius else np.zeros((0, 2))])
+        if not len(ends):
+            return 0, 0, np.zeros((0, 0), np.float32)
+        limit = np.array(self.rgb.shape[1::-1])
+        margin = max(width / 2, radius) + 1
+        low = np.floor(np.clip(ends.min(axis=0) - margin, 0, limit)).astype(int)
+        high = np.ceil(np.clip(ends.max(axis=0) + margin + 1, 0, limit)).astype(int)
+        left, top = low
+        columns, rows = np.maximum(high - low, 0)
+        if not (rows and columns):
+            return 0, 0, np.zeros((0, 0), np.float32)
+        large = np.zeros((rows * _FINER, columns * _FINER), np.uint8)
+        half = max(width * _FINER / 2 - _RIM, 0.25)
+        for line in lines:
+            path = (line - low + 0.5) * _FINER - 0.5
+            for start, end in pairwise(path):
+                across = np.array([start[1] - end[1], end[0] - start[0]])
+                across *= half / max(float(np.linalg.norm(across)), 1e-9)
+                corners = np.stack([start + across, end + across, end - across, start - across])
+                cv2.fillConvexPoly(large, _fixed(corners), 255, cv2.LINE_8, _SUBPIXEL_BITS)
+            if width > 1.5:  # rounded ends and corners, where they show
+                self._dots(large, path, half)
+        if radius:
+            self._dots(large, (points - low + 0.5) * _FINER - 0.5, radius * _FINER - _RIM)
+        small = cv2.resize(large, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
+        return int(top), int(left), small.astype(np.float32) / np.float32(255)
+
+    @staticmethod
+    def _dots(large: NDArray[np.uint8], centers: NDArray, radius: float) -> None:
+        for center in _fixed(centers):
+            size = round(max(radius, 0.25) * 2**_SUBPIXEL_BITS)
+            cv2.circle(large, center.tolist(), size, 255, -1, cv2.LINE_8, _SUBPIXEL_BITS)
+
+    def _paint(self, mask: tuple[int, int, NDArray[np.float32]], color: Color, opacity: float) -> None:
+        top, left, coverage = mask
+        patch = self.rgb[top : top + coverage.shape[0], left : left + coverage.shape[1]]
+        weight = opacity * coverage[: patch.shape[0], : patch.shape[1], None]
+        patch[:] = np.round(patch + weight * (np.array(color, np.float32) - patch))
+
+
+def _fixed(points: NDArray) -> NDArray[np.int32]:
+    """Points to cv2's fixed-point coordinates; far ones are brought within its reach."""
+    return np.round(np.clip(points, -1e6, 1e6) * 2**_SUBPIXEL_BITS).astype(np.int32)
+
+
+def readable_on(color: Color) -> Color:
+    """Dark or light ink, whichever reads better on a ground of this colour (by its luma, Rec. 601)."""
+    return INK if np.dot(color, (0.299, 0.587, 0.114)) > 150 else PAPER
+
+
+def text_mask(text: str, size: float) -> NDArray[np.float32]:
+    """Coverage 0..1 of a line of text ``size`` pixels high, (h, w); h depends on the size alone."""
+    font = _font(max(6, round(size)))
+    *_, bottom = font.getbbox("Åg" + text)
+    glyphs, (x, y) = font.getmask2(text, mode="L")  # type: ignore[union-attr]
+    x = max(x, 0)  # some letters lean out to the left of where they stand
+    mask = np.zeros((int(np.ceil(bottom)), max(int(np.ceil(font.getlength(text))) + 1, glyphs.size[0] + x)), np.float32)
+    if glyphs.size[0] and glyphs.size[1]:
+        drawn = np.array(glyphs, np.float32).reshape(glyphs.size[::-1])[: mask.shape[0] - y]
+        mask[y : y + drawn.shape[0], x : x + drawn.shape[1]] = drawn / 255
+    return mask
+
+
+@cache
+def _font(size: int) -> FreeTypeFont | ImageFont:
+    from PIL import ImageFont as fonts
+
+    return fonts.load_default(size)

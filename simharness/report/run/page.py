@@ -1,0 +1,199 @@
+"""The page that a person reads: one HTML file with everything in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import polars as pl
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.skeleton import COCO17
+from simharness.report.figures.palette import css, person_color
+from simharness.report.figures.templating import fill
+from simharness.report.run import plots
+from simharness.report.run.film import Animation
+from simharness.report.run.headline import COLUMNS, NOTHING
+from simharness.report.run.pictures import Picture
+from simharness.scenario.toml_writer import dumps
+from simharness.scoring.pcp import GROUPS, Part
+from simharness.scoring.pose import pair
+from simharness.trial.run_folder import Record
+from simharness.types.visibility import Visibility
+from simharness.world.motion.choreography import roles
+
+_HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
+_LIGHTEST = 165.0  # luma of a line, 0 to 255
+_VISIBILITY_LABELS = {
+    Visibility.VISIBLE: "visible",
+    Visibility.SELF_OCCLUDED: "self-occluded",
+    Visibility.OCCLUDED_BY_PERSON: "behind a person",
+    Visibility.OCCLUDED_BY_CLUTTER: "behind clutter",
+    Visibility.OUTSIDE: "outside",
+}
+
+
+def render(
+    record: Record,
+    *,
+    pictures: Sequence[Picture] = (),
+    things: Sequence[Floats] = (),
+    animation: Animation | None = None,
+) -> str:
+    """Make the page of a run.
+
+    Args:
+        record: the run.
+        pictures: shown below the headline numbers.
+        things: outlines of the clutter seen from above, each (n, 2) metres.
+        animation: the film of the run.
+
+    Returns:
+        A self-contained HTML document.
+    """
+    summary = record.summary
+    main, scores = next(iter(summary["variants"].items()))
+    return fill(
+        "run.html",
+        scenario=record.scenario,
+        summary=summary,
+        main=main,
+        facts=_facts(record),
+        cards=[{"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS],
+        columns=COLUMNS,
+        parts=_parts_table(summary["variants"]),
+        people=_people_table(record, main),
+        pictures=pictures,
+        animation=animation,
+        plots=_plots(record, main, things),
+        stages=summary.get("run", {}).get("stages_s", {}),
+        command=_command(record),
+        resolved=dumps(record.scenario),
+    )
+
+
+def _facts(record: Record) -> list[tuple[str, str]]:
+    scenario = record.scenario
+    things = (*scenario.clutter.model_dump(exclude={"coverage"}).values(), *scenario.decoys.model_dump().values())
+    return [
+        ("people", f"{scenario.people.count}"),
+        ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
+        ("things in the way", f"{sum(things)}"),
+        ("detector", "a pose head" if scenario.detector.onnx else scenario.detector.name),
+        ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
+        ("detections", f"{sum(map(len, record.detections))}"),
+        ("seed", f"{scenario.seed}"),
+        ("version", f"{record.summary['code']}"),
+    ]
+
+
+def _command(record: Record) -> str:
+    return record.summary.get("run", {}).get("command") or "simharness run scenario.toml"
+
+
+def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """PCP of each group of parts: a row each, a number for each variant."""
+    rows = [
+        {
+            "part": group.replace("_", " "),
+            "values": [scores["pcp_parts"][group] for scores in variants.values()],
+        }
+        for group in GROUPS
+    ]
+    return [*rows, {"part": "all", "values": [scores["pcp"] for scores in variants.values()]}]
+
+
+def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
+    """How each person fared: a row each."""
+    errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
+    doing = roles(record.scenario.people)
+    rows = []
+    for person in range(errors.shape[1]):
+        mine, counted = errors[:, person], parts[:, person] != Part.UNDEFINED
+        found = np.isfinite(mine)
+        correct = (parts[:, person] == Part.CORRECT).sum()
+        rows.append(
+            {
+                "name": f"person {person}",
+                "color": _line_color(person),
+                "activity": doing[person],
+                "found": f"{100 * found.mean():.1f}",
+                "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
+                "mpjpe": f"{mine[found].mean():.1f}" if found.any() else NOTHING,
+            }
+        )
+    return rows
+
+
+def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
+    """Mean joint error of every true person in every frame, (T, P), millimetres; NaN where not found."""
+    rows = scores.filter(pl.col("variant") == variant).sort("frame")["errors_mm"].to_list()
+    return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
+        len(rows), -1
+    )
+
+
+def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
+    """What became of the ten parts of every true person in every frame, (T, P, 10)."""
+    rows = scores.filter(pl.col("variant") == variant).sort("frame")["parts"].to_list()
+    people = len(rows[0]) // 10
+    return np.array(rows, np.int8).reshape(len(rows), people, 10)
+
+
+def joint_errors(record: Record, variant: str) -> Floats:
+    """How far every true joint is from its estimate, (T, P, J), millimetres; NaN where there is none."""
+    errors = np.full((len(record.time), *record.truth[0].joints.shape[:2]), np.nan)
+    for frame, (true, estimate) in enumerate(zip(record.truth, record.estimates[variant], strict=True)):
+        partner = pair(true.joints, estimate.joints).estimate
+        found = partner >= 0
+        offset = true.joints[found] - estimate.joints[partner[found]]
+        errors[frame, found] = 1000 * np.linalg.norm(offset, axis=-1)
+    return errors
+
+
+def _line_color(person: int) -> str:
+    """The colour of a person, darkened where it would be lost as a line on white."""
+    color = person_color(person)
+    luma = float(np.dot(color, (0.299, 0.587, 0.114)))  # Rec. 601
+    red, green, blue = (round(part * min(1.0, _LIGHTEST / luma)) for part in color)
+    return css((red, green, blue))
+
+
+def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Markup]:
+    """The SVG of each plot; those that nothing can be drawn in are left out."""
+    joints = np.stack([true.joints for true in record.truth])
+    people = joints.shape[1]
+    colors = [_line_color(person) for person in range(people)]
+    found = np.concatenate([estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]])
+    drawn = {
+        "plan": plots.floor_plan(
+            record.rig,
+            record.scenario.room.size[:2],
+            things=things,
+            paths=joints[:, :, _HIPS, :2].mean(axis=2),
+            estimates=found,
+            colors=colors,
+        ),
+        "times": plots.stage_times(
+            {
+                variant: {
+                    stage: time["median"] for stage, time in scores["timings_ms"].items() if time["median"] is not None
+                }
+                for variant, scores in record.summary["variants"].items()
+            }
+        ),
+    }
+    if people:
+        labels = np.stack([true.visibility for true in record.truth])
+        shares = np.stack([(labels == label).mean(axis=(0, 2, 3)) for label in _VISIBILITY_LABELS], axis=1)
+        drawn["visibility"] = plots.visibility_shares(
+            [camera.name for camera in record.rig], shares, labels=list(_VISIBILITY_LABELS.values())
+        )
+        drawn["distribution"] = plots.error_distribution(
+            {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
+        )
+        drawn["errors"] = plots.error_over_time(record.time, person_errors(record.scores, main), colors=colors)
+    return {name: Markup(svg) for name, svg in drawn.items()}

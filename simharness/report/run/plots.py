@@ -1,0 +1,160 @@
+"""The plots of one run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from mvpose.arrays import Floats
+from mvpose.camera import Rig
+from simharness.report.figures.svg_figure import (
+    FAINT,
+    INK,
+    LINE,
+    STAGE_COLORS,
+    VARIANT_COLORS,
+    VISIBILITY_COLORS,
+    Color,
+    figure,
+    legend,
+)
+
+
+def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) -> str:
+    """Mean joint error of each person, (T, P) millimetres; NaN where not found: marked below the axis."""
+    with figure("error-over-time") as (axes, written):
+        top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
+        for person in range(errors.shape[1]):
+            axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
+            lost = np.isnan(errors[:, person])
+            row = -top * (0.05 + 0.045 * person)
+            axes.plot(time[lost], np.full(lost.sum(), row), "s", ms=3, color=colors[person], clip_on=False)
+        axes.set(xlabel="time, s", ylabel="mean joint error, mm")
+        axes.set_ylim(-top * (0.05 + 0.045 * errors.shape[1]) if np.isnan(errors).any() else 0, top)
+        axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
+        axes.set_xlim(time[0], max(time[-1], time[0] + 1e-6))
+        axes.grid(axis="y")
+        legend(axes, columns=min(4, max(1, errors.shape[1])))
+    return written[0]
+
+
+def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) -> str:
+    """The share of true joints placed within a distance, for each variant; NaN is infinitely far."""
+    with figure("error-distribution") as (axes, written):
+        grid = np.linspace(0, limit, 301)
+        for (variant, values), color in zip(errors.items(), VARIANT_COLORS * len(errors), strict=False):
+            ranked = np.sort(np.where(np.isnan(values), np.inf, values))
+            share = np.searchsorted(ranked, grid, side="right") / max(1, len(ranked))
+            axes.plot(grid, 100 * share, color=color, lw=1.8, label=variant, zorder=3)
+        axes.set(xlabel="within, mm", ylabel="share of all true joints, %", xlim=(0, limit), ylim=(0, 101))
+        axes.grid()
+        axes.legend(loc="lower right", labelcolor=INK)
+    return written[0]
+
+
+def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequence[str]) -> str:
+    """How many of the joints each camera sees: shares (V, 5), 0 to 1, by visibility label."""
+    with figure("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
+        left = np.zeros(len(cameras))
+        rows = np.arange(len(cameras))
+        for column, (label, color) in enumerate(zip(labels, VISIBILITY_COLORS, strict=True)):
+            width = 100 * shares[:, column]
+            axes.barh(rows, width, left=left, height=0.66, color=color, label=label, lw=0)
+            left += width
+        axes.set(xlabel="share of joints, %", xlim=(0, 100), yticks=rows, yticklabels=cameras)
+        axes.invert_yaxis()
+        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.spines["left"].set_visible(False)
+        legend(axes, columns=3)
+    return written[0]
+
+
+def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
+    """Median milliseconds a frame of each stage of each variant; a method without stages is one, ``method``."""
+    times = {name: {"method": each["total"]} if set(each) == {"total"} else each for name, each in times.items()}
+    with figure("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
+        rows = np.arange(len(times))
+        left = np.zeros(len(times))
+        stages = list(dict.fromkeys(stage for each in times.values() for stage in each if stage != "total"))
+        for stage, spare in zip(stages, VARIANT_COLORS * len(stages), strict=False):
+            width = np.array([each.get(stage, 0.0) for each in times.values()])
+            axes.barh(rows, width, left=left, height=0.6, color=STAGE_COLORS.get(stage, spare), label=stage, lw=0)
+            left += width
+        for row, (end, each) in enumerate(zip(left.tolist(), times.values(), strict=True)):
+            told = f"{each.get('total', end):.1f} ms"
+            axes.annotate(told, (end, row), xytext=(4, 0), textcoords="offset points", va="center")
+        axes.set(xlabel="median, ms", yticks=rows, yticklabels=list(times))
+        axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.18)
+        axes.invert_yaxis()
+        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.spines["left"].set_visible(False)
+        legend(axes, columns=3)
+    return written[0]
+
+
+def floor_plan(
+    rig: Rig,
+    room: tuple[float, float],
+    *,
+    things: Sequence[Floats],
+    paths: Floats,
+    estimates: Floats,
+    colors: Sequence[Color],
+) -> str:
+    """The scene from above.
+
+    Args:
+        rig: cameras, drawn with the wedge that each sees.
+        room: its x and y, metres, about the origin.
+        things: outlines of the clutter, each (n, 2) metres.
+        paths: where the people truly went, (T, P, 2) metres.
+        estimates: where the method saw people, (k, 2) metres.
+        colors: of the people, P of them.
+    """
+    with figure("floor-plan", size=(5.2, 4.8)) as (axes, written):
+        half = np.array(room) / 2
+        corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        axes.add_patch(Polygon(corners, fill=False, ec=FAINT, lw=1.2))
+        for outline in things:
+            axes.add_patch(Polygon(outline, fc=LINE, ec=FAINT, lw=0.8))
+        for camera in rig:
+            tangent = camera.size[0] / 2 / camera.K[0, 0]
+            _camera(axes, camera.center[:2], camera.R[2][:2], tangent=tangent, name=camera.name)
+        for person in range(paths.shape[1]):
+            axes.plot(
+                *paths[:, person].T,
+                color=colors[person],
+                lw=2.2,
+                alpha=0.55,
+                solid_capstyle="round",
+                zorder=3,
+            )
+            axes.plot(*paths[-1, person], "o", ms=5, color=colors[person], zorder=4, label=f"person {person}")
+        if len(estimates):
+            axes.plot(*estimates.T, ".", ms=2.2, color=INK, mew=0, zorder=5)
+            axes.plot([], [], ".", ms=5, color=INK, mew=0, label="estimated")
+        reach = np.vstack([corners, rig.centers[:, :2]])
+        low, high = reach.min(axis=0) - 0.4, reach.max(axis=0) + 0.4
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", ylabel="y, m")
+        axes.set_aspect("equal")
+        axes.spines[:].set_visible(False)
+        legend(axes, columns=min(5, paths.shape[1] + 1))
+    return written[0]
+
+
+def _camera(axes: Axes, center: Floats, forward: Floats, *, tangent: float, name: str) -> None:
+    length = float(np.linalg.norm(forward))
+    if length < 1e-6:  # it looks straight down
+        axes.plot(*center, "s", color=INK, ms=4)
+        return
+    bearing = math.atan2(forward[1], forward[0])
+    side = math.atan(tangent)
+    ends = [center + 1.2 * np.array([math.cos(bearing + turn), math.sin(bearing + turn)]) for turn in (side, -side)]
+    axes.add_patch(Polygon(np.array([center, *ends]), fc=FAINT, ec="none", alpha=0.18, zorder=1))
+    axes.plot(*center, "o", color=INK, ms=3.5, zorder=4)
+    aside = center + 0.3 * np.array([-forward[1], forward[0]]) / length
+    axes.text(float(aside[0]), float(aside[1]), name, ha="center", va="center", fontsize=8, color=FAINT)

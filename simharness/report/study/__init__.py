@@ -1,0 +1,1 @@
+"""The page of a study: curves, breaking points, failures, worst frames."""

@@ -1,0 +1,267 @@
+"""The plots of a study."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
+
+from mvpose.arrays import Floats
+from simharness.report.figures.svg_figure import FAINT, INK, LINE, VARIANT_COLORS, Color, figure, legend
+from simharness.report.study.factor_names import axis_label
+from simharness.scoring.catalogue import ScoreInfo
+from simharness.statistics.comparison import Interval
+
+KIND_COLORS: Mapping[str, Color] = {
+    "missed": "#8b93a1",
+    "ghost": "#8a63c9",
+    "merged": "#d9643a",
+    "split": "#d9a514",
+    "swapped_limb": "#3b82c4",
+    "displaced_joint": "#2e9e6b",
+}
+BLAME_COLORS: Mapping[str, Color] = {
+    "detection": "#8a63c9",
+    "matching": "#d9a514",
+    "reconstruction": "#2e9e6b",
+    "method": "#3b82c4",
+}
+_SPARE = "#8b93a1"
+
+_SIZE = (4.5, 3.0)  # inches of 72 px: a phone's width
+_WIDE_RANGE = 30.0  # numbers that differ by this factor are better told apart on a logarithmic axis
+_MOST_LISTED = 6  # values of a key, in a line about what a mean is over
+_LINE, _LINE_HEIGHT = 62, 0.15  # letters below an axis; inches
+_LETTER = 0.025  # of the axis: the width of a label's letter, and between two labels
+_DARK = 0.55  # luma of a cell under which its number is written in white
+
+
+def curve(
+    name: str,
+    *,
+    factor: str,
+    values: Sequence[Any],
+    numeric: bool,
+    lines: Mapping[str, Sequence[Interval]],
+    score: ScoreInfo,
+    threshold: float | None = None,
+    title: str = "",
+    notes: Sequence[str] = (),
+    beside: Sequence[Sequence[Interval]] = (),
+) -> str:
+    """A score against the values of a factor: a line for each variant, with its interval.
+
+    Args:
+        name: unlike that of any other plot of the page.
+        factor: the key that varies; below the axis stands its name and its unit, too.
+        values: of it, k.
+        numeric: whether they are numbers.
+        lines: k means of each variant.
+        score: what is plotted.
+        threshold: where it breaks: a dashed line.
+        title: above the plot.
+        notes: what is said below the axis, wrapped.
+        beside: lines of the plots that this one is compared with: the scale has room for them, too.
+    """
+    label = axis_label(factor) if axis_label(factor).startswith(factor) else f"{axis_label(factor)} ({factor})"
+    below = [line for each in (label, *notes) for line in textwrap.wrap(each, _LINE, break_long_words=False)]
+    height = _SIZE[1] + _LINE_HEIGHT * (len(below) - 1 + 1.5 * bool(title))
+    with figure(name, size=(_SIZE[0], height)) as (axes, written):
+        places = np.array(values, float) if numeric else np.arange(len(values), dtype=float)
+        apart = 0.0 if numeric else min(0.16, 0.6 / max(1, len(lines)))
+        for index, ((variant, intervals), color) in enumerate(
+            zip(lines.items(), VARIANT_COLORS * len(lines), strict=False)
+        ):
+            mean, low, high = (np.array([getattr(each, end) for each in intervals]) for end in ("mean", "low", "high"))
+            at = places + apart * (index - (len(lines) - 1) / 2)
+            under = 0.7 * (len(lines) - 1 - index)  # points: so that lines that coincide are all seen
+            if numeric:
+                axes.fill_between(at, low, high, color=color, alpha=0.16, lw=0, zorder=2)
+                axes.plot(
+                    at, mean, "o-", color=color, lw=1.5 + under, ms=3.4 + under, label=variant, zorder=4, clip_on=False
+                )
+            else:
+                axes.vlines(at, low, high, color=color, lw=1.6, alpha=0.55, zorder=3)
+                axes.plot(at, mean, "o", color=color, ms=4.6, label=variant, zorder=4, clip_on=False)
+        _limits(axes, [*lines.values(), *beside], score, threshold)
+        if threshold is not None:
+            axes.axhline(threshold, color=FAINT, lw=0.9, ls=(0, (4, 3)), zorder=1)
+        axes.set(xlabel="\n".join(below), ylabel=f"{score.title}, {score.unit}" if score.unit else score.title)
+        if title:
+            axes.figure.suptitle(title, fontsize=10, fontweight="bold")
+        _ticks(axes, values, places, numeric)
+        axes.grid(axis="y")
+        legend(axes, columns=min(4, len(lines)))
+    return written[0]
+
+
+def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
+    """Room for everything that is known; shares end at 100, and what has no upper bound begins at 0."""
+    ends = [end for line in lines for each in line for end in (each.mean, each.low, each.high)]
+    known = np.array([*ends, *([] if threshold is None else [threshold])])
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return
+    if score.better == "higher":
+        pad = max(0.07 * np.ptp(known), 0.5)
+        top = 100.0 + 0.35 * pad if score.unit == "%" and known.max() + pad > 100 else known.max() + pad
+        axes.set_ylim(max(0.0, known.min() - pad), top)
+        if score.unit == "%":
+            axes.set_yticks([tick for tick in axes.get_yticks() if axes.get_ylim()[0] <= tick <= 100])
+    else:
+        axes.set_ylim(0, 1.08 * known.max() or 1.0)
+
+
+def _ticks(axes: Axes, values: Sequence[Any], places: Floats, numeric: bool) -> None:
+    if not numeric:
+        axes.set_xticks(places, [short(value) for value in values])
+        axes.set_xlim(-0.6, len(values) - 0.4)
+        longest = max(len(short(value)) for value in values)
+        if longest * len(values) > 44:
+            axes.tick_params(axis="x", labelrotation=30)
+            for label in axes.get_xticklabels():
+                label.set_horizontalalignment("right")
+        return
+    if places.min() > 0 and places.max() / places.min() >= _WIDE_RANGE:
+        axes.set_xscale("log")
+        axes.minorticks_off()
+    across = np.log(places) if axes.get_xscale() == "log" else places
+    axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))  # values that were tried, no others
+
+
+def _spaced(places: Floats, labels: Sequence[str]) -> list[str]:
+    """Labels at ascending places along an axis, but for those that would run into another: the ends come first."""
+    space = np.ptp(places) or 1.0
+
+    def near(one: int, other: int) -> bool:
+        return abs(places[one] - places[other]) < space * _LETTER * (len(labels[one]) + len(labels[other]) + 1) / 2
+
+    kept = [0]
+    for index in range(len(labels) - 1, 0, -1):
+        if not any(near(index, other) for other in kept):
+            kept.append(index)
+    return [label if index in kept else "" for index, label in enumerate(labels)]
+
+
+def heat_map(
+    name: str,
+    *,
+    down: tuple[str, Sequence[Any]],
+    along: tuple[str, Sequence[Any]],
+    means: Floats,
+    score: ScoreInfo,
+    span: tuple[float, float],
+) -> str:
+    """A score at every combination of two factors.
+
+    Args:
+        name: unlike that of any other plot of the page.
+        down: the key of a factor and its values, k1.
+        along: another and its values, k2.
+        means: the scores, (k1, k2).
+        score: what is plotted.
+        span: the scores of the first and the last colour: the same for maps beside each other.
+    """
+    with figure(name, size=(_SIZE[0], max(1.6, 0.9 + 0.38 * len(down[1])))) as (axes, written):
+        colors = "viridis" if score.better == "higher" else "viridis_r"
+        mesh = axes.pcolormesh(
+            means, cmap=colors, vmin=span[0], vmax=max(span[1], span[0] + 1e-9), edgecolors=LINE, linewidth=0.6
+        )
+        for row, column in np.ndindex(means.shape):
+            value = means[row, column]
+            told, ink = "–", INK
+            if np.isfinite(value):
+                told = f"{value:.{score.digits}f}"
+                ink = "#fbfbfb" if np.dot(mesh.cmap(mesh.norm(value))[:3], (0.299, 0.587, 0.114)) < _DARK else "#14161a"
+            axes.text(column + 0.5, row + 0.5, told, ha="center", va="center", color=ink, fontsize=8.5)
+        axes.set_xticks(np.arange(means.shape[1]) + 0.5, [short(value) for value in along[1]])
+        axes.set_yticks(np.arange(means.shape[0]) + 0.5, [short(value) for value in down[1]])
+        beside = textwrap.wrap(axis_label(down[0]), 10 + 5 * len(down[1]), break_long_words=False)
+        axes.set(xlabel=axis_label(along[0]), ylabel="\n".join(beside))
+        axes.invert_yaxis()
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    return written[0]
+
+
+def short(value: Any) -> str:
+    """A value of a factor as plots and tables write it."""
+    if value is None:
+        return "–"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def mean_over(over: Mapping[str, Sequence[Any]]) -> str:
+    """What a mean is over, in words: keys with their values; nothing where it is over nothing."""
+    said = []
+    for key, values in over.items():
+        told = ", ".join(map(short, values))
+        if len(values) > _MOST_LISTED:
+            numbers = all(isinstance(value, int | float) for value in values)
+            ends = f"{short(values[0])} to {short(values[-1])}, " if numbers else ""
+            told = f"({ends}{len(values)} values)"
+        said.append(f"{key} {told}")
+    return f"mean over {' and '.join(said)}" if said else ""
+
+
+def failure_bars(
+    name: str,
+    *,
+    amounts: Mapping[str, Mapping[str, float]],
+    colors: Mapping[str, Color],
+    hatched: Mapping[str, Mapping[str, float]] | None = None,
+) -> str:
+    """Failures by class, a stacked bar for each variant.
+
+    Args:
+        name: unlike that of any other plot of the page.
+        amounts: failures in 100 frames of each variant by class.
+        colors: of the classes; others are grey.
+        hatched: which part of an amount is drawn hatched.
+    """
+    classes = list(dict.fromkeys([*colors, *(key for each in amounts.values() for key in each)]))
+    classes = [key for key in classes if any(each.get(key) for each in amounts.values())]
+    with figure(name, size=(_SIZE[0], 1.15 + 0.4 * len(amounts))) as (axes, written):
+        rows = np.arange(len(amounts))
+        left = np.zeros(len(amounts))
+        for key in classes:
+            width = np.array([each.get(key, 0.0) for each in amounts.values()])
+            color = colors.get(key, _SPARE)
+            axes.barh(rows, width, left=left, height=0.62, color=color, label=key.replace("_", " "), lw=0)
+            if hatched:
+                part = np.array([hatched.get(variant, {}).get(key, 0.0) for variant in amounts])
+                if part.any():
+                    start = left + width - part
+                    axes.barh(rows, part, left=start, height=0.62, color="none", ec=INK, hatch="////", lw=0, alpha=0.75)
+            left += width
+        for row, end in enumerate(left.tolist()):
+            axes.annotate(f"{end:.1f}", (end, row), xytext=(4, 0), textcoords="offset points", va="center")
+        axes.set(xlabel="failures in 100 frames", yticks=rows, yticklabels=list(amounts))
+        axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.14)
+        axes.set_ylim(len(amounts) - 0.5, -0.5)
+        axes.tick_params(axis="y", length=0, labelcolor=INK)
+        axes.spines["left"].set_visible(False)
+        legend(axes, columns=3)
+    return written[0]
+
+
+def time_distribution(times: Mapping[str, Floats]) -> str:
+    """The share of frames that took each variant no longer than so many milliseconds."""
+    with figure("time-distribution", size=_SIZE) as (axes, written):
+        for (variant, values), color in zip(times.items(), VARIANT_COLORS * max(1, len(times)), strict=False):
+            ranked = np.sort(values[np.isfinite(values)])
+            if len(ranked):
+                share = 100 * np.arange(1, len(ranked) + 1) / len(ranked)
+                axes.step([ranked[0], *ranked], [0, *share], where="post", color=color, lw=1.7, label=variant, zorder=3)
+        axes.set(xlabel="time of a frame, ms", ylabel="share of frames, %", ylim=(0, 101))
+        if any(len(values) for values in times.values()):
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
+            axes.xaxis.set_minor_formatter(FuncFormatter(lambda tick, _: ""))
+        axes.grid()
+        legend(axes, columns=min(4, max(1, len(times))))
+    return written[0]

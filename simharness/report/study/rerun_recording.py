@@ -1,0 +1,123 @@
+"""A trial as a recording for the viewer of rerun (https://rerun.io): truth and estimates in 3D, and in every view."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from simharness.report.figures.overlay import COCO17_LIMBS
+from simharness.report.figures.palette import TRUTH, Color, person_color
+
+if TYPE_CHECKING:
+    from simharness.report.study.replay import Replay
+
+
+_THICK, _THIN = 0.02, 0.006  # metres, radii of estimated and of true limbs
+_DOT = 3.0  # pixels, radius of a keypoint
+_PICTURE = 0.4  # metres from a camera's centre to where its picture hangs
+
+
+def write_rerun(replay: Replay, path: Path) -> None:
+    """Write a trial as an ``.rrd`` file.
+
+    The world is in metres, z up. ``world/truth/person0`` and so on hold everybody's limbs, ``world/estimates`` those of
+    every estimate in the colour of its person (grey: a ghost); ``world/cameras/NAME`` the cameras as the method
+    believes them, with ``detections`` and ``truth`` in their pixels. The timeline ``time`` counts seconds, ``frame``
+    frames.
+
+    Raises:
+        ValueError: the SDK is not installed, or the file cannot be written.
+    """
+    require_sdk()
+    import rerun
+
+    _check_writable(path)
+    recording = rerun.RecordingStream("simharness", recording_id=f"{replay.trial.scenario.name}-{replay.variant}")
+    recording.save(path)
+    recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    _log_still(recording, replay)
+    for frame, time in enumerate(replay.time):
+        recording.set_time("time", duration=float(time))
+        recording.set_time("frame", sequence=frame)
+        _log_frame(recording, replay, frame)
+    recording.flush()
+    recording.disconnect()
+
+
+def require_sdk() -> None:
+    """Refuse to go on without the SDK: a ValueError says how to install it."""
+    if importlib.util.find_spec("rerun") is None:
+        raise ValueError("--rerun: needs the rerun SDK, which is not installed: pip install -e '.[viewer]'")
+
+
+def _check_writable(path: Path) -> None:
+    """Refuse what the SDK would only complain about in its log."""
+    try:
+        path.open("wb").close()
+    except OSError as error:
+        raise ValueError(f"--rerun {path}: cannot be written: {error.strerror}") from None
+
+
+def _log_still(recording: Any, replay: Replay) -> None:
+    """Cameras and things."""
+    import rerun
+
+    for camera in replay.trial.shots.believed:
+        place = f"world/cameras/{camera.name}"
+        pose = rerun.Transform3D(translation=camera.center, mat3x3=camera.R.T)
+        eye = rerun.Pinhole(
+            image_from_camera=camera.K,
+            resolution=camera.size,
+            camera_xyz=rerun.ViewCoordinates.RDF,
+            image_plane_distance=_PICTURE,
+        )
+        recording.log(place, pose, eye, static=True)
+    for solid in replay.trial.scene.solids:
+        if solid.kind != "room" and solid.trajectory is None:
+            mesh = rerun.Mesh3D(
+                vertex_positions=solid.mesh.vertices, triangle_indices=solid.mesh.faces, albedo_factor=(150, 150, 150)
+            )
+            recording.log(f"world/things/{solid.name}", mesh, static=True)
+
+
+def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
+    import rerun
+
+    truth, detections, estimate = replay.truth[frame], replay.detections[frame], replay.estimates[frame]
+    for person, joints in enumerate(truth.joints):
+        thin = rerun.LineStrips3D(_limbs(joints), colors=TRUTH, radii=_THIN)
+        recording.log(f"world/truth/person{person}", thin)
+    owners = replay.owners(frame)
+    strips: list[Floats] = []
+    colors: list[Color] = []
+    for joints, owner in zip(estimate.joints, owners.tolist(), strict=True):
+        limbs = _limbs(joints)
+        strips += limbs
+        colors += [person_color(owner)] * len(limbs)
+    recording.log("world/estimates", rerun.LineStrips3D(strips, colors=colors, radii=_THICK))
+    said = np.append(owners, -1)[estimate.matching.labels_of(len(detections))]
+    for view, camera in enumerate(replay.trial.shots.believed):
+        place = f"world/cameras/{camera.name}"
+        points, shades = _keypoints(detections.keypoints, np.flatnonzero(detections.view == view), said)
+        recording.log(f"{place}/detections", rerun.Points2D(points, colors=shades, radii=_DOT))
+        drawn = [limb for pixels in truth.pixels[view] for limb in _limbs(pixels)]
+        recording.log(f"{place}/truth", rerun.LineStrips2D(drawn, colors=TRUTH))
+
+
+def _limbs(joints: Floats) -> list[Floats]:
+    """The limbs both of whose ends have a place, (2, D) each."""
+    known = np.asarray(np.isfinite(joints).all(axis=1))
+    return [joints[[a, b]] for a, b in COCO17_LIMBS if known[a] and known[b]]
+
+
+def _keypoints(keypoints: Floats, mine: NDArray[np.intp], said: NDArray[np.int64]) -> tuple[Floats, list[Color]]:
+    """The keypoints of one view that were detected, (n, 2), and the colours of whom they are taken for."""
+    points = keypoints[mine]
+    detection, joint = np.nonzero(np.isfinite(points).all(axis=-1))
+    taken = np.asarray(said[mine])[detection]
+    return points[detection, joint], [person_color(person) for person in taken.tolist()]

@@ -1,0 +1,154 @@
+"""The worst frames of a study, looked at again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from simharness.gate.trial_command import overrides
+from simharness.report.figures.turnable import Turnable, turnable
+from simharness.report.run.pictures import MOST_VIEWS, Picture, draw_frame
+from simharness.report.study.replay import Replay, replay
+from simharness.scenario.named_files import relative_files
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.study_definition import Study, load_study
+from simharness.scenario.toml_writer import toml
+from simharness.scoring.pose import LIMIT
+from simharness.study.result_folder import Results
+from simharness.trial.stages.frame_tasks import studio_of
+from simharness.world.scene.playback import Playback
+
+SHOWN = 4
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of a trial as one variant estimated it.
+
+    Attributes:
+        trial: identity.
+        variant: of the method.
+        frame: index.
+        cost: how bad it is, millimetres: the errors summed, and the limit for everyone missed or made up.
+        setting: what is special about the trial, by name: the case, every factor, the seed.
+    """
+
+    trial: str
+    variant: str
+    frame: int
+    cost: float
+    setting: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A bad frame, shown.
+
+    Attributes:
+        picture: every camera's picture.
+        view: the people in 3D, over time.
+        setting: of the trial, one line.
+        trial: identity.
+        command: that renders the trial again.
+    """
+
+    picture: Picture
+    view: Turnable
+    setting: str
+    trial: str
+    command: str
+
+
+def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
+    """The worst frames for the first variant of a study that has any, the worst first.
+
+    One of a setting; where there are fewer settings than asked for, one of a trial.
+    """
+    variant = next((name for name in results.info["variants"] if name in set(results.frames["variant"])), None)
+    if variant is None:
+        return []  # nothing finished, and the tables have no columns
+    errors = results.people.group_by("trial", "variant", "frame").agg(pl.col("error_mm").sum())
+    frames = (
+        results.frames.filter(pl.col("variant") == variant)
+        .join(errors, on=["trial", "variant", "frame"], how="left")
+        .with_columns(cost=pl.col("error_mm").fill_null(0.0) + 1000 * LIMIT * (pl.col("missed") + pl.col("ghosts")))
+        .sort("cost", "trial", "frame", descending=[True, False, False])
+        .unique("trial", keep="first", maintain_order=True)
+    )
+    settings = {row["trial"]: row for row in results.trials.iter_rows(named=True)}
+    keys = [*(("case",) if any(results.trials["case"]) else ()), *results.info["factors"]]
+    first: dict[str, Frame] = {}
+    rest: list[Frame] = []
+    for row in frames.iter_rows(named=True):
+        about = settings[row["trial"]]
+        setting = {key: about[key] for key in keys}
+        found = Frame(row["trial"], variant, row["frame"], row["cost"], setting | {"seed": about["seed"]})
+        if str(setting) in first:
+            rest.append(found)
+        else:
+            first[str(setting)] = found
+    chosen = list(first.values())[:count]
+    chosen += rest[: count - len(chosen)]
+    return sorted(chosen, key=lambda frame: -frame.cost)
+
+
+def show(
+    results: Results, frames: list[Frame], *, progress: Callable[[int], None] = lambda frames: None
+) -> Iterator[tuple[Shown, Replay]]:
+    """Run the trials of frames again and show the frames; pictures are rasterised where the trials needed none.
+
+    Raises:
+        ValueError: a trial that cannot be built any more: a file that it names is gone.
+    """
+    # Files in it are relative to where the study was started.
+    study = load_study(results.folder / "study.toml", limit=None, folder=Path()) if frames else None
+    for number, frame in enumerate(frames, start=1):
+        scenario = results.scenario_of(frame.trial)
+        again = replay(scenario, frame.variant)
+        studio = studio_of(scenario, Playback(again.trial.scene))
+        rgb = draw_frame(
+            again.trial,
+            studio,
+            frame.frame,
+            truth=again.truth[frame.frame],
+            detections=again.detections[frame.frame],
+            estimate=again.estimates[frame.frame],
+            explained=False,
+        )
+        setting = ", ".join(f"{key} {value}" for key, value in frame.setting.items())
+        picture = Picture(f"{number}. {setting}", _caption(results, frame, again), rgb)
+        assert study is not None
+        command = _command(study, scenario)
+        yield Shown(picture, turnable(again, frame.frame), setting, frame.trial, command), again
+        progress(1)
+
+
+def _command(study: Study, scenario: Scenario) -> str:
+    """What renders a trial of a study again, for a shell."""
+    setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
+    files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.said))]
+    sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]
+    layers = ["--overlay", "truth,detections,estimates"]
+    return shlex.join(["simharness", "render", str(study.path), *sets, "--seed", str(scenario.seed), *layers])
+
+
+def _caption(results: Results, frame: Frame, again: Replay) -> str:
+    row = results.frames.row(
+        by_predicate=(pl.col("trial") == frame.trial)
+        & (pl.col("variant") == frame.variant)
+        & (pl.col("frame") == frame.frame),
+        named=True,
+    )
+    ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
+    error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.0f} mm"
+    cameras = len(again.trial.shots.believed)
+    views = f"; {MOST_VIEWS} of {cameras} cameras" if cameras > MOST_VIEWS else ""
+    return (
+        f"Frame {frame.frame} of {len(again.time)}, at {again.time[frame.frame]:.1f} s, variant {frame.variant}: "
+        f"{row['found']} of {row['people']} people found, {ghosts}{error}{views}."
+    )

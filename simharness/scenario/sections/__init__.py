@@ -1,0 +1,1 @@
+"""The sections of a scenario: frozen models, every key documented, unknown keys refused."""

@@ -1,0 +1,279 @@
+"""A study from its settings to its folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from simharness.runtime.atomic_files import appearing
+from simharness.scenario.study_definition import Study, Value
+from simharness.study.plan import Planned, plan
+from simharness.study.result_folder import Results, read_study, write_study
+from simharness.study.scheduler import Failure, Measure, Success, Unit, told, work_off
+from simharness.study.study_file import document
+from simharness.study.study_progress import Quiet, Watch
+from simharness.study.tables import tables
+from simharness.study.trial_store import Entry, Store, StoreError
+from simharness.trial.measure import measure as measure_trial
+from simharness.trial.provenance import provenance
+from simharness.trial.stages.estimators import estimators_of
+
+
+@dataclass(frozen=True)
+class FailedTrial:
+    """A trial of which at least one variant could not be measured.
+
+    Attributes:
+        trial: its identity.
+        case: of its setting.
+        factors: of its setting.
+        seed: its own.
+        variants: that are missing.
+        error: why; with the names of the variants where it is not that of all.
+    """
+
+    trial: str
+    case: str
+    factors: Mapping[str, Value]
+    seed: int
+    variants: tuple[str, ...]
+    error: str
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What became of the trials of a study.
+
+    Attributes:
+        trials: how many there are; those that two settings share count once.
+        kept: how many were finished before.
+        run: how many were finished now.
+        failed: the others. Of some of them there are variants that were measured, and kept.
+        damaged: entries of the store that were found damaged and run again.
+        seconds: that it took.
+    """
+
+    trials: int
+    kept: int
+    run: int
+    failed: tuple[FailedTrial, ...]
+    damaged: tuple[str, ...]
+    seconds: float
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, and what is kept of the study."""
+
+    def __init__(self, finished: int, trials: int) -> None:
+        super().__init__(f"interrupted: {finished} of {trials} trials are kept; the same command goes on")
+
+
+def run_study(
+    study: Study,
+    *,
+    out: Path,
+    store: Path | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    watch: Watch | None = None,
+    command: str | None = None,
+    measure: Measure = measure_trial,
+) -> Results:
+    """Run what is not finished of a study, and write its results.
+
+    Args:
+        study: what to run.
+        out: where the folder named as the study goes. It appears when it is whole, in the place of an earlier one.
+        store: the folder of finished trials; ``out / "store"`` by default.
+        workers: processes; see :func:`simharness.study.scheduler.work_off`.
+        scheduler: address of a Dask scheduler, instead.
+        watch: is told of every trial.
+        command: how the user asked for this.
+        measure: what is done with a trial.
+
+    Returns:
+        The results, as :func:`simharness.study.result_folder.read_study` reads them;
+        ``info["failed"]`` says what is missing.
+
+    Raises:
+        ValueError: the folder is no place for a study, the store is no store, the scheduler does not answer, or a
+            method of one's own cannot be loaded.
+        RunError: the disk is full, or the cluster went away. What is finished is kept.
+        Interrupted: Ctrl-C. What is finished is kept.
+    """
+    folder, store = out / study.name, out / "store" if store is None else store
+    _check_place(folder, store)
+    estimators_of(study.base.method)  # better now than at every trial
+    opened, planned = Store(store), plan(study)
+    tally = _run(planned, opened, workers=workers, scheduler=scheduler, watch=watch, measure=measure)
+    order = {id(setting): index for index, setting in enumerate(study.settings)}
+    ordered = sorted(planned, key=lambda each: (order[id(each.setting)], each.seed))
+    failed = {each.trial for each in tally.failed}
+    rows = [(each, entry) for each in ordered for entry in _entries(opened, each, failed=each.trial in failed)]
+    info = _info(study, tally, command)
+    try:
+        with appearing(folder) as partial:
+            write_study(partial, info, tables(rows, study.factors), document(study))
+    except OSError as error:
+        raise StoreError(
+            f"{folder}: cannot be written: {error.strerror}. All trials are kept: make room, and the same command goes "
+            "on"
+        ) from error
+    return read_study(folder)
+
+
+def run_shard(
+    study: Study,
+    shard: tuple[int, int],
+    *,
+    store: Path,
+    workers: int = 1,
+    scheduler: str | None = None,
+    watch: Watch | None = None,
+    measure: Measure = measure_trial,
+) -> Tally:
+    """Run one of ``n`` parts of a study, into a store alone: ``simharness merge`` puts the stores together.
+
+    Args:
+        study: what to run.
+        shard: which part, from 1 to n; and n.
+        store: the folder of finished trials.
+        workers: as of :func:`run_study`.
+        scheduler: as of :func:`run_study`.
+        watch: as of :func:`run_study`.
+        measure: as of :func:`run_study`.
+
+    Raises:
+        ValueError, RunError, Interrupted: as of :func:`run_study`; no such part.
+    """
+    part, parts = shard
+    if not 1 <= part <= parts:
+        raise ValueError(f"a shard is i/n with i from 1 to n, got {part}/{parts}")
+    estimators_of(study.base.method)
+    planned = list(_different(plan(study)))[part - 1 :: parts]
+    return _run(planned, Store(store), workers=workers, scheduler=scheduler, watch=watch, measure=measure)
+
+
+def _run(
+    planned: Sequence[Planned],
+    store: Store,
+    *,
+    workers: int,
+    scheduler: str | None,
+    watch: Watch | None,
+    measure: Measure,
+) -> Tally:
+    """Measure what the store lacks."""
+    start = perf_counter()
+    watch = watch or Quiet()
+    different = {each.trial: each for each in _different(planned)}
+    missing = {trial: _missing(store, each) for trial, each in different.items()}
+    units = [Unit(trial, different[trial].scenario, variants) for trial, variants in missing.items() if variants]
+    damaged = tuple(sorted(store.damaged))
+    kept, run, failed = len(different) - len(units), 0, dict[str, Failure]()
+    watch.begin(len(different), kept)
+    try:
+        with closing(work_off(units, measure, workers=workers, scheduler=scheduler)) as results:
+            for result in results:
+                each = different[result.unit.trial]
+                for part in result.parts:
+                    if isinstance(part, Success):
+                        _keep(store, each, part)
+                    else:
+                        _note(store, each, part)
+                if isinstance(result, Failure):
+                    failed[each.trial] = result
+                else:
+                    run += 1
+                watch.advance(isinstance(result, Failure))
+    except KeyboardInterrupt:  # which may come between a trial's last entry and its count: the store knows
+        finished = sum(all(map(store.holds, different[unit.trial].entries.values())) for unit in units)
+        raise Interrupted(kept + finished, len(different)) from None
+    losses = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)
+    return Tally(len(different), kept, run, losses, damaged, perf_counter() - start)
+
+
+def _different(planned: Sequence[Planned]) -> Iterator[Planned]:
+    """The first of those that are the same trial."""
+    seen: set[str] = set()
+    for each in planned:
+        if each.trial not in seen:
+            seen.add(each.trial)
+            yield each
+
+
+def _missing(store: Store, planned: Planned) -> tuple[str, ...]:
+    return tuple(variant for variant, identity in planned.entries.items() if not store.has(identity))
+
+
+def _keep(store: Store, planned: Planned, success: Success) -> None:
+    for variant, measured in success.measured.items():
+        entry = Entry(planned.trial, variant, measured, success.seconds / len(success.measured))
+        store.write(planned.entries[variant], entry)
+
+
+def _note(store: Store, planned: Planned, failure: Failure) -> None:
+    for variant in failure.unit.variants:
+        noted = {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback}
+        store.write_failure(planned.entries[variant], noted)
+
+
+def _failed(planned: Planned, failure: Failure) -> FailedTrial:
+    lost = [part for part in failure.parts if isinstance(part, Failure)]
+    return FailedTrial(
+        trial=planned.trial,
+        case=planned.setting.case,
+        factors=dict(planned.setting.factors),
+        seed=planned.seed,
+        variants=tuple(variant for part in lost for variant in part.unit.variants),
+        error=told(lost, planned.entries),
+    )
+
+
+def _entries(store: Store, planned: Planned, *, failed: bool) -> Iterator[Entry]:
+    """What the store has of a trial; all of it, but of one that failed.
+
+    Raises:
+        StoreError: an entry is not there any more.
+    """
+    for identity in planned.entries.values():
+        entry = store.read(identity)
+        if entry is not None:
+            yield entry
+        elif not failed:
+            raise StoreError(
+                f"store {store.folder}: entry {identity} was finished and can no longer be read; the same command runs "
+                "it again"
+            )
+
+
+def _info(study: Study, tally: Tally, command: str | None) -> dict[str, Any]:
+    return {
+        "name": study.name,
+        "description": study.description,
+        "factors": list(study.factors),
+        "one_at_a_time": study.one_at_a_time,
+        "settings": len(study.settings),
+        "trials": tally.trials,
+        "kept": tally.kept,
+        "run": tally.run,
+        "failed": [asdict(each) for each in tally.failed],
+        "damaged": list(tally.damaged),
+        **provenance(command=command, seeds=study.seeds, variants=study.variants, seconds=tally.seconds),
+    }
+
+
+def _check_place(folder: Path, store: Path) -> None:
+    """Before the work: a place that is no good is better known at once, and nothing may be replaced but a study."""
+    if folder.resolve() in (store.resolve(), *store.resolve().parents):
+        raise ValueError(f"the results would take the place of the store {store}: name another folder by --store")
+    if folder.exists() and not (folder / "study.json").is_file() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"{folder} is there and holds no study: name another folder by --out, or rename the study")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {folder.parent}: cannot make this folder: {error.strerror}") from None

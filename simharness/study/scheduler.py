@@ -1,0 +1,343 @@
+"""Trials shared out: in this process, among processes of this machine, or on a Dask cluster.
+
+What fails is tried again, for a worker may die of what it has no fault in, and given up after :data:`ATTEMPTS`; the
+others go on. What the scenario is to blame for is given up at once: it would fail the same way again. Variants that
+failed together are tried once more one by one, so that one that fails costs no other its result.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import secrets
+import traceback
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from simharness.runtime.frame_pool import RunError
+from simharness.scenario.sections.scenario import Scenario
+from simharness.trial.identity import code
+from simharness.trial.trial_result import Measured
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+ATTEMPTS = 3
+"""How often a trial may fail before it is given up."""
+
+_PATIENCE = 30.0  # seconds to wait for a scheduler
+_FIRST_WORKER = 30.0  # seconds to wait for the first worker of one that has none
+
+Measure = Callable[[Scenario, Sequence[str]], Mapping[str, Measured]]
+"""What is done with a trial, in whatever process: :func:`simharness.trial.measure.measure`. It must be picklable, and
+say by a ValueError that the scenario is to blame."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What is shared out: a trial, and the variants of it that are wanted. It is detected once for all of them.
+
+    Attributes:
+        trial: its identity.
+        scenario: at its seed.
+        variants: of the method.
+    """
+
+    trial: str
+    scenario: Scenario
+    variants: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Success:
+    """A unit that is done.
+
+    Attributes:
+        unit: which.
+        measured: by variant.
+        seconds: that it took.
+    """
+
+    unit: Unit
+    measured: Mapping[str, Measured]
+    seconds: float
+
+    @property
+    def parts(self) -> tuple[Success]:
+        """It is one whole."""
+        return (self,)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A unit that failed.
+
+    Attributes:
+        unit: which.
+        error: in a line.
+        traceback: of it; empty where there is none.
+        final: whether it would fail the same way again.
+        deaths: how many workers died over it.
+        alone: what each variant did by itself, in the unit's order, where the unit has several; at least one failed.
+    """
+
+    unit: Unit
+    error: str
+    traceback: str
+    final: bool = False
+    deaths: int = 0
+    alone: tuple[Success | Failure, ...] = ()
+
+    @property
+    def parts(self) -> tuple[Success | Failure, ...]:
+        """What is known of its variants: each by itself, or that all failed together."""
+        return self.alone or (self,)
+
+
+def work_off(
+    units: Collection[Unit], measure: Measure, *, workers: int = 1, scheduler: str | None = None
+) -> Generator[Success | Failure, None, None]:
+    """Measure units, each until it is done or has failed for good, and yield them as they come.
+
+    A unit of several variants that has failed :data:`ATTEMPTS` times is divided: each variant is tried by itself, and
+    given up at once if it fails as all did together. What comes of that is one result, too.
+
+    Closing the iterator, or an error in whoever iterates, ends all work.
+
+    Args:
+        units: in the order in which they are begun, no two of one trial.
+        measure: what to do with each.
+        workers: processes; 1 works in this one, where a crash cannot be survived. They are spawned, so a script that
+            calls this needs its ``if __name__ == "__main__"``.
+        scheduler: address of a Dask scheduler whose workers do it instead.
+
+    Raises:
+        ValueError: fewer than one worker; no scheduler at the address, or it has no workers, or they run other code.
+        RunError: the cluster went away.
+    """
+    if workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+    if scheduler is None and workers == 1:
+        yield from _work_here(units, measure)
+    elif units:
+        with _client(min(workers, len(units)), scheduler) as client:
+            yield from _work_there(units, measure, client)
+
+
+def attempt(measure: Measure, unit: Unit) -> Success | Failure:
+    """Measure a unit once. Errors come back as text, for not every exception can travel."""
+    start = perf_counter()
+    try:
+        measured = measure(unit.scenario, unit.variants)
+    except Exception as error:
+        said = str(error) if isinstance(error, ValueError | RunError) else f"{type(error).__name__}: {error}"
+        return Failure(unit, said, traceback.format_exc(), final=isinstance(error, ValueError))
+    return Success(unit, measured, perf_counter() - start)
+
+
+def told(failures: Iterable[Failure], variants: Collection[str]) -> str:
+    """The errors of failures in a line, with whose they are, but where all variants have the same one.
+
+    Args:
+        failures: of variants of one trial.
+        variants: all of the trial.
+    """
+    whose: dict[str, list[str]] = {}
+    for each in failures:
+        whose.setdefault(each.error, []).extend(each.unit.variants)
+    if len(whose) == 1 and set(*whose.values()) == set(variants):
+        return next(iter(whose))
+    return "; ".join(f"{', '.join(names)}: {error}" for error, names in whose.items())
+
+
+def _divided(failure: Failure) -> list[Unit]:
+    """The variants of a unit that has failed for good, each a unit; none where that would tell nothing new."""
+    if failure.final or len(failure.unit.variants) < 2:
+        return []
+    return [replace(failure.unit, variants=(variant,)) for variant in failure.unit.variants]
+
+
+def _joined(together: Failure, alone: Iterable[Success | Failure]) -> Success | Failure:
+    """What came of a unit that failed: what its variants did one by one."""
+    unit = together.unit
+    alone = tuple(sorted(alone, key=lambda each: unit.variants.index(each.unit.variants[0])))
+    done = [each for each in alone if isinstance(each, Success)]
+    lost = [each for each in alone if isinstance(each, Failure)]
+    if lost:
+        return Failure(unit, told(lost, unit.variants), lost[0].traceback, alone=alone)
+    measured = {variant: each for part in done for variant, each in part.measured.items()}
+    return Success(unit, measured, sum(each.seconds for each in done))
+
+
+def _work_here(units: Iterable[Unit], measure: Measure) -> Generator[Success | Failure, None, None]:
+    for unit in units:
+        result = _persist(unit, measure)
+        if isinstance(result, Failure) and (parts := _divided(result)):
+            result = _joined(result, [_persist(part, measure, together=result) for part in parts])
+        yield result
+
+
+def _persist(unit: Unit, measure: Measure, together: Failure | None = None) -> Success | Failure:
+    """Attempt a unit until it is done or has failed for good; ``together``: the failure that it is a part of."""
+    for _ in range(ATTEMPTS):
+        result = attempt(measure, unit)
+        if isinstance(result, Success) or result.final or _again(result, together):
+            break
+    return result
+
+
+def _again(failure: Failure, together: Failure | None) -> bool:
+    """Whether a variant fails by itself as it did, :data:`ATTEMPTS` times, with the others."""
+    return together is not None and failure.error == together.error
+
+
+def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Generator[Success | Failure, None, None]:
+    """As many units are on their way as the cluster has threads: more would wait at workers that may die under them.
+
+    When a worker dies nobody knows which of the units that were at it has killed it. So those come last, one at a time:
+    then there is no doubt, and one that needs much memory has the machine to itself.
+    """
+    waiting, suspects, alone = iter(units), deque[Unit](), False
+    parts = deque[Unit]()  # of units that are divided; they come before what waits
+    together: dict[str, Failure] = {}  # by trial, how they failed
+    finished: dict[str, list[Success | Failure]] = {}  # by trial, what came of its parts so far
+    failed: Counter[tuple[str, tuple[str, ...]]] = Counter()
+    running: dict[Future[Any], Unit] = {}
+    completed = _completed()
+
+    def submit(unit: Unit) -> None:
+        # A name of its own each time: what failed under a name would not be run under it again.
+        future = client.submit(attempt, measure, unit, key=f"{unit.trial}-{secrets.token_hex(4)}", pure=False)
+        running[future] = unit
+        completed.add(future)
+
+    while True:
+        while not alone and len(running) < max(1, sum(client.nthreads().values())):
+            unit = parts.popleft() if parts else next(waiting, None)
+            if unit is None:
+                alone = not running
+                break
+            submit(unit)
+        if alone and not running and suspects:
+            submit(suspects.popleft())
+        if not running:
+            return
+        future = next(completed)
+        unit = running.pop(future)
+        result, whole = _result(future, unit), together.get(unit.trial)
+        del future  # what is held would be measured anew, were the worker that has it to die
+        if isinstance(result, Failure):
+            tried = unit.trial, unit.variants
+            failed[tried] += max(1, result.deaths) if alone else 1
+            if not (result.final or failed[tried] >= ATTEMPTS or _again(result, whole)):
+                if result.deaths:
+                    suspects.append(unit)
+                else:
+                    submit(unit)
+                continue
+            if whole is None and (divided := _divided(result)):
+                together[unit.trial], finished[unit.trial] = result, []
+                (suspects if alone or result.deaths else parts).extend(divided)
+                continue
+        if whole is None:
+            yield result
+            continue
+        finished[unit.trial].append(result)
+        if len(finished[unit.trial]) == len(whole.unit.variants):
+            yield _joined(whole, finished.pop(unit.trial))
+
+
+def _completed() -> Any:
+    from distributed import as_completed
+
+    return as_completed()
+
+
+def _result(future: Future[Any], unit: Unit) -> Success | Failure:
+    """What came back, or that the worker died of it.
+
+    Raises:
+        RunError: nothing will come back.
+    """
+    from distributed import KilledWorker
+
+    if future.status == "finished":
+        result: Success | Failure = future.result()
+        return result
+    if future.status != "error":
+        raise RunError(f"the Dask scheduler went away, or somebody else cancelled trial {unit.trial}")
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Failure(
+            unit, "the worker process died; it may have run out of memory", "", deaths=error.allowed_failures + 1
+        )
+    return Failure(unit, f"{type(error).__name__}: {error}", "")
+
+
+@contextlib.contextmanager
+def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
+    """A client of a cluster of this machine, or of the one at an address."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    if scheduler is not None:
+        with _connected(scheduler) as client:
+            yield client
+        return
+    # A worker that dies is told of at once, for _work_there decides what then. Nothing is logged: it is told of here.
+    quiet = {"distributed.scheduler.allowed-failures": 0, "logging": {"distributed": "critical"}}
+    with (
+        dask.config.set(quiet),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",  # any free port: the scheduler has one without a dashboard, too
+            silence_logs=logging.CRITICAL,
+            memory_limit=0,  # Dask would share the memory out evenly, and kill whoever takes more
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        client.register_plugin(_deaf_to_interrupts())
+        yield client
+
+
+@contextlib.contextmanager
+def _connected(scheduler: str) -> Iterator[Client]:
+    from distributed import Client
+
+    try:
+        client = Client(scheduler, timeout=_PATIENCE)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--scheduler {scheduler}: no Dask scheduler answers there: {error}") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_FIRST_WORKER)
+        except TimeoutError:
+            raise ValueError(f"--scheduler {scheduler}: it has no workers; start some by: dask worker") from None
+        for address, theirs in client.run(code, on_error="return").items():
+            if isinstance(theirs, Exception):
+                raise ValueError(f"--scheduler {scheduler}: worker {address} cannot import simharness: {theirs}")
+            if theirs != code():
+                raise ValueError(
+                    f"--scheduler {scheduler}: worker {address} runs another version of simharness or mvpose, and "
+                    "results would be kept under the wrong one: install this version there"
+                )
+        yield client
+
+
+def _deaf_to_interrupts() -> Any:
+    """Ctrl-C reaches all processes of a terminal; only this one is to act on it."""
+    from distributed import WorkerPlugin
+
+    class Deaf(WorkerPlugin):
+        def setup(self, worker: Any) -> None:
+            import signal
+
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Deaf()

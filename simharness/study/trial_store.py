@@ -1,0 +1,245 @@
+"""The store of finished trials: a file for each trial and variant, there whole or not at all.
+
+A store is a folder::
+
+    store.json              which format it is of
+    3f/3f09...b2.trial      an entry: a ZIP of trial.json, frames.parquet, people.parquet and failures.parquet
+    3f/3f09...b2.failed.json    the error of a trial that could not be measured; a later run tries it again
+
+Files get their names by renaming, and one name always stands for the same result, so any number of processes may use a
+store at once: the worst that happens is that two do the same work.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+import time
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.frame_pool import RunError
+from simharness.trial.trial_result import Measured
+
+FORMAT = 1
+_TABLES = ("frames", "people", "failures")
+_STALE = 24 * 3600.0  # seconds after which nobody is still writing a temporary file
+_ENTRY = re.compile(r"[0-9a-f]{16,}")
+
+
+class StoreError(RunError):
+    """A store that cannot be written to any more: no room, no permission. What is in it stays."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a store keeps of a trial and variant.
+
+    Attributes:
+        trial: :func:`simharness.trial.identity.trial_identity`.
+        variant: of the method.
+        measured: the result.
+        seconds: what it cost: the trial's time by the number of variants that were measured together.
+    """
+
+    trial: str
+    variant: str
+    measured: Measured
+    seconds: float
+
+
+class Store:
+    """A folder of finished trials.
+
+    Attributes:
+        folder: where it is.
+        damaged: the entries that were found damaged, which count as not being there. They stay until they are written
+            anew, for somebody may be doing so.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        """Open a store, or begin one in a folder that is empty or not there.
+
+        Raises:
+            ValueError: a folder that holds something else, a store of another format, no permission.
+        """
+        self.folder = Path(folder)
+        self.damaged: set[str] = set()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._check_format()
+            self._sweep()
+        except OSError as error:
+            raise ValueError(f"store {self.folder}: cannot be used: {error.strerror}: {error.filename}") from None
+
+    def holds(self, identity: str) -> bool:
+        """Whether there is an entry that was not found damaged so far; unlike :meth:`has`, without reading it."""
+        return identity not in self.damaged and self.file_of(identity).exists()
+
+    def has(self, identity: str) -> bool:
+        """Whether there is an entry, and all of it can be read."""
+        return self._sound(identity) is not None
+
+    def read(self, identity: str) -> Entry | None:
+        """An entry; None where there is none that can be read."""
+        content = self._sound(identity)
+        if content is None:
+            return None
+        try:
+            return _unpacked(content)
+        except Exception:
+            self.damaged.add(identity)
+            return None
+
+    def write(self, identity: str, entry: Entry) -> None:
+        """Keep an entry.
+
+        Raises:
+            StoreError: the disk is full, or cannot be written to for another reason. Nothing is left of the entry.
+        """
+        self._write(self.file_of(identity), _packed(identity, entry))
+        self.damaged.discard(identity)
+        with contextlib.suppress(OSError):
+            self._failure_path(identity).unlink()
+
+    def write_failure(self, identity: str, failure: dict[str, Any]) -> None:
+        """Note why there is no entry.
+
+        Raises:
+            StoreError: as :meth:`write`.
+        """
+        self._write(self._failure_path(identity), json.dumps(failure, indent=2).encode())
+
+    def failure(self, identity: str) -> dict[str, Any] | None:
+        """What was noted last; None where nothing was, or it cannot be read."""
+        try:
+            noted = json.loads(self._failure_path(identity).read_bytes())
+        except (OSError, ValueError):
+            return None
+        return noted if isinstance(noted, dict) else None
+
+    def copy_from(self, other: Store, identity: str) -> bool:
+        """Take an entry of another store; False where it is damaged there.
+
+        Raises:
+            StoreError: as :meth:`write`.
+        """
+        content = other._sound(identity)
+        if content is not None:
+            self._write(self.file_of(identity), content)
+        return content is not None
+
+    def __iter__(self) -> Iterator[str]:
+        """The identities of all entries, damaged ones too, in order."""
+        return iter(sorted(path.stem for path in self.folder.glob("??/*.trial") if not path.name.startswith(".")))
+
+    def file_of(self, identity: str) -> Path:
+        """Where an entry is, or would be."""
+        assert _ENTRY.fullmatch(identity), identity
+        return self.folder / identity[:2] / f"{identity}.trial"
+
+    def _failure_path(self, identity: str) -> Path:
+        return self.file_of(identity).with_suffix(".failed.json")
+
+    def _sound(self, identity: str) -> bytes | None:
+        """The bytes of an entry if every checksum in them is right and they say that they are this entry."""
+        try:
+            content = self.file_of(identity).read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError:
+            self.damaged.add(identity)
+            return None
+        try:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                parts = {name: archive.read(name) for name in ("trial.json", *(f"{name}.parquet" for name in _TABLES))}
+            if json.loads(parts["trial.json"])["entry"] != identity:
+                raise ValueError("this is another entry")
+        except Exception:  # of damaged bytes a parser may raise anything
+            self.damaged.add(identity)
+            return None
+        return content
+
+    def _write(self, path: Path, content: bytes) -> None:
+        try:
+            path.parent.mkdir(exist_ok=True)
+            write_whole(path, content)
+        except OSError as error:
+            raise StoreError(
+                f"store {self.folder}: cannot be written to: {error.strerror}. What is finished is kept: make room, "
+                "and the same command goes on"
+            ) from error
+
+    def _check_format(self) -> None:
+        file = self.folder / "store.json"
+        try:
+            said = json.loads(file.read_bytes())["format"]
+        except FileNotFoundError:
+            if strange := sorted(path.name for path in self.folder.iterdir() if not path.name.startswith(".")):
+                if file.exists():  # another process began the store just now
+                    return self._check_format()
+                raise ValueError(
+                    f"store {self.folder}: this folder is not empty and no store of trials (it has {strange[0]} and no "
+                    "store.json): name another folder"
+                ) from None
+            return write_whole(file, json.dumps({"what": "simharness trials", "format": FORMAT}).encode())
+        except (ValueError, KeyError, TypeError):
+            said = None
+        if said != FORMAT:
+            what = "its store.json cannot be read" if said is None else f"it is of format {said}"
+            raise ValueError(
+                f"store {self.folder}: {what}, and this version of simharness reads format {FORMAT}: name another "
+                "folder by --store, or delete this one to run everything again"
+            )
+        return None
+
+    def _sweep(self) -> None:
+        """Remove what killed processes left."""
+        now = time.time()
+        for path in (*self.folder.glob(".*.partial"), *self.folder.glob("??/.*.partial")):
+            with contextlib.suppress(OSError):
+                if now - path.stat().st_mtime > _STALE:
+                    path.unlink()
+
+
+def is_store(folder: Path) -> bool:
+    """Whether a folder is a store, of whatever format."""
+    return (folder / "store.json").is_file()
+
+
+def parquet(table: pl.DataFrame) -> bytes:
+    """A table as the bytes of a Parquet file."""
+    buffer = io.BytesIO()
+    table.write_parquet(buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def _packed(identity: str, entry: Entry) -> bytes:
+    said = {
+        "entry": identity,
+        "trial": entry.trial,
+        "variant": entry.variant,
+        "seconds": entry.seconds,
+        "scores": dict(entry.measured.scores),
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("trial.json", json.dumps(said, indent=1, allow_nan=False))
+        for name in _TABLES:
+            archive.writestr(f"{name}.parquet", parquet(getattr(entry.measured, name)))
+    return buffer.getvalue()
+
+
+def _unpacked(content: bytes) -> Entry:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        said = json.loads(archive.read("trial.json"))
+        tables = {name: pl.read_parquet(archive.read(f"{name}.parquet")) for name in _TABLES}
+    return Entry(said["trial"], said["variant"], Measured(scores=said["scores"], **tables), said["seconds"])

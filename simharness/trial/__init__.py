@@ -1,0 +1,1 @@
+"""One trial: a scenario at a seed built, captured, detected, estimated, audited and scored."""

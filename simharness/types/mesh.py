@@ -1,0 +1,94 @@
+"""The one thing that renderers draw: a triangle mesh in the world with a colour for each face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose.checks import as_array
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle mesh in the world.
+
+    Faces are opaque from both sides, so a board may be a single sheet and a room may be seen from within.
+
+    Attributes:
+        vertices: metres, (n, 3) float32.
+        faces: vertex indices, (k, 3) int32, counter-clockwise as seen from outside.
+        colors: sRGB albedo of each face, 0 to 1, (k, 3) float32.
+        smooth: shade with normals interpolated over the faces (skin) or with one normal a face (boxes).
+        texture: a picture that multiplies ``colors``, sRGB, (h, w, 3) uint8; None for plain faces.
+        uv: where the three corners of each face lie in the texture, (k, 3, 2) float32: u to the right and v down, the
+            whole texture from 0 to 1; beyond that it repeats. Given if and only if there is a texture.
+        parts: label of each face, -1 for none, (k,) int8; of a body the
+            :class:`simharness.world.humans.segments.Segment`. None where no face has one.
+
+    Raises:
+        ValueError: a wrong shape, a vertex or a place in the texture that is not finite, a face that names a vertex
+            that does not exist, a colour outside 0..1, a texture without pixels, ``texture`` without ``uv``.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    colors: NDArray[np.float32]
+    smooth: bool = False
+    texture: NDArray[np.uint8] | None = None
+    uv: NDArray[np.float32] | None = None
+    parts: NDArray[np.int8] | None = None
+
+    def __post_init__(self) -> None:
+        vertices = _checked_vertices(self.vertices, "n")
+        faces = as_array(self.faces, ("k", 3), "mesh faces", np.int32)
+        colors = as_array(self.colors, (len(faces), 3), "mesh colors", np.float32)
+        if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+            raise ValueError(
+                f"mesh faces must index the {len(vertices)} vertices from 0, got {faces.min()} to {faces.max()}"
+            )
+        if len(faces) and not (colors.min() >= 0 and colors.max() <= 1):  # NaN fails both
+            raise ValueError(f"mesh colors must lie in 0..1, got {colors.min():.3g} to {colors.max():.3g}")
+        for key, value in (("vertices", vertices), ("faces", faces), ("colors", colors)):
+            object.__setattr__(self, key, value)
+        if (self.texture is None) != (self.uv is None):
+            missing = "uv" if self.uv is None else "texture"
+            raise ValueError(f"a mesh has both a texture and the uv of its faces, or neither; the {missing} is missing")
+        if self.texture is not None and self.uv is not None:
+            texture = as_array(self.texture, ("h", "w", 3), "mesh texture", np.uint8)
+            uv = as_array(self.uv, (len(faces), 3, 2), "mesh uv", np.float32)
+            if not texture.size:
+                raise ValueError(f"mesh texture must have pixels, got {texture.shape}")
+            if not np.isfinite(uv).all():
+                bad = int(np.flatnonzero(~np.isfinite(uv).all(axis=(1, 2)))[0])
+                raise ValueError(f"mesh uv must be finite, got {uv[bad].tolist()} at face {bad}")
+            object.__setattr__(self, "texture", texture)
+            object.__setattr__(self, "uv", uv)
+        if self.parts is not None:
+            parts = as_array(self.parts, (len(faces),), "mesh parts", np.int8)
+            if len(parts) and parts.min() < -1:
+                raise ValueError(f"mesh parts must be labels from 0, or -1 for none, got {parts.min()}")
+            object.__setattr__(self, "parts", parts)
+
+    def moved(self, vertices: ArrayLike) -> Self:
+        """The same mesh with its vertices elsewhere, (n, 3).
+
+        All else is shared, so nothing of it is checked again and renderers keep what they know of it.
+
+        Raises:
+            ValueError: another number of vertices, or one that is not finite.
+        """
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        object.__setattr__(other, "vertices", _checked_vertices(vertices, len(self.vertices)))
+        return other
+
+
+def _checked_vertices(vertices: ArrayLike, count: int | str) -> NDArray[np.float32]:
+    result = as_array(vertices, (count, 3), "mesh vertices", np.float32)
+    if not np.isfinite(result).all():
+        bad = int(np.flatnonzero(~np.isfinite(result).all(axis=1))[0])
+        raise ValueError(f"mesh vertices must be finite, got {result[bad].tolist()} at vertex {bad}")
+    return result

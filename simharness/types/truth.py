@@ -1,0 +1,62 @@
+"""The truth about one frame: where everyone is, and whom and how wrongly each detection shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.checks import as_array
+
+
+class KeypointError(IntEnum):
+    """What is wrong with one detected keypoint (Ronchi & Perona, "Benchmarking and error diagnosis in multi-instance
+    pose estimation", ICCV 2017), by its distance from the true one in units of OKS sigma x sqrt(area).
+    """
+
+    GOOD = 0  # under 1.14
+    JITTER = 1  # 1.14 to 2.35
+    MISS = 2  # beyond, and every keypoint of a phantom
+    INVERSION = 3  # at the left-right counterpart of the same person
+    SWAP = 4  # at a joint of another person
+    ABSENT = 5  # not detected
+
+
+GOOD_BELOW, MISS_FROM = 1.14, 2.35
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the scorer knows of one frame and the method must not.
+
+    Attributes:
+        joints: COCO-17 in the world, (P, J, 3), metres.
+        pixels: their projections, (V, P, J, 2); NaN behind the camera.
+        visibility: :class:`simharness.types.visibility.Visibility`, (V, P, J).
+        boxes: x, y, width, height of each whole silhouette within the image, (V, P, 4); zeros where outside.
+        person: true person of each of the frame's detections, (m,), -1 for a phantom.
+        error: :class:`KeypointError` of each detected keypoint, (m, J).
+    """
+
+    joints: NDArray[np.float64]
+    pixels: NDArray[np.float64]
+    visibility: NDArray[np.int8]
+    boxes: NDArray[np.float64]
+    person: NDArray[np.int64]
+    error: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        joints = as_array(self.joints, ("P", "J", 3), "joints")
+        pixels = as_array(self.pixels, ("V", *joints.shape[:2], 2), "pixels")
+        person = as_array(self.person, ("m",), "person", np.int64)
+        for key, value in (
+            ("joints", joints),
+            ("pixels", pixels),
+            ("visibility", as_array(self.visibility, pixels.shape[:3], "visibility", np.int8)),
+            ("boxes", as_array(self.boxes, (*pixels.shape[:2], 4), "boxes")),
+            ("person", person),
+            ("error", as_array(self.error, (len(person), joints.shape[1]), "error", np.int8)),
+        ):
+            object.__setattr__(self, key, value)

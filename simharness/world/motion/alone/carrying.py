@@ -1,0 +1,125 @@
+"""Carrying a box: down to it, up with it, aside with it, and down again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Spot, Track
+from simharness.world.motion.performance import Performance, Prop
+from simharness.world.motion.poses.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import Foot, arm_angles, girdle, plant, pose_angles, reach_with
+from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
+from simharness.world.motion.poses.timing import glide, rounds
+from simharness.world.motion.trajectory import Trajectory
+
+_GRIP, _NEARER = (
+    0.75,
+    0.15,
+)  # of the hands on the box: height, as a share of its own; nearer than its middle, of its depth
+_STRETCH = 0.92  # of the arms' length: how far they stretch down to it
+_TOE_ROOM = 0.02  # metres between toes and box
+_CARRIED = (0.62, -0.58)  # ahead of and over the shoulders, as shares of the arm: the hands of one who carries
+
+
+def carry(
+    performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
+) -> Performance:
+    """Lift a box from the floor, step aside with it, put it down, straighten up; then carry it back."""
+    (kinematics,) = performers
+    assert isinstance(track, Spot)
+    sense, big, tall, far = rng.uniform(size=4)
+    stature = kinematics.body.stature
+    depth, width = 0.14 * stature, (0.19 + 0.05 * big) * stature
+    u, marks = rounds(time, 2 * (1.2, 1.3, 1.5, 1.3, 1.1), rng=rng, pace=pace)
+    way = (1.0 if sense < 0.5 else -1.0) * (0.11 + 0.05 * far) * stature
+
+    own = {side: stance(kinematics, side, apart=1.35, out=np.radians(18.0)).moved(0.05, -way / 2) for side in SIDES}
+    steps: dict[str, list[tuple[float, float, Print]]] = {side: [] for side in SIDES}
+    low_keys, up_keys, hold_keys, aside_keys = ([(0.0, start)] for start in (0.0, 0.0, 0.0, -way / 2))
+    aloft = np.zeros(len(time), bool)
+    for first, there in ((0, way / 2), (5, -way / 2)):
+        begun, down, lifted, carried, put, risen = marks[first : first + 6]
+        low_keys += [(begun, 0.0), (down, 1.0), (lifted, 0.0), (carried, 0.0), (put, 1.0), (risen, 0.0)]
+        up_keys += [(down, 0.0), (lifted, 1.0), (carried, 1.0), (put, 0.0)]
+        hold_keys += [(begun + 0.3 * (down - begun), 0.0), (down, 1.0), (put, 1.0), (risen - 0.2, 0.0)]
+        aside_keys += [(lifted, -there), (carried, there)]
+        aloft |= (u > down) & (u < put)
+        half = (carried - lifted) / 2
+        order = ("left", "right") if there > 0 else ("right", "left")
+        for side, starts in zip(order, (lifted + 0.05, lifted + half), strict=True):
+            steps[side].append((starts, starts + 0.9 * half, own[side].moved(0.0, there + way / 2)))
+    low, up, hold, aside = (glide(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
+    feet = {side: tread(kinematics, track, u, own[side], steps[side], lift=0.04) for side in SIDES}
+    motion = _bend(kinematics, track, time, own["left"], low, up, aside, feet, at_ease(time, rng))
+
+    once = np.zeros(1)
+    standing = {side: tread(kinematics, track, once, own[side]) for side in SIDES}
+    lowest = _bend(kinematics, track, once, own["left"], once + 1, once, once - way / 2, standing, {})
+    (shoulders,) = _in_spot(track, _shoulders(kinematics, lowest))
+    arm = kinematics.arms["left"]
+    length, apart = np.linalg.norm(arm.end - arm.anchors[0]), width / 2 - arm.anchors[0, 1]
+    toes = kinematics.soles["left"][:, 0].max() + own["left"].place[0]
+    held = np.array([toes + _TOE_ROOM + depth / 2 - _NEARER * depth, -way / 2])  # between the hands, on the floor
+    # Low enough to be gripped by this body, or as tall as drawn.
+    drop = np.sqrt(max((_STRETCH * length) ** 2 - (held[0] - shoulders[0]) ** 2 - apart**2, 0.0))
+    height = max((0.15 + 0.06 * tall) * stature, (shoulders[2] - drop) / _GRIP)
+    grip = np.array([-_NEARER * depth, 0.0, _GRIP * height])
+    # In the air the box hangs from the shoulders, as the arms do that hold it.
+    below = np.append(held, grip[2]) - shoulders
+    ahead = np.array([_CARRIED[0] * length, 0.0, _CARRIED[1] * length])
+    hung = _in_spot(track, _shoulders(kinematics, motion)) + below + up[:, None] * (ahead - below) - grip
+    on_floor = np.stack([np.full(len(time), held[0] - grip[0]), aside, np.zeros(len(time))], axis=-1)
+    box = np.where(aloft[:, None], hung, on_floor)
+    stretched = arm_angles(kinematics, shoulder_flexion=70.0, shoulder_abduction=5.0, elbow_flexion=25.0)
+    close = arm_angles(kinematics, shoulder_flexion=20.0, shoulder_abduction=8.0, elbow_flexion=75.0)
+    grasp = stretched + up[:, None] * (close - stretched)
+    for side, outward in zip(SIDES, (1.0, -1.0), strict=True):
+        place = in_world(track, box + grip + [0.0, outward * width / 2, 0.0])
+        motion = reach_with(kinematics, motion, side, place, weight=hold, guess=grasp)
+    turn = np.tile([np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)], (len(time), 1))
+    pose = np.concatenate([in_world(track, box), turn], axis=1)
+    return Performance((motion,), (Prop("box", (float(depth), float(width), float(height)), Trajectory(time, pose)),))
+
+
+def _bend(
+    kinematics: Kinematics,
+    spot: Spot,
+    time: Floats,
+    foot: Print,
+    low: Floats,
+    up: Floats,
+    aside: Floats,
+    feet: Mapping[str, Foot],
+    curves: Curves,
+) -> Motion:
+    """The body down at the box as far as ``low`` says and carrying it as far as ``up`` says; the arms come later."""
+    blend(curves, low, lumbar_flexion=42.0, thorax_flexion=28.0, neck_flexion=-12.0, thorax_rotation=0.0)
+    blend(curves, up, lumbar_flexion=-3.0, thorax_rotation=0.0)
+    blend(curves, low, **limbs(shoulder_flexion=75.0, shoulder_abduction=8.0, elbow_flexion=15.0))
+    hip = hip_over(
+        kinematics, shank=np.radians(5.0 + 14.0 * low + 11.0 * up), thigh=np.radians(7.0 + 88.0 * low + 15.0 * up)
+    )
+    hip[:, 0] += foot.place[0]
+    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=np.radians(1.0 + 20.0 * low - 4.0 * up), aside=aside)
+    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+
+def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:
+    """The middle between the shoulders in the world, (T, 3) metres."""
+    ends = []
+    for side in SIDES:
+        turn, place = girdle(kinematics, motion, side)
+        ends.append(turn @ kinematics.arms[side].anchors[0] + place)
+    return (ends[0] + ends[1]) / 2
+
+
+def _in_spot(spot: Spot, place: Floats) -> Floats:
+    """Points (T, 3) of the world in the spot's frame."""
+    back = Spot(np.zeros(2), -spot.bearing)
+    return in_world(back, place - [*spot.place, 0.0])

@@ -1,0 +1,143 @@
+"""What people do while they stand: shift their weight, wave, point, talk with their hands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses.footing import in_world, stance, tread
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, some_side
+from simharness.world.motion.poses.timing import strokes, wander
+
+_STRAIGHTEST = np.radians(8.0)  # knees at ease
+_FURTHEST = 0.034  # metres: the pelvis keeps within this of the spot's middle, ahead and aside
+_SHIFT = 0.018  # metres: the weight goes from foot to foot
+
+
+def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator) -> Motion:
+    """Stand on the spot and do one of ``GESTURES``, over and over, with natural pauses.
+
+    Args:
+        activity: a key of ``GESTURES``.
+        kinematics: the body.
+        spot: where and facing where.
+        time: seconds, (T,).
+        rng: draws which arm, the rhythm, and the manner.
+    """
+    curves = at_ease(time, rng)
+    curves |= {"forward": 0.006 * wander(time, rng, 0.2), "aside": _SHIFT * wander(time, rng, 0.12)}
+    GESTURES[activity](curves, time, rng)
+
+    forward, aside = curves.pop("forward"), curves.pop("aside")
+    pelvis = _shifted(
+        spot, forward, aside, turned=0.3 * curves["thorax_rotation"], lean=0.15 * curves["lumbar_flexion"]
+    )
+    curves["lumbar_bending"] = np.degrees(pelvis.list)
+    feet = {side: tread(kinematics, spot, time, stance(kinematics, side)) for side in SIDES}
+    # The height must hold for all that the pelvis ever does, not only for what it does in these seconds.
+    ends = np.array([[ahead, left] for ahead in (-_FURTHEST, _FURTHEST) for left in (-_FURTHEST, _FURTHEST)])
+    corners = _shifted(spot, *ends.T, turned=np.zeros(4), lean=np.zeros(4))
+    planted = {side: tread(kinematics, spot, np.zeros(4), stance(kinematics, side)) for side in SIDES}
+    return stand_on(
+        kinematics,
+        time,
+        pelvis,
+        feet,
+        pose_angles(len(time), **curves),
+        straightest=_STRAIGHTEST,
+        fit=(corners, planted),
+    )
+
+
+def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean: Floats) -> Pelvis:
+    """The pelvis of a person who stands, forward and aside of the spot by metres (T,), turned and leaning (degrees)."""
+    return Pelvis(
+        ground=in_world(spot, np.stack([forward, aside], axis=-1)),
+        bob=np.zeros(len(forward)),
+        bearing=spot.bearing + np.radians(turned),
+        lean=np.radians(lean),
+        list=1.2 * aside,  # radians a metre: the hip over the standing foot is the higher one
+    )
+
+
+def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+    """Nothing but shifting weight and looking around a little more."""
+    curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * wander(time, rng, 0.12)
+
+
+def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+    """The hand goes up beside the head, palm forward, and waves from the elbow."""
+    side, _ = some_side(rng)
+    on = strokes(time, rng, hold=2.4, rest=0.5)
+    beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
+    arm = limb(
+        side,
+        shoulder_abduction=rng.uniform(55, 80),
+        shoulder_flexion=rng.uniform(15, 35),
+        shoulder_rotation=-75.0 + 6.0 * beat,
+        elbow_flexion=rng.uniform(85, 105) + rng.uniform(18, 26) * beat,
+        forearm_pronation=-5.0,
+        wrist_flexion=-6.0 + 10.0 * beat,
+        clavicle_elevation=10.0,
+    )
+    blend(curves, on, **arm, neck_flexion=-2.0)
+
+
+def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+    """A straight arm points at something that the eyes follow too."""
+    side, sign = some_side(rng)
+    on = strokes(time, rng, hold=2.0, rest=0.6)
+    away = rng.uniform(-10, 45) + 10.0 * wander(time, rng, 0.3)  # to the arm's side
+    blend(
+        curves,
+        on,
+        **limb(
+            side,
+            shoulder_flexion=rng.uniform(72, 100) + 4.0 * wander(time, rng, 0.3),
+            shoulder_abduction=away,
+            shoulder_rotation=0.0,
+            elbow_flexion=6.0,
+            forearm_pronation=55.0,
+            wrist_flexion=0.0,
+            clavicle_elevation=6.0,
+        ),
+        thorax_rotation=sign * (0.25 * away - 6.0),
+        neck_rotation=sign * 0.6 * away,
+        neck_flexion=0.0,
+    )
+
+
+def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
+    """Both hands in front of the belly, beating along with what is said; the head nods."""
+    for side in SIDES:
+        on = strokes(time, rng, hold=3.0, rest=0.5)
+        blend(
+            curves,
+            on,
+            **limb(
+                side,
+                shoulder_flexion=20.0 + 9.0 * wander(time, rng, 0.5),
+                shoulder_abduction=13.0 + 5.0 * wander(time, rng, 0.4),
+                shoulder_rotation=16.0 + 14.0 * wander(time, rng, 0.6),
+                elbow_flexion=82.0 + 18.0 * wander(time, rng, 0.7),
+                forearm_pronation=-10.0 + 30.0 * wander(time, rng, 0.5),
+                wrist_flexion=12.0 * wander(time, rng, 0.8),
+            ),
+        )
+    curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * wander(time, rng, 0.8)
+
+
+GESTURES: dict[str, Callable[[Curves, Floats, np.random.Generator], None]] = {
+    "stand": _stand,
+    "wave": _wave,
+    "point": _point,
+    "talk": _talk,
+}
+"""What can be done on a spot; each changes the curves of a person who stands at ease."""

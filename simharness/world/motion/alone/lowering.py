@@ -1,0 +1,157 @@
+"""Going down and up again on one's feet: squat, crouch, kneel on one knee."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses.footing import PEELING, carry_pelvis, hip_over, stance, tread
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import plant, pose_angles
+from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, limbs
+from simharness.world.motion.poses.timing import glide, rounds, wander
+
+_ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()  # pitch of the foot behind a kneeling leg, and at most
+_ANKLE = float(np.radians(20.0))  # its dorsiflexion, where a greater one would be needed
+_OTHER = {"left": "right", "right": "left"}
+
+
+def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
+    """Bend the knees until the thighs are nearly level, heels down, arms forward for balance, and come up again."""
+    deep, wide, arms, head = rng.uniform(size=4)
+    u, marks = rounds(time, (1.2, 0.5, 1.2, 0.7), rng=rng, pace=pace)
+    low = glide(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
+    curves = at_ease(time, rng)
+    blend(
+        curves,
+        low,
+        **limbs(shoulder_flexion=85 + 40 * arms, shoulder_abduction=4.0, elbow_flexion=8.0 + 30 * (1 - arms)),
+        lumbar_flexion=14.0,
+        thorax_flexion=10.0,
+        neck_flexion=-8.0 - 10 * head,
+    )
+    lean = np.radians(2.0 + 26.0 * low)
+    hip = hip_over(kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + (55.0 + 23.0 * deep) * low))
+    own = {side: stance(kinematics, side, apart=1.05 + 0.3 * wide, out=np.radians(10 + 8 * wide)) for side in SIDES}
+    hip[:, 0] += own["left"].place[0] + 0.1  # the spot is in the middle of where the pelvis goes
+    own = {side: foot.moved(0.1) for side, foot in own.items()}
+    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean, aside=0.004 * wander(time, rng, 0.2))
+    feet = {side: tread(kinematics, spot, time, own[side]) for side in SIDES}
+    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+
+def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
+    """Step forward, go down on the other knee, stay, come up and step back."""
+    handed, bow, look = rng.uniform(size=3)
+    back = "right" if handed < 0.6 else "left"
+    front = _OTHER[back]
+    u, marks = rounds(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
+    stepped, down, stayed, up, home, _ = marks[1:]
+
+    def through(standing: float, lunging: float, kneeling: float) -> Floats:
+        keys = ((0.0, standing), (stepped, lunging), (down, kneeling), (stayed, kneeling), (up, lunging))
+        return glide(u, *keys, (home, standing))
+
+    shank, thigh, on_toes = _kneeling(kinematics)
+    pitch = np.radians(through(0.0, -38.0, np.degrees(on_toes)))
+    hip = hip_over(
+        kinematics,
+        shank=np.radians(through(3.0, 52.0, np.degrees(shank))),
+        thigh=np.radians(through(5.0, -30.0, np.degrees(thigh))),
+        pitch=pitch,
+    )
+    knelt = hip_over(kinematics, shank=shank, thigh=thigh, pitch=on_toes)
+    half = knelt[0] / 2  # the spot is in the middle of where the pelvis goes
+    behind, before = (stance(kinematics, side).moved(-half) for side in (back, front))
+    there = before.moved(_before(kinematics, knelt))
+    hip[:, 0] += behind.place[0]
+    aside = 0.35 * behind.place[1] * through(0.0, 1.0, 0.3)
+    lean = np.radians(through(1.0, 8.0, 3.0 + 4.0 * bow))
+    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean, aside=aside)
+    feet = {
+        back: tread(kinematics, spot, time, behind, pitch=pitch),
+        front: tread(
+            kinematics,
+            spot,
+            u,
+            before,
+            [(PEELING, stepped, there), (up + 0.1, home, before)],
+            lift=0.09,
+        ),
+    }
+    curves = at_ease(time, rng)
+    low = through(0.0, 0.15, 1.0)
+    _rest_on_knee(curves, low, front)
+    blend(curves, low, lumbar_flexion=8.0 + 10 * bow, thorax_flexion=5.0 + 8 * bow, neck_flexion=10.0 * look)
+    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+
+def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
+    """Stay low, one foot ahead and the heel of the other up, and shift and look about."""
+    handed, deep = rng.uniform(size=2)
+    back = "right" if handed < 0.6 else "left"
+    front = _OTHER[back]
+    rate = 0.3 * pace
+    fidget = wander(time, rng, rate)
+    pitch, shank = np.radians(-42.0), np.radians(58.0)
+    thigh = np.radians(52.0 + 14.0 * deep)
+    middle = hip_over(kinematics, shank=shank, thigh=thigh, pitch=pitch)
+    hip = hip_over(kinematics, shank=shank - 0.06 * fidget, thigh=thigh + np.radians(12.0) * fidget, pitch=pitch)
+    behind = stance(kinematics, back).moved(-middle[0])
+    before = stance(kinematics, front).moved(_before(kinematics, middle, shank=np.radians(12.0)) - middle[0])
+    hip[:, 0] += behind.place[0]
+    lean = np.radians(16.0 + 8.0 * wander(time, rng, rate))
+    aside = 0.035 * wander(time, rng, rate)
+    pelvis, height = carry_pelvis(
+        kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * wander(time, rng, rate)
+    )
+    feet = {
+        back: tread(kinematics, spot, time, behind, pitch=pitch),
+        front: tread(kinematics, spot, time, before),
+    }
+    curves = at_ease(time, rng)
+    on = np.ones(len(time))
+    _rest_on_knee(curves, on, front)
+    blend(
+        curves,
+        on,
+        lumbar_flexion=14.0 + 10.0 * wander(time, rng, rate),
+        thorax_flexion=10.0,
+        thorax_rotation=22.0 * wander(time, rng, rate),
+        neck_flexion=-14.0 + 8.0 * wander(time, rng, rate),
+        neck_rotation=35.0 * wander(time, rng, rate),
+    )
+    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+
+def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:
+    """The forearm of the front leg's side rests on the thigh; the other arm hangs ahead of the hip."""
+    blend(
+        curves,
+        on,
+        **limb(front, shoulder_flexion=32.0, shoulder_abduction=10.0, shoulder_rotation=20.0, elbow_flexion=72.0),
+        **limb(_OTHER[front], shoulder_flexion=14.0, shoulder_abduction=14.0, elbow_flexion=30.0),
+    )
+
+
+def _kneeling(kinematics: Kinematics) -> tuple[float, float, float]:
+    """Of a leg whose knee is on the floor: shank and thigh, radians from upright, and the pitch of the foot.
+
+    The foot stands on its toes. A long one stands higher and so tilts the shank more than an ankle allows: it tips over
+    its toes a little.
+    """
+    _, lower = kinematics.leg_parts
+    _, ankle = kinematics.rolling.at(np.array([_ON_TOES]))
+    shank = float(np.pi / 2 + np.arcsin((ankle[0] - kinematics.kneecap) / lower))
+    return shank, float(np.radians(6.0)), max(_TIPPED, min(_ON_TOES, _ANKLE - shank))
+
+
+def _before(kinematics: Kinematics, hip: Floats, *, shank: float = 0.3) -> float:
+    """How far ahead of the back foot the front one stands, metres, under a hip (2,), its shank so far from upright."""
+    upper, lower = kinematics.leg_parts
+    _, ankle = kinematics.rolling.at(np.asarray(0.0))
+    rise = hip[1] - (float(ankle) + lower * np.cos(shank))
+    return float(hip[0] + np.sqrt(upper**2 - rise**2) - lower * np.sin(shank))

@@ -1,0 +1,157 @@
+"""Lying down on one's back and getting up again: squat, sit on the floor, roll back, stretch the legs."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.poses.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import arm_angles, plant, pose_angles, reach_with
+from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
+from simharness.world.motion.poses.timing import ease, glide, rounds, wander
+
+_SITTING = 0.68  # of the leg's length: from ankles to hips of one who sits on the floor, knees up
+_BACK = 0.05  # and how much further when lying
+_STRETCHED = 0.965  # of the leg's length
+_HEELS = np.radians(10.0)  # pitch of the feet: while one sits on the floor the heels carry
+_TOES_UP = np.radians(58.0)  # while one lies
+_LYING: tuple[str, ...] = (
+    "Hips",
+    "LHipJoint",
+    "RHipJoint",
+    "LowerBack",
+    "Spine",
+    "Spine1",
+    "Neck",
+    "Neck1",
+    "Head",
+    "LeftShoulder",
+)
+_LYING += ("RightShoulder", "LeftUpLeg", "RightUpLeg")
+_SAMPLES, _SPARE = 14, 0.002  # metres: the trunk lies that much higher, for it moves a little as the legs do
+# Of the stature: how far the hands are from the middle, and the palms over the floor, on their thumbs, on their edges.
+_HANDS, _THUMB, _EDGE = 0.2, 0.042, 0.05
+# A hand on the floor, its fingers ahead: the columns are where its x (the thumb), y and z (the wrist) point.
+_FLAT = {
+    "left": np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+}
+_OUT = np.radians(2.0)  # of the toes: an ankle does not let a leg that lies back turn them out
+_ROLL = (0.0, 0.5, 1.0)  # sitting, half-way, lying
+_TRUNK = {  # degrees at these
+    "lean": (-36.0, -55.0, -90.0),  # of the pelvis
+    "lumbar_flexion": (34.0, 34.0, 0.0),
+    "thorax_flexion": (22.0, 24.0, 2.0),
+    "neck_flexion": (4.0, 22.0, 4.0),
+}
+
+
+def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
+    """Go down to the floor, lie on the back for a while, and get up the same way."""
+    open_, wide = rng.uniform(size=2)
+    lasting = (1.1, 1.1, 1.2, 1.1, 1.6, 1.0, 1.2, 1.1, 1.1, 0.5)
+    u, marks = rounds(time, lasting, rng=rng, pace=pace)
+    squatted, sat, lain, stretched, stirred, bent, curled, raised, stood, _ = marks[1:]
+
+    def through(*values: float) -> Floats:
+        """Values when standing, squatting, sitting, lying, and on the way back."""
+        down = zip((0.0, squatted, sat, lain), values, strict=True)
+        return glide(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
+
+    low, down, roll = through(0.0, 1.0, 1.0, 1.0), through(0.0, 0.0, 1.0, 1.0), through(0.0, 0.0, 0.0, 1.0)
+    length = kinematics.leg_length
+    half = 0.5 * (_SITTING + _BACK) * length  # the spot is in the middle of where the pelvis goes
+    own = {side: stance(kinematics, side, apart=0.95 + 0.2 * wide, out=_OUT).moved(half) for side in SIDES}
+    ankle = own["left"].place[0]
+    lying = ankle - (_SITTING + _BACK) * length
+    feet = {}
+    for side, late in zip(SIDES, (0.0, 0.3), strict=True):
+        ahead = float(lying + _STRETCHED * length - kinematics.rolling.at(np.asarray(_TOES_UP))[0])
+        far = Print((ahead, own[side].place[1] * (0.9 + 0.5 * open_)), own[side].bearing, pitch=_TOES_UP)
+        out = (lain + late * (stretched - lain), stretched - (0.3 - late) * (stretched - lain))
+        home = (stirred + late * (bent - stirred), bent - (0.3 - late) * (bent - stirred))
+        bent_knee = 1.0 - glide(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
+        steps = [(*out, far), (*home, own[side])]
+        feet[side] = tread(kinematics, spot, u, own[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0)
+
+    trunk = _trunk(roll)
+    squatting = hip_over(kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + 73.0 * low))
+    floor = np.stack([-(_SITTING + _BACK * roll) * length, _hip_height(kinematics, roll)], axis=-1)
+    hip = squatting + down[:, None] * (floor - squatting)
+    hip[:, 0] += ankle
+    upright = 2.0 + 20.0 * low
+    lean = np.radians(upright + down * (trunk.pop("lean") - upright))
+    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean)
+
+    curves = at_ease(time, rng)
+    blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
+    blend(curves, low * (1 - down), **limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
+    blend(curves, down, **trunk, neck_rotation=14.0 * roll * wander(time, rng, 0.12))
+    motion = plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+
+    # The hands support the body behind the hips, and lie beside them in the end.
+    seat = ankle - _SITTING * length
+    arm = kinematics.arms["left"]
+    reach = 0.955 * float(np.linalg.norm(arm.end - arm.anchors[0]))
+    behind, beside = seat - 0.3 * length, lying - arm.anchors[0, 2] + reach  # all but straight, or the elbows dip
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        ahead, left = behind + roll * (beside - behind), np.full(len(time), sign * _HANDS * kinematics.body.stature)
+        over = (_THUMB + roll * (_EDGE - _THUMB) + 0.25 * (1 - down)) * kinematics.body.stature
+        place = np.stack([ahead, left, over], axis=-1)
+        fingers = spot.bearing + sign * np.radians(130.0 - 120.0 * roll)  # outwards and back, then along the body
+        edge = sign * np.radians(75.0) * roll  # from the palm onto the edge of the hand, the thumb up
+        turn = _about_z(fingers) @ _FLAT[side] @ _about_z(edge)
+        back = arm_angles(
+            kinematics, shoulder_flexion=-30.0, shoulder_rotation=-30.0, elbow_flexion=60.0, wrist_flexion=-50.0
+        )
+        flat = arm_angles(
+            kinematics, shoulder_flexion=2.0, shoulder_abduction=24.0, shoulder_rotation=35.0, elbow_flexion=14.0
+        )
+        guess = back + roll[:, None] * (flat - back)
+        motion = reach_with(
+            kinematics,
+            motion,
+            side,
+            in_world(spot, place),
+            turn=turn,
+            weight=ease(down / 0.7),
+            guess=guess,
+            turn_weight=0.012,
+        )
+    return motion
+
+
+def _about_z(angle: Floats) -> Floats:
+    """Rotations (T, 3, 3) by angles (T,)."""
+    return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+
+
+def _trunk(roll: Floats) -> Curves:
+    """How the trunk is held, in degrees, at shares (T,) of the way from sitting to lying."""
+    return {name: PchipInterpolator(_ROLL, values)(roll) for name, values in _TRUNK.items()}
+
+
+def _hip_height(kinematics: Kinematics, roll: Floats) -> Floats:
+    """Height of the hips, (T,) metres, at which the skin of the trunk just touches the floor, at shares (T,)."""
+    share = np.linspace(0.0, 1.0, _SAMPLES)
+    trunk = _trunk(share)
+    lean = np.radians(trunk.pop("lean"))
+    body, spot, length = kinematics.body, Spot(np.zeros(2), 0.0), kinematics.leg_length
+    most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
+    lying = np.isin(most, [body.index(name) for name in _LYING])
+    own = {side: stance(kinematics, side, out=_OUT) for side in SIDES}
+    feet = {side: tread(kinematics, spot, share, own[side], pitch=_HEELS) for side in SIDES}
+    height = np.full(_SAMPLES, 0.1)
+    for _ in range(2):
+        hip = np.stack([own["left"].place[0] - (_SITTING + _BACK * share) * length, height], axis=-1)
+        pelvis, up = carry_pelvis(kinematics, spot, hip, lean=lean)
+        motion = plant(kinematics, share, pelvis, up, feet, pose_angles(_SAMPLES, **trunk))
+        lowest = [body.skin(pose)[lying, 2].min() for pose in kinematics.transforms(motion)]
+        height = height + _SPARE - np.array(lowest, float)
+    return PchipInterpolator(share, height)(roll)

@@ -1,0 +1,180 @@
+"""Running along a loop: as walking, but with a stride in which both feet leave the floor.
+
+The sagittal angles of hip, knee and ankle pass through the landmarks of a runner at about 3 m/s as T. F. Novacheck
+gives them ("The biomechanics of running", Gait and Posture 7, 1998: foot off at 39 % of the stride; the knee flexes to
+about 40 degrees in stance and 90 in swing, the hip from 45 to -7, the ankle from 20 to -20); between the landmarks they
+are smooth curves of ours. Slower runners take the same shapes smaller.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.alone.gait import Gait, Knots, flattened, periodic, pinned
+from simharness.world.motion.alone.walking import footsteps, laps
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import Foot, Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.timing import ease
+
+FOOT_OFF = 0.39  # share of the stride when the toes leave the floor; 0 is when the foot strikes it
+# Degrees at shares of the stride.
+_HIP: Knots = ((0.0, 30), (0.1, 26), (0.2, 14), (0.3, 2), (0.4, -7), (0.46, -5), (0.55, 9), (0.65, 29), (0.75, 42))
+_HIP += ((0.84, 45), (0.93, 38))
+_KNEE: Knots = ((0.0, 15), (0.08, 30), (0.16, 40), (0.24, 36), (0.32, 25), (0.39, 19), (0.46, 34), (0.55, 68))
+_KNEE += ((0.64, 89), (0.72, 85), (0.82, 56), (0.9, 26), (0.96, 13))
+_ANKLE: Knots = ((0.0, -3), (0.06, 2), (0.13, 9), (0.19, 10), (0.26, 4), (0.33, -6), (0.39, -16), (0.45, -20))
+_ANKLE += ((0.55, -8), (0.7, 0), (0.85, 3))
+_CADENCE = 1.2  # strides a second at pace 1 of legs 0.85 m long; quicker ones of shorter legs, as pendulums swing
+_LEG = 0.85
+_VIGOUR = (0.15, 1.5)  # amplitudes, as a share of the curves, between which a stride is sought
+_FLAT, _HEEL_RISE = 0.06, 0.17  # shares of the stride when the foot has come down, when its heel has left the floor
+_EARLY = 0.07  # of the stride: feet land this much nearer, or the leg would have to be longer as they strike
+_CLEARANCE = 0.12  # between the swinging foot and the floor, of the leg's length
+_MIDSTANCE = 0.19  # when the pelvis is lowest
+_GRAVITY, _FLATTENED = 9.81, 0.6
+_STRAIGHTEST = np.radians(8.0)
+_WIDTH = 0.25  # of the prints, as a share of that of the feet in the neutral stance
+_SAMPLES = 240
+
+
+def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
+    """Run round the loop at its speed.
+
+    Args:
+        kinematics: the body.
+        loop: the way and the speed.
+        time: seconds, (T,).
+        pace: cadence over the usual.
+        rng: draws the phase and the manner.
+    """
+    stride = make_stride(kinematics, speed=loop.speed, pace=pace)
+    offset, swing, upright, droop = rng.uniform(size=4)
+    vigour = min(stride.vigour, 1.1)
+
+    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+        cycle = 2 * np.pi * phase
+        heading = loop.heading(time)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+        aside = 0.012 * np.sin(cycle + 0.1 * np.pi)
+        pelvis = Pelvis(
+            ground=loop.position(time) + aside[:, None] * left,
+            bob=-stride.bob * np.cos(2 * (cycle - 2 * np.pi * _MIDSTANCE)),
+            bearing=heading - np.radians(6.0) * vigour * np.cos(cycle),
+            lean=np.full(len(time), np.radians(4.0 + 3.0 * upright)),
+            list=np.radians(3.5) * vigour * np.sin(cycle + 0.1 * np.pi),
+        )
+        width = _WIDTH * kinematics.legs["left"].end[1]
+        feet = {
+            side: footsteps(loop, stride, side, phase - late, time, width=width, toe_out=np.radians(5.0))
+            for side, late in zip(SIDES, (0.0, 0.5), strict=True)
+        }
+        return pelvis, feet
+
+    phase = offset + stride.frequency * time  # of the left foot
+    pelvis, feet = stances(time, phase)
+    cycle = 2 * np.pi * phase
+    forward = {"left": -np.cos(cycle - 0.1 * np.pi), "right": np.cos(cycle - 0.1 * np.pi)}  # with the other leg
+    arms = (0.75 + 0.5 * swing) * (0.5 + 0.5 * vigour)
+    turned = np.degrees(pelvis.bearing - loop.heading(time))
+    bank = np.degrees(_bank(loop, time))
+    angles = pose_angles(
+        len(time),
+        lumbar_flexion=3.0,
+        thorax_flexion=3.0,
+        neck_flexion=-6.0 + 4.0 * droop,
+        lumbar_rotation=-0.6 * turned,
+        thorax_rotation=-1.4 * turned,
+        neck_rotation=1.0 * turned + np.degrees(np.clip(0.5 * loop.curvature(time), -0.5, 0.5)),
+        lumbar_bending=np.degrees(pelvis.list) * 0.5 + 0.4 * bank,
+        thorax_bending=np.degrees(pelvis.list) * 0.3 + 0.3 * bank,
+        **{f"{side}_shoulder_flexion": -8.0 + 32.0 * arms * forward[side] for side in SIDES},
+        **{f"{side}_shoulder_abduction": 12.0 + 6.0 * droop for side in SIDES},
+        **{f"{side}_shoulder_rotation": 22.0 + 8.0 * forward[side] for side in SIDES},
+        **{f"{side}_elbow_flexion": 88.0 + 12.0 * arms * forward[side] for side in SIDES},
+        **{f"{side}_forearm_pronation": 5.0 for side in SIDES},
+        **{f"{side}_clavicle_elevation": 3.0 for side in SIDES},
+    )
+    lap, strides = laps(loop, stride)
+    return stand_on(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+
+
+def _bank(loop: Loop, time: Floats) -> Floats:
+    """How far a runner leans into the bend, to the left, (T,) radians."""
+    return np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.3, 0.3)
+
+
+def normative(phase: ArrayLike) -> Floats:
+    """Flexion of hip and knee and dorsiflexion of the ankle, (..., 3) radians, at shares (...) of the stride."""
+    phase = np.mod(phase, 1.0)
+    return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
+
+
+def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
+    """How a body runs at a speed: the cadence of its legs, and the curves as large as the stride needs.
+
+    Args:
+        kinematics: the body.
+        speed: metres a second.
+        pace: cadence over the usual.
+
+    Raises:
+        ValueError: a speed at which this body does not run.
+    """
+    frequency = _CADENCE * pace * float(np.sqrt(_LEG / kinematics.leg_length))
+    stride = speed / frequency
+    least, most = (_swept(kinematics, vigour) for vigour in _VIGOUR)
+    if not least < FOOT_OFF * stride < most:
+        low, high = (swept / FOOT_OFF * frequency for swept in (least, most))
+        raise ValueError(
+            f"a person {kinematics.body.stature:.2f} m tall runs at {low:.2f} to {high:.2f} m/s, not at {speed:g} m/s"
+        )
+    vigour = float(brentq(lambda v: _swept(kinematics, v) - FOOT_OFF * stride, *_VIGOUR, xtol=1e-5))
+    phase, pitch, print_x = _play(kinematics, vigour)
+    stance, swing = phase <= FOOT_OFF, phase >= FOOT_OFF
+    lead = float(np.mean(print_x[stance] + stride * phase[stance])) - _EARLY * stride
+    progress = np.zeros(len(phase))
+    ahead = (print_x + stride * phase - lead) / stride
+    progress[swing] = pinned(phase[swing], ahead[swing], 0.0, 1.0)
+    # A wave of two periods a stride of which the top is the flight: it would fall freely there at an acceleration of g,
+    # but the flight is short, and what the wave lacks around it flattens it.
+    bob = _FLATTENED * _GRAVITY / (4 * np.pi * frequency) ** 2
+    along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
+    return Gait(
+        stride=stride,
+        frequency=frequency,
+        vigour=vigour,
+        bob=bob,
+        lead=lead,
+        phase=phase,
+        pitch=pitch,
+        lift=_CLEARANCE * vigour * kinematics.leg_length * ease(along / 0.38) * ease((1 - along) / 0.36),
+        progress=progress,
+        foot_off=FOOT_OFF,
+        rolling=kinematics.rolling,
+    )
+
+
+def _swept(kinematics: Kinematics, vigour: float) -> float:
+    """How far the pelvis passes over a planted foot, metres."""
+    phase, _, print_x = _play(kinematics, vigour)
+    return float(print_x[0] - np.interp(FOOT_OFF, phase, print_x))
+
+
+def _play(kinematics: Kinematics, vigour: float) -> tuple[Floats, Floats, Floats]:
+    """The curves on a body: phase (n,), the foot's pitch (n,), and its print (n,) before the pelvis."""
+    phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    hip, knee, ankle = (vigour * normative(phase)).T
+    order = kinematics.leg_order
+    angles = np.zeros((len(phase), len(order)))
+    for name, curve in (("hip_flexion", hip), ("knee_flexion", knee), ("ankle_dorsiflexion", ankle)):
+        angles[:, order.index(name)] = curve
+    _, place = kinematics.legs["left"].forward(angles)
+    pitch = hip - knee + ankle
+    pitch = np.where(phase < FOOT_OFF, flattened(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
+    return phase, pitch, place[:, 0] - kinematics.rolling.at(pitch)[0]

@@ -1,0 +1,135 @@
+"""Walking along a loop: footprints beside the way, a pelvis that follows it, arms and trunk that counter the legs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.alone.gait import Gait, make_gait
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import Foot, Pelvis, pose_angles, stand_on
+
+_GRAVITY = 9.81
+_STRAIGHTEST = np.radians(4.0)
+_TOE_OUT = np.radians(7.0)
+_STEP_WIDTH = 0.55  # between the feet, as a share of their distance in the neutral stance
+_EVERY, _SHIFTS = 0.03, 9  # seconds, and different phases of the stride, at which the whole way is looked at
+# Amplitudes at full vigour: pelvis after Perry and Burnfield, "Gait Analysis", 2010; arms (degrees) after Murray, Sepic
+# and Barnard, Phys. Ther. 47, 1967.
+_PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
+_ARM_SWING = 19.0
+_ELBOW_SWING = 13.0
+
+
+def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
+    """Walk round the loop at its speed.
+
+    Feet are planted: a footprint lies where the pelvis passes over it, and the foot rolls over it without slipping
+    from heel strike to toe off, so that neither a bend nor the sway of the pelvis drags a foot.
+
+    Args:
+        kinematics: the body.
+        loop: the way and the speed.
+        time: seconds, (T,).
+        pace: as in ``make_gait``.
+        rng: draws the phase and the manner: how far the arms swing, how the trunk leans.
+    """
+    gait = make_gait(kinematics, speed=loop.speed, pace=pace)
+    offset, swing, manner, droop = rng.uniform(size=4)
+    arms = (0.7 + 0.6 * swing) * gait.vigour
+    lean_degrees = 1.0 + 4.0 * manner
+    phase = offset + gait.frequency * time  # of the left foot; the right is half a stride later
+
+    width = _STEP_WIDTH * kinematics.legs["left"].end[1]
+
+    def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+        heading, cycle = loop.heading(time), 2 * np.pi * phase
+        aside = _PELVIS_SWAY * np.sin(cycle - 0.05 * np.pi)  # over the standing foot
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+        pelvis = Pelvis(
+            ground=loop.position(time) + aside[:, None] * left,
+            bob=-gait.bob * np.cos(2 * cycle),  # lowest when a heel strikes
+            bearing=heading - _PELVIS_TURN * gait.vigour * np.cos(cycle),  # the side that steps goes forward
+            lean=np.full(len(time), np.radians(1.0)),
+            list=_PELVIS_LIST * gait.vigour * np.cos(cycle - 0.30 * np.pi),  # the swinging side drops
+        )
+        feet = {
+            side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=_TOE_OUT)
+            for side, late in zip(SIDES, (0.0, 0.5), strict=True)
+        }
+        return pelvis, feet
+
+    pelvis, feet = stances(time, phase)
+    cycle = 2 * np.pi * phase
+    bank = np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.25, 0.25)  # into the bend
+    turned, listed = -_PELVIS_TURN * gait.vigour * np.cos(cycle), pelvis.list
+    counter = 2.0 * np.degrees(turned)  # the thorax turns as far the other way as the pelvis
+    forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # an arm swings with the leg of the other side
+    look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
+    angles = pose_angles(
+        len(time),
+        lumbar_flexion=lean_degrees,
+        thorax_flexion=lean_degrees * 0.6,
+        neck_flexion=6.0 * droop - lean_degrees,
+        lumbar_bending=0.6 * np.degrees(listed) + 0.2 * np.degrees(bank),
+        thorax_bending=0.4 * np.degrees(listed) + 0.2 * np.degrees(bank),
+        lumbar_rotation=-0.35 * counter,
+        thorax_rotation=-0.65 * counter,
+        neck_rotation=0.5 * counter + look,
+        **{f"{side}_shoulder_flexion": 1.0 + arms * (4.0 + _ARM_SWING * forward[side]) for side in forward},
+        **{f"{side}_shoulder_abduction": 8.0 + 2.0 * droop for side in forward},
+        **{f"{side}_shoulder_rotation": 8.0 for side in forward},
+        **{f"{side}_elbow_flexion": 12.0 + arms * (10.0 + _ELBOW_SWING * forward[side]) for side in forward},
+        **{f"{side}_forearm_pronation": 15.0 for side in forward},
+        **{f"{side}_wrist_flexion": 6.0 for side in forward},
+    )
+    lap, strides = laps(loop, gait)
+    return stand_on(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+
+
+def laps(loop: Loop, gait: Gait) -> tuple[Floats, Floats]:
+    """Times (n,) once round the loop, several times over, and the phase of the stride at each, (n,).
+
+    Between them they come near every place on the way in every phase of the stride: what holds for them holds for as
+    long as someone goes on.
+    """
+    once = np.arange(0.0, loop.length / loop.speed, _EVERY)
+    shifts = np.arange(_SHIFTS) / _SHIFTS
+    return np.tile(once, _SHIFTS), (shifts[:, None] + gait.frequency * once).ravel()
+
+
+def footsteps(loop: Loop, gait: Gait, side: str, phase: Floats, time: Floats, *, width: float, toe_out: float) -> Foot:
+    """One foot's way from print to print.
+
+    Args:
+        loop: the way and the speed.
+        gait: what a foot does in a stride.
+        side: of the foot.
+        phase: counts its strides, (T,).
+        time: seconds, (T,).
+        width: of the prints from the middle of the way, metres.
+        toe_out: how far the toes point outwards, radians.
+    """
+    outward = 1.0 if side == "left" else -1.0
+    stride = np.floor(phase)
+    struck = time - (phase - stride) / gait.frequency
+
+    def prints(when: Floats) -> tuple[Floats, Floats]:
+        """Ankle (T, 2) over the print, as if flat, and bearing of a foot that lands at ``when``."""
+        passed = when + gait.lead / loop.speed  # the pelvis is over the print
+        heading = loop.heading(passed)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+        return loop.position(passed) + outward * width * left, heading + outward * toe_out
+
+    here, bearing = prints(struck)
+    there, bearing_there = prints(struck + 1.0 / gait.frequency)
+    pitch, lift, progress = gait.foot(phase)
+    swung = np.angle(np.exp(1j * (bearing_there - bearing)))
+    bearing = bearing + progress * swung
+    ahead, height = gait.rolling.at(pitch)
+    toes = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    ground = here + progress[:, None] * (there - here) + ahead[:, None] * toes
+    return Foot(ankle=np.column_stack([ground, height + lift]), bearing=bearing, pitch=pitch)

@@ -1,0 +1,110 @@
+"""How deep people are in one another, told by MuJoCo from the contact shapes of their bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose.arrays import Floats
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.poses.kinematics import Addresses, Kinematics
+
+_FLESH = 0.15  # metres: how far a body reaches to the side beyond the heads of its bones, at most
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Someone at N times.
+
+    Attributes:
+        person: index into the cast.
+        motion: sampled at these times.
+        low: least x and y that the body reaches to, (N, 2) metres; ``high`` the greatest.
+    """
+
+    person: int
+    motion: Motion
+    low: Floats
+    high: Floats
+
+    def near(self, other: Presence) -> NDArray[np.intp]:
+        """The indices of the times at which two might touch."""
+        meet = (self.low < other.high) & (other.low < self.high)
+        return np.flatnonzero(meet.all(axis=1))
+
+
+class Crowd:
+    """Bodies that may touch, two at a time in a MuJoCo model with nothing else.
+
+    Args:
+        cast: the bodies, in the order of the people.
+    """
+
+    def __init__(self, cast: Sequence[Kinematics]) -> None:
+        self._cast = tuple(cast)
+        self._pairs: dict[tuple[int, int], _Pair] = {}
+
+    def presence(self, person: int, motion: Motion, time: ArrayLike) -> Presence:
+        """Where the body of a person is at times (N,), seconds."""
+        mover, sampled = self._cast[person], motion.at(time)
+        bones = mover.transforms(sampled)[:, :, :2]
+        heads = np.matmul(bones[..., :3], mover.body.heads[:, :, None])[..., 0] + bones[..., 3]
+        return Presence(person, sampled, heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH)
+
+    def penetration(self, one: Presence, other: Presence) -> Floats:
+        """How deep two people are in one another, (N,) metres, 0 where they are apart.
+
+        It is the depth of the deepest of MuJoCo's contacts between the shapes of the two: how far these would have to
+        move to get clear of each other.
+        """
+        depth = np.zeros(len(one.motion))
+        near = one.near(other)
+        if len(near):
+            depth[near] = self._pair(one.person, other.person).depths(one.motion, other.motion, near)
+        return depth
+
+    def _pair(self, one: int, other: int) -> _Pair:
+        if (one, other) not in self._pairs:
+            self._pairs[one, other] = _Pair(self._cast[one], self._cast[other])
+        return self._pairs[one, other]
+
+
+def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: ArrayLike) -> Floats:
+    """How deep any two people are in one another at times (N,), (N, P, P) metres; see :meth:`Crowd.penetration`."""
+    crowd = Crowd(cast)
+    people = [crowd.presence(person, motion, time) for person, motion in enumerate(motions)]
+    depth = np.zeros((np.size(time), len(people), len(people)))
+    for one, other in combinations(people, 2):
+        depth[:, one.person, other.person] = depth[:, other.person, one.person] = crowd.penetration(one, other)
+    return depth
+
+
+class _Pair:
+    """Two people in a MuJoCo model."""
+
+    def __init__(self, one: Kinematics, other: Kinematics) -> None:
+        spec = mujoco.MjSpec()
+        spec.modelname = "pair"
+        for prefix, mover in (("one/", one), ("other/", other)):
+            spec.attach(mover.spec.copy(), prefix=prefix, frame=spec.worldbody.add_frame())
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._one = Addresses(self._model, one.body, prefix="one/")
+        self._other = Addresses(self._model, other.body, prefix="other/")
+
+    def depths(self, one: Motion, other: Motion, rows: NDArray[np.intp]) -> Floats:
+        """Depth of the deepest contact at rows (n,) of two motions, (n,) metres."""
+        depth = np.zeros(len(rows))
+        for k, row in enumerate(rows):
+            self._one.write(self._data.qpos, one.root[row], one.angles[row])
+            self._other.write(self._data.qpos, other.root[row], other.angles[row])
+            mujoco.mj_kinematics(self._model, self._data)
+            mujoco.mj_collision(self._model, self._data)
+            if self._data.ncon:
+                depth[k] = max(0.0, -self._data.contact.dist.min())
+        return depth

@@ -1,0 +1,299 @@
+"""Acclaim's skeleton (ASF) and motion (AMC) files, in which CMU publishes its motion capture.
+
+A bone turns about its beginning, in axes of its own: with C the turn of these axes and M that of its values, both
+applied in the order in which the file lists them and about fixed axes, the bone is turned by C M C^-1 against its
+parent. Source: J. Lander, "Working with Motion Capture File Formats", Game Developer, January 1998.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+from simharness.world.motion.mocap.lines import Line, Reader, shown
+from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
+
+RATE = 120.0  # Hz: an AMC file does not say; CMU's are recorded so
+_TURNS, _SHIFTS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
+_ROOT = "root"
+_MOST_BONES = 1000
+
+
+@dataclass
+class _Bone:
+    """What the file says of a bone; of the root ``offset`` is its position."""
+
+    line: Line
+    offset: Floats
+    frame: Rotation
+    dofs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Acclaim:
+    """An ASF file: the skeleton, and how an AMC file's values turn it.
+
+    Attributes:
+        skeleton: joints are the beginnings of the bones of their names, and the tips of the last ones.
+        frames: by the bone's name, its axes.
+        dofs: by the bone's name, what its values are, in order: "rx", "ry", "rz", of the root also "tx", "ty", "tz".
+        origin: what is added to the root's place, (3,).
+        degrees: whether angles are in degrees.
+    """
+
+    skeleton: Skeleton
+    frames: dict[str, Rotation]
+    dofs: dict[str, tuple[str, ...]]
+    origin: Floats
+    degrees: bool
+
+
+def read_asf(path: Path) -> Acclaim:
+    """Read a skeleton.
+
+    Raises:
+        ValueError: a file that is not one, naming file and line.
+    """
+    reader = Reader(path)
+    degrees = True
+    root: _Bone | None = None
+    bones: dict[str, _Bone] = {}
+    parents: dict[str, str] = {}
+    while (line := reader.peek()) is not None:
+        reader.take("")
+        section = line.words[0].lower()
+        if not section.startswith(":"):
+            raise line.fault(f"expected a section such as :bonedata, got {shown(line.words[0])}")
+        if section == ":units":
+            degrees = _units(reader)
+        elif section == ":root":
+            root = _root(reader, line, degrees)
+        elif section == ":bonedata":
+            bones = _bones(reader, degrees)
+        elif section == ":hierarchy":
+            parents = _hierarchy(reader, bones)
+        else:  # version, name, documentation, skin
+            _body(reader)
+    for missing, there in ((":root", root), (":bonedata", bones), (":hierarchy", parents)):
+        if not there:
+            raise reader.fault(f"has no section {missing}; is it an ASF file?")
+    assert root is not None
+    orphan = next((bone for name, bone in bones.items() if name not in parents), None)
+    if orphan is not None:
+        raise orphan.line.fault(f"bone {shown(orphan.line.words[-1])} has no parent in :hierarchy")
+    return Acclaim(
+        skeleton=_skeleton(bones, parents),
+        frames={_ROOT: root.frame} | {name: bone.frame for name, bone in bones.items()},
+        dofs={_ROOT: root.dofs} | {name: bone.dofs for name, bone in bones.items()},
+        origin=root.offset,
+        degrees=degrees,
+    )
+
+
+def read_amc(path: Path, acclaim: Acclaim) -> Recording:
+    """Read a motion of a skeleton; it is taken to have been recorded at ``RATE``.
+
+    Raises:
+        ValueError: a file that is not one or does not fit the skeleton, naming file and line.
+    """
+    reader = Reader(path)
+    degrees = acclaim.degrees
+    while (line := reader.peek()) is not None and line.words[0].startswith(":"):
+        degrees = {":DEGREES": True, ":RADIANS": False}.get(line.words[0].upper(), degrees)
+        reader.take("")
+    moving = {name: dofs for name, dofs in acclaim.dofs.items() if dofs}
+    values: dict[str, list[list[float]]] = {name: [] for name in moving}
+    frames = first = 0
+    while reader.peek() is not None:
+        head = reader.take("")
+        number = head.words[0] if not frames else str(first + frames)  # an excerpt begins anywhere
+        if head.words != (number,) or not number.isdecimal():
+            expected = f"the number of frame {number}" if frames else "the number of the first frame"
+            raise head.fault(f"expected {expected} alone, got {shown(' '.join(head.words))}")
+        first = first if frames else int(number[:9])
+        frames += 1
+        absent = set(moving) - _frame(reader, moving, values)
+        if absent:
+            raise head.fault(f"frame {number} has no values for {', '.join(sorted(absent))}")
+    if not frames:
+        raise reader.fault("has no frames; is it an AMC file?")
+    return _recording(path.name, acclaim, values, frames, degrees=degrees)
+
+
+def _frame(reader: Reader, moving: dict[str, tuple[str, ...]], values: dict[str, list[list[float]]]) -> set[str]:
+    """Read the lines of one frame into ``values``; return the bones that it has."""
+    seen: set[str] = set()
+    while (line := reader.peek()) is not None and not line.words[0].isdigit():
+        name = line.words[0]
+        if name not in moving:
+            raise line.fault(f"the skeleton has no bone {shown(name)} that moves; it has {', '.join(moving)}")
+        if name in seen:
+            raise line.fault(f"{name} appears twice in one frame")
+        dofs = moving[name]
+        values[name].append(line.numbers(line.words[1:], len(dofs), f"{name} ({' '.join(dofs)})"))
+        seen.add(name)
+        reader.take("")
+    return seen
+
+
+def _recording(
+    file: str, acclaim: Acclaim, values: dict[str, list[list[float]]], frames: int, *, degrees: bool
+) -> Recording:
+    skeleton = acclaim.skeleton
+    turns = np.zeros((frames, len(skeleton), 4))
+    turns[..., 0] = 1.0
+    root = np.tile(acclaim.origin, (frames, 1))
+    for name, rows in values.items():
+        table = np.array(rows, float)
+        dofs = acclaim.dofs[name]
+        for k, axis in enumerate(_SHIFTS):
+            if axis in dofs:
+                root[:, k] += table[:, dofs.index(axis)]
+        turning = [k for k, dof in enumerate(dofs) if dof in _TURNS]
+        if turning:
+            order = "".join(dofs[k][1] for k in turning)
+            own = Rotation.from_euler(order, table[:, turning], degrees=degrees)
+            frame = acclaim.frames[name]
+            turn = frame * own * frame.inv()
+            turns[:, skeleton.names.index(name)] = turn.as_quat(scalar_first=True)
+    return Recording(file=file, skeleton=skeleton, rate=RATE, root=root, turns=turns)
+
+
+def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
+    names, above, offsets = [_ROOT], [-1], [np.zeros(3)]
+    for place, name in enumerate(names):  # grows while it is gone through: children after their parents
+        tip = bones[name].offset if name in bones else np.zeros(3)
+        children = [child for child, parent in parents.items() if parent == name]
+        if not children and name in bones:
+            children = [name + END]
+        names += children
+        above += [place] * len(children)
+        offsets += [tip] * len(children)
+    lost = [bone for name, bone in bones.items() if name not in names]
+    if lost:
+        raise lost[0].line.fault(f"bone {shown(lost[0].line.words[1])} hangs on itself in :hierarchy, not on the root")
+    return Skeleton(tuple(names), np.array(above), np.array(offsets))
+
+
+def _body(reader: Reader) -> list[Line]:
+    """The lines up to the next section."""
+    lines = []
+    while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
+        lines.append(reader.take(""))
+    return lines
+
+
+def _units(reader: Reader) -> bool:
+    """Whether angles are in degrees."""
+    degrees = True
+    for line in _body(reader):
+        if line.words[0].lower() == "angle":
+            unit = line.words[1].lower() if len(line.words) > 1 else ""
+            if unit not in ("deg", "rad"):
+                raise line.fault(f"expected angle deg or rad, got {shown(unit)}")
+            degrees = unit == "deg"
+    return degrees
+
+
+def _root(reader: Reader, head: Line, degrees: bool) -> _Bone:
+    order: tuple[str, ...] = (*_SHIFTS, *_TURNS)
+    place, values, axis = np.zeros(3), [0.0, 0.0, 0.0], "xyz"
+    for line in _body(reader):
+        key, *_ = line.words
+        if key.lower() == "order":
+            order = tuple(word.lower() for word in line.words[1:])
+            if set(order) - {*_SHIFTS, *_TURNS} or len(set(order)) != len(order):
+                raise line.fault(f"expected an order of TX TY TZ RX RY RZ, got {shown(' '.join(line.words[1:]))}")
+        elif key.lower() == "axis":
+            axis = _axis(line, line.words[1:])
+        elif key.lower() == "position":
+            place = np.array(line.numbers(line.words[1:], 3, "the root's position"))
+        elif key.lower() == "orientation":
+            values = line.numbers(line.words[1:], 3, "the root's orientation")
+        else:
+            raise line.fault(f"expected order, axis, position or orientation, got {shown(key)}")
+    return _Bone(head, place, Rotation.from_euler(axis, values, degrees=degrees), order)
+
+
+def _bones(reader: Reader, degrees: bool) -> dict[str, _Bone]:
+    bones: dict[str, _Bone] = {}
+    while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
+        begin = reader.take("")
+        if begin.words[0].lower() != "begin":
+            raise begin.fault(f"expected begin, got {shown(begin.words[0])}")
+        name, bone = _bone(reader, begin, degrees)
+        if name in bones or name == _ROOT:
+            raise bone.line.fault(f"there are two bones {shown(name)}")
+        bones[name] = bone
+        if len(bones) > _MOST_BONES:
+            raise begin.fault(f"more than {_MOST_BONES} bones")
+    return bones
+
+
+def _bone(reader: Reader, begin: Line, degrees: bool) -> tuple[str, _Bone]:
+    named: Line | None = None
+    direction = length = None
+    frame = Rotation.identity()
+    dofs: tuple[str, ...] = ()
+    while True:
+        line = reader.take("the end of the bone that begins in line " + str(begin.number))
+        key, *_ = line.words
+        key, rest = key.lower(), line.words[1:]
+        if key == "end":
+            break
+        if key.startswith(":") or key == "begin":
+            raise line.fault(f"the bone that begins in line {begin.number} has no end")
+        if key == "name":
+            if len(rest) != 1:
+                raise line.fault(f"expected one name, got {len(rest)}")
+            named = line
+        elif key == "direction":
+            direction = np.array(line.numbers(rest, 3, "direction"))
+            if np.linalg.norm(direction) < 1e-6:
+                raise line.fault("expected a direction, got a vector of no length")
+            direction /= np.linalg.norm(direction)
+        elif key == "length":
+            (length,) = line.numbers(rest, 1, "length")
+            if length < 0:
+                raise line.fault(f"expected a length of 0 or more, got {length:g}")
+        elif key == "axis":
+            values = line.numbers(rest[:3], 3, "axis")
+            frame = Rotation.from_euler(_axis(line, rest[3:]), values, degrees=degrees)
+        elif key == "dof":
+            dofs = tuple(word.lower() for word in rest)
+            if set(dofs) - set(_TURNS) or len(set(dofs)) != len(dofs):
+                raise line.fault(f"expected dof to be some of rx ry rz, got {shown(' '.join(rest))}")
+    for what, value in (("name", named), ("direction", direction), ("length", length)):
+        if value is None:
+            raise begin.fault(f"the bone that begins here has no {what}")
+    assert named is not None
+    assert direction is not None
+    return named.words[1], _Bone(named, direction * length, frame, dofs)
+
+
+def _axis(line: Line, words: tuple[str, ...]) -> str:
+    order = words[0].lower() if len(words) == 1 else ""
+    if sorted(order) != ["x", "y", "z"]:
+        raise line.fault(f"expected the order of the axes, such as XYZ, got {shown(' '.join(words))}")
+    return order
+
+
+def _hierarchy(reader: Reader, bones: dict[str, _Bone]) -> dict[str, str]:
+    """By name, the parent's name."""
+    parents: dict[str, str] = {}
+    for line in _body(reader):
+        if line.words[0].lower() in ("begin", "end") and len(line.words) == 1:
+            continue
+        parent, *children = line.words
+        for name in line.words:
+            if name != _ROOT and name not in bones:
+                raise line.fault(f":bonedata has no bone {shown(name)}")
+        for child in children:
+            if child in parents or child == _ROOT:
+                raise line.fault(f"{child} has a parent already")
+            parents[child] = parent
+    return parents

@@ -1,0 +1,198 @@
+"""Joint angles of a limb from the directions of its segments, a whole motion at once and smooth in time.
+
+Directions are given in the frame of what carries the limb, as a left limb's: those of a right one are mirrored, and so
+are its hinges, so that the same angles come of it. Where directions leave an angle open (the twist of a straight arm)
+or two sets of angles give the same ones (a raised arm), smoothness decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solveh_banded
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.model import HINGES
+
+_X, _Y, _Z = np.eye(3)
+_ITERATIONS = 12
+_LARGEST_STEP = 0.4  # radians an iteration
+_SMOOTH = 1.5  # weight of an angle's acceleration (radians a frame^2): passes what is slower than about 8 Hz at 60 Hz
+_EASE = 0.03  # weight of an angle's distance from ease: decides where nothing else does
+_LAZY = 0.01  # of two ways to raise an arm equally well, the one with the smaller angles
+ARM: tuple[str, ...] = (
+    "shoulder_flexion",
+    "shoulder_abduction",
+    "shoulder_rotation",
+    "elbow_flexion",
+    "forearm_pronation",
+    "wrist_flexion",
+)
+"""Hinges from the collar bone to the hand, without the side."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """A direction on a limb that shall point somewhere.
+
+    Attributes:
+        hinges: how many hinges, from the first, move it.
+        neutral: where it points in the neutral pose, (3,).
+        target: where it shall point, (T, 3) unit vectors.
+        weight: of its error against that of others.
+    """
+
+    hinges: int
+    neutral: Floats
+    target: Floats
+    weight: float
+
+
+def arm_angles(upper: Floats, fore: Floats, hand: Floats | None, thumb: Floats | None) -> Floats:
+    """Angles (T, 6) of ``ARM``, within their ranges, from directions (T, 3) in the frame of the collar bone.
+
+    Args:
+        upper: from shoulder to elbow.
+        fore: from elbow to wrist.
+        hand: along the hand; None: unknown, it follows the forearm.
+        thumb: from the little finger's side of the palm to the thumb's; None: unknown.
+    """
+    aims = [Aim(3, -_Z, upper, 1.0), Aim(4, -_Z, fore, 1.0)]
+    if hand is not None and thumb is not None:
+        aims += [Aim(6, -_Z, hand, 0.3), Aim(6, _X, thumb, 0.4)]
+    start = np.zeros((len(upper), len(ARM)))
+    start[:, :4] = _continuous(_euler(upper, fore))
+    ease = np.radians([0.0, 0.0, 0.0, 10.0, 15.0, 5.0])
+    return solve_directions([f"left_{name}" for name in ARM], aims, start=start, ease=ease)
+
+
+def thigh_and_shank(thigh: Floats, shank: Floats) -> Floats:
+    """Flexion, abduction and rotation of the hip and flexion of the knee, (T, 4), from directions (T, 3)."""
+    flexion, abduction = np.arctan2(thigh[:, 0], -thigh[:, 2]), np.arcsin(np.clip(thigh[:, 1], -1, 1))
+    inner = _into(_turn(-_Y, flexion) @ _turn(_X, abduction), shank)
+    knee = np.arctan2(np.hypot(inner[:, 0], inner[:, 1]), -inner[:, 2])
+    # Of a straight knee the twist is open; it fades in as the knee bends.
+    rotation = np.arctan2(inner[:, 1] * np.sin(knee), 0.02 + np.maximum(-inner[:, 0], 0.0) * np.sin(knee))
+    return np.stack([flexion, abduction, rotation, knee], axis=-1)
+
+
+def solve_directions(names: list[str], aims: list[Aim], *, start: Floats, ease: Floats) -> Floats:
+    """Angles (T, n) of hinges, within their ranges, that bring directions to their targets smoothly.
+
+    Gauss-Newton over all frames together: the normal equations are banded, for only neighbours in time are coupled.
+
+    Args:
+        names: of n hinges from the trunk outwards, of ``DOFS``.
+        aims: what points where.
+        start: angles (T, n) to start from.
+        ease: angles (n,) that are preferred where the aims leave them open.
+    """
+    hinges = [HINGES[DOFS.index(name)] for name in names]
+    low, high = np.array([hinge.range for hinge in hinges]).T
+    frames, count = start.shape
+    bands = 2 * count + 1
+    smooth = _second_differences(frames)
+    angles = np.clip(start, low, high)
+    for _ in range(_ITERATIONS):
+        turns, axes = [np.broadcast_to(np.eye(3), (frames, 3, 3))], []
+        for k, hinge in enumerate(hinges):
+            axes.append(turns[-1] @ hinge.axis)
+            turns.append(turns[-1] @ _turn(hinge.axis, angles[:, k]))
+        normal = np.tile(_EASE**2 * np.eye(count), (frames, 1, 1))
+        right = _EASE**2 * (ease - angles)
+        for aim in aims:
+            now = turns[aim.hinges] @ aim.neutral
+            moved = np.zeros((frames, 3, count))
+            for k in range(aim.hinges):
+                moved[:, :, k] = np.cross(axes[k], now)
+            normal += aim.weight**2 * moved.swapaxes(1, 2) @ moved
+            right += aim.weight**2 * (moved.swapaxes(1, 2) @ (aim.target - now)[..., None])[..., 0]
+        right -= _SMOOTH**2 * _apply(smooth, angles)
+        banded = np.zeros((bands, frames * count))
+        for i in range(count):
+            for j in range(i, count):
+                banded[j - i, i::count] = normal[:, i, j]
+        for gap in range(3):
+            banded[gap * count] += _SMOOTH**2 * np.repeat(smooth[gap], count)
+        step = solveh_banded(banded, right.ravel(), lower=True).reshape(frames, count)
+        moved_to = np.clip(angles + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP), low, high)
+        change = np.abs(moved_to - angles).max(initial=0.0)
+        angles = moved_to
+        if change < 1e-4:
+            break
+    return angles
+
+
+def _second_differences(frames: int) -> Floats:
+    """The lower bands (3, T) of D'D, where D takes second differences."""
+    bands = np.zeros((3, frames))
+    kernel = (1.0, -2.0, 1.0)
+    rows = max(frames - 2, 0)
+    for i in range(3):
+        for j in range(i + 1):
+            bands[i - j, j : j + rows] += kernel[i] * kernel[j]
+    return bands
+
+
+def _apply(bands: Floats, values: Floats) -> Floats:
+    """The symmetric matrix of lower bands (3, T) times values (T, n)."""
+    result = bands[0][:, None] * values
+    for gap in (1, 2):
+        weight = bands[gap][: len(values) - gap, None] if len(values) > gap else np.zeros((0, 1))
+        if len(weight):
+            result[gap:] += weight * values[:-gap]
+            result[:-gap] += weight * values[gap:]
+    return result
+
+
+def _euler(upper: Floats, fore: Floats) -> Floats:
+    """The two sets of shoulder flexion, abduction, rotation and elbow flexion that give two directions, (2, T, 4)."""
+    sets = []
+    for over in (False, True):
+        flexion, abduction = np.arctan2(upper[:, 0], -upper[:, 2]), np.arcsin(np.clip(upper[:, 1], -1, 1))
+        if over:
+            flexion, abduction = flexion + np.pi, np.pi - abduction
+        inner = _into(_turn(-_Y, flexion) @ _turn(_X, abduction), fore)
+        elbow = np.arccos(np.clip(-inner[:, 2], -1, 1))
+        sets.append(np.stack([flexion, abduction, np.arctan2(-inner[:, 1], inner[:, 0]), elbow], axis=-1))
+    return np.stack(sets)
+
+
+def _continuous(sets: Floats) -> Floats:
+    """Of several sets of angles (S, T, n) the way through time, (T, n), of least strain and jumps (Viterbi, 1967)."""
+    names = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation", "elbow_flexion")
+    low, high = np.array([HINGES[DOFS.index(f"left_{name}")].range for name in names]).T
+    middle = (low + high) / 2
+    sets = middle + np.angle(np.exp(1j * (sets - middle)))
+    # What the twist of a straight arm is means nothing, nor what the flexion of one that points sideways is.
+    sure = np.stack([np.cos(sets[..., 1]) ** 2, np.ones(sets.shape[:2]), np.sin(sets[..., 3]) ** 2], axis=-1)
+    beyond = np.maximum(sets - high, 0) + np.maximum(low - sets, 0)
+    beyond[..., 2] *= np.sin(sets[..., 3])
+    strain = (beyond**2).sum(axis=-1) + _LAZY * (sets[..., :2] ** 2).sum(axis=-1)
+    count, frames = strain.shape
+    cost, back = strain[:, 0], np.zeros((frames, count), int)
+    for t in range(1, frames):
+        change = sets[None, :, t, :3] - sets[:, None, t - 1, :3]  # from, to
+        jump = (np.minimum(sure[None, :, t], sure[:, None, t - 1]) * change**2).sum(axis=-1)
+        total = cost[:, None] + jump
+        back[t] = total.argmin(axis=0)
+        cost = total.min(axis=0) + strain[:, t]
+    chosen = np.empty(frames, int)
+    chosen[-1] = int(cost.argmin())
+    for t in range(frames - 1, 0, -1):
+        chosen[t - 1] = back[t, chosen[t]]
+    result = sets[chosen, np.arange(frames)]
+    result[:, 2] *= np.sin(result[:, 3]) ** 2
+    return result
+
+
+def _turn(axis: Floats, angle: Floats) -> Floats:
+    return Rotation.from_rotvec(angle[:, None] * axis).as_matrix()
+
+
+def _into(turn: Floats, vector: Floats) -> Floats:
+    """Vectors (T, 3) in turned frames (T, 3, 3)."""
+    return (turn.swapaxes(1, 2) @ vector[..., None])[..., 0]

@@ -1,0 +1,55 @@
+"""What a person does over time: the pelvis and the joint angles, to be read at any moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mvpose.arrays import Floats
+from mvpose.checks import as_array
+from simharness.world.humans.anatomy import DOFS
+from simharness.world.motion.trajectory import check_poses, check_times, through, through_poses
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The configuration of one person at T times, and smoothly between them.
+
+    Attributes:
+        time: seconds, (T,), ascending.
+        root: position of the pelvis in metres and its orientation as a unit quaternion w x y z, (T, 7).
+        angles: joint angles in radians, (T, D), in the order of ``simharness.world.humans.anatomy.DOFS``.
+
+    Raises:
+        ValueError: a wrong shape, a value that is not finite, times that do not ascend, a quaternion that is not of
+            unit length.
+    """
+
+    time: Floats
+    root: Floats
+    angles: Floats
+
+    def __post_init__(self) -> None:
+        time = as_array(self.time, ("T",), "motion time")
+        root = as_array(self.root, (len(time), 7), "motion root")
+        angles = as_array(self.angles, (len(time), len(DOFS)), "motion angles")
+        check_times(time, "motion")
+        check_poses(root, "motion root")
+        if not np.isfinite(angles).all():
+            bad = int(np.flatnonzero(~np.isfinite(angles).all(axis=1))[0])
+            raise ValueError(f"motion angles must be finite; those at index {bad} are not")
+        for key, value in (("time", time), ("root", root), ("angles", angles)):
+            object.__setattr__(self, key, value)
+
+    def __len__(self) -> int:
+        return len(self.root)
+
+    def at(self, time: ArrayLike) -> Motion:
+        """The same motion at other times (n,), ascending; before its first and after its last it stands still."""
+        return Motion(np.asarray(time, float), *self.read(time))
+
+    def read(self, time: ArrayLike) -> tuple[Floats, Floats]:
+        """Root (..., 7) and angles (..., D) at any times (...)."""
+        return through_poses(self.time, self.root, time), through(self.time, self.angles, time)

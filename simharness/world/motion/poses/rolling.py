@@ -1,0 +1,57 @@
+"""A sole on the floor: how the ankle moves while the foot rolls from heel to toes without slipping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from mvpose.arrays import Floats
+
+_STEP, _ROUNDING = 0.25, 5.0  # degrees
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """What the pitch of a foot does to its ankle.
+
+    Attributes:
+        pitch: toes up positive, (n,) radians, ascending.
+        ahead: how far the ankle is ahead of where it is when the foot lies flat, (n,) metres.
+        height: of the ankle when the lowest point of the sole touches the floor, (n,) metres.
+        passing: the same, rounded where the lowest point goes from toe to heel, and nowhere lower, (n,) metres: for a
+            foot in the air, which does not turn corners.
+    """
+
+    pitch: Floats
+    ahead: Floats
+    height: Floats
+    passing: Floats
+
+    def at(self, pitch: Floats) -> tuple[Floats, Floats]:
+        """Advance and height of the ankle at pitches (...)."""
+        return np.interp(pitch, self.pitch, self.ahead), np.interp(pitch, self.pitch, self.height)
+
+    def spare(self, pitch: Floats) -> Floats:
+        """By how much a foot that passes through pitches (...) in the air clears the floor, metres."""
+        return np.interp(pitch, self.pitch, self.passing - self.height)
+
+
+def roll(sole: Floats) -> Rolling:
+    """Roll a rigid sole over its edges: at each pitch the lowest point touches, and while it touches it stays.
+
+    Args:
+        sole: points of the sole relative to the ankle, x forward, z up, while it lies flat, (n, 3) metres.
+    """
+    pitch = np.radians(np.arange(-95.0, 95.0, _STEP))
+    forward, up = sole[:, 0], sole[:, 2]
+    x = forward * np.cos(pitch)[:, None] - up * np.sin(pitch)[:, None]
+    z = forward * np.sin(pitch)[:, None] + up * np.cos(pitch)[:, None]
+    touching = z.argmin(axis=1)
+    rows = np.arange(len(pitch) - 1)
+    ahead = np.concatenate([[0.0], np.cumsum(x[rows, touching[:-1]] - x[rows + 1, touching[:-1]])])
+    ahead -= np.interp(0.0, pitch, ahead)
+    height = -z.min(axis=1)
+    passing = np.maximum(height, gaussian_filter1d(height, _ROUNDING / _STEP))
+    return Rolling(pitch=pitch, ahead=ahead, height=height, passing=passing)

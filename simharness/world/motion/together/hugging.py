@@ -1,0 +1,299 @@
+"""Two people hug: they step up to each other, close their arms, hold, let go and step back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+from simharness.world.motion.contact import Crowd
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.performance import Performance
+from simharness.world.motion.poses.footing import in_world, stance, tread
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posing import Foot, Pelvis, girdle, pose_angles, reach_with, stand_on
+from simharness.world.motion.poses.posture import Curves, at_ease, limbs
+from simharness.world.motion.poses.timing import bump, ease, rounds
+from simharness.world.motion.together.partners import bent, face_to_face, nudged, towards
+
+Role = Literal["over", "under"]
+
+_STEP = 0.17  # of a leg's length: how far each steps forward
+_LIFT = 0.03  # metres: of a foot that steps
+_ASIDE = 0.045  # metres that each stands to the left of the line between them, so that heads pass
+_SHIFT = 0.02  # metres: the weight goes over the standing foot
+_STRAIGHTEST = np.radians(8.0)
+_DEEPEST = 0.012  # metres that clothes and flesh give way where chests touch
+_APART = np.arange(0.7, 0.2, -0.01)  # metres between pelvises that are tried
+_ON_SKIN = 0.028  # metres from the skin of a back to the skin of the palm that lies on it
+_TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "LeftShoulder", "RightShoulder")
+_LEVEL = 0.03  # metres up and down that make one level of a trunk
+# How far round arms may reach, at best first; in the end, as with a small child, they stay open.
+_WRAPS: tuple[float | None, ...] = (1.0, 0.75, 0.5, 0.25, 0.0, None)
+_PRESSED, _MOST_PRESSED = 0.02, 0.045  # metres that an arm may press into the other: at ease, and rather than stay open
+_ARMS_BACK = limbs(shoulder_flexion=-35.0, shoulder_abduction=12.0, elbow_flexion=5.0)
+_LEAN = 8.0  # degrees; and more for the taller, per metre that the shoulders are higher
+_LEAN_MORE, _MOST_LEAN = 70.0, 36.0
+# Of a palm on the other's back, against one's own pelvis: it faces oneself, the fingers point across, the thumb up.
+_FLAT = {
+    "right": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
+    "left": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+}
+
+
+@dataclass(frozen=True)
+class _Hold:
+    """How one holds the other.
+
+    Attributes:
+        raised, out, turned, bent: flexion, abduction and rotation of the shoulders and flexion of the elbows, degrees,
+            that those of closed arms are near.
+        height: of the palms, metres over the other's shoulders.
+        across: of the palms, metres from the other's spine.
+    """
+
+    raised: float
+    out: float
+    turned: float
+    bent: float
+    height: float
+    across: float
+
+
+# The taller one's arms go over the other's shoulders, the other's around the waist.
+_OPEN = {
+    "over": limbs(shoulder_flexion=95.0, shoulder_abduction=50.0, shoulder_rotation=15.0, elbow_flexion=20.0),
+    "under": limbs(shoulder_flexion=30.0, shoulder_abduction=50.0, shoulder_rotation=10.0, elbow_flexion=25.0),
+}
+_DETOUR = 30.0  # degrees
+_HOLDS: Mapping[Role, _Hold] = {
+    "over": _Hold(raised=122.0, out=40.0, turned=78.0, bent=97.0, height=0.02, across=0.16),
+    "under": _Hold(raised=50.0, out=52.0, turned=50.0, bent=65.0, height=-0.30, across=0.17),
+}
+
+
+@dataclass(frozen=True)
+class _Course:
+    """When, in a round, they are ``close``, ``let_go``, begin to step ``back`` and are ``away`` again; it ends later.
+
+    Seconds. The methods take seconds since the round began, (T,), and say how far something is done, 0 to 1.
+    """
+
+    close: float
+    let_go: float
+    back: float
+    away: float
+    end: float
+
+    def near(self, u: Floats) -> Floats:
+        """How far the pelvis has come up to the other."""
+        return ease(u / self.close) * (1 - ease((u - self.back) / (self.away - self.back)))
+
+    def open(self, u: Floats) -> Floats:
+        """How far the arms are held out."""
+        lowered = self.back + 0.4 * (self.away - self.back)
+        return ease(u / (0.6 * self.close)) * (1 - ease((u - lowered) / (self.away + 0.25 - lowered)))
+
+    def around(self, u: Floats) -> Floats:
+        """How far the arms have closed."""
+        begun = 0.85 * self.close
+        return ease((u - begun) / 0.8) * (1 - ease((u - self.let_go) / (self.back + 0.1 - self.let_go)))
+
+    def instants(self, count: int) -> Floats:
+        """Instants from coming near to letting go; ``count`` of them while the arms are closed."""
+        there = np.linspace(0.4 * self.close, 0.84 * self.close, 4, endpoint=False)
+        return np.concatenate([there, np.linspace(0.86 * self.close, self.back + 0.1, count)])
+
+
+def hug(
+    performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
+) -> Performance:
+    """Step up to each other, hug, step back; the taller one's arms go over the other's, which go round the waist."""
+    u, marks = rounds(time, (1.5, 2.1, 0.8, 1.5, 0.6), rng=rng, pace=pace)
+    course = _Course(*marks[1:])
+    taller = int(performers[1].body.stature > performers[0].body.stature)
+    roles: tuple[Role, Role] = ("under", "over") if taller else ("over", "under")
+    distance, wraps = _fit(performers, roles, course)
+    came = [
+        _come(mover, home, course, time, u, _attentive(time, rng), lean=lean)
+        for mover, home, lean in zip(performers, _homes(performers, spot, distance), _leans(performers), strict=True)
+    ]
+    return Performance(
+        tuple(
+            _embrace(performers[k], came[k], performers[1 - k], came[1 - k], roles[k], wraps[k], course, u)
+            for k in (0, 1)
+        )
+    )
+
+
+def _fit(
+    performers: Sequence[Kinematics], roles: tuple[Role, Role], course: _Course
+) -> tuple[float, tuple[float | None, float | None]]:
+    """How near their pelvises come, metres, when their bodies just touch, and how far round each then reaches.
+
+    The second is as of :func:`_laid`: as far as the arms can without going through the other; None: not at all.
+    """
+    crowd, instants = Crowd(performers), course.instants(30)
+    homes, leans = _homes(performers, Spot(np.zeros(2), 0.0), _APART[0]), _leans(performers)
+    came = [
+        _come(mover, home, course, instants, instants, {}, lean=lean)
+        for mover, home, lean in zip(performers, homes, leans, strict=True)
+    ]
+    bare = [towards(motion, 1.0, **_ARMS_BACK) for motion in came]
+    present = crowd.presence(0, bare[0], instants)
+    for distance in _APART:
+        nearer = _shifted(bare[1], distance - _APART[0])
+        if crowd.penetration(present, crowd.presence(1, nearer, instants)).max() > _DEEPEST:
+            break
+    came[1], bare[1] = _shifted(came[1], distance - _APART[0]), nearer
+
+    def around(person: int, wrap: float | None) -> Motion:
+        other = 1 - person
+        role = roles[person]
+        return _embrace(performers[person], came[person], performers[other], came[other], role, wrap, course, instants)
+
+    wraps, shown = [], bare
+    for person in (0, 1):
+        other = crowd.presence(1 - person, shown[1 - person], instants)
+        tried = [around(person, wrap) for wrap in _WRAPS]
+        depths = [crowd.penetration(crowd.presence(person, own, instants), other).max() for own in tried]
+        free = np.flatnonzero(np.array(depths) < _PRESSED)
+        best = int(free[0] if len(free) else np.argmin(depths[:-1]))
+        if depths[best] > _MOST_PRESSED:
+            best = int(np.argmin(depths))
+        wraps.append(_WRAPS[best])
+        shown[person] = tried[best]
+    return float(distance), (wraps[0], wraps[1])
+
+
+def _shifted(motion: Motion, ahead: float) -> Motion:
+    root = motion.root + np.array([ahead, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return Motion(motion.time, root, motion.angles)
+
+
+def _homes(performers: Sequence[Kinematics], middle: Spot, distance: float) -> tuple[Spot, Spot]:
+    """Where both stand before they step up to ``distance`` metres."""
+    first, second = (_STEP * mover.leg_length for mover in performers)
+    apart = distance + first + second
+    return face_to_face(middle, apart, share=(distance / 2 + first) / apart, aside=_ASIDE)
+
+
+def _leans(performers: Sequence[Kinematics]) -> list[float]:
+    """How far each bends the trunk, degrees."""
+    heights = np.array([mover.standing_height + mover.arms["left"].anchors[0][2] for mover in performers])
+    higher = np.maximum(heights - heights[::-1], 0.0)
+    return [float(lean) for lean in np.minimum(_LEAN + _LEAN_MORE * higher, _MOST_LEAN)]
+
+
+def _attentive(time: Floats, rng: np.random.Generator) -> Curves:
+    """Somebody at ease who looks at the other."""
+    curves = at_ease(time, rng)
+    return curves | {name: 0.3 * curves[name] for name in ("neck_rotation", "thorax_rotation")}
+
+
+def _come(
+    mover: Kinematics, home: Spot, course: _Course, time: Floats, u: Floats, curves: Curves, *, lean: float
+) -> Motion:
+    """Step up to the other, and back, with hanging arms."""
+    pelvis, feet = _steps(mover, home, course, u)
+    angles = pose_angles(len(u), **curves)
+    whole = _steps(mover, home, course, np.linspace(0.0, course.end, 80))
+    motion = stand_on(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
+    near = course.near(u)
+    return towards(bent(motion, lean * near), near, neck_bending=9.0)
+
+
+def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
+    """The right foot, then the left one, steps forward, and so they step back."""
+    step = _STEP * mover.leg_length
+    times: dict[str, list[tuple[float, float]]] = {"right": [], "left": []}
+    for start, end in ((0.0, course.close), (course.back, course.away)):
+        times["right"].append((start + 0.08 * (end - start), start + 0.52 * (end - start)))
+        times["left"].append((start + 0.5 * (end - start), start + 0.96 * (end - start)))
+    feet, aside = {}, np.zeros(len(u))
+    for side, (there, back) in times.items():
+        own = stance(mover, side)
+        feet[side] = tread(mover, home, u, own, [(*there, own.moved(step)), (*back, own)], lift=_LIFT)
+        over = _SHIFT if side == "right" else -_SHIFT
+        aside += over * (bump(u, *there) + bump(u, *back))
+    pelvis = Pelvis(
+        ground=in_world(home, np.stack([step * course.near(u), aside], axis=-1)),
+        bob=np.zeros(len(u)),
+        bearing=np.full(len(u), home.bearing),
+        lean=np.zeros(len(u)),
+        list=np.zeros(len(u)),
+    )
+    return pelvis, feet
+
+
+def _embrace(
+    mover: Kinematics,
+    motion: Motion,
+    other: Kinematics,
+    others: Motion,
+    role: Role,
+    wrap: float | None,
+    course: _Course,
+    u: Floats,
+) -> Motion:
+    """Close both arms around the other, the palms on the other's back."""
+    hold = _HOLDS[role]
+    opened = course.open(u)
+    motion = towards(
+        motion,
+        opened,
+        **_OPEN[role],
+        **limbs(forearm_pronation=10.0, wrist_flexion=0.0),
+    )
+    if role == "over":  # outside of the other's arms, which come up at the same time
+        out = _DETOUR * 4 * opened * (1 - opened)
+        motion = nudged(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
+    if wrap is None:
+        return motion
+    guess = np.radians([hold.raised, hold.out, hold.turned, hold.bent, 15.0, 0.0])
+    # Nobody reaches up to a back that is higher than the own shoulders.
+    shoulder = other.arms["left"].anchors[0][2]
+    own = mover.standing_height + mover.arms["left"].anchors[0][2] - other.standing_height
+    height = min(shoulder + hold.height, own)
+    inward = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
+    for side, sign in (("right", 1.0), ("left", -1.0)):
+        turn, place = girdle(other, others, "left" if sign > 0 else "right")
+        palm = turn @ _laid(other, height, sign * hold.across, wrap) + place
+        motion = reach_with(
+            mover,
+            motion,
+            side,
+            palm,
+            turn=inward @ _FLAT[side],
+            weight=course.around(u),
+            guess=guess,
+            turn_weight=0.02,
+            follow=True,
+        )
+    return motion
+
+
+def _laid(mover: Kinematics, height: float, left: float, wrap: float) -> Floats:
+    """Where a palm lies on somebody's trunk, just off the skin, in that one's neutral frame, (3,) metres.
+
+    Args:
+        mover: the body that it lies on.
+        height: over the pelvis, metres.
+        left: of the spine, metres.
+        wrap: how far round the arm reaches: 1 to the back, 0 to the flank only.
+    """
+    body = mover.body
+    most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
+    trunk = mover.neutral_skin[np.isin(most, [body.index(name) for name in _TRUNK])]
+    height = float(np.clip(height, trunk[:, 2].min() + _LEVEL, trunk[:, 2].max() - _LEVEL))
+    near = trunk[np.argsort(np.abs(trunk[:, 1] - left) + np.abs(trunk[:, 2] - height))[:40]]
+    back = np.array([near[:, 0].min() - _ON_SKIN, left, height])
+    level = trunk[np.abs(trunk[:, 2] - height) < _LEVEL]
+    (low, _), (high, wide) = level[:, :2].min(axis=0), level[:, :2].max(axis=0)
+    flank = np.array([(low + high) / 2, np.sign(left) * (wide + _ON_SKIN), height])
+    return flank + wrap * (back - flank)

@@ -1,0 +1,112 @@
+"""Where a rigid thing is over time: sampled poses, and the smooth curve through them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+from mvpose.checks import as_array
+
+RATE = 60.0  # Hz: motions are planned at this rate and read at any time; frames and cameras have clocks of their own
+_UNIT_TOLERANCE = 1e-6
+
+
+def motion_clock(duration: float, *, margin: float = 0.0) -> Floats:
+    """The times (N,) at which motions are planned: from ``-margin`` to ``duration + margin`` seconds and a little on.
+
+    Time 0 is among them. ``margin`` is how far the clocks of cameras are off at most.
+    """
+    before = int(np.ceil(margin * RATE)) + 1
+    after = int(np.ceil((duration + margin) * RATE)) + 1
+    return np.arange(-before, after + 1) / RATE
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The poses of one rigid thing at N times.
+
+    Attributes:
+        time: seconds, (N,), ascending; one time alone stands still.
+        pose: position in metres and orientation as a unit quaternion w x y z, (N, 7).
+
+    Raises:
+        ValueError: a wrong shape, a value that is not finite, times that do not ascend, a quaternion that is not of
+            unit length.
+    """
+
+    time: Floats
+    pose: Floats
+
+    def __post_init__(self) -> None:
+        time = as_array(self.time, ("N",), "trajectory time")
+        pose = as_array(self.pose, (len(time), 7), "trajectory pose")
+        check_times(time, "trajectory")
+        check_poses(pose, "trajectory pose")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "pose", pose)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def at(self, time: ArrayLike) -> Floats:
+        """Poses (..., 7) at times (...); before the first and after the last the thing stands still."""
+        return through_poses(self.time, self.pose, time)
+
+
+def through(time: Floats, values: Floats, when: ArrayLike) -> Floats:
+    """The smooth curve through ``values`` (N, D) of ``time`` (N,) at times (...), (..., D).
+
+    Cubic Hermite with central differences (Catmull and Rom, 1974): continuous velocity, and local, so that a curve
+    does not depend on how long it goes on. Held at its ends.
+    """
+    when = np.asarray(np.clip(when, time[0], time[-1]), float)
+    if len(time) == 1:
+        return np.broadcast_to(values[0], (*when.shape, values.shape[1])).copy()
+    k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
+    before, after = np.maximum(k - 1, 0), np.minimum(k + 2, len(time) - 1)
+    step = (time[k + 1] - time[k])[..., None]
+    start, end = values[k], values[k + 1]
+    leaving = step * (end - values[before]) / (time[k + 1] - time[before])[..., None]
+    arriving = step * (values[after] - start) / (time[after] - time[k])[..., None]
+    s = (when - time[k])[..., None] / step
+    turn = s - 1
+    return (1 + 2 * s) * turn**2 * start + s * turn**2 * leaving + s**2 * (3 - 2 * s) * end + s**2 * turn * arriving
+
+
+def through_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
+    """As :func:`through` for poses (N, 7): quaternions w x y z are interpolated on the shorter way and kept unit."""
+    flips = np.where((pose[1:, 3:] * pose[:-1, 3:]).sum(axis=1) < 0, -1.0, 1.0)
+    signs = np.concatenate([np.ones(min(len(pose), 1)), np.cumprod(flips)])
+    steady = np.concatenate([pose[:, :3], pose[:, 3:] * signs[:, None]], axis=1)
+    result = through(time, steady, when)
+    result[..., 3:] /= np.linalg.norm(result[..., 3:], axis=-1, keepdims=True)
+    return result
+
+
+def posed(points: NDArray[np.floating], pose: Floats) -> Floats:
+    """Points (n, 3) of a thing's own frame in the world, where its pose (7,) puts them."""
+    turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+    return np.asarray(points @ turn.T + pose[:3])
+
+
+def check_times(time: Floats, what: str) -> None:
+    """Refuse times that are none, not finite or do not ascend."""
+    if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise ValueError(f"{what} time must be one or more finite seconds, ascending, got {time[:5].tolist()}...")
+
+
+def check_poses(pose: Floats, what: str) -> None:
+    """Refuse poses (N, 7) that are not finite or whose quaternions are not of unit length."""
+    if not np.isfinite(pose).all():
+        bad = int(np.flatnonzero(~np.isfinite(pose).all(axis=1))[0])
+        raise ValueError(f"{what} must be finite; the one at index {bad} is not")
+    off = np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0)
+    if (off > _UNIT_TOLERANCE).any():
+        raise ValueError(
+            f"{what} quaternions (w x y z) must have unit length, the one at index {int(off.argmax())} is off by "
+            f"{off.max():.2g}"
+        )

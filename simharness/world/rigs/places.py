@@ -1,0 +1,124 @@
+"""Where the cameras of a layout stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.scenario.sections.scenario import Cameras
+
+_FROM_WALLS = 0.25  # metres: cameras in the corners of a room
+_GOLDEN = 180.0 * (3.0 - np.sqrt(5.0))  # degrees: turns of it never gather on one side
+_LOWEST = 1.0 / 3.0  # of a dome's height: people stand beneath
+
+
+def places(cameras: Cameras, *, room: tuple[float, float, float] | None = None) -> Floats:
+    """Where the cameras of a layout stand, before any jitter.
+
+    Bearings run counter-clockwise from the x axis as seen from above; ``start`` is the first.
+
+    - ring: camera k at the bearing ``start + 360 k / count``, ``radius`` from the z axis;
+    - arc: evenly from ``start`` to ``start + spread`` on the same circle, both ends included;
+    - line: ``spacing`` apart, across the bearing ``start`` at ``radius``, from right to left as seen from the z axis;
+    - corners: of the room, 0.25 m from its walls, or of the square of half side ``radius`` where there is no room;
+      after four the middles of the walls, then the quarters, and so on;
+    - dome: on the half ellipsoid that stands on the floor at ``radius`` and is ``height`` high, evenly by area from a
+      third of the height to the top, each a golden angle from the one below (or at ``heights``);
+    - pairs: two by two, ``spacing`` apart, side by side on a ring as camera k of which each pair stands;
+    - free: ``positions``.
+
+    Args:
+        cameras: the section of the scenario.
+        room: its x, y, z, metres; None: no walls.
+
+    Returns:
+        (n, 3) metres.
+
+    Raises:
+        ValueError: numbers that make no such layout, naming the key.
+    """
+    if cameras.layout == "free":
+        if not cameras.positions:
+            raise ValueError("cameras.layout = 'free' needs cameras.positions: one [x, y, z] for every camera, metres")
+        return np.array(cameras.positions)
+    count = cameras.count
+    if count < 2:
+        raise ValueError(f"cameras.count = {count}: a rig needs at least 2 cameras to triangulate, got {count}")
+    if cameras.layout == "dome":
+        return _dome(cameras)
+    if cameras.layout == "corners":
+        half = np.array([cameras.radius, cameras.radius] if room is None else room[:2])
+        flat = _corners(count, half if room is None else half / 2 - _FROM_WALLS)
+    else:
+        flat = _FLAT[cameras.layout](cameras)
+    return np.column_stack([flat, _heights(cameras)])
+
+
+def _heights(cameras: Cameras) -> Floats:
+    return np.resize(np.array(cameras.heights or (cameras.height,)), cameras.count)
+
+
+def _at(bearings: Floats, radius: float | Floats) -> Floats:
+    """Points (n, 2) at bearings (n,), degrees."""
+    angles = np.radians(bearings)
+    return np.column_stack([radius * np.cos(angles), radius * np.sin(angles)])
+
+
+def _ring(cameras: Cameras) -> Floats:
+    return _at(cameras.start + 360.0 * np.arange(cameras.count) / cameras.count, cameras.radius)
+
+
+def _arc(cameras: Cameras) -> Floats:
+    if cameras.spread == 360.0:
+        raise ValueError(
+            "cameras.spread = 360 puts the last camera of the arc on the first: take cameras.layout = 'ring', or less"
+        )
+    return _at(cameras.start + cameras.spread * np.arange(cameras.count) / (cameras.count - 1), cameras.radius)
+
+
+def _line(cameras: Cameras) -> Floats:
+    ahead, left = _at(np.array([cameras.start, cameras.start + 90.0]), 1.0)
+    along = cameras.spacing * (np.arange(cameras.count) - (cameras.count - 1) / 2)
+    return cameras.radius * ahead + along[:, None] * left
+
+
+def _pairs(cameras: Cameras) -> Floats:
+    if cameras.count % 2:
+        raise ValueError(f"cameras.count = {cameras.count}: pairs need an even number of cameras")
+    pairs = cameras.count // 2
+    bearings = cameras.start + 360.0 * np.arange(pairs) / pairs
+    half = cameras.spacing / 2 * _at(bearings + 90.0, 1.0)
+    middles = _at(bearings, cameras.radius)
+    return np.stack([middles - half, middles + half], axis=1).reshape(-1, 2)
+
+
+_FLAT: dict[str, Callable[[Cameras], Floats]] = {"ring": _ring, "arc": _arc, "line": _line, "pairs": _pairs}
+
+
+def _corners(count: int, half: Floats) -> Floats:
+    """Around a rectangle of half sides (2,): its corners, then the middles of its sides, then the quarters, ..."""
+    if (half <= 0).any():
+        raise ValueError(f"room.size leaves no corners {_FROM_WALLS:g} m from the walls for cameras.layout = 'corners'")
+    corners = half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+    shares, steps = [0.0], 2
+    while 4 * len(shares) < count:
+        shares += [odd / steps for odd in range(1, steps, 2)]
+        steps *= 2
+    points = [corners + share * (np.roll(corners, -1, axis=0) - corners) for share in shares]
+    return np.concatenate(points)[:count]
+
+
+def _dome(cameras: Cameras) -> Floats:
+    top, count = cameras.height, cameras.count
+    if top <= 0:
+        raise ValueError(f"cameras.height = {top:g} leaves a dome no height: expected metres above the floor")
+    if cameras.heights and max(cameras.heights) > top:
+        raise ValueError(
+            f"cameras.heights reaches {max(cameras.heights):g} m, above the top of the dome: take cameras.height at "
+            "least that"
+        )
+    z = _heights(cameras) if cameras.heights else top * (_LOWEST + (1 - _LOWEST) * np.arange(count) / (count - 1))
+    radius = cameras.radius * np.sqrt(np.maximum(1.0 - (z / top) ** 2, 0.0))
+    return np.column_stack([_at(cameras.start + _GOLDEN * np.arange(count), radius), z])

@@ -1,0 +1,378 @@
+"""Dynamic playback: people carry out their planned motions with muscles, under gravity and contact.
+
+Every hinge has a proportional-derivative servo with the strength of a human joint. Servos alone lose their balance (a
+planned walk falls after 1.5 s), so the pelvis is helped along by a force and a torque towards where it is planned to
+be, both bounded: a collision or a push that is stronger has consequences. Servos and help act at 480 Hz; what comes of
+it is given at the rate of the plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.body import Body
+from simharness.world.motion.motion import Motion
+from simharness.world.scene.dynamics.efforts import Efforts
+from simharness.world.scene.things.solids import Solid
+
+STEP_RATE = 480.0  # Hz, at least
+LEVER = 0.5  # metres: the helping torque is bounded by the greatest helping force at this lever
+
+# By joint: stiffness (N m / rad) and greatest torque (N m) of an adult of 70 kg and 1.7 m. Torques are about those that
+# adults exert at most (Anderson, Madigan and Nussbaum, J. Biomech. 40, 2007, for the leg) and that simulated people
+# are given (Peng et al., "DeepMimic", SIGGRAPH 2018). Servos are about half as stiff as theirs: what a plan needs is
+# reckoned beforehand (``efforts.py``), and soft legs get over a stumble that stiff ones turn into a fall.
+_MUSCLES = {
+    "lumbar": (600.0, 200.0),
+    "thorax": (600.0, 200.0),
+    "neck": (90.0, 50.0),
+    "hip": (360.0, 200.0),
+    "knee": (360.0, 180.0),
+    "ankle": (300.0, 130.0),
+    "clavicle": (240.0, 100.0),
+    "shoulder": (240.0, 100.0),
+    "elbow": (180.0, 60.0),
+    "forearm": (36.0, 15.0),
+    "wrist": (36.0, 15.0),
+}
+_DAMPING = 0.1  # s: of a servo, as a share of its stiffness
+_ADULT = 70.0 * 1.7  # kg m: torques go with mass and length
+_HELP_RATE = 2 * np.pi * 2.0  # rad/s: how quickly the pelvis is brought back, were the help unbounded
+_REACH = (0.4, 1.0)  # metres from the planned pelvis: where help begins to fail, and where there is none; who is
+# further away has fallen or been carried off, and is not dragged along the floor
+_GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the helping torque
+_BAR = 0.018  # metres: radius of the bars that people stand on
+_CONTACT_TIME = 0.006  # s, in which contacts are resolved; MuJoCo wants at least two steps
+_CHUNK = 120  # planned instants that are read at a time: plans may be long
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force on one person's pelvis.
+
+    Attributes:
+        person: index.
+        start, duration: seconds.
+        force: newtons, (3,), in the world.
+    """
+
+    person: int
+    start: float
+    duration: float
+    force: tuple[float, float, float]
+
+
+def track(
+    model: mujoco.MjModel,
+    bodies: Sequence[Body],
+    motions: Sequence[Motion],
+    *,
+    assist: float,
+    solids: Sequence[Solid] = (),
+    pushes: Sequence[Push] = (),
+) -> tuple[Motion, ...]:
+    """Let people carry out their planned motions, and see what comes of it.
+
+    Args:
+        model: everybody ("person0/...") and everything; it is not changed.
+        bodies: P bodies.
+        motions: their plans, on one clock.
+        assist: the largest force that helps a pelvis along, newtons; the torque is bounded by ``assist * LEVER``.
+        solids: of the scene; the moving ones go their way and push who is in it, but for props that are carried.
+        pushes: forces from outside.
+
+    Returns:
+        The motions as they happened, at the plans' times.
+    """
+    if not motions:
+        return ()
+    tracker = Tracker(model, bodies, motions, assist=assist, solids=solids, pushes=pushes)
+    configurations = np.array(list(tracker.run()))
+    return tuple(
+        Motion(tracker.time, configurations[:, person.root], configurations[:, person.hinges])
+        for person in tracker.people
+    )
+
+
+@dataclass(frozen=True)
+class _Person:
+    """Where one person is in MuJoCo's arrays, and how strong.
+
+    Attributes:
+        pelvis: its body.
+        mass: kilograms.
+        root, hinges: in ``qpos``, (7,) and (D,).
+        root_dofs, hinge_dofs: in ``qvel``, (6,) and (D,).
+        stiffness, strength: of the hinges, (D,).
+    """
+
+    pelvis: int
+    mass: float
+    root: Integers
+    hinges: Integers
+    root_dofs: Integers
+    hinge_dofs: Integers
+    stiffness: Floats
+    strength: Floats
+
+
+class Tracker:
+    """Plans being carried out. It goes through its time once.
+
+    Attributes:
+        time: of the plans, (T,) seconds.
+        people: where everyone is in MuJoCo's arrays.
+        model: a copy, with the servos' damping.
+        data: MuJoCo's state; ``xfrc_applied`` of the pelvises is the help that acts, and the pushes.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        bodies: Sequence[Body],
+        motions: Sequence[Motion],
+        *,
+        assist: float,
+        solids: Sequence[Solid] = (),
+        pushes: Sequence[Push] = (),
+    ) -> None:
+        self.time = motions[0].time
+        self.model = copy(model)
+        self._substeps = int(np.ceil(np.diff(self.time).max(initial=0.0) * STEP_RATE - 1e-6)) or 1
+        if len(self.time) > 1:
+            self.model.opt.timestep = float(np.diff(self.time).mean()) / self._substeps
+        self._motions = tuple(motions)
+        self._assist = assist
+        self._pushes = tuple(pushes)
+        self.people = tuple(_person(self.model, body, f"person{i}/") for i, body in enumerate(bodies))
+        self._moving = [solid for solid in solids if solid.trajectory is not None]
+        self._mocap = [int(self.model.body(solid.name).mocapid[0]) for solid in self._moving]
+        for solid in self._moving:
+            if solid.kind == "prop" and _is_moved(solid):
+                _without_contact(self.model, solid.name)
+        _stand_on_soles(self.model)
+        # Contact forces are scaled to the inertia at the contact, which is little at a foot that carries a body: at
+        # MuJoCo's defaults it sinks in by a centimetre.
+        self.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_OVERRIDE
+        self.model.opt.o_solref[:] = _CONTACT_TIME, 1.0
+        self.model.opt.impratio = 10.0  # or feet creep
+        self.model.opt.o_solimp[:3] = 0.95, 0.99, 0.001
+        for person in self.people:
+            self.model.dof_damping[person.hinge_dofs] = _DAMPING * person.stiffness
+        self._pelvises = np.array([person.pelvis for person in self.people])
+        self._masses = np.array([[person.mass] for person in self.people])
+        self._roots = np.stack([person.root for person in self.people])
+        self._root_dofs = np.stack([person.root_dofs for person in self.people])
+        self._hinges = np.concatenate([person.hinges for person in self.people])
+        self._hinge_dofs = np.concatenate([person.hinge_dofs for person in self.people])
+        self._stiffness = np.concatenate([person.stiffness for person in self.people])
+        self._strength = np.concatenate([person.strength for person in self.people])
+        self.data = mujoco.MjData(self.model)
+        self._efforts = Efforts(
+            self.model,
+            [person.root_dofs for person in self.people],
+            [person.hinge_dofs for person in self.people],
+        )
+
+    def run(self) -> Iterator[Floats]:
+        """The configuration, ``qpos``, at each of the times: as planned at the first, then as it comes."""
+        last = len(self.time) - 1
+        step = self.model.opt.timestep
+        for start in range(0, max(last, 1), _CHUNK):
+            stop = min(start + _CHUNK, last)
+            times = self.time[start] + step * np.arange((stop - start) * self._substeps + 2)
+            plan = _Plan([motion.at(times) for motion in self._motions], step)
+            placements = [solid.trajectory.at(times) for solid in self._moving if solid.trajectory is not None]
+            efforts = self._foreseen(times[:: self._substeps], plan, placements)
+            if start == 0:
+                self._begin(plan, placements)
+                yield self.data.qpos.copy()
+            for k in range((stop - start) * self._substeps):
+                self._step(plan, placements, efforts[k + 1], k + 1, float(times[k]))
+                if (k + 1) % self._substeps == 0:
+                    yield self.data.qpos.copy()
+
+    def _begin(self, plan: _Plan, placements: list[Floats]) -> None:
+        self.data.qpos[:], self.data.qvel[:] = self._configuration(plan, 0)
+        self._place(placements, 0)
+        mujoco.mj_forward(self.model, self.data)
+
+    def _configuration(self, plan: _Plan, k: int) -> tuple[Floats, Floats]:
+        """Everybody's planned ``qpos`` and ``qvel`` at the plan's instant of index ``k``."""
+        qpos, qvel = np.empty(self.model.nq), np.empty(self.model.nv)
+        for i, person in enumerate(self.people):
+            qpos[person.root], qpos[person.hinges] = plan.roots[k, i], plan.angles[k, i]
+            qvel[person.root_dofs[:3]], qvel[person.root_dofs[3:]] = plan.velocities[k, i], plan.spins[k, i]
+            qvel[person.hinge_dofs] = plan.speeds[k, i]
+        return qpos, qvel
+
+    def _foreseen(self, frames: Floats, plan: _Plan, placements: list[Floats]) -> Floats:
+        """Torques that the plan asks of all hinges at its instants, (n, P D); reckoned at some, straight between."""
+        count, every = len(plan.angles), self._substeps
+        states = [self._configuration(plan, k) for k in range(0, count, every)]
+        speeds = np.array([qvel for _, qvel in states])
+        accelerations = np.gradient(speeds, frames, axis=0) if len(frames) > 1 else np.zeros_like(speeds)
+        known = np.array(
+            [
+                self._efforts.torques(*states[k], accelerations[k], self._placed(placements, k * every)).ravel()
+                for k in range(len(states))
+            ]
+        )
+        at = np.minimum(np.arange(count) / every, len(known) - 1)
+        before = np.minimum(at.astype(int), max(len(known) - 2, 0))
+        share = (at - before)[:, None]
+        return (1 - share) * known[before] + share * known[np.minimum(before + 1, len(known) - 1)]
+
+    def _place(self, placements: list[Floats], k: int) -> None:
+        for mocap, pose in self._placed(placements, k):
+            self.data.mocap_pos[mocap], self.data.mocap_quat[mocap] = pose[:3], pose[3:]
+
+    def _placed(self, placements: list[Floats], k: int) -> list[tuple[int, Floats]]:
+        """Index and pose (7,) of what moves by itself."""
+        return [(mocap, pose[k]) for mocap, pose in zip(self._mocap, placements, strict=True)]
+
+    def _step(self, plan: _Plan, placements: list[Floats], effort: Floats, k: int, time: float) -> None:
+        """From one instant towards that of index ``k`` of the plan."""
+        data = self.data
+        self._place(placements, k)
+        speed = data.qvel[self._hinge_dofs]
+        off = plan.angles[k].ravel() - data.qpos[self._hinges] - self.model.opt.timestep * speed
+        hold = self._hold(plan, k)
+        wanted = np.repeat(hold, len(DOFS)) * effort + self._stiffness * (
+            off + _DAMPING * (plan.speeds[k].ravel() - speed)
+        )
+        torque = np.clip(wanted, -self._strength, self._strength)
+        # The model's own damping, which MuJoCo integrates implicitly, is part of the servo: give back what it takes.
+        data.qfrc_applied[self._hinge_dofs] = torque + _DAMPING * self._stiffness * speed
+        data.xfrc_applied[self._pelvises] = self._help(plan, hold, k)
+        for push in self._pushes:
+            if push.start <= time < push.start + push.duration:
+                data.xfrc_applied[self.people[push.person].pelvis, :3] += push.force
+        mujoco.mj_step(self.model, data)
+
+    def _hold(self, plan: _Plan, k: int) -> Floats:
+        """How far people still keep to their plan, (P,): 1 near it, 0 where they are out of its reach."""
+        off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self._roots[:, :3]], axis=1)
+        near, far = _REACH
+        return np.clip((far - off) / (far - near), 0.0, 1.0)
+
+    def _help(self, plan: _Plan, hold: Floats, k: int) -> Floats:
+        """Forces and torques (P, 6) that bring the pelvises to where they are planned, within the bounds."""
+        root, speed = self.data.qpos[self._roots], self.data.qvel[self._root_dofs]  # (P, 7), (P, 6)
+        force = self._masses * _pull(plan.roots[k, :, :3] - root[:, :3], plan.velocities[k] - speed[:, :3])
+        # Turns and spins are about the pelvis's own axes, as MuJoCo's are; the torque acts in the world.
+        turn = _between(root[:, 3:], plan.roots[k, :, 3:])
+        torque = self._masses * _GYRATION**2 * _pull(turn, plan.spins[k] - speed[:, 3:])
+        torque = (self.data.xmat[self._pelvises].reshape(-1, 3, 3) @ torque[..., None])[..., 0]
+        return np.concatenate(
+            [_bounded(force, hold * self._assist), _bounded(torque, hold * self._assist * LEVER)], axis=1
+        )
+
+
+class _Plan:
+    """Everybody's plan at n instants ``step`` seconds apart.
+
+    Attributes:
+        roots: of the pelvises, (n, P, 7).
+        velocities: of the pelvises in the world, (n, P, 3) m/s. spins: about their own axes, (n, P, 3) rad/s.
+        angles, speeds: of the hinges, (n, P, D), radians and rad/s.
+    """
+
+    def __init__(self, motions: Sequence[Motion], step: float) -> None:
+        self.roots = np.stack([motion.root for motion in motions], axis=1)
+        self.angles = np.stack([motion.angles for motion in motions], axis=1)
+        self.velocities = np.gradient(self.roots[..., :3], step, axis=0)
+        self.speeds = np.gradient(self.angles, step, axis=0)
+        turns = _between(self.roots[:-1, :, 3:], self.roots[1:, :, 3:])
+        self.spins = np.concatenate([turns, turns[-1:]]) / step
+
+
+def _pull(off: Floats, slow: Floats) -> Floats:
+    """The acceleration of a critically damped spring, from what is lacking in place and in velocity."""
+    return _HELP_RATE**2 * off + 2 * _HELP_RATE * slow
+
+
+def _between(first: Floats, second: Floats) -> Floats:
+    """The turn (..., 3), radians about its own axes, that takes orientation ``first`` to ``second``, both (..., 4)."""
+    w, v = first[..., :1], first[..., 1:]
+    u, x = second[..., :1], second[..., 1:]
+    real = w * u + (v * x).sum(axis=-1, keepdims=True)
+    across = v[..., [1, 2, 0]] * x[..., [2, 0, 1]] - v[..., [2, 0, 1]] * x[..., [1, 2, 0]]
+    imaginary = w * x - u * v - across
+    sine = np.linalg.norm(imaginary, axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, np.abs(real)) * np.where(real < 0, -1.0, 1.0)
+    return np.asarray(imaginary * angle / np.maximum(sine, 1e-12))
+
+
+def _bounded(vectors: Floats, most: Floats) -> Floats:
+    """Vectors (P, 3), none longer than ``most`` (P,)."""
+    length = np.sqrt((vectors**2).sum(axis=1))
+    return np.asarray(vectors * np.minimum(1.0, most / np.maximum(length, 1e-12))[:, None])
+
+
+def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
+    root = model.joint(f"{prefix}root")
+    hinges = [model.joint(f"{prefix}{name}") for name in DOFS]
+    pelvis = int(model.body(f"{prefix}{body.bones[0]}").id)
+    mass = float(model.body_subtreemass[pelvis])
+    size = mass * body.stature / _ADULT
+    stiffness, strength = size * np.array([_MUSCLES[_joint(name)] for name in DOFS]).T
+    return _Person(
+        pelvis=pelvis,
+        mass=mass,
+        root=root.qposadr[0] + np.arange(7),
+        hinges=np.array([hinge.qposadr[0] for hinge in hinges]),
+        root_dofs=root.dofadr[0] + np.arange(6),
+        hinge_dofs=np.array([hinge.dofadr[0] for hinge in hinges]),
+        stiffness=stiffness,
+        strength=strength,
+    )
+
+
+def _joint(dof: str) -> str:
+    """The key of ``_MUSCLES`` for a degree of freedom: of "left_knee_flexion" it is "knee"."""
+    return next(word for word in dof.split("_") if word in _MUSCLES)
+
+
+def _stand_on_soles(model: mujoco.MjModel) -> None:
+    """Make the capsules of the feet bars that lead from beside the ankle down to the floor under the ball.
+
+    A capsule is round and a sole is flat: those that fit a foot best meet the floor elsewhere than the skin, of which
+    the plan is made, does, and whoever steps on them is pushed off the plan. The heel, over which a planned foot rolls
+    within a tenth of a stride, touches nothing: a bar there would roll otherwise than the skin, and trip. In the
+    initial configuration everyone stands on z = 0.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE):
+        body = int(model.geom_bodyid[geom])
+        if not model.body(body).name.endswith("Foot"):
+            continue
+        center, turn = data.geom_xpos[geom], data.xmat[body].reshape(3, 3)
+        reach = model.geom_size[geom, 1] * data.geom_xmat[geom].reshape(3, 3)[:, 2]
+        ends = np.stack([center - reach, center + reach])
+        ball = int(np.linalg.norm((ends - data.xpos[body])[:, :2], axis=1).argmax())
+        ends[ball, 2], ends[1 - ball, 2] = _BAR, data.xpos[body, 2]
+        way, half = ends[ball] - ends[1 - ball], float(np.linalg.norm(ends[ball] - ends[1 - ball])) / 2
+        model.geom_pos[geom] = turn.T @ (ends.mean(axis=0) - data.xpos[body])
+        mujoco.mju_quatZ2Vec(model.geom_quat[geom], turn.T @ (way / (2 * half)))
+        model.geom_size[geom, :2] = _BAR, half
+        model.geom_rbound[geom] = half + _BAR
+        model.geom_aabb[geom] = 0.0, 0.0, 0.0, _BAR, _BAR, half + _BAR
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the capsules as they were
+
+
+def _is_moved(solid: Solid) -> bool:
+    return solid.trajectory is not None and float(np.ptp(solid.trajectory.pose, axis=0).max()) > 1e-6
+
+
+def _without_contact(model: mujoco.MjModel, name: str) -> None:
+    geoms = model.geom_bodyid == model.body(name).id
+    model.geom_contype[geoms] = model.geom_conaffinity[geoms] = 0

@@ -1,0 +1,86 @@
+"""Kinematic playback: the motions drive the MuJoCo model, and its bodies tell where everything is at any moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mvpose.arrays import Floats
+from mvpose.skeleton import COCO17
+from simharness.types.landmarks import LANDMARKS
+from simharness.world.humans.body import body_model
+from simharness.world.humans.model import bone_transforms
+from simharness.world.motion.poses.kinematics import Addresses
+from simharness.world.scene.build import Scene
+
+
+@dataclass(frozen=True)
+class State:
+    """Where everyone and everything is at one moment.
+
+    Attributes:
+        time: seconds.
+        landmarks: of ``simharness.types.landmarks.LANDMARKS`` in the world, (P, L, 3), metres.
+        bones: skinning transforms, rest pose to world, (P, B, 3, 4).
+        placements: poses of the scene's moving solids in their order, (M, 7): metres, quaternion w x y z.
+    """
+
+    time: float
+    landmarks: Floats
+    bones: Floats
+    placements: Floats
+
+    @property
+    def joints(self) -> Floats:
+        """COCO-17 joints in the world, (P, 17, 3), metres."""
+        return self.landmarks[:, : len(COCO17)]
+
+
+class Playback:
+    """A scene that can be looked at at any time. Holds one state of MuJoCo's, so it is not for sharing.
+
+    Attributes:
+        scene: what is played.
+        data: MuJoCo's state, that of the last :class:`State` given.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.data = mujoco.MjData(scene.model)
+        self._people = [Addresses(scene.model, body, prefix=f"person{i}/") for i, body in enumerate(scene.bodies)]
+        self._mocap = [int(scene.model.body(solid.name).mocapid[0]) for solid in scene.moving]
+        self._empty = np.zeros((0, len(body_model().bones), 3, 4))
+
+    def at(self, time: float) -> State:
+        """The scene at one time, seconds."""
+        return next(self.over([time]))
+
+    def over(self, times: ArrayLike) -> Iterator[State]:
+        """The scene at times (n,), one after the other."""
+        times = np.asarray(times, float)
+        motions = [motion.read(times) for motion in self.scene.motions]
+        placements = np.empty((len(times), len(self._mocap), 7))
+        for k, solid in enumerate(self.scene.moving):
+            assert solid.trajectory is not None  # or it would not be among the moving
+            placements[:, k] = solid.trajectory.at(times)
+        for n, time in enumerate(times):
+            for address, (root, angles) in zip(self._people, motions, strict=True):
+                address.write(self.data.qpos, root[n], angles[n])
+            self.data.mocap_pos[self._mocap] = placements[n, :, :3]
+            self.data.mocap_quat[self._mocap] = placements[n, :, 3:]
+            mujoco.mj_kinematics(self.scene.model, self.data)
+            bones = [
+                bone_transforms(body, *address.read(self.data))
+                for body, address in zip(self.scene.bodies, self._people, strict=True)
+            ]
+            landmarks = [body.landmarks(pose) for body, pose in zip(self.scene.bodies, bones, strict=True)]
+            yield State(
+                time=float(time),
+                landmarks=np.stack(landmarks) if landmarks else np.zeros((0, len(LANDMARKS), 3)),
+                bones=np.stack(bones) if bones else self._empty,
+                placements=placements[n],
+            )

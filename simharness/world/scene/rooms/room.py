@@ -1,0 +1,140 @@
+"""The room: a floor and four walls, open above; or the floor alone.
+
+The floor's faces look up and the walls' faces look into the room: counter-clockwise as seen from inside, which is
+the outside of the wall as a thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.scenario.sections.room import Room
+from simharness.types.mesh import Mesh
+from simharness.types.random_streams import stream
+from simharness.world.scene.rooms.lighting import room_lighting
+from simharness.world.scene.rooms.surfaces import FLOORS, WALLS, Finish
+from simharness.world.scene.things.geoms import Box
+from simharness.world.scene.things.shapes import quad_mesh
+from simharness.world.scene.things.solids import Solid
+
+Choice = TypeVar("Choice")
+
+_CELL = 1.0  # metres, about: of the grids of floor and walls
+_THICK = 0.1  # metres: of the floor and the walls as solids, away from the room
+_AROUND = 4.0  # metres of ground around an open floor
+_RIM = 0.25  # metres, about: cells of that ground, which fades into the background
+# Facing walls share a tone, so that the corners read and a picture tells where one looks.
+_TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
+
+
+def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
+    """Floor and walls of a room around the origin, its floor at z = 0; without walls, floor and ground around it.
+
+    Looks are drawn by streams of the room's own: the size changes none, and one look not the other.
+    """
+    x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
+    rng = stream(seed, "room", "floor")
+    finish = _chosen(FLOORS, room.floor, rng)(rng)
+    slab = Box((0.0, 0.0, -_THICK / 2), (x, y, _THICK / 2))
+    floor = Solid("room", "floor", _floor(x, y, finish), (slab,), slab)
+    if not room.walls:
+        return floor, _ground(room, seed, finish)
+    rng = stream(seed, "room", "wall")
+    paper = _chosen(WALLS, room.wall, rng)(rng, z)
+    # Each wall from its left corner to its right corner as seen from inside.
+    runs = {
+        "wall +x": ((x, y), (x, -y)),
+        "wall -x": ((-x, -y), (-x, y)),
+        "wall +y": ((-x, y), (x, y)),
+        "wall -y": ((x, -y), (-x, -y)),
+    }
+    return floor, *(_wall(name, np.array(left), np.array(right), z, paper) for name, (left, right) in runs.items())
+
+
+def _chosen(looks: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
+    """A look by its name; drawn for "any". The draw is made in any case, so that what follows is not shifted."""
+    drawn = list(looks)[rng.integers(len(looks))]
+    return looks[drawn if name == "any" else name]
+
+
+def _floor(x: float, y: float, finish: Finish) -> Mesh:
+    columns, rows = _ticks(-x, x, _CELL), _ticks(-y, y, _CELL)
+    grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
+    return _papered(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
+
+
+def _wall(name: str, left: Floats, right: Floats, height: float, finish: Finish) -> Solid:
+    length = float(np.linalg.norm(right - left))
+    along = (right - left) / length
+    out = np.array([-along[1], along[0]])
+    middle = (left + right) / 2 + out * _THICK / 2
+    block = Box(
+        (float(middle[0]), float(middle[1]), height / 2),
+        (length / 2 + _THICK, _THICK / 2, height / 2),
+        float(np.arctan2(along[1], along[0])),
+    )
+    columns, rows = _ticks(0.0, length, _CELL), _ticks(0.0, height, _CELL)
+    grid = np.empty((len(columns), len(rows), 3))
+    grid[..., :2] = (left + columns[:, None] * along)[:, None]
+    grid[..., 2] = rows
+    place = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1)
+    return Solid("room", name, _papered(grid, place, finish, _TONES[name[-1]]), (block,), block)
+
+
+def _ground(room: Room, seed: int, finish: Finish) -> Solid:
+    """A plain ring around an open floor, of the floor's mean colour and paler and paler outwards, as haze would."""
+    half = np.array(room.size[:2]) / 2
+    light = room_lighting(room, seed)
+    shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
+    mean = finish.texture.reshape(-1, 3).mean(axis=0) / 255
+    steps = round(_AROUND / _RIM)
+    rings = np.stack([_outline(half + _AROUND * k / steps) for k in range(steps + 1)])
+    sides = rings.shape[1]
+    k = np.arange(sides)
+    after = (k + 1) % sides
+    quads = np.concatenate(
+        [
+            np.column_stack([n * sides + k, (n + 1) * sides + k, (n + 1) * sides + after, n * sides + after])
+            for n in range(steps)
+        ]
+    )
+    fade = np.repeat(((np.arange(steps) + 1) / steps) ** 1.5, sides)[:, None]
+    mesh = quad_mesh(rings.reshape(-1, 3), quads, (1 - fade) * mean + fade * np.clip(shown, 0, 1))
+    slab = Box((0.0, 0.0, -_THICK / 2), (float(half[0] + _AROUND), float(half[1] + _AROUND), _THICK / 2))
+    return Solid("room", "ground", mesh, (slab,), slab)
+
+
+def _outline(half: Floats, each: int = 8) -> Floats:
+    """The outline (n, 3) on the floor of a rectangle, counter-clockwise from above, in equal parts."""
+    corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
+    share = np.arange(each)[:, None] / each
+    sides = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return np.pad(np.concatenate(sides), ((0, 0), (0, 1)))
+
+
+def _ticks(low: float, high: float, step: float) -> Floats:
+    return np.linspace(low, high, max(1, round((high - low) / step)) + 1)
+
+
+def _papered(grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float]) -> Mesh:
+    """A grid of vertices (c, r, 3) that shows a texture.
+
+    Args:
+        grid: column by column; right, then up, is counter-clockwise.
+        place: where the vertices are on the surface, metres to the right and up, (c, r, 2); the texture's lower edge
+            is at height 0.
+        finish: the texture.
+        tone: what multiplies it.
+    """
+    columns, rows = grid.shape[:2]
+    i, j = np.meshgrid(np.arange(columns - 1), np.arange(rows - 1), indexing="ij")
+    corner = (i * rows + j).ravel()
+    quads = np.stack([corner, corner + rows, corner + rows + 1, corner + 1], axis=-1)
+    mesh = quad_mesh(grid.reshape(-1, 3), quads, np.broadcast_to(np.array(tone), (len(quads), 3)))
+    uv = place.reshape(-1, 2) / finish.size * [1.0, -1.0] + [0.0, 1.0]
+    return replace(mesh, texture=finish.texture, uv=uv[mesh.faces].astype(np.float32))

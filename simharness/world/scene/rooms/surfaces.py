@@ -1,0 +1,189 @@
+"""What floors and walls are made of: textures that repeat without seams, drawn by numbers.
+
+A texture shows a patch of so many metres; its rows run down, on a wall from the top to the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+
+_FLOOR_GRAIN = 192  # pixels a metre
+_WALL_GRAIN = 160
+SKIRTING = 0.1  # metres
+
+
+@dataclass(frozen=True)
+class Finish:
+    """A texture (h, w, 3) uint8, sRGB, of a patch of ``size`` width and height, metres."""
+
+    texture: NDArray[np.uint8]
+    size: tuple[float, float]
+
+
+def tiles(rng: np.random.Generator) -> Finish:
+    """Light and dark tiles of half a metre, no two quite alike."""
+    count, side = 8, _FLOOR_GRAIN // 2
+    i, j = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    base = np.where(((i + j) % 2 == 1)[..., None], (0.735, 0.725, 0.70), (0.86, 0.84, 0.80))
+    tone = base * (1 + rng.uniform(-0.025, 0.025, (count, count, 1)))
+    picture = np.repeat(np.repeat(tone, side, axis=0), side, axis=1)
+    picture *= 1 + 0.015 * _noise(rng, picture.shape[:2], 24)[..., None]
+    inside = np.minimum(*np.meshgrid(_to_edge(count * side, side), _to_edge(count * side, side)))
+    picture *= np.where(inside < 1.5, 0.86, 1.0)[..., None]  # grout
+    return _finish(picture, _FLOOR_GRAIN)
+
+
+def wood(rng: np.random.Generator) -> Finish:
+    """Boards of oak, 14 cm wide, their ends staggered."""
+    boards, width, length = 16, 27, 3 * _FLOOR_GRAIN
+    shape = (boards * width, length)
+    picture = np.empty((*shape, 3))
+    grain = _noise(rng, (shape[0], shape[1]), 64, across=3) + 0.6 * _noise(rng, (shape[0], shape[1]), 32, across=1)
+    for board in range(boards):
+        rows = slice(board * width, (board + 1) * width)
+        ends = np.sort(rng.uniform(0, length, 2))
+        which = np.searchsorted(ends, np.arange(length)) % 2
+        tones = np.array([0.71, 0.53, 0.36]) * rng.uniform(0.84, 1.10, (2, 1)) + rng.uniform(-0.015, 0.015, (2, 3))
+        picture[rows] = tones[which]
+        picture[rows, ends.astype(int)] *= 0.72
+        picture[board * width] *= 0.76
+    picture *= 1 + 0.07 * grain[..., None]
+    return _finish(picture, _FLOOR_GRAIN)
+
+
+def carpet(rng: np.random.Generator) -> Finish:
+    """Squares of loop carpet, laid with the pile this way and that."""
+    side = 2 * _FLOOR_GRAIN
+    color = np.array([[0.36, 0.44, 0.52], [0.45, 0.42, 0.44], [0.40, 0.48, 0.42], [0.52, 0.46, 0.40]])[rng.integers(4)]
+    half = side // 2
+    lines = 1 + 0.05 * np.sin(2 * np.pi * np.arange(side) / 6)
+    picture = np.ones((side, side))
+    picture *= np.where(_checks(side, half), lines[:, None], lines[None, :])
+    picture *= np.where(_checks(side, half), 1.03, 0.97)
+    picture *= 1 + 0.10 * rng.uniform(-1, 1, (side, side)) + 0.05 * _noise(rng, (side, side), 48)
+    return _finish(picture[..., None] * color, _FLOOR_GRAIN)
+
+
+def concrete(rng: np.random.Generator) -> Finish:
+    """Poured concrete with a joint every two metres."""
+    side = 4 * _FLOOR_GRAIN
+    shape = (side, side)
+    cloud = _noise(rng, shape, 192) + 0.5 * _noise(rng, shape, 64) + 0.25 * _noise(rng, shape, 16)
+    picture = 0.66 * (1 + 0.07 * cloud + 0.035 * rng.uniform(-1, 1, shape))
+    edge = np.minimum(*np.meshgrid(_to_edge(side, side // 2), _to_edge(side, side // 2)))
+    picture *= np.where(edge < 1.5, 0.74, 1.0)
+    return _finish(picture[..., None] * np.array([1.0, 0.985, 0.96]), _FLOOR_GRAIN)
+
+
+def plain(rng: np.random.Generator, height: float) -> Finish:
+    """Paint put on with a roller."""
+    shape = _wall_shape(2.0, height)
+    picture = np.repeat((1 + 0.007 * _noise(rng, shape, 40) + 0.006 * rng.uniform(-1, 1, shape))[..., None], 3, axis=2)
+    return _skirted(picture * (0.95, 0.95, 0.95))
+
+
+def panels(rng: np.random.Generator, height: float) -> Finish:
+    """Wooden panels with mouldings up to the dado rail, paint above."""
+    tall, wide = shape = _wall_shape(2.0, height)
+    picture = np.full((*shape, 3), 0.95) * (1 + 0.007 * _noise(rng, shape, 40))[..., None]
+    dado = tall - round(min(1.05, 0.45 * height) * _WALL_GRAIN)
+    tint = np.array([[0.52, 0.60, 0.58], [0.62, 0.56, 0.48], [0.46, 0.52, 0.60], [0.66, 0.64, 0.60]])[rng.integers(4)]
+    picture[dado:] = tint * (1 + 0.02 * _noise(rng, shape, 20, across=3)[dado:, :, None])
+    each = wide // 2
+    top, foot = dado + 20, tall - round(SKIRTING * _WALL_GRAIN) - 12
+    for left in (0, each):
+        field = picture[top:foot, left + 14 : left + each - 14]
+        for inset, shade in ((0, 0.72), (2, 1.14), (4, 0.86), (6, 1.05)):
+            cut = field[inset : len(field) - inset, inset : field.shape[1] - inset]
+            cut[:] = tint * shade
+        field[8:-8, 8:-8] = tint * (
+            0.97 + 0.02 * _noise(rng, shape, 20)[: len(field) - 16, : field.shape[1] - 16, None]
+        )
+    picture[dado - 7 : dado] = 1.08 * tint
+    picture[dado : dado + 2] = 0.7 * tint
+    return _skirted(picture, tint=0.85 * tint)
+
+
+def brick(rng: np.random.Generator, height: float) -> Finish:
+    """Bricks in stretcher bond, whitewashed now and then."""
+    course, length = 12, 40  # pixels: 7.5 and 25 cm
+    tall, wide = shape = _wall_shape(8 * length / _WALL_GRAIN, height)
+    mortar = np.array([0.78, 0.76, 0.72])
+    base = np.array([[0.66, 0.40, 0.32], [0.86, 0.84, 0.81]])[rng.integers(2)]
+    picture = mortar * np.ones((*shape, 1))
+    for row, top in enumerate(range(tall - course, -course, -course)):
+        for k in range(wide // length):
+            tone = base * (1 + rng.uniform(-0.13, 0.10)) + rng.uniform(-0.02, 0.02, 3)
+            columns = (k * length + (row % 2) * length // 2 + np.arange(2, length)) % wide
+            picture[max(top + 2, 0) : max(top + course, 0), columns] = tone
+    picture *= 1 + 0.05 * _noise(rng, shape, 6)[..., None] + 0.03 * rng.uniform(-1, 1, (*shape, 1))
+    return _skirted(picture)
+
+
+def stripes(rng: np.random.Generator, height: float) -> Finish:
+    """Striped wallpaper."""
+    shape = _wall_shape(1.2, height)
+    pale = np.array([0.93, 0.91, 0.86])
+    tint = np.array([[0.70, 0.78, 0.80], [0.84, 0.74, 0.66], [0.74, 0.78, 0.66], [0.78, 0.72, 0.80]])[rng.integers(4)]
+    at = np.arange(shape[1]) % (shape[1] // 4) / (shape[1] // 4)
+    row = np.where((at < 0.5)[:, None], tint, pale)
+    row = np.where((np.abs(at - 0.75) < 0.03)[:, None], tint, row)
+    return _skirted(row * (1 + 0.01 * _noise(rng, shape, 12)[..., None]))
+
+
+FLOORS: Mapping[str, Callable[[np.random.Generator], Finish]] = MappingProxyType(
+    {"tiles": tiles, "wood": wood, "carpet": carpet, "concrete": concrete}
+)
+"""By name."""
+WALLS: Mapping[str, Callable[[np.random.Generator, float], Finish]] = MappingProxyType(
+    {"plain": plain, "panels": panels, "brick": brick, "stripes": stripes}
+)
+"""By name; each takes the height of the wall, metres."""
+
+
+def _wall_shape(width: float, height: float) -> tuple[int, int]:
+    return max(round(height * _WALL_GRAIN), 1), round(width * _WALL_GRAIN)
+
+
+def _skirted(picture: Floats, tint: Floats | None = None) -> Finish:
+    """With a skirting board along the floor."""
+    board = min(round(SKIRTING * _WALL_GRAIN), len(picture) // 2)
+    picture[-board:] = (0.56, 0.54, 0.52) if tint is None else tint
+    picture[-board : -board + 2] *= 1.15
+    return _finish(picture, _WALL_GRAIN)
+
+
+def _finish(picture: Floats, grain: int) -> Finish:
+    texture = np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+    return Finish(texture, (texture.shape[1] / grain, texture.shape[0] / grain))
+
+
+def _to_edge(length: int, cell: int) -> NDArray[np.int_]:
+    """Distance of every pixel to the nearest border between cells."""
+    at = np.arange(length) % cell
+    return np.minimum(at, cell - 1 - at)
+
+
+def _checks(side: int, half: int) -> NDArray[np.bool_]:
+    i, j = np.meshgrid(np.arange(side) // half, np.arange(side) // half, indexing="ij")
+    return np.asarray((i + j) % 2 == 0)
+
+
+def _noise(rng: np.random.Generator, shape: tuple[int, int], cell: int, *, across: int | None = None) -> Floats:
+    """Smooth noise of about unit size whose blobs are ``cell`` pixels along and ``across`` down; it repeats."""
+    down = cell if across is None else across
+    rows, columns = max(shape[0] // down, 1), max(shape[1] // cell, 1)
+    coarse = np.pad(rng.uniform(-1, 1, (rows, columns)), 2, mode="wrap")
+    scale = np.array([shape[1] / columns, shape[0] / rows])
+    size = (round(scale[0] * (columns + 4)), round(scale[1] * (rows + 4)))
+    fine = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
+    top, left = round(2 * scale[1]), round(2 * scale[0])
+    return np.asarray(fine[top : top + shape[0], left : left + shape[1]], float)

@@ -1,0 +1,59 @@
+"""Putting things together piece by piece, each piece with its looks and its geom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mvpose.arrays import Floats
+from simharness.types.mesh import Mesh
+from simharness.types.mirror import Mirror
+from simharness.world.scene.things.geoms import Box, Cylinder, Geom
+from simharness.world.scene.things.shapes import bar_mesh, box_mesh, joined, surface
+from simharness.world.scene.things.solids import Thing
+
+
+class Assembly:
+    """A thing in the making. It stands on z = 0 around the origin, its front towards +x."""
+
+    def __init__(self) -> None:
+        self._meshes: list[Mesh] = []
+        self._geoms: list[Geom] = []
+
+    def box(self, center: Sequence[float], size: Sequence[float], color: ArrayLike, *, yaw: float = 0.0) -> Self:
+        """Add a box of ``size`` x, y, z metres; ``color`` of all of it (3,) or of its six sides (6, 3)."""
+        x, y, z = (float(v) for v in center)
+        dx, dy, dz = (float(v) / 2 for v in size)
+        return self.boxes([Box((x, y, z), (dx, dy, dz), yaw)], np.asarray([color], float))
+
+    def boxes(self, boxes: Sequence[Box], colors: ArrayLike) -> Self:
+        """Add boxes; ``colors`` as those of :func:`simharness.world.scene.things.shapes.box_mesh`."""
+        self._meshes.append(box_mesh(boxes, colors))
+        self._geoms += boxes
+        return self
+
+    def bar(
+        self, start: Sequence[float], end: Sequence[float], radius: float, color: ArrayLike, sides: int = 10
+    ) -> Self:
+        """Add a round bar from one point to another, metres."""
+        a, b = np.asarray(start, float), np.asarray(end, float)
+        length = float(np.linalg.norm(b - a))
+        x, y, z = ((a + b) / 2).tolist()
+        i, j, k = ((b - a) / length).tolist()
+        bar = Cylinder((x, y, z), radius, length / 2, (i, j, k))
+        self._meshes.append(bar_mesh(bar, color, sides=sides))
+        self._geoms.append(bar)
+        return self
+
+    def mesh(self, mesh: Mesh) -> Self:
+        """Add a mesh as it is."""
+        self._meshes.append(mesh)
+        self._geoms.append(surface(mesh))
+        return self
+
+    def thing(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> Thing:
+        """What has been put together."""
+        return Thing(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)

@@ -1,0 +1,137 @@
+"""Meshes of simple shapes, to build things from: quadrilaterals, boxes, bars, and what comes off a lathe.
+
+Faces are counter-clockwise seen from outside. Creases have vertices of their own on either side, so that a smooth mesh
+may hold flat sides and sharp edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mvpose.arrays import Floats
+from simharness.types.mesh import Mesh
+from simharness.world.scene.things.geoms import Box, Cylinder, Surface
+
+# Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
+_QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+TOP = 5  # of a box's sides
+_CREASE = np.cos(np.radians(40))  # a profile that bends more has an edge there
+
+
+def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh:
+    """Quadrilaterals (k, 4), counter-clockwise from outside, each with a colour (k, 3), as triangles."""
+    faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return Mesh(
+        vertices=vertices.astype(np.float32),
+        faces=faces.astype(np.int32),
+        colors=np.repeat(np.clip(colors, 0, 1), 2, axis=0).astype(np.float32),
+        smooth=False,
+    )
+
+
+def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
+    """Boxes as one mesh.
+
+    Args:
+        boxes: n boxes.
+        colors: albedo 0..1 of each box (n, 3) or of each of its sides -x, +x, -y, +y, -z, +z (n, 6, 3).
+    """
+    colors = np.asarray(colors, float)
+    if colors.ndim == 2:
+        colors = np.repeat(colors[:, None], 6, axis=1)
+    vertices = np.concatenate([box.corners[_QUADS].reshape(-1, 3) for box in boxes])
+    return quad_mesh(vertices, np.arange(len(vertices)).reshape(-1, 4), colors.reshape(-1, 3))
+
+
+def hexahedron(corners: ArrayLike, color: ArrayLike) -> Mesh:
+    """Six flat sides over eight corners (8, 3) in the order of those of a ``Box``."""
+    vertices = np.asarray(corners, float)[_QUADS].reshape(-1, 3)
+    return quad_mesh(vertices, np.arange(24).reshape(-1, 4), np.broadcast_to(np.asarray(color, float), (6, 3)))
+
+
+def bar_mesh(bar: Cylinder, color: ArrayLike, *, sides: int = 14) -> Mesh:
+    """A cylinder with its ends."""
+    profile = [(0.0, -bar.half), (bar.radius, -bar.half), (bar.radius, bar.half), (0.0, bar.half)]
+    upright = lathe(profile, color, sides=sides)
+    along = np.array(bar.axis)
+    across = np.cross(along, [0.0, 1.0, 0.0] if abs(along[1]) < 0.9 else [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    axes = np.stack([across, np.cross(along, across), along])
+    return replace(upright, vertices=(upright.vertices @ axes + bar.center).astype(np.float32))
+
+
+def lathe(profile: ArrayLike, colors: ArrayLike, *, sides: int = 16, squash: float = 1.0) -> Mesh:
+    """A body of revolution about the z axis, smooth around and along, with edges where the profile bends sharply.
+
+    Args:
+        profile: radius and height of m points from the bottom up, (m, 2) metres; radius 0 closes an end.
+        colors: albedo of all of it (3,), or of each of the m - 1 bands (m - 1, 3).
+        sides: how many make the round.
+        squash: extent in x over that in y.
+    """
+    profile = np.asarray(profile, float)
+    bands = np.diff(profile, axis=0)
+    colors = np.broadcast_to(np.asarray(colors, float), (len(bands), 3))
+    unit = bands / np.linalg.norm(bands, axis=1, keepdims=True)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    circle = np.column_stack([squash * np.cos(turn), np.sin(turn)])
+    rings = np.concatenate(
+        [profile[:, :1, None] * circle, np.broadcast_to(profile[:, 1, None, None], (len(profile), sides, 1))], axis=2
+    )
+    edges = [n for n in range(1, len(bands)) if unit[n] @ unit[n - 1] < _CREASE]
+    return loft(rings, colors, edges=edges)
+
+
+def loft(rings: ArrayLike, colors: ArrayLike, *, edges: Sequence[int] = ()) -> Mesh:
+    """A smooth skin over closed outlines, each joined to the next.
+
+    Args:
+        rings: m outlines of s points, counter-clockwise seen from the last one's side, (m, s, 3) metres; an outline
+            may be a point.
+        colors: albedo of all of it (3,), of each of the m - 1 bands (m - 1, 3), or of each quadrilateral (m - 1, s, 3).
+        edges: outlines at which the skin has a sharp edge.
+    """
+    rings = np.asarray(rings, float)
+    count, sides = rings.shape[:2]
+    colors = np.asarray(colors, float)
+    colors = np.broadcast_to(colors[:, None] if colors.ndim == 2 else colors, (count - 1, sides, 3))
+    k = np.arange(sides)
+    after = (k + 1) % sides
+    skin, quads = [rings[0]], []
+    for n in range(1, count):
+        if n - 1 in edges:
+            skin.append(rings[n - 1])
+        skin.append(rings[n])
+        low, high = (len(skin) - 2) * sides, (len(skin) - 1) * sides
+        quads.append(np.column_stack([low + k, low + after, high + after, high + k]))
+    mesh = quad_mesh(np.concatenate(skin), np.concatenate(quads), colors.reshape(-1, 3))
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
+    there = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10  # at a point, quadrilaterals are triangles
+    return replace(mesh, faces=mesh.faces[there], colors=mesh.colors[there], smooth=True)
+
+
+def shifted(mesh: Mesh, offset: ArrayLike) -> Mesh:
+    """The mesh carried by ``offset`` (3,) metres."""
+    return replace(mesh, vertices=(mesh.vertices + np.asarray(offset, float)).astype(np.float32))
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Several meshes as one, smooth if any is; none may have a texture."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return Mesh(
+        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
+        faces=np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]).astype(
+            np.int32
+        ),
+        colors=np.concatenate([mesh.colors for mesh in meshes]),
+        smooth=any(mesh.smooth for mesh in meshes),
+    )
+
+
+def surface(mesh: Mesh) -> Surface:
+    """The geom that is exactly a mesh."""
+    return Surface(mesh.vertices.astype(float), mesh.faces)

@@ -1,0 +1,132 @@
+"""Storage that stands in the way: boxes, stacked or not, open bookshelves with things on their boards, bare racks."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.world.scene.things.assembly import Assembly
+from simharness.world.scene.things.geoms import Box
+from simharness.world.scene.things.shapes import TOP
+from simharness.world.scene.things.solids import Thing
+
+_BOX_SIDE = (0.40, 0.75)  # metres
+_BOX_HEIGHT = (0.40, 1.10)
+_STACKED = 0.35  # chance of a smaller box on top of a low one
+_STACK_HEIGHT = (0.25, 0.45)
+BOX_COLORS = np.array(
+    [
+        [0.76, 0.60, 0.42],
+        [0.70, 0.52, 0.35],
+        [0.36, 0.50, 0.55],
+        [0.80, 0.66, 0.38],
+        [0.66, 0.42, 0.34],
+        [0.50, 0.56, 0.46],
+    ]
+)
+_TAPE = 0.06  # metres
+_SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
+_BOARD = 0.025
+_RACK_WIDTH, _RACK_HEIGHT, _RACK_DEPTH = (0.6, 0.8), (1.0, 1.3), (0.30, 0.38)
+_POST, _SHEET = 0.03, 0.015
+_METAL = np.array([[0.72, 0.73, 0.75], [0.25, 0.26, 0.28], [0.88, 0.88, 0.86]])
+WOOD = np.array([[0.62, 0.47, 0.33], [0.80, 0.72, 0.60], [0.40, 0.30, 0.24], [0.86, 0.85, 0.82]])
+BOOK_COLORS = np.array(
+    [
+        [0.55, 0.22, 0.20],
+        [0.20, 0.32, 0.46],
+        [0.25, 0.42, 0.32],
+        [0.78, 0.62, 0.30],
+        [0.82, 0.79, 0.72],
+        [0.36, 0.26, 0.40],
+    ]
+)
+
+
+def draw_box(rng: np.random.Generator) -> Thing:
+    """A box of 0.4 to 1.1 m with a strip of tape over it, sometimes with a smaller one on top."""
+    size = np.array([rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_HEIGHT)])
+    upper = np.array([*(size[:2] * rng.uniform(0.55, 0.85, 2)), rng.uniform(*_STACK_HEIGHT)])
+    turn = rng.uniform(-0.4, 0.4)
+    stacked = rng.uniform() < _STACKED and size[2] + upper[2] < _BOX_HEIGHT[1]
+    colors = BOX_COLORS[rng.integers(len(BOX_COLORS), size=2)]
+    boxes, painted = taped(size, colors[0], base=0.0, yaw=0.0)
+    if stacked:
+        more, more_painted = taped(upper, colors[1], base=size[2], yaw=turn)
+        boxes, painted = boxes + more, painted + more_painted
+    return Assembly().boxes(boxes, painted).thing()
+
+
+def taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list[Box], list[Floats]]:
+    """A box in three slices side by side, the middle one with a paler top: a strip of packing tape."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    edges = np.array([-size[1] / 2, -_TAPE / 2, _TAPE / 2, size[1] / 2])
+    boxes, painted = [], []
+    for k, (low, high) in enumerate(pairwise(edges)):
+        across = float(low + high) / 2
+        center = (float(-s * across), float(c * across), float(base + size[2] / 2))
+        boxes.append(Box(center, (float(size[0] / 2), float(high - low) / 2, float(size[2] / 2)), yaw))
+        sides = np.tile(color, (6, 1))
+        if k == 1:
+            sides[TOP] = 0.45 * color + 0.55 * np.array([0.93, 0.89, 0.80])
+        painted.append(sides)
+    return boxes, painted
+
+
+def draw_shelf(rng: np.random.Generator) -> Thing:
+    """An open bookshelf about 1.8 m tall: two sides, boards, a cross brace low at the back, books and cartons."""
+    width, height, depth = rng.uniform(*_SHELF_WIDTH), rng.uniform(*_SHELF_HEIGHT), rng.uniform(*_SHELF_DEPTH)
+    boards = int(rng.integers(5, 7))
+    wood = WOOD[rng.integers(len(WOOD))]
+    inner = width - 2 * _BOARD
+    parts: list[tuple[Box, Floats]] = []
+    for side in (-1.0, 1.0):
+        place = (0.0, side * (width - _BOARD) / 2, height / 2)
+        parts.append((Box(place, (depth / 2, _BOARD / 2, height / 2)), wood))
+    levels = np.linspace(0.08, height - _BOARD / 2, boards)
+    for z in levels:
+        parts.append((Box((0.0, 0.0, float(z)), (depth / 2, inner / 2, _BOARD / 2)), 0.94 * wood))
+    for z, above in pairwise(levels):
+        parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
+    boxes, colors = zip(*parts, strict=True)
+    return Assembly().boxes(boxes, np.array(colors)).thing()
+
+
+def draw_rack(rng: np.random.Generator) -> Thing:
+    """A rack of thin posts and boards, bare and as high as a chest: it stands in the way, and hides little."""
+    width, height, depth = rng.uniform(*_RACK_WIDTH), rng.uniform(*_RACK_HEIGHT), rng.uniform(*_RACK_DEPTH)
+    levels = np.linspace(0.12, height - 0.06, int(rng.integers(3, 5)))
+    metal = _METAL[rng.integers(len(_METAL))]
+    posts = [
+        Box((x * (depth - _POST) / 2, y * (width - _POST) / 2, height / 2), (_POST / 2, _POST / 2, height / 2))
+        for x in (-1.0, 1.0)
+        for y in (-1.0, 1.0)
+    ]
+    boards = [Box((0.0, 0.0, float(z)), (depth / 2, width / 2, _SHEET / 2)) for z in levels]
+    boxes = posts + boards
+    return Assembly().boxes(boxes, np.array([metal] * len(posts) + [0.9 * metal] * len(boards))).thing()
+
+
+def _things(
+    rng: np.random.Generator, floor: float, room: float, inner: float, depth: float
+) -> list[tuple[Box, Floats]]:
+    """What stands on one board: a row of books from one end and perhaps a carton, with air between."""
+    parts: list[tuple[Box, Floats]] = []
+    end = rng.choice([-1.0, 1.0])
+    filled = inner * rng.uniform(0.25, 0.7)
+    at = 0.0
+    while at < filled:
+        thick, tall, deep = rng.uniform(0.02, 0.05), room * rng.uniform(0.55, 0.9), depth * rng.uniform(0.55, 0.85)
+        y = end * (inner / 2 - at - thick / 2)
+        color = BOOK_COLORS[rng.integers(len(BOOK_COLORS))] * rng.uniform(0.85, 1.1)
+        parts.append((Box((0.0, float(y), float(floor + tall / 2)), (deep / 2, thick / 2, tall / 2)), color))
+        at += thick
+    free = inner - at
+    if free > 0.25 and rng.uniform() < 0.6:
+        wide, tall, deep = min(0.3, 0.8 * free), room * rng.uniform(0.4, 0.75), 0.75 * depth
+        y = -end * (inner / 2 - wide / 2 - rng.uniform(0.0, free - wide) * 0.5)
+        color = BOX_COLORS[rng.integers(len(BOX_COLORS))]
+        parts.append((Box((0.0, float(y), float(floor + tall / 2)), (deep / 2, wide / 2, tall / 2)), color))
+    return parts

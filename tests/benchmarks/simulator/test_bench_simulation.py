@@ -1,0 +1,31 @@
+"""What the figures say, of figures made up."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.simulator.simulation import STAGES, SWEEPS, Size, table_of
+
+
+def sizes(*, power, build):
+    """A cost of (people x cameras) ** power microseconds for each of the stages."""
+
+    def size(sweep, people, cameras, frames):
+        cost = 1e-3 * (people * cameras) ** power
+        return Size(sweep, people, cameras, frames, build, dict.fromkeys(STAGES, cost))
+
+    return [size("target", 4, 5, 2000), *(size(sweep, *point, 100) for sweep in SWEEPS for point in SWEEPS[sweep])]
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_exponents_are_those_of_the_cost(power):
+    lines = [line.split() for line in table_of(sizes(power=power, build=1.0)).splitlines()]
+    assert [line[1] for line in lines if line and line[0] == "exponent"] == [f"{power:.2f}"] * 3
+
+
+@pytest.mark.parametrize(("build", "mark"), [(3.9, "✓"), (4.0, "✗")])
+def test_the_target_counts_what_is_done_once(build, mark):
+    """60 microseconds of stages and the building: 253 frames a second, and 246."""
+    (line,) = [line for line in table_of(sizes(power=1.0, build=build)).splitlines() if "frames a second" in line]
+    assert line.split()[3] == f"{1e3 / (build + 0.06):.0f}"
+    assert mark in line

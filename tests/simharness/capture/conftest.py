@@ -1,0 +1,46 @@
+"""Both renderers behind one fixture."""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from simharness.capture.rendering.choice import make_renderer
+from simharness.capture.rendering.renderer import Unavailable
+
+sys.path.insert(0, str(Path(__file__).parent))  # shapes.py
+
+
+@cache
+def _made(name):
+    try:
+        return make_renderer(name)
+    except Unavailable as error:
+        return error
+
+
+def _renderer_or_skip(name):
+    made = _made(name)
+    if isinstance(made, Unavailable):
+        # CI installs the GL libraries and says so: there, a test that cannot run has failed.
+        (pytest.fail if os.environ.get("SIMHARNESS_REQUIRE_GL") else pytest.skip)(str(made))
+    return made
+
+
+@pytest.fixture(params=["raster", "gl"])
+def renderer(request):
+    return _renderer_or_skip(request.param)
+
+
+@pytest.fixture
+def raster():
+    return _renderer_or_skip("raster")
+
+
+@pytest.fixture
+def gl():
+    return _renderer_or_skip("gl")

@@ -1,0 +1,54 @@
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simharness.capture.rendering.optics import appear
+from simharness.types.random_streams import stream
+from simharness.world.rigs.layouts import intrinsics, look_at
+
+SIZE = (640, 480)
+
+
+def camera(distortion=(0.0, 0, 0, 0, 0)):
+    from dataclasses import replace
+
+    plain = look_at((3.0, 1, 2), (0, 0, 1), K=intrinsics(80, SIZE), size=SIZE)
+    return replace(plain, distortion=np.array(distortion))
+
+
+@given(distortion=st.sampled_from([(0.0,) * 5, (-0.1, 0.01, 0.001, -0.002, 0.0), (-0.37, 0.15, 0.0, 0.0, 0.0)]))
+def test_it_is_opencvs_projection(distortion):
+    eye = camera(distortion)
+    points = stream(0, "points").uniform([-1, -1, 0], [1, 1, 2], (200, 3))
+    expected, _ = cv2.projectPoints(points, cv2.Rodrigues(eye.R)[0], eye.t, eye.K, eye.distortion)
+    np.testing.assert_allclose(appear(eye, points), expected[:, 0], atol=1e-6)
+
+
+def test_what_is_behind_or_too_near_does_not_appear():
+    eye = camera()
+    forward = eye.R[2]
+    points = eye.center + np.array([-1.0, 0.04, 0.06])[:, None] * forward
+    assert np.isnan(appear(eye, points, near=0.05)).any(axis=-1).tolist() == [True, True, False]
+
+
+def test_a_lens_that_folds_over_shows_nothing_twice():
+    """With k1 = -0.4 the radius r (1 - 0.4 r²) turns back at r = 0.91: what lies beyond is not imaged."""
+    eye = camera((-0.4, 0.0, 0.0, 0.0, 0.0))
+    right, _, forward = eye.R
+    radius = np.array([0.3, 0.85, 0.97, 1.4])
+    points = eye.center + 2 * (forward + radius[:, None] * right)
+    folded = eye.project(points)
+    assert eye.inside(folded)[2:].any()  # or this test shows nothing
+    assert np.isfinite(appear(eye, points)).all(axis=-1).tolist() == [True, True, False, False]
+
+
+def test_shapes_are_kept():
+    assert appear(camera(), np.zeros((3, 17, 3))).shape == (3, 17, 2)
+    assert appear(camera((0.1, 0, 0, 0, 0)), np.zeros((0, 17, 3))).shape == (0, 17, 2)
+
+
+@pytest.mark.parametrize("where", [(np.nan, 0, 0), (np.inf, 0, 0)])
+def test_what_is_nowhere_does_not_appear(where):
+    assert np.isnan(appear(camera(), where)).all()

@@ -1,9 +1,0 @@
-import pytest
-
-from simharness.detector.fitting.twin import Twin, film_twin
-
-
-@pytest.fixture(scope="session")
-def twin() -> Twin:
-    """Four people at work on the rig of Shelf, 12 s of them."""
-    return film_twin(seed=0)

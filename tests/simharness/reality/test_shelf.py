@@ -1,0 +1,186 @@
+import shutil
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.optimize import linear_sum_assignment
+
+from mvpose.skeleton import coco17_to_shelf14
+from simharness.reality.shelf import FRAMES, Shelf, read_shelf, read_truth
+from simharness.scoring.pcp import percent, score_parts
+from simharness.scoring.pose import pair
+
+
+@pytest.fixture(scope="module")
+def shelf(shared_data):
+    return read_shelf(shared_data / "shelf")
+
+
+@pytest.fixture
+def copied(shared_data, tmp_path):
+    """A copy of the files of two frames, to be damaged."""
+    source, folder = shared_data / "shelf", tmp_path / "shelf"
+    for view in range(5):
+        (folder / "openpose" / str(view)).mkdir(parents=True)
+        for frame in range(2):
+            name = f"openpose/{view}/{view}_{frame:012d}_keypoints.json"
+            shutil.copyfile(source / name, folder / name)
+    for name in ("calibration_shelf.json", "actorsGT.mat"):
+        shutil.copyfile(source / name, folder / name)
+    return folder
+
+
+def test_the_published_frames(shelf):
+    assert shelf.frames.tolist() == list(range(300, 600))
+    assert len(shelf.rig) == 5
+    assert all(camera.size == (1032, 776) for camera in shelf.rig)
+    # Actors are annotated as a whole or not at all; how often was counted in the file.
+    defined = np.isfinite(shelf.truth).all(axis=(2, 3))
+    assert (defined == np.isfinite(shelf.truth).any(axis=(2, 3))).all()
+    assert defined.sum(axis=0).tolist() == [279, 37, 161, 33]
+    assert all(set(detections.view) == set(range(5)) for detections in shelf.detections[:10])
+
+
+def test_detections_lie_on_the_truth_of_the_same_frame(shelf):
+    """Published: limb joints to OpenPose, median 16.1 / 8.6 / 8.8 / 11.1 / 12.3 px for views 0 to 4."""
+    nearest: list[list[float]] = [[] for _ in shelf.rig]
+    for truth, detections in zip(shelf.truth, shelf.detections, strict=True):
+        for person in truth[np.isfinite(truth).all(axis=(1, 2))]:
+            for view, camera in enumerate(shelf.rig):
+                keypoints = detections.keypoints[detections.view == view][:, _LIMBS]
+                distance = np.linalg.norm(keypoints - camera.project(person[:12]), axis=-1)
+                total = np.nanmean(np.where((~np.isnan(distance)).any(axis=1, keepdims=True), distance, 1e4), axis=1)
+                if total.min(initial=np.inf) < 60:
+                    nearest[view].extend(distance[total.argmin()])
+    medians = [np.nanmedian(errors) for errors in nearest]
+    np.testing.assert_allclose(medians, [16.1, 8.6, 8.8, 11.1, 12.3], atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("head", "actors", "average"),
+    [("voxelpose", (99.5, 93.5, 98.5), 97.2), ("2019", (98.5, 91.9, 98.6), 96.3)],
+)
+def test_an_oracle_scores_what_was_published(shelf, head, actors, average):
+    """Detections given to their true person by projection, then score-weighted DLT: the whole protocol."""
+    parts, errors = [], []
+    for truth, detections in zip(shelf.truth, shelf.detections, strict=True):
+        estimate = coco17_to_shelf14(_oracle(shelf, truth, detections), head=head)
+        parts.append(score_parts(truth, estimate))
+        errors.extend(pair(truth, estimate).error)
+    scores = [percent(np.stack(parts)[:, actor]) for actor in range(3)]
+    np.testing.assert_allclose(scores, actors, atol=0.3)
+    assert np.mean(scores) == pytest.approx(average, abs=0.3)
+    if head == "voxelpose":
+        assert 1000 * np.nanmedian(errors) == pytest.approx(47, abs=1)
+
+
+_LIMBS = [16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9]  # COCO-17 joints of SHELF14's first twelve
+_REACH = 60.0  # pixels between a detection and its person
+
+
+def _oracle(shelf, truth, detections):
+    people = np.flatnonzero(np.isfinite(truth).all(axis=(1, 2)))
+    owner = np.full(len(detections), -1)
+    for view, camera in enumerate(shelf.rig):
+        mine = np.flatnonzero(detections.view == view)
+        keypoints = detections.keypoints[mine][:, _LIMBS]
+        distance = np.linalg.norm(camera.project(truth[people, None, :12]) - keypoints, axis=-1)
+        count = np.isfinite(distance).sum(axis=-1)
+        mean = np.where(count > 0, np.nansum(distance, axis=-1) / np.maximum(count, 1), np.inf)
+        for row, column in zip(*linear_sum_assignment(np.minimum(mean, 2 * _REACH)), strict=True):
+            if mean[row, column] < _REACH:
+                owner[mine[column]] = people[row]
+    result = []
+    for person in people:
+        joints = np.full((17, 3), np.nan)
+        for joint in range(17):
+            rows = []
+            for index in np.flatnonzero((owner == person) & (detections.scores[:, joint] > 0)):
+                P = shelf.rig.P[detections.view[index]]
+                x, y = detections.keypoints[index, joint]
+                rows += [
+                    weighted
+                    for weighted in detections.scores[index, joint] * np.stack([x * P[2] - P[0], y * P[2] - P[1]])
+                ]
+            if len(rows) >= 4:
+                point = np.linalg.svd(np.array(rows))[2][-1]
+                joints[joint] = point[:3] / point[3]
+        result.append(joints)
+    return np.array(result).reshape(-1, 17, 3)
+
+
+def test_two_frames_of_a_copy_read_the_same(copied, shelf):
+    part = read_shelf(copied, frames=range(300, 302))
+    np.testing.assert_array_equal(part.truth, shelf.truth[:2])
+    np.testing.assert_array_equal(part.detections[1].keypoints, shelf.detections[1].keypoints)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("actorsGT.mat", "Shelf's truth"),
+        ("calibration_shelf.json", "a VoxelPose calibration"),
+        ("openpose/3/3_000000000001_keypoints.json", "OpenPose output"),
+    ],
+)
+@pytest.mark.parametrize("kept", [None, 0, 0.1, 0.5])
+def test_missing_and_truncated_files_are_named(copied, name, expected, kept):
+    path = copied / name
+    content = path.read_bytes()
+    path.unlink()
+    if kept is not None:
+        path.write_bytes(content[: int(kept * len(content))])
+    with pytest.raises(ValueError, match="no such file" if kept is None else "cut off") as raised:
+        read_shelf(copied, frames=range(300, 302))
+    assert str(path) in str(raised.value)
+    assert expected in str(raised.value)
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"nowhere: no such folder; expected Shelf's calibration_shelf\.json"):
+        read_shelf(tmp_path / "nowhere")
+
+
+def _cells(poses):
+    track = np.empty((len(poses), 1), object)
+    track[:, 0] = poses
+    return track
+
+
+def _mat(path, *tracks):
+    actors = np.empty((1, len(tracks)), object)
+    actors[0] = tracks
+    savemat(path, {"actor3D": actors})
+    return path
+
+
+def test_frames_without_annotation_are_nan(tmp_path):
+    pose = np.arange(42.0).reshape(14, 3)
+    track = _cells([pose, np.zeros((1, 0)), np.zeros((1, 1)), np.full((14, 3), np.nan)])
+    truth = read_truth(_mat(tmp_path / "gt.mat", track, track, track, track), frames=range(4))
+    for actor in range(4):
+        np.testing.assert_array_equal(truth[0, actor], pose)
+    assert np.isnan(truth[1:]).all()
+
+
+def test_another_layout_is_refused(tmp_path):
+    track = _cells([np.zeros((14, 3)), np.zeros((14, 3))])
+    with pytest.raises(ValueError, match=r"gt\.mat: actor3D must be cells of 4 actors"):
+        read_truth(_mat(tmp_path / "gt.mat", track, track), frames=range(2))
+    with pytest.raises(ValueError, match=r"gt\.mat: actor 1 has 2 frames; expected more than 599"):
+        read_truth(_mat(tmp_path / "gt.mat", track, track, track, track), frames=FRAMES)
+    odd = _cells([np.zeros((14, 3)), np.zeros((17, 3))])
+    with pytest.raises(
+        ValueError, match=r"gt\.mat: actor 2, frame 1: expected 14 x 3 joints or nothing, got \(17, 3\)"
+    ):
+        read_truth(_mat(tmp_path / "gt.mat", track, odd, track, track), frames=range(2))
+    savemat(tmp_path / "other.mat", {"x": np.zeros(3)})
+    with pytest.raises(ValueError, match=r"other\.mat: has no variable actor3D"):
+        read_truth(tmp_path / "other.mat", frames=range(2))
+
+
+def test_the_fields_must_fit(shelf):
+    with pytest.raises(ValueError, match=r"truth must be \(300, 4, 14, 3\), got \(299, 4, 14, 3\)"):
+        Shelf(shelf.rig, shelf.truth[1:], shelf.detections, shelf.frames)
+    with pytest.raises(ValueError, match="expected detections of 300 frames, got 2"):
+        Shelf(shelf.rig, shelf.truth, shelf.detections[:2], shelf.frames)

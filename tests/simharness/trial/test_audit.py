@@ -1,0 +1,140 @@
+"""The self-audit: a good run passes, and each thing that can be wrong is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mvpose import Rig
+from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
+from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks
+from simharness.trial.stages.build import prepare
+from simharness.trial.stages.frame_tasks import Filming
+from simharness.types.visibility import Visibility
+from simharness.world.rigs.faults import shoot
+from simharness.world.scene.simulation import simulate
+
+ALL_FAULTS = Faults(
+    focal=0.01, center=3.0, rotation=0.3, translation=0.01, rotation_drift=0.5, translation_drift=0.02,
+    clock_offset=0.05, clock_jitter=0.01, dropped=0.1, frozen=0.2, dead=(1,), swapped=((0, 2),),
+)  # fmt: skip
+
+
+def small(**sections) -> Scenario:
+    defaults = {
+        "people": People(count=2, activities=("wave", "walk")),
+        "cameras": Cameras(count=3, size=(320, 240)),
+        "clutter": Clutter(boxes=1),
+    }
+    return Scenario(name="small", seed=5, duration=0.6, rate=10.0, **{**defaults, **sections})
+
+
+class Ready:
+    def __init__(self, scenario):
+        self.scenario = scenario
+        trial = prepare(scenario)
+        self.scene, self.shots = trial.scene, trial.shots
+        self.sequence = simulate(trial.scene)
+        self.views = Filming(scenario, trial.scene, trial.shots, frozenset())(range(scenario.frames))
+
+    def audit(self, **changed):
+        parts = {"scene": self.scene, "shots": self.shots, "sequence": self.sequence, "views": self.views} | changed
+        audit(self.scenario, **parts)
+
+
+@pytest.fixture(scope="module")
+def ready() -> Ready:
+    return Ready(small())
+
+
+def test_a_good_run_passes(ready):
+    ready.audit()
+    assert (ready.views.visibility == Visibility.VISIBLE).sum() > 100  # or it would pass for want of joints
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"faults": ALL_FAULTS},
+        {"faults": Faults(rolling_shutter=0.03)},
+        {"cameras": Cameras(count=3, size=(320, 240), distortion=(-0.3, 0.1, 0.001, -0.001, 0.0))},
+        {"rendering": Rendering(renderer="rays")},
+        {"people": People(count=0)},
+    ],
+    ids=["faults", "rolling shutter", "distortion", "rays", "nobody"],
+)
+def test_whatever_is_asked_for_passes(sections):
+    Ready(small(**sections)).audit()
+
+
+def test_a_truth_that_is_off_by_a_pixel_is_found(ready):
+    with pytest.raises(AuditError, match=r"projection: frame 0, view 0, person \d, joint \d+ is at .* OpenCV"):
+        ready.audit(views=replace(ready.views, pixels=ready.views.pixels + 1.0))
+
+
+def test_a_person_in_the_place_of_another_is_found(ready):
+    swapped = replace(ready.views, pixels=ready.views.pixels[:, :, ::-1], visibility=ready.views.visibility[:, :, ::-1])
+    with pytest.raises(AuditError, match="projection"):
+        ready.audit(views=swapped)
+
+
+def test_joints_called_visible_that_are_hidden_are_found(ready):
+    inside = ready.views.visibility != Visibility.OUTSIDE
+    lying = np.where(inside, Visibility.VISIBLE, Visibility.OUTSIDE).astype(np.int8)
+    with pytest.raises(AuditError, match=r"pictures: of \d+ visible joints .* only \d+ lie where"):
+        ready.audit(views=replace(ready.views, visibility=lying))
+
+
+@pytest.mark.parametrize(
+    ("done", "asked", "said"),
+    [
+        (Faults(clock_offset=0.1), Faults(), "clocks: the picture of view .* ms late"),
+        (Faults(clock_jitter=0.1), Faults(clock_jitter=0.001), "clocks: the picture of view"),
+        (Faults(dropped=0.5), Faults(), "clocks: pictures are missing"),
+        (Faults(frozen=0.5), Faults(dropped=0.5), "clocks: pictures are missing or repeated, and faults.frozen"),
+        (Faults(), Faults(dead=(1,)), "clocks: camera 1 delivers"),
+    ],
+)
+def test_clocks_that_are_not_as_asked_are_found(ready, done, asked, said):
+    time = np.arange(30) / 10.0
+    shots = shoot(ready.shots.true, done, time, seed=0)
+    check_clocks(done, shots, time)
+    with pytest.raises(AuditError, match=said):
+        check_clocks(asked, shots, time)
+
+
+@pytest.mark.parametrize(
+    ("done", "said"),
+    [
+        (Faults(focal=0.01), "focal length"),
+        (Faults(center=2.0), "principal point"),
+        (Faults(rotation=0.2), "orientation"),
+        (Faults(translation=0.01), "position"),
+        (Faults(rotation_drift=3.0), "orientation"),
+        (Faults(translation_drift=0.1), "position"),
+        (Faults(swapped=((0, 1),)), "position"),
+    ],
+)
+def test_a_calibration_that_is_not_as_asked_is_found(ready, done, said):
+    shots = shoot(ready.shots.true, done, np.arange(30) / 10.0, seed=0)
+    check_calibration(done, shots)
+    with pytest.raises(
+        AuditError, match=f"calibration: camera .* is off in its .*{said if said != 'position' else ''}"
+    ):
+        check_calibration(Faults(), shots)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
+def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, share):
+    """The error is log-normal: three deviations up are more than three down."""
+    time = np.arange(3) / 10.0
+    faults = Faults(focal=share)
+    for seed in range(150):
+        check_calibration(faults, shoot(ready.shots.true, faults, time, seed=seed))
+    shots = shoot(ready.shots.true, Faults(), time, seed=0)
+    for length in np.exp([7 * share, -7 * share]):
+        scale = np.diag([length, length, 1.0])
+        wide = Rig([replace(camera, K=camera.K @ scale) for camera in shots.believed])
+        with pytest.raises(AuditError, match="focal length"):
+            check_calibration(faults, replace(shots, believed=wide))

@@ -1,0 +1,49 @@
+import importlib
+import pkgutil
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+import mvpose
+from mvpose import Camera, Detections, Pipeline, Rig
+from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
+from simharness.trial.kernel_compilation import Compilation, compile_kernels
+
+
+def signatures():
+    """What every kernel of the method has been compiled or loaded for, by module and name."""
+    found = {}
+    for each in pkgutil.walk_packages(mvpose.__path__, "mvpose."):
+        if not each.name.endswith("__main__"):
+            for name, kernel in vars(importlib.import_module(each.name)).items():
+                if isinstance(kernel, numba.core.dispatcher.Dispatcher) and kernel.signatures:
+                    found[kernel.py_func.__module__, name] = list(kernel.signatures)
+    return found
+
+
+def test_a_real_frame_finds_everything_compiled():
+    rng = np.random.default_rng(0)
+    K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+    rig = Rig([Camera(K, np.eye(3), [x, 0, 4], [-0.1, 0, 0, 0, 0], (640, 480)) for x in (-1, 0, 1)])
+    pixels = rig.project(rng.uniform([-1, -0.8, -0.3], [1, 0.8, 0.3], (4, 17, 3))).reshape(12, 17, 2)
+    scores = rng.choice([0.0, 0.5, 1.0], (12, 17))
+    compile_kernels(PRESETS)
+    before = signatures()
+    for stage in ("rays", "affinity", "matching", "reconstruction"):
+        assert any(module.startswith(f"mvpose.{stage}") for module, _ in before), stage
+    for variant in PRESETS:
+        seen = Detections.from_keypoints(np.repeat([0, 1, 2], 4), pixels, scores)
+        Pipeline.preset(variant).estimate(rig, replace(seen, descriptors=rng.random((12, 5))))
+        if variant not in NEED_DESCRIPTORS:
+            Pipeline.preset(variant).estimate(rig, seen)
+    assert signatures() == before
+
+
+def test_a_compilation_that_fails_costs_only_the_head_start():
+    compilation = Compilation(["no such preset"])
+    compilation.start()
+    compilation.wait()
+    with pytest.raises(ValueError, match="no preset"):
+        compile_kernels(["no such preset"])

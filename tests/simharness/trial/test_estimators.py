@@ -1,0 +1,407 @@
+"""Methods of one's own: where they are found, how they are asked, and what is said when that goes wrong."""
+
+import html
+import importlib
+import pickle
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from moments import crowd, moment, ring
+
+from mvpose import Pipeline
+from mvpose.pipeline import PRESETS
+from simharness.report.run.result_folder import run
+from simharness.report.study.digest import write_digest
+from simharness.report.study.page import write_report
+from simharness.report.study.replay import replay
+from simharness.runtime.frame_pool import RunError, map_frames
+from simharness.scenario.load import load
+from simharness.scenario.sections.scenario import Estimators, Method
+from simharness.scenario.study_definition import load_study
+from simharness.study.runner import run_study
+from simharness.testing import assert_robust
+from simharness.trial.looking import look
+from simharness.trial.measure import measure
+from simharness.trial.run_folder import read_run
+from simharness.trial.stages.build import prepare
+from simharness.trial.stages.estimators import OwnEstimator, estimators_of, load_estimator, sources_of
+from simharness.trial.stages.frame_tasks import Estimating
+
+WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
+MINE = """
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from mvpose import Estimate, Pipeline
+
+
+@dataclass
+class Mine:
+    preset: str = "fast"
+
+    def estimate(self, rig, detections):
+        return Pipeline.preset(self.preset).estimate(rig, detections)
+
+
+class Silent:
+    def estimate(self, rig, detections):
+        return Estimate.of_joints(Mine().estimate(rig, detections).joints)
+
+
+class Slow:
+    def estimate(self, rig, detections):
+        time.sleep(0.1)
+        return Mine().estimate(rig, detections)
+
+
+class Broken:
+    def estimate(self, rig, detections):
+        return 1 / 0  # BROKEN
+
+
+class Answers:
+    answer = None
+
+    def estimate(self, rig, detections):
+        return self.answer
+
+
+class Dictionary(Answers):
+    answer = {"joints": []}
+
+
+class Shelf(Answers):
+    answer = Estimate(np.zeros((1, 14, 3)), np.ones((1, 14)), Estimate.of_joints([]).matching)
+
+
+class Infinite(Answers):
+    answer = Estimate(np.full((1, 17, 3), np.inf), np.ones((1, 17)), Estimate.of_joints([]).matching)
+
+
+class Unsure(Answers):
+    answer = Estimate(np.zeros((1, 17, 3)), np.full((1, 17), np.nan), Estimate.of_joints([]).matching)
+
+
+class OfOthers(Answers):
+    answer = Estimate.of_joints(np.zeros((1, 17, 3)), labels=[0])
+
+
+class OfNobody:
+    def estimate(self, rig, detections):
+        matching = Estimate.of_joints(np.zeros((2, 17, 3)), labels=[1] * len(detections)).matching
+        return Estimate(np.zeros((1, 17, 3)), np.ones((1, 17)), matching)
+
+
+class Needs:
+    def __init__(self, weights):
+        self.weights = weights
+
+
+mine = Mine("no-3dps")
+pipeline = Pipeline.preset("hungarian")
+number = 3
+
+
+def make():
+    return mine
+"""
+SCENE = """
+name = "own"
+duration = 0.4
+rate = 5
+rendering.renderer = "rays"
+people.count = 2
+detector.profile = "perfect"
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(MINE)
+    return path
+
+
+@pytest.fixture
+def scenario(mine):
+    """Write a scenario file beside ``mine.py``, with these lines besides."""
+
+    def write(lines, variant):
+        path = mine.with_name("own.toml")
+        path.write_text(f'{SCENE}variants = ["{variant}"]\n{lines}')
+        return path
+
+    return write
+
+
+RIG = ring(4)
+SEEN, TRUTH = moment(RIG, crowd(2, spacing=1.2))
+
+
+class TestLoading:
+    @pytest.mark.parametrize("name", ["Mine", "mine", "make"])
+    def test_an_object_or_what_makes_one(self, mine, name):
+        estimator = load_estimator(f"{mine}:{name}")
+        assert estimator.preset == ("fast" if name == "Mine" else "no-3dps")
+        assert load_estimator(f"{mine}:{name}") is estimator
+
+    def test_a_module(self, mine, tmp_path, monkeypatch):
+        package = tmp_path / "own_package"
+        package.mkdir()
+        (package / "__init__.py").touch()
+        mine.rename(package / "method.py")
+        monkeypatch.syspath_prepend(tmp_path)
+        assert type(load_estimator("own_package.method:Mine")) is importlib.import_module("own_package.method").Mine
+        with pytest.raises(ValueError, match=re.escape("there is no module own_package.methods: install it")):
+            load_estimator("own_package.methods:Mine")
+
+    def test_files_of_one_name_are_not_mistaken_for_each_other(self, mine, tmp_path, monkeypatch):
+        (tmp_path / "other").mkdir()
+        (tmp_path / "other" / "mine.py").write_text(MINE.replace('"fast"', '"full"'))
+        for folder, preset in ((tmp_path, "fast"), (tmp_path / "other", "full")):
+            monkeypatch.chdir(folder)
+            assert load_estimator("mine.py:Mine").preset == preset
+
+    @pytest.mark.parametrize(
+        ("text", "name", "said"),
+        [
+            (None, "Mine", r"mine\.py: no such file"),
+            (MINE, "Mien", r"mine\.py has no Mien; did you mean Mine\?"),
+            (MINE, "number", r"number is int, which has no estimate\(rig, detections\) -> mvpose\.Estimate"),
+            (MINE, "Needs", r"Needs\(\) raised TypeError: .*weights"),
+            ("import os\nnothing_such\n", "Mine", r"NameError: name 'nothing_such' .* \(mine\.py, line 2\)"),
+            ("\n\ndef f(:\n", "Mine", r"SyntaxError: .* \(mine\.py, line 3\)"),
+            ("import sys\nsys.exit(4)\n", "Mine", r"SystemExit: 4 \(mine\.py, line 2\)"),
+            ("\nimport no_such_module\n", "Mine", r"No module named 'no_such_module' \(mine\.py, line 2\)"),
+        ],
+    )
+    def test_what_is_wrong_is_said(self, mine, text, name, said):
+        mine.unlink() if text is None else mine.write_text(text)
+        method = Method(variants=("own",), estimators=Estimators(own=f"{mine}:{name}"))
+        with pytest.raises(ValueError, match=rf"^method\.estimators\.own: .*{said}"):
+            estimators_of(method)
+
+    def test_an_error_in_a_module_has_its_file_and_line(self, tmp_path, monkeypatch):
+        (tmp_path / "own_wrong.py").write_text("\n\nnothing_such\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        with pytest.raises(ValueError, match=r"own_wrong cannot be imported: NameError: .* \(own_wrong\.py, line 3\)"):
+            load_estimator("own_wrong:Mine")
+
+    @pytest.mark.parametrize("name", PRESETS)
+    def test_no_name_of_a_preset_is_free(self, name):
+        with pytest.raises(ValueError, match=rf"^method\.estimators\.{name}: that is a preset"):
+            estimators_of(Method(estimators=Estimators(**{name: "mine.py:Mine"})))
+
+    def test_the_nearest_variant_is_named_be_it_ones_own(self):
+        method = Method(variants=("moin",), estimators=Estimators(mine="mine.py:Mine"))
+        with pytest.raises(
+            ValueError, match=r"^method\.variants: there is no 'moin'; did you mean mine\? .*full.*mine"
+        ):
+            estimators_of(method)
+
+    def test_who_is_not_asked_for_is_not_loaded(self):
+        method = Method(variants=("fast",), estimators=Estimators(mine="nowhere.py:Mine"))
+        assert isinstance(estimators_of(method)["fast"], Pipeline)
+
+
+class TestAnswers:
+    def test_they_are_those_of_the_object_and_timed(self, mine):
+        mined = OwnEstimator("own", f"{mine}:Silent").estimate(RIG, SEEN)
+        np.testing.assert_array_equal(mined.joints, Pipeline.preset("fast").estimate(RIG, SEEN).joints)
+        assert len(mined) == 2
+        assert 0 < mined.timings["total"] < 60
+
+    def test_times_of_stages_are_kept_and_the_whole_is_timed_here(self, mine):
+        """What wraps a pipeline and answers that one's estimate must not pass for as fast."""
+        timings = OwnEstimator("own", f"{mine}:Mine").estimate(RIG, SEEN).timings
+        stages = {stage: seconds for stage, seconds in timings.items() if stage != "total"}
+        assert set(stages) == {"affinity", "matching", "reconstruction"}
+        assert timings["total"] >= sum(stages.values())
+        assert OwnEstimator("own", f"{mine}:Slow").estimate(RIG, SEEN).timings["total"] >= 0.1
+
+    @pytest.mark.parametrize(
+        ("name", "said"),
+        [
+            ("Broken", f"ZeroDivisionError: .*line {MINE[: MINE.index('# BROKEN')].count(chr(10)) + 1}"),
+            ("Answers", r"returned NoneType, expected mvpose\.Estimate: Estimate\.of_joints\(joints\) makes one"),
+            ("Dictionary", "returned dict, expected mvpose.Estimate"),
+            ("Shelf", r"joints \(coco17\) must be \(n, 17, 3\), got \(1, 14, 3\)"),
+            ("Infinite", "joints must be finite"),
+            ("Unsure", "scores must be finite"),
+            ("OfOthers", rf"labels must be \({len(SEEN)},\), got \(1,\)"),
+            ("OfNobody", "labels must be -1, or 0 to n - 1 of n = 1 people, got 1 to 1"),
+        ],
+    )
+    def test_what_is_wrong_with_them_is_said(self, mine, name, said):
+        with pytest.raises(RunError, match=rf"^own \(.*mine\.py:{name}\): .*{said}"):
+            OwnEstimator("own", f"{mine}:{name}").estimate(RIG, SEEN)
+
+    def test_only_the_place_travels(self, mine):
+        own = OwnEstimator("own", f"{mine}:make")
+        assert own.loaded
+        assert len(pickle.dumps(own)) < 200 + len(str(mine))
+        assert pickle.loads(pickle.dumps(own)) == own
+
+    def test_the_frame_is_named_in_whatever_process(self, scenario):
+        path = scenario('[method.estimators]\nlate = "late.py:Late"', "late")
+        late = (
+            "from mvpose import Estimate\n\n\nclass Late:\n    def estimate(self, rig, detections):\n"
+            "        assert len(detections)\n        return Estimate.of_joints([])\n"
+        )
+        path.with_name("late.py").write_text(late)
+        trial = prepare(load(path))
+        _, detected = look(trial)
+        empty = detected[1].detections
+        detected[1] = type(detected[1])(**{**vars(detected[1]), "detections": type(empty).empty()})
+        estimating = Estimating(trial.shots.believed, tuple(detected), trial.pipelines)
+        for workers in (1, 2):
+            with pytest.raises(RunError, match=r"^frame 1: late \(.*late\.py:Late\): AssertionError.*line 6"):
+                map_frames(estimating, range(2), workers=workers)
+
+
+class TestInTrials:
+    def test_a_trial_that_fails_says_who_and_where(self, scenario):
+        broken = load(scenario('[method.estimators]\nown = "mine.py:Broken"', "own"))
+        with pytest.raises(RunError, match=r"^frame \d: own \(.*mine\.py:Broken\): ZeroDivisionError"):
+            measure(broken)
+
+    def test_it_scores_as_the_preset_that_it_is(self, scenario):
+        own = load(scenario('[method.estimators]\nown = "mine.py:Mine"', "own"), overrides=["detector.profile=poor"])
+        measured = measure(own, ["own", "fast"])
+        timeless = [key for key in measured["own"].scores if "time" not in key and not key.startswith("blame")]
+        assert measured["own"].scores["pcp"] < 100
+        for key in timeless:
+            assert measured["own"].scores[key] == measured["fast"].scores[key], key
+
+    def test_without_labels_nothing_is_said_of_matching(self, scenario):
+        own = load(scenario('[method.estimators]\nown = "mine.py:Silent"', "own"), overrides=["detector.profile=poor"])
+        measured = measure(own, ["own", "fast"])
+        silent, told = measured["own"].scores, measured["fast"].scores
+        for key in ("match_f1", "match_precision", "match_recall", "violations", "merged", "split"):
+            assert silent[key] is None
+            assert told[key] is not None
+        assert silent["recall"] == told["recall"]
+        assert silent["mpjpe_mm"] == told["mpjpe_mm"]
+        counts = ("pairs_correct", "violations", "merged", "phantoms")
+        assert measured["own"].frames.schema == measured["fast"].frames.schema
+        assert all(measured["own"].frames[key].is_null().all() for key in counts)
+        failures = measured["own"].failures
+        assert len(failures)
+        assert set(failures["stage"]) <= {"detection", "method"}
+        assert failures["matching_alone"].is_null().all()
+        assert not set(failures["kind"]) & {"merged", "split"}
+
+    def test_a_pipeline_of_ones_own_has_stages(self, scenario):
+        own = load(
+            scenario('[method.estimators]\nown = "mine.py:pipeline"', "own"), overrides=["detector.profile=poor"]
+        )
+        failures = measure(own)["own"].failures
+        assert len(failures)
+        assert set(failures["stage"]) <= {"detection", "matching", "reconstruction"}
+        assert not failures["matching_alone"].is_null().any()
+
+    def test_heat_maps_are_given_where_there_are_any(self, scenario):
+        path = scenario('detector.heatmaps.size = "64x48"\n[method.estimators]\nown = "mine.py:Mine"', "own")
+        trial = prepare(load(path))
+        _, detected = look(trial)
+        estimating = Estimating(trial.shots.believed, tuple(detected), trial.pipelines)
+        assert estimating.seen(0, "own").likelihoods is not None
+        assert estimating.seen(0, "fast").likelihoods is None
+
+    def test_it_can_be_asserted(self, scenario):
+        path = scenario('[method.estimators]\nown = "mine.py:Silent"', "own")
+        assert_robust(path, variant="own", recall=90, ghosts=0.1)
+        with pytest.raises(AssertionError, match="Match F1 applies to none of the trials"):
+            assert_robust(path, variant="own", match_f1=50)
+
+    def test_a_study_is_refused_before_its_trials(self, scenario, tmp_path):
+        study = load_study(scenario('seeds = 3\n[method.estimators]\nown = "mine.py:Mien"', "own"))
+        with pytest.raises(ValueError, match=r"^method\.estimators\.own: .* did you mean Mine\?"):
+            run_study(study, out=tmp_path / "out")
+        assert not (tmp_path / "out" / "store").exists()
+
+
+@pytest.mark.slow
+def test_a_run_without_labels_is_read_as_it_was(scenario, tmp_path, capfd):
+    path = scenario('[method.estimators]\nown = "mine.py:Silent"', "own")
+    folder = run(load(path, overrides=['variants=["own", "fast"]']), out=tmp_path / "runs", workers=2)
+    assert "Traceback" not in capfd.readouterr().err  # of compiling what is no preset
+    record = read_run(folder)
+    for detections, own, fast in zip(record.detections, record.estimates["own"], record.estimates["fast"], strict=True):
+        assert len(detections)
+        assert not own.matching.tells(len(detections))
+        assert fast.matching.tells(len(detections))
+        np.testing.assert_array_equal(own.joints, fast.joints)
+    assert record.summary["variants"]["own"]["matching"]["f1"] is None
+    assert f'own = "{path.with_name("mine.py")}:Silent"' in (folder / "scenario.toml").read_text()
+
+
+@pytest.mark.slow
+def test_a_foreign_program_is_stressed_like_any_preset(tmp_path, monkeypatch):
+    """The example of README: another program, in a study on two processes, to its report and digest."""
+    monkeypatch.chdir(tmp_path)
+    Path("methods").mkdir()
+    for file in WRAPPED.parent.glob("*.py"):
+        Path("methods", file.name).write_bytes(file.read_bytes())
+    lines = 'seeds = 2\nvariants = ["full", "foreign"]\n[method.estimators]\nforeign = "methods/wrapped.py:Foreign"'
+    Path("own.toml").write_text(f"{SCENE}{lines}\n")
+    results = run_study(load_study("own.toml"), out=Path("studies"), workers=2)
+    assert results.info["failed"] == []
+    rows = results.trials.filter(pl.col("variant") == "foreign")
+    assert rows.height == 2
+    assert rows["recall"].to_list() == [100.0, 100.0]  # by exact detections
+    assert rows["mpjpe_mm"].max() < 1
+    assert rows["match_f1"].to_list() == [100.0, 100.0]
+    assert rows["time_ms"].min() > 1
+    assert rows["time_matching_ms"].is_null().all()
+    page = write_report(results).read_text()
+    assert "foreign" in page
+    (shown, *_) = re.findall("simharness render [^<]*", html.unescape(page))  # a trial again, from here
+    assert """--set 'method.estimators.foreign="methods/wrapped.py:Foreign"' """ in shown
+    write_digest(results, Path("kept"))
+    assert "| foreign | " in Path("kept/table.md").read_text()
+    again = replay(results.scenario_of(results.trials["trial"][0]), "foreign")
+    assert all(len(estimate) == 2 for estimate in again.estimates)
+    Path("methods/program.py").write_text("import sys\nsys.exit('out of order')\n")
+    with pytest.raises(RunError, match=r"foreign \(methods/wrapped\.py:Foreign\): RuntimeError: .*out of order"):
+        measure(load("own.toml", overrides=["seeds=1"]), ["foreign"])
+
+
+def test_the_example_needs_no_simulator():
+    estimator = load_estimator(f"{WRAPPED}:Foreign")
+    estimate = estimator.estimate(RIG, SEEN)
+    assert len(estimate) == 2
+    for label in range(2):
+        (person,) = set(TRUTH.person[estimate.matching.labels == label])
+        np.testing.assert_allclose(estimate.joints[label], TRUTH.joints[person], atol=1e-6)
+    program = WRAPPED.with_name("program.py").read_text()
+    assert "import mvpose" not in program
+    assert "from mvpose" not in program
+    assert "simharness" not in program.replace("nor simharness", "")
+
+
+class TestSources:
+    def test_of_a_file_all_python_beside_it(self, tmp_path):
+        for name in ("one.py", "two.py", "notes.txt"):
+            (tmp_path / name).write_text(name)
+        (tmp_path / "below").mkdir()
+        (tmp_path / "below" / "three.py").write_text("three.py")
+        assert sources_of(f"{tmp_path / 'one.py'}:A") == {"one.py": b"one.py", "two.py": b"two.py"}
+
+    def test_of_a_module_its_whole_package(self, tmp_path, monkeypatch):
+        folder = tmp_path / "own_whole" / "part"
+        folder.mkdir(parents=True)
+        for file in (folder.parent / "__init__.py", folder / "__init__.py", folder / "method.py"):
+            file.write_text("1 / 0")  # which nobody needs to import
+        (tmp_path / "own_single.py").write_text("single")
+        monkeypatch.syspath_prepend(tmp_path)
+        assert set(sources_of("own_whole.part.method:A")) == {"__init__.py", "part/__init__.py", "part/method.py"}
+        assert set(sources_of("own_single:A")) == {"own_single.py"}
+        assert sources_of("own_nowhere:A") == {}
+        assert not {"own_whole", "own_single"} & set(sys.modules)

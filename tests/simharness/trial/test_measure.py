@@ -1,0 +1,123 @@
+"""One trial, measured."""
+
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from simharness.runtime.frame_pool import RunError
+from simharness.scenario.load import load
+from simharness.scenario.study_definition import load_study
+from simharness.scoring.catalogue import SCORES
+from simharness.study.runner import run_study
+from simharness.trial import measure as module
+from simharness.trial.measure import Measured, measure
+
+QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
+CHEAP = ("rendering.renderer=rays", "duration=0.6", "rate=5", "people.count=2", "cameras.count=3")
+TIMES = [key for key in SCORES if key.startswith("time_")]
+
+
+def cheap(*more):
+    return load(QUICKSTART, overrides=[*CHEAP, *more])
+
+
+def timeless(scores):
+    return {key: score for key, score in scores.items() if key not in TIMES}
+
+
+def without_times(table):
+    return table.select(column for column in table.columns if not column.startswith("time_"))
+
+
+@pytest.fixture(scope="module")
+def both():
+    return measure(cheap(), ["full", "fast"])
+
+
+def test_every_variant_has_all_scores_and_a_row_for_each_frame_and_person(both):
+    assert list(both) == ["full", "fast"]
+    for measured in both.values():
+        assert list(measured.scores) == list(SCORES)
+        assert 0 < measured.scores["pcp"] <= 100
+        assert measured.scores["time_ms"] > 0
+        assert measured.frames["frame"].to_list() == [0, 1, 2]
+        assert measured.people.select("frame", "person").rows() == [(t, p) for t in range(3) for p in range(2)]
+
+
+def test_failures_are_counted_in_the_scores(both):
+    for measured in both.values():
+        assert len(measured.failures) > 0
+        counted = sum(score for key, score in measured.scores.items() if key.startswith("failures_"))
+        assert counted == pytest.approx(len(measured.failures) / 3)
+        blamed = [measured.scores[f"blame_{stage}"] for stage in ("detection", "matching", "reconstruction")]
+        assert sum(blamed) == pytest.approx(100)
+        missed = measured.failures.filter(pl.col("kind") == "missed")
+        assert len(missed) == measured.people.filter(~pl.col("found")).height
+
+
+def test_a_variant_does_the_same_alone_as_beside_another(both):
+    alone = measure(cheap(), ["fast"])["fast"]
+    assert timeless(alone.scores) == timeless(both["fast"].scores)
+    for table in ("frames", "people", "failures"):
+        assert without_times(getattr(alone, table)).equals(without_times(getattr(both["fast"], table)))
+
+
+def test_without_blame_the_rest_is_the_same(both):
+    blameless = measure(cheap(), ["fast"], blame=False)["fast"]
+    blamed = {key: score for key, score in both["fast"].scores.items() if key.startswith("blame_")}
+    assert timeless(blameless.scores) == timeless(both["fast"].scores) | dict.fromkeys(blamed)
+    assert blameless.failures["stage"].null_count() == len(blameless.failures) > 0
+
+
+def test_the_scenario_says_the_variants_where_nobody_does():
+    assert list(measure(cheap('variants=["no-3dps"]'), blame=False)) == ["no-3dps"]
+
+
+def test_failures_are_looked_into_with_what_the_variant_saw(monkeypatch):
+    seen = {}
+
+    def look(recording, estimator, estimates, failures):
+        (detections,) = recording.detections
+        again = estimator.estimate(recording.rig, detections)
+        (estimate,) = estimates
+        assert again.joints == pytest.approx(estimate.joints, nan_ok=True)
+        seen.setdefault(id(estimator), detections.likelihoods is not None)
+        return find_stages(recording, estimator, estimates, failures)
+
+    find_stages = module.find_stages
+    monkeypatch.setattr(module, "find_stages", look)
+    measure(cheap("detector.heatmaps.size=64x48"), ["full", "fast"])
+    assert sorted(seen.values()) == [False, True]
+
+
+def test_people_that_do_not_fit_are_the_scenarios_fault():
+    with pytest.raises(ValueError, match=r"people\."):
+        measure(cheap("people.area=0.3"))
+
+
+def test_what_goes_wrong_later_is_not(monkeypatch):
+    def broken(*_args):
+        raise ValueError("wrong turn")
+
+    monkeypatch.setattr(module, "assess", broken)
+    with pytest.raises(RunError, match="ValueError: wrong turn"):
+        measure(cheap(), ["fast"])
+
+
+@pytest.mark.parametrize("score", [float("nan"), float("inf")])
+def test_a_score_is_a_finite_number_or_none(both, score):
+    some = both["fast"]
+    with pytest.raises(ValueError, match=r"pcp = (nan|inf)"):
+        Measured({**some.scores, "pcp": score}, some.frames, some.people, some.failures)
+
+
+@pytest.mark.slow
+def test_a_study_is_the_same_whatever_the_number_of_workers(tmp_path):
+    study = load_study(QUICKSTART, overrides=CHEAP, seeds=3, variants=["full", "fast"])
+    one, two = (run_study(study, out=tmp_path / f"{workers}", workers=workers) for workers in (1, 2))
+    assert len(one.trials) == 6
+    assert one.info["failed"] == []
+    assert without_times(one.trials).drop("seconds").equals(without_times(two.trials).drop("seconds"))
+    for table in ("frames", "people", "failures"):
+        assert without_times(getattr(one, table)).equals(without_times(getattr(two, table)))

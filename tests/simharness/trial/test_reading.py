@@ -1,0 +1,107 @@
+"""Networks that look at the rendered pictures of a scenario."""
+
+import numpy as np
+import pytest
+from onnx_graphs import dots, mean_color
+
+from simharness.report.run.result_folder import run
+from simharness.scenario.load import ScenarioError, load
+from simharness.trial.looking import look
+from simharness.trial.run_folder import read_run
+from simharness.trial.stages.build import prepare
+
+BODY = """
+name = "tiny"
+seed = 5
+duration = 0.2
+[people]
+count = 2
+activities = ["wave", "talk"]
+[cameras]
+count = 3
+size = [200, 150]
+[detector]
+profile = "perfect"
+[method]
+variants = ["full", "appearance", "geometry"]
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    def write(text):
+        path = tmp_path / "tiny.toml"
+        path.write_text(BODY + text)
+        return path
+
+    return write
+
+
+def test_descriptors_are_read_off_the_pictures_and_kept(scenario, tmp_path):
+    mean_color(tmp_path / "colors.onnx")
+    path = scenario('[appearance]\nsource = "pictures"\nnetwork = "colors.onnx"\n')
+    record = read_run(run(load(path), out=tmp_path / "runs"))
+    assert sum(map(len, record.detections)) >= 10
+    for detections in record.detections:
+        np.testing.assert_allclose(np.linalg.norm(detections.descriptors, axis=1), 1.0)
+    assert set(record.estimates) == {"full", "appearance", "geometry"}
+    # One person's crops are of one colour, more or less, and not of the other's.
+    detections, truth = record.detections[0], record.truth[0]
+    same = truth.person[:, None] == truth.person
+    distance = np.linalg.norm(detections.descriptors[:, None] - detections.descriptors, axis=-1)
+    assert distance[same & ~np.eye(len(same), dtype=bool)].mean() < distance[~same].mean()
+
+
+def test_the_result_does_not_depend_on_the_workers(scenario, tmp_path):
+    mean_color(tmp_path / "colors.onnx")
+    path = scenario('[appearance]\nsource = "pictures"\nnetwork = "colors.onnx"\n')
+    one, two = (run(load(path), out=tmp_path / f"runs{workers}", workers=workers) for workers in (1, 2))
+    assert (one / "detections.npz").read_bytes() == (two / "detections.npz").read_bytes()
+
+
+def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
+    dots(tmp_path / "head.onnx")
+    simulated = look(prepare(load(scenario(""), overrides=['method.variants=["full"]'])))[1]
+    changed = ['method.variants=["full"]', f"detector.onnx={tmp_path / 'head.onnx'}", "detector.heatmaps.size=64x48"]
+    read = look(prepare(load(scenario(""), overrides=changed)))[1]
+    for before, after in zip(simulated, read, strict=True):
+        np.testing.assert_array_equal(before.detections.boxes, after.detections.boxes)
+        np.testing.assert_array_equal(before.truth.person, after.truth.person)
+        assert after.detections.likelihoods is not None
+        assert (after.detections.keypoints != before.detections.keypoints).any()
+        # A head that looks for the brightest spot is right about hardly anything, and is told so.
+        assert (after.truth.error > 0).mean() > 0.5
+
+
+def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
+    dots(tmp_path / "head.onnx")
+    path, head = scenario('[appearance]\nsource = "drawn"\n'), f"detector.onnx={tmp_path / 'head.onnx'}"
+    simulated, read = (look(prepare(load(path, overrides=changed)))[1] for changed in ([], [head]))
+    for before, after in zip(simulated, read, strict=True):
+        assert len(before.detections.descriptors)
+        np.testing.assert_array_equal(before.detections.descriptors, after.detections.descriptors)
+    record = read_run(run(load(path, overrides=[head]), out=tmp_path / "runs"))
+    assert set(record.estimates) == {"full", "appearance", "geometry"}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[appearance]\nsource = "pictures"\nnetwork = "none.onnx"\n', "appearance.network: .*none.onnx"),
+        ('[appearance]\nsource = "pictures"\nnetwork = "tiny.toml"\n', "appearance.network: .*tiny.toml"),
+        ("", 'appearance goes by descriptors alone.*appearance.source = "pictures"'),
+    ],
+)
+def test_mistakes_are_named_before_any_work(scenario, text, message):
+    with pytest.raises(ValueError, match=message):
+        prepare(load(scenario(text)))
+
+
+def test_a_pose_head_that_is_none_is_named(scenario):
+    with pytest.raises(ValueError, match=r"detector\.onnx: .*tiny.toml"):
+        prepare(load(scenario('[rendering]\nrenderer = "rays"\n'), overrides=["detector.onnx=tiny.toml"]))
+
+
+def test_sources_are_known(scenario):
+    with pytest.raises(ScenarioError, match=r"appearance\.source"):
+        load(scenario('[appearance]\nsource = "photos"\n'))

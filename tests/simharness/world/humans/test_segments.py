@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from simharness.world.humans.body import Part, make_body
+from simharness.world.humans.looks import dress
+from simharness.world.humans.segments import Segment, of_bones, of_faces
+from simharness.world.humans.shape import Shape
+from simharness.world.humans.wardrobe import draw_looks
+
+
+@pytest.fixture(scope="module")
+def body():
+    return make_body(Shape())
+
+
+def test_every_segment_shows_and_lies_between_its_joints(body):
+    """Along the limb no face lies further beyond the joints that bound its segment than flesh blends."""
+    middle = body.vertices[body.faces].mean(1)
+    chains = {"UPPER_ARM": ("Arm", "ForeArm"), "FOREARM": ("ForeArm", "Hand"), "THIGH": ("UpLeg", "Leg")}
+    chains["SHANK"] = ("Leg", "Foot")
+    for name, bones in chains.items():
+        for side in ("Left", "Right"):
+            mine = middle[body.segments == Segment[f"{side.upper()}_{name}"]]
+            first, last = (body.heads[body.index(side + bone)] for bone in bones)
+            axis = last - first
+            along = (mine - first) @ axis / (axis @ axis)
+            assert -0.3 < along.min() < 0.2, name
+            assert 0.8 < along.max() < 1.25, name
+            assert (np.sign(mine[:, 1]) == (1 if side == "Left" else -1)).mean() > 0.99
+
+
+def test_left_and_right_have_as_many_faces_and_none_is_missing(body):
+    count = np.bincount(body.segments, minlength=len(Segment))
+    assert (count > 100).all()
+    for segment in Segment:
+        if segment.name.startswith("LEFT"):
+            other = Segment[segment.name.replace("LEFT", "RIGHT")]
+            assert count[segment] == pytest.approx(count[other], rel=0.12)
+
+
+def test_face_hands_and_shoes_are_of_head_hands_and_feet(body):
+    for parts, segments in (
+        ([Part.SCALP, Part.LIPS, Part.IRIS, Part.BROW], {Segment.HEAD}),
+        ([Part.SOLE], {Segment.LEFT_FOOT, Segment.RIGHT_FOOT}),
+    ):
+        assert set(body.segments[np.isin(body.part, parts)].tolist()) == segments
+    hand = body.part == Part.HAND
+    left = body.vertices[body.faces[hand]].mean(1)[:, 1] > 0
+    for side, segment in ((left, Segment.LEFT_HAND), (~left, Segment.RIGHT_HAND)):
+        assert (body.segments[hand][side] == segment).mean() > 0.97
+
+
+def test_what_is_worn_belongs_to_a_segment_too(body):
+    for look in draw_looks(0, 6):
+        dressed = dress(body, look)
+        assert dressed.segments.shape == (len(dressed.faces),)
+        assert dressed.segments.dtype == np.int8
+        same = dressed.segments[: len(body.faces)] == body.segments
+        assert same.all()
+        assert np.isin(dressed.segments[dressed.part == Part.SCALP], [Segment.HEAD]).all()
+
+
+def test_the_heavier_weight_decides():
+    faces, bones = [[0, 1, 2], [1, 2, 3]], ("Hips", "LeftArm", "LeftArmTwist", "Nothing")
+    weight_bones = np.array([[1, 0], [1, 0], [0, 2], [0, 3]])
+    weights = np.array([[0.9, 0.1], [0.6, 0.4], [0.7, 0.3], [1.0, 0.0]])
+    assert of_bones(bones).tolist() == [Segment.TORSO, Segment.LEFT_UPPER_ARM, Segment.LEFT_UPPER_ARM, Segment.TORSO]
+    # First face: 0.9 + 0.6 + 0.3 of the arm against 1.2; second: 0.6 + 0.3 against 2.1.
+    found = of_faces(faces, weight_bones, weights, bones=bones)
+    assert found.tolist() == [Segment.LEFT_UPPER_ARM, Segment.TORSO]

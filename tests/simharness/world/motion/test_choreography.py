@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from casting import performer
+from scipy.spatial.transform import Rotation
+
+from simharness.scenario.sections.scenario import Scenario
+from simharness.types.random_streams import stream
+from simharness.world.motion.activities import ACTIVITIES
+from simharness.world.motion.choreography import choreograph, hand_out, in_the_way, moved
+from simharness.world.motion.contact import penetration
+from simharness.world.motion.paths import Spot
+from simharness.world.motion.performance import Activity, Performance, Prop, solo
+from simharness.world.motion.trajectory import Trajectory, motion_clock
+
+CLOCK = motion_clock(4.0, margin=1.0)
+
+
+def scenario(seed=0, **people):
+    return Scenario(name="crowd", seed=seed, duration=4.0, people=people)
+
+
+def cast(count):
+    return [performer(k % 4, child=k % 4 == 3) for k in range(count)]
+
+
+def test_activities_are_handed_out_in_turn_and_pairs_take_two():
+    one, two = (Activity(name, n, Spot, 0.0, solo(lambda: None)) for name, n in (("one", 1), ("two", 2)))
+    spare = Activity("stand", 1, Spot, 0.0, solo(lambda: None))
+    parties = hand_out([one, two], 7, spare=spare)
+    assert [(party.people, party.activity.name) for party in parties] == [
+        ((0,), "one"),
+        ((1, 2), "two"),
+        ((3,), "one"),
+        ((4, 5), "two"),
+        ((6,), "one"),
+    ]
+    assert hand_out([two], 3, spare=spare)[-1].activity.name == "stand"  # nobody is left to greet
+    assert hand_out([one], 0, spare=spare) == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_people_who_do_nothing_together_keep_out_of_each_other(seed):
+    people = cast(6)
+    made = choreograph(
+        scenario(seed, count=6, activities=("walk", "point", "walk", "wave"), area=2.0, spacing=0.6), people, CLOCK
+    )
+    assert len(made.motions) == 6
+    assert penetration(people, made.motions, CLOCK[::2]).max() < 0.015  # between the instants that were checked
+    ways = np.stack([motion.root[:, :2] for motion in made.motions])
+    apart = np.linalg.norm(ways[:, None] - ways[None], axis=-1)[~np.eye(6, dtype=bool)]
+    assert apart.min() >= 0.6
+    assert np.abs(ways).max() <= 2.0
+    for motion in made.motions:
+        np.testing.assert_array_equal(motion.time, CLOCK)
+
+
+def test_pairs_meet_and_keep_away_from_the_others():
+    people = cast(5)
+    made = choreograph(scenario(count=5, activities=("shake_hands", "walk", "table"), area=2.5), people, CLOCK)
+    ways = np.stack([motion.root[:, :2] for motion in made.motions])
+    apart = np.linalg.norm(ways[:, None] - ways[None], axis=-1).min(axis=-1)
+    assert apart[0, 1] < 1.2
+    assert apart[3, 4] < 1.6
+    together = np.zeros((5, 5), bool)
+    together[[0, 3], [1, 4]] = True
+    others = ~(together | together.T | np.eye(5, dtype=bool))
+    assert apart[others].min() >= 0.8
+    depth = penetration(people, made.motions, CLOCK[::3])
+    assert depth[:, others].max() < 0.01
+    assert depth.max() < 0.05
+    assert {prop.kind for prop in made.props} <= {"table", "chair"}
+    for prop in made.props:
+        for person in (0, 1, 2):
+            assert not in_the_way(prop, made.motions[person])
+
+
+def test_one_more_person_changes_none_of_the_others():
+    people = cast(4)
+    three = choreograph(scenario(2, count=3, activities=("wave", "walk")), people[:3], CLOCK)
+    four = choreograph(scenario(2, count=4, activities=("wave", "walk")), people, CLOCK)
+    for before, after in zip(three.motions, four.motions, strict=False):
+        np.testing.assert_array_equal(before.root, after.root)
+        np.testing.assert_array_equal(before.angles, after.angles)
+
+
+def test_too_close_is_told_with_its_keys():
+    with pytest.raises(ValueError, match=r"people.count = 4 .*people.area = 0.3 m .*people.spacing = 0.15 m"):
+        choreograph(scenario(count=4, activities=("point",), area=0.3, spacing=0.15), cast(4), CLOCK[:60])
+
+
+def test_nobody():
+    assert choreograph(scenario(count=0), [], CLOCK).motions == ()
+
+
+@pytest.mark.parametrize("name", ["wave", "table", "hand_over"])
+def test_what_is_done_on_a_spot_is_carried_there(name):
+    """Done at the origin and carried to a spot it is what is done on that spot."""
+    activity = ACTIVITIES[name]
+    people = [performer(0), performer(1)][: activity.performers]
+    spot = Spot(np.array([0.7, -1.1]), 2.2)
+    clock = CLOCK[:90]
+    there, carried = (
+        activity.perform(people, where, clock, rng=stream(1, name), pace=1.1)
+        for where in (spot, Spot(np.zeros(2), 0.0))
+    )
+    carried = moved(carried, spot)
+    for one, other in zip(there.motions, carried.motions, strict=True):
+        np.testing.assert_allclose(one.root[:, :3], other.root[:, :3], atol=1e-6)
+        np.testing.assert_allclose(one.angles, other.angles, atol=2e-4)
+    for one, other in zip(there.props, carried.props, strict=True):
+        np.testing.assert_allclose(one.trajectory.at(clock)[:, :3], other.trajectory.at(clock)[:, :3], atol=1e-6)
+
+
+def test_carried_poses_turn_about_the_vertical():
+    pose = np.array([[1.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]])
+    prop = Prop("box", (0.2, 0.3, 0.2), Trajectory(np.zeros(1), pose))
+    (carried,) = moved(Performance((), (prop,)), Spot(np.array([2.0, 3.0]), np.pi / 2)).props
+    np.testing.assert_allclose(carried.trajectory.pose[0, :3], [2.0, 4.0, 0.5], atol=1e-12)
+    turn = Rotation.from_quat(carried.trajectory.pose[0, 3:], scalar_first=True)
+    np.testing.assert_allclose(turn.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("ahead", "blocked"), [(0.2, True), (0.45, True), (0.55, False), (2.0, False)])
+def test_a_thing_is_in_the_way_of_whoever_comes_near_its_ground_plan(ahead, blocked):
+    made = choreograph(scenario(count=1, activities=("stand",)), cast(1), CLOCK)
+    (motion,) = made.motions
+    place = [*(motion.root[0, :2] + [0.0, ahead]), 0.0, np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
+    prop = Prop("table", (0.4, 1.0, 0.7), Trajectory(np.zeros(1), np.array([place])))  # turned: 0.2 m towards it
+    assert in_the_way(prop, motion) == blocked

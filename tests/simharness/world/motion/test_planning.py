@@ -1,0 +1,152 @@
+"""Plans are checked by brute force: everybody's place at many instants, finer than the planner's own."""
+
+import numpy as np
+import pytest
+
+from simharness.world.motion.paths import SWAY, Loop, Spot
+from simharness.world.motion.planning import Going, Replaying, Staying, plan_tracks
+
+WALK = Going("walk", 1.04, 0.85, 1.15)
+RUN = Going("run", 2.8, 2.0, 3.5, running=True)
+STAND = Staying("stand")
+SPAN = (-1.0, 7.0)
+
+
+def apart(tracks, wishes, *, span, step=1 / 50):
+    """Least distance of any two tracks beyond their clearances, metres."""
+    times = np.arange(*span, step)
+    ways = np.stack([track.position(times) for track in tracks])
+    clear = np.array([getattr(wish, "clearance", 0.0) for wish in wishes])
+    least = np.inf
+    for i in range(len(tracks)):
+        for j in range(i):
+            least = min(least, np.linalg.norm(ways[i] - ways[j], axis=1).min() - clear[i] - clear[j])
+    return least, np.abs(ways).max()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("wishes", "area", "spacing"),
+    [
+        ([WALK, STAND] * 2, 2.0, 0.8),
+        ([WALK, STAND] * 4 + [WALK], 2.0, 0.8),
+        ([WALK, STAND] * 3, 3.0, 1.5),
+        ([RUN, WALK, STAND], 2.5, 0.8),
+        ([Staying("table", 0.7, together=True), WALK, Staying("hug", 0.4, together=True), WALK], 2.5, 0.8),
+    ],
+)
+def test_everyone_is_apart_and_inside_at_all_times(seed, wishes, area, spacing):
+    tracks = plan_tracks(seed, wishes, area=area, spacing=spacing, span=SPAN)
+    assert [isinstance(track, Loop) for track in tracks] == [isinstance(wish, Going) for wish in wishes]
+    least, furthest = apart(tracks, wishes, span=SPAN)
+    assert least >= spacing + 2 * SWAY - 0.03  # between the planner's instants
+    assert furthest <= area - SWAY + 0.01
+    for track, wish in zip(tracks, wishes, strict=True):
+        if isinstance(track, Spot):
+            assert np.abs(track.place).max() <= area - SWAY - wish.clearance
+        else:
+            assert track.speed <= wish.fastest
+
+
+def test_ten_minutes_of_twenty_people_are_planned():
+    wishes = [WALK, STAND] * 10
+    tracks = plan_tracks(0, wishes, area=4.0, spacing=0.8, span=(-1.0, 601.0))
+    least, _ = apart(tracks, wishes, span=(-1.0, 601.0), step=1 / 20)
+    assert least >= 0.85
+    assert len({track.length for track in tracks if isinstance(track, Loop)}) >= 3  # not all in one file
+
+
+def test_ways_that_cross_are_gone_round_in_time():
+    """Two loops that meet can only be kept for long if they repeat together."""
+    crossing = 0
+    for seed in range(6):
+        one, other = plan_tracks(seed, [WALK, WALK], area=2.0, spacing=0.8, span=(-1.0, 601.0))
+        once = [track.position(np.linspace(0, track.length / track.speed, 300)) for track in (one, other)]
+        nearest = np.linalg.norm(once[0][:, None] - once[1][None], axis=-1).min()
+        beat = (one.length / one.speed) / (other.length / other.speed)
+        if nearest < 0.8:
+            crossing += 1
+            assert min(abs(beat * k - m) for k in (1, 2, 3) for m in (1, 2, 3)) < 1e-6
+    assert crossing >= 3
+
+
+def test_one_more_wish_moves_nobody():
+    four = plan_tracks(5, [WALK, STAND] * 2, area=2.0, spacing=0.8, span=SPAN)
+    five = plan_tracks(5, [WALK, STAND] * 2 + [WALK], area=2.0, spacing=0.8, span=SPAN)
+    times = np.linspace(*SPAN, 50)
+    for before, after in zip(four, five, strict=False):
+        np.testing.assert_array_equal(before.position(times), after.position(times))
+
+
+def test_plans_differ_by_seed_and_repeat():
+    times = np.linspace(*SPAN, 50)
+    one, again, other = (
+        plan_tracks(seed, [WALK, STAND], area=2.0, spacing=0.8, span=SPAN)[0].position(times) for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(one, again)
+    assert np.abs(one - other).max() > 0.1
+
+
+def test_recorded_ways_keep_apart_too():
+    times = np.linspace(*SPAN, 481)
+    way = np.column_stack([0.3 * times, 0.1 * np.sin(times)])
+    wishes = [Replaying("mocap", times, way)] * 3 + [WALK]
+    tracks = plan_tracks(0, wishes, area=2.5, spacing=0.8, span=SPAN)
+    least, furthest = apart(tracks, wishes, span=SPAN)
+    assert least >= 0.87
+    assert furthest <= 2.46
+
+
+def test_who_is_not_admitted_is_sent_elsewhere():
+    tried = []
+
+    def admit(index, track, before):
+        assert list(before) == list(range(index))
+        tried.append((index, tuple(track.place)))
+        return track.place[0] > 0
+
+    tracks = plan_tracks(0, [STAND] * 8, area=3.0, spacing=0.5, span=SPAN, admit=admit)
+    assert all(track.place[0] > 0 for track in tracks)
+    assert any(place[0] <= 0 for _, place in tried)
+    assert [index for index, _ in tried] == sorted(index for index, _ in tried)
+
+
+def test_nobody_needs_no_room():
+    assert plan_tracks(0, [], area=0.01, spacing=9.0, span=SPAN) == ()
+
+
+def test_a_crowd_that_does_not_fit_is_told_what_to_change():
+    with pytest.raises(ValueError, match=r"people.count = 9 .*people.area = 1 m.*people.spacing = 1.5 m") as error:
+        plan_tracks(0, [STAND] * 9, area=1.0, spacing=1.5, span=SPAN)
+    assert "lower people.count" in str(error.value)
+    with pytest.raises(ValueError, match=r"raise people\.spacing"):
+        plan_tracks(0, [STAND] * 2, area=1.0, spacing=0.5, span=SPAN, admit=lambda index, track, before: index == 0)
+
+
+@pytest.mark.parametrize(
+    ("wish", "area", "least"),
+    [(WALK, 0.3, 0.5), (RUN, 1.0, None), (STAND, 0.04, 0.1), (Staying("lie", 1.0), 1.0, 1.05)],
+)
+def test_an_area_too_small_for_one_alone(wish, area, least):
+    with pytest.raises(ValueError, match=rf'people.area = {area:g} m is too small for "{wish.what}"') as error:
+        plan_tracks(0, [wish], area=area, spacing=0.5, span=SPAN)
+    named = float(str(error.value).split("it takes ")[1].split(" m")[0])
+    if least is not None:
+        assert named == pytest.approx(least)
+    plan_tracks(0, [wish], area=named + 0.05, spacing=0.5, span=SPAN)  # what the message asks for suffices
+
+
+def test_a_recorded_way_too_long_names_its_keys():
+    times = np.linspace(*SPAN, 100)
+    wish = Replaying("mocap", times, np.column_stack([times, times]))
+    with pytest.raises(ValueError, match=r"people.motion.*people.area = 1 m.*people.motion.start"):
+        plan_tracks(0, [wish], area=1.0, spacing=0.5, span=SPAN)
+
+
+def test_people_keep_the_middle_free():
+    tracks = plan_tracks(3, [STAND, WALK, STAND], area=2.2, spacing=0.6, span=SPAN, around=0.9)
+    times = np.arange(*SPAN, 0.01)
+    for track in tracks:
+        assert np.hypot(*track.position(times).T).min() >= 0.9
+    free = plan_tracks(3, [STAND, WALK, STAND], area=2.2, spacing=0.6, span=SPAN)
+    assert min(np.hypot(*track.position(times).T).min() for track in free) < 0.9

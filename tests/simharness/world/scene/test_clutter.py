@@ -1,0 +1,182 @@
+import numpy as np
+import pytest
+from walkers import Rays, ring, space
+
+from simharness.scenario.sections.room import Clutter, Room
+from simharness.scenario.sections.scenario import Scenario
+from simharness.types.random_streams import stream
+from simharness.world.rigs.layouts import build_rig
+from simharness.world.scene.build import build
+from simharness.world.scene.placing.clutter import SPECIES, place_clutter
+from simharness.world.scene.placing.placement import BODY_HALF_WIDTH, LENS, LIMB
+from simharness.world.scene.placing.sight import Pictures, cuts
+from simharness.world.scene.things.fixtures import draw_cart
+from simharness.world.scene.things.storage import draw_box, draw_shelf
+
+ROOM = Room()
+DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in SPECIES} | {"cart": draw_cart}
+EVERYTHING = Clutter(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
+
+
+def extent(thing):
+    return thing.mesh.vertices.min(axis=0), thing.mesh.vertices.max(axis=0)
+
+
+@pytest.mark.parametrize("name", DRAW)
+@pytest.mark.parametrize("seed", range(4))
+def test_things_stand_on_the_floor_around_the_origin(name, seed):
+    thing = DRAW[name](stream(seed, name))
+    low, high = extent(thing)
+    assert low[2] == pytest.approx(0.0, abs=1e-6)
+    assert 0.4 <= high[2] <= 3.0
+    assert (np.abs(low + high)[:2] < 0.35).all()
+    assert len(thing.mesh.faces) < 1500
+    assert (
+        thing.hull((1.0, 2.0), 0.3).distance(thing.at((1.0, 2.0), 0.3, kind="clutter", name="it").mesh.vertices).max()
+        < 1e-5
+    )
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_rays_meet_what_is_seen(name):
+    """The geoms are the mesh: lines through the thing are cut by both or by neither."""
+    rng = np.random.default_rng(5)
+    for seed in range(3):
+        solid = DRAW[name](stream(seed, name)).at((0.4, -0.3), 0.8, kind="clutter", name=name)
+        rays = Rays([solid])
+        center, half = np.array(solid.hull.center), np.array(solid.hull.half)
+        start = center + [3.0, 1.0, 1.0]
+        ends = start + 2 * (center + rng.uniform(-1, 1, (400, 3)) * half - start)
+        seen = cuts(solid.mesh, np.tile(start, (400, 1)), ends)
+        met = np.isfinite(rays.distance(start, ends))
+        assert seen.any()
+        assert (seen == met).mean() >= 0.985
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_no_two_are_alike(name):
+    one, two = (DRAW[name](stream(seed, name)) for seed in (0, 1))
+    assert not np.array_equal(one.mesh.vertices, two.mesh.vertices)
+    again = DRAW[name](stream(0, name))
+    np.testing.assert_array_equal(one.mesh.vertices, again.mesh.vertices)
+    np.testing.assert_array_equal(one.mesh.colors, again.mesh.colors)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_box_on_a_box_lies_on_it(seed):
+    boxes = draw_box(stream(seed, "box")).geoms
+    for box in boxes:
+        assert box.center[2] - box.half[2] in (pytest.approx(0.0), pytest.approx(2 * boxes[0].half[2]))
+
+
+def test_some_boxes_are_stacked_and_most_are_not():
+    stacked = [len(draw_box(stream(seed, "box")).geoms) > 3 for seed in range(100)]
+    assert 0.05 < np.mean(stacked) < 0.5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_shelf_is_an_open_bookshelf_with_things_on_its_boards(seed):
+    thing = draw_shelf(stream(seed, "shelf"))
+    low, high = extent(thing)
+    boxes = thing.geoms
+    assert len(boxes) > 20
+    solid_share = sum(8 * np.prod(box.half) for box in boxes) / np.prod(high - low)
+    assert 0.1 < solid_share < 0.6
+    boards = [box for box in boxes if box.half[2] < 0.02]
+    tops = np.array([box.center[2] + box.half[2] for box in boards])
+    for box in boxes[2 + len(boards) :]:
+        assert np.abs(tops - (box.center[2] - box.half[2])).min() < 1e-9  # it stands on a board
+        assert box.half[0] <= high[0]
+        assert abs(box.center[1]) + box.half[1] <= high[1] - 0.02  # between the sides
+    lows, highs = (np.array([edge(box.corners, axis=0) for box in boxes]) for edge in (np.min, np.max))
+    overlap = np.minimum(highs[:, None], highs) - np.maximum(lows[:, None], lows)
+    through = (overlap > 1e-9).all(axis=2) & ~np.eye(len(boxes), dtype=bool)
+    assert not through.any()  # nothing goes through anything else
+
+
+@pytest.fixture(scope="module", params=range(3))
+def furnished(request):
+    free = space(seed=request.param)
+    return free, place_clutter(request.param, EVERYTHING, free)
+
+
+def test_everything_asked_for_is_there(furnished):
+    _, placed = furnished
+    assert [solid.name for solid in placed] == [
+        *("pillar0", "shelf0", "rack0", "partition0", "table0", "box0", "box1"),
+        *("plant0", "plant1", "chair0", "chair1", "cart0"),
+    ]
+    assert all(solid.kind == "clutter" for solid in placed)
+
+
+def test_nothing_is_in_anyones_way(furnished):
+    free, placed = furnished
+    for solid in placed:
+        for frame in range(0, len(free.time), 5):
+            hull = solid.hull_at(free.time[frame])
+            assert hull.distance_on_floor(free.pelvises[frame]).min() >= BODY_HALF_WIDTH - 1e-9
+            assert hull.distance_on_floor(free.joints[frame]).min() >= LIMB - 1e-9
+            if solid.trajectory is None and frame > 200:
+                break
+
+
+def test_nothing_stands_in_anything_else_or_in_a_wall(furnished):
+    free, placed = furnished
+    for moment in free.time[::40]:
+        hulls = [solid.hull_at(moment) for solid in placed]
+        for k, hull in enumerate(hulls):
+            assert np.abs(hull.corners[:, :2]).max() <= 4.0
+            assert all(hull.gap_on_floor(other) > 0.05 for other in hulls[:k])
+
+
+def test_lenses_and_pictures_stay_clear(furnished):
+    free, placed = furnished
+    pictures = Pictures(free.rig)
+    for solid in placed:
+        for moment in free.time[::40]:
+            assert solid.hull_at(moment).distance(free.rig.centers).min() >= LENS - 1e-6
+        if solid.trajectory is None:
+            pictures.add(solid)
+    assert pictures.filled.mean(axis=1).max() <= 0.6
+
+
+def test_a_picture_is_never_filled():
+    """Twelve partitions around people whom one low camera sees from close by: its picture stays open."""
+    low = ring(3, radius=2.6, height=1.2)
+    placed = place_clutter(0, Clutter(partitions=9), space(1, area=0.8, rig=low))
+    pictures = Pictures(low)
+    for solid in placed:
+        pictures.add(solid)
+    assert 0.2 < pictures.filled.mean(axis=1).max() <= 0.6
+
+
+def test_one_more_changes_nothing_that_stood_before():
+    free = space()
+    before = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=2, shelves=1, carts=1), free)}
+    after = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=3, shelves=1, carts=2), free)}
+    assert set(after) - set(before) == {"box2", "cart1"}
+    for name in ("box0", "box1", "shelf0"):
+        np.testing.assert_array_equal(after[name].mesh.vertices, before[name].mesh.vertices)
+
+
+def test_what_finds_no_place_is_told():
+    with pytest.raises(ValueError, match=r"clutter.tables: table \d+ finds no place.*lower clutter.tables"):
+        place_clutter(0, Clutter(tables=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
+    with pytest.raises(ValueError, match=r"clutter.carts: no way is free for cart \d+.*lower clutter.carts"):
+        place_clutter(0, Clutter(carts=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
+
+
+def test_where_people_keep_the_middle_free_the_first_thing_stands_there():
+    scenario = Scenario.model_validate(
+        {
+            "name": "about",
+            "duration": 1.0,
+            "people": {"count": 3, "activities": ["reach"], "area": 1.6, "around": 0.9},
+            "clutter": {"boxes": 1, "racks": 1},
+            "cameras": {"count": 3},
+        }
+    )
+    scene = build(scenario, build_rig(scenario.cameras))
+    places = {solid.name: np.hypot(*solid.hull.center[:2]) for solid in scene.solids if solid.kind == "clutter"}
+    assert places["rack0"] < 0.45
+    assert places["box0"] > 0.9

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+from walkers import Rays, ring, space
+
+from simharness.scenario.sections.room import Clutter
+from simharness.world.scene.placing.clutter import place_clutter
+from simharness.world.scene.placing.coverage import share_hidden
+
+
+def measured(free, solids) -> float:
+    """Share of the joints in the pictures that MuJoCo's rays do not reach, at other moments than the placer's."""
+    rays = Rays(solids)
+    hidden, count = 0, 0
+    for moment in np.linspace(0.13, free.time[-1] - 1.2, 9):
+        rays.put(moment)
+        joints = free.joints[np.abs(free.time - moment).argmin()].reshape(-1, 3)
+        for camera in free.rig:
+            shown = joints[camera.inside(camera.project(joints))]
+            hidden += np.isfinite(rays.distance(camera.center, shown)).sum()
+            count += len(shown)
+    return hidden / count
+
+
+@pytest.mark.parametrize("asked", [0.1, 0.25, 0.4])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_share_asked_for_is_hidden(asked, seed):
+    free = space(seed=seed)
+    solids = place_clutter(seed, Clutter(coverage=asked), free)
+    assert measured(free, solids) == pytest.approx(asked, abs=0.05)
+
+
+def test_what_was_asked_for_counts_and_carts_where_they_are():
+    free = space(seed=3, duration=10.0)
+    asked = Clutter(boxes=3, shelves=1, carts=1, coverage=0.3)
+    solids = place_clutter(3, asked, free)
+    assert [solid.name for solid in solids][:5] == ["shelf0", "box0", "box1", "box2", "cart0"]
+    assert len(solids) > 5
+    assert measured(free, solids) == pytest.approx(0.3, abs=0.05)
+    assert share_hidden(free, solids) == pytest.approx(measured(free, solids), abs=0.03)
+
+
+def test_asking_for_more_adds_to_the_same_things():
+    free = space(seed=1)
+    less, more = (place_clutter(1, Clutter(coverage=share), free) for share in (0.2, 0.35))
+    assert len(more) > len(less)
+    for one, two in zip(less[:-1], more, strict=False):
+        np.testing.assert_array_equal(one.mesh.vertices, two.mesh.vertices)
+
+
+def test_zero_adds_nothing():
+    assert place_clutter(0, Clutter(coverage=0.0), space()) == ()
+
+
+def test_what_cannot_be_reached_is_told():
+    high = ring(3, radius=1.2, height=5.0)  # they look down on everybody
+    with pytest.raises(ValueError, match=r"clutter.coverage = 0.8 cannot be reached: \d+ more things hide 0\.\d\d of"):
+        place_clutter(0, Clutter(coverage=0.8), space(2, duration=2.0, rig=high))
+    with pytest.raises(ValueError, match=r"clutter.coverage = 0.02 is less than what the things that were asked for"):
+        place_clutter(0, Clutter(shelves=3, pillars=3, coverage=0.02), space())
+    with pytest.raises(ValueError, match=r"no joint is in any picture: take people.count above 0"):
+        place_clutter(0, Clutter(coverage=0.2), space(0))

@@ -1,0 +1,256 @@
+"""People with weight: what holds them up, what brings them down, and what happens when they meet."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from simharness.types.random_streams import stream
+from simharness.world.humans.anatomy import DOFS
+from simharness.world.humans.body import make_body
+from simharness.world.humans.model import person_spec
+from simharness.world.humans.shape import Shape
+from simharness.world.motion.alone.walking import walk
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import make_loop
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
+from simharness.world.scene.dynamics.efforts import Efforts
+from simharness.world.scene.dynamics.tracking import LEVER, Push, Tracker, track
+from simharness.world.scene.things.assembly import Assembly
+
+GRAVITY = 9.81
+MAN = Kinematics(make_body(Shape(gender=0.1, height=0.42)))
+WOMAN = Kinematics(make_body(Shape(gender=0.95, height=0.3, weight=0.7)))
+CHILD = Kinematics(make_body(Shape(gender=0.4, age=0.35, height=0.5)))
+
+
+def room(cast, *solids):
+    """A floor, people, and things."""
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, -0.05], size=[60, 60, 0.05])
+    for solid in solids:
+        solid.add_to(spec)
+    for i, kinematics in enumerate(cast):
+        person = person_spec(kinematics.body, f"person{i}")
+        spec.attach(person, prefix=f"person{i}/", frame=spec.worldbody.add_frame())
+    return spec.compile()
+
+
+def standing(kinematics, *, duration=1.0, height=0.0, place=(0.0, 0.0), **degrees) -> Motion:
+    """Somebody who stands still in the neutral pose but for some angles, ``height`` metres over the floor."""
+    time = motion_clock(duration)
+    root = np.tile([*place, kinematics.standing_height + height, 1.0, 0, 0, 0], (len(time), 1))
+    angles = np.zeros((len(time), len(DOFS)))
+    for name, value in degrees.items():
+        angles[:, DOFS.index(name)] = np.radians(value)
+    return Motion(time, root, angles)
+
+
+def walking(kinematics, *, start=(0.0, 0.0), ahead=1.0, duration=2.0, seed=1) -> Motion:
+    """Somebody who walks along y, up (``ahead`` 1) or down (-1), all but straight."""
+    around = np.linspace(0, 2 * np.pi, 800, endpoint=False)
+    circle = 20 * ahead * np.stack([np.cos(around) - 1, np.sin(around)], axis=-1)
+    loop = make_loop(np.asarray(start) + circle, speed=1.0, start=0.0)
+    return walk(kinematics, loop, motion_clock(duration), rng=stream(seed, "walk"))
+
+
+def misplaced(planned: Motion, happened: Motion) -> np.ndarray:
+    """How far the pelvis is from its plan, (T,) metres."""
+    return np.linalg.norm(happened.root[:, :3] - planned.root[:, :3], axis=1)
+
+
+def test_nothing_but_gravity_moves_the_centre_of_mass_of_one_who_floats():
+    """However the muscles pull, it falls by g t^2 / 2."""
+    plan = standing(MAN, height=3.0, duration=0.5, left_elbow_flexion=40.0)
+    waving = replace(plan, angles=plan.angles + 0.8 * np.sin(9 * plan.time[:, None]) * (plan.angles > 0))
+    tracker = Tracker(room([MAN]), [MAN.body], [waving], assist=1e-9)
+    pelvis = tracker.people[0].pelvis
+    heights, elbow = [], []
+    for qpos in tracker.run():
+        mujoco.mj_kinematics(tracker.model, tracker.data)
+        mujoco.mj_comPos(tracker.model, tracker.data)
+        heights.append(tracker.data.subtree_com[pelvis, 2])
+        elbow.append(qpos[tracker.people[0].hinges[DOFS.index("left_elbow_flexion")]])
+    fallen = heights[0] - np.array(heights)
+    time = plan.time - plan.time[0]
+    # The elbow's first velocity lifts a little; and MuJoCo moves by the velocity at the end of a step.
+    start = (fallen[1] - GRAVITY * time[1] * (time[1] + 1 / 480) / 2) / time[1]
+    np.testing.assert_allclose(fallen, start * time + GRAVITY * time * (time + 1 / 480) / 2, atol=1e-3)
+    assert abs(start) < 0.1
+    assert np.ptp(elbow) > 0.5
+
+
+def test_an_assist_of_more_than_the_weight_carries():
+    plan = standing(CHILD, height=1.0, duration=1.5)
+    (held,) = track(room([CHILD]), [CHILD.body], [plan], assist=2 * GRAVITY * CHILD.body.mass)
+    (let_go,) = track(room([CHILD]), [CHILD.body], [plan], assist=0.5 * GRAVITY * CHILD.body.mass)
+    assert misplaced(plan, held).max() < 0.1
+    assert misplaced(plan, let_go).max() > 0.5
+
+
+@pytest.mark.parametrize("kinematics", [MAN, WOMAN, CHILD], ids=["man", "woman", "child"])
+def test_free_walking_follows_the_plan(kinematics):
+    plan = walking(kinematics, duration=3.0)
+    (happened,) = track(room([kinematics]), [kinematics.body], [plan], assist=300.0)
+    off = np.linalg.norm(kinematics.joints(happened) - kinematics.joints(plan), axis=-1)
+    assert off.mean() < 0.03
+    assert misplaced(plan, happened).max() < 0.05
+    assert np.degrees(np.sqrt(np.mean((happened.angles - plan.angles) ** 2))) < 2.0
+    assert misplaced(plan, happened).max() > 1e-3  # it is not the plan itself
+
+
+def test_without_help_a_walk_falls():
+    plan = walking(MAN, duration=3.0)
+    (happened,) = track(room([MAN]), [MAN.body], [plan], assist=1e-6)
+    assert misplaced(plan, happened)[-1] > 0.4
+
+
+def test_the_help_keeps_within_its_bound():
+    push = Push(person=0, start=0.3, duration=0.2, force=(1200.0, 0.0, 0.0))
+    tracker = Tracker(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
+    pelvis = tracker.people[0].pelvis
+    forces, torques = [], []
+    for _ in tracker.run():
+        if not 0.25 < tracker.data.time + tracker.time[0] < 0.55:
+            forces.append(np.linalg.norm(tracker.data.xfrc_applied[pelvis, :3]))
+            torques.append(np.linalg.norm(tracker.data.xfrc_applied[pelvis, 3:]))
+    assert max(forces) <= 150.0 + 1e-9
+    assert max(torques) <= 150.0 * LEVER + 1e-9
+    assert max(forces) == pytest.approx(150.0)  # it was needed
+
+
+def test_a_push_displaces_and_a_small_one_is_recovered_from():
+    plan = walking(MAN, duration=3.0)
+    scene = room([MAN])
+
+    def pushed(force: float) -> np.ndarray:
+        push = Push(person=0, start=1.0, duration=0.2, force=(force, 0.0, 0.0))
+        (happened,) = track(scene, [MAN.body], [plan], assist=300.0, pushes=[push])
+        return misplaced(plan, happened)
+
+    time = plan.time
+    calm, small, great = pushed(0.0), pushed(400.0), pushed(2500.0)
+    np.testing.assert_array_equal(small[time < 1.0], calm[time < 1.0])
+    assert small.max() > calm.max() + 0.02
+    assert small[-1] < 0.05
+    assert great[-1] > 0.5
+
+
+def test_walkers_who_would_walk_through_each_other_collide():
+    cast = [MAN, WOMAN]
+    plans = [walking(MAN, start=(0.0, -1.2)), walking(WOMAN, start=(0.1, 1.2), ahead=-1.0, seed=2)]
+    apart = np.linalg.norm(plans[0].root[:, :2] - plans[1].root[:, :2], axis=1)
+    assert apart.min() < 0.15  # as planned
+    tracker = Tracker(room(cast), [mover.body for mover in cast], plans, assist=300.0)
+    owner = tracker.model.body_rootid[tracker.model.geom_bodyid]
+    deepest, met = 0.0, False
+    happened = []
+    for qpos in tracker.run():
+        happened.append([qpos[person.root[:2]] for person in tracker.people])
+        for contact in tracker.data.contact:
+            if 0 not in owner[contact.geom]:
+                met = True
+                deepest = min(deepest, contact.dist)
+    assert met
+    assert deepest > -0.03
+    gap = np.linalg.norm(np.subtract(*np.moveaxis(np.array(happened), 1, 0)), axis=-1)
+    assert gap.min() > 0.2
+
+
+def block(kind, *, moving=True):
+    """A box of 0.4 m at the height of the hips that comes along x at 1 m/s, through the origin at 0.8 s."""
+    time = np.arange(-0.1, 2.0, 1 / RATE) if moving else np.zeros(1)
+    pose = np.zeros((len(time), 7))
+    pose[:, 3] = 1.0
+    pose[:, 0] = np.minimum(time, 1.2) - 0.8 if moving else -0.5
+    thing = Assembly().box((0.0, 0.0, 0.95), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5)).thing()
+    return thing.along(Trajectory(time, pose), kind=kind, name="block")
+
+
+@pytest.mark.parametrize(("kind", "moved"), [("clutter", True), ("prop", False)])
+def test_a_cart_pushes_people_and_what_is_carried_does_not(kind, moved):
+    solid = block(kind)
+    plan = standing(MAN, duration=1.4)
+    (happened,) = track(room([MAN], solid), [MAN.body], [plan], assist=300.0, solids=[solid])
+    assert (misplaced(plan, happened).max() > 0.2) == moved
+
+
+def test_the_model_and_the_plan_stay_as_they_are_and_it_happens_the_same_again():
+    scene = room([MAN])
+    before = (scene.opt.timestep, scene.dof_damping.copy(), scene.geom_size.copy())
+    plan = walking(MAN, duration=0.5)
+    (one,), (two,) = (track(scene, [MAN.body], [plan], assist=300.0) for _ in range(2))
+    np.testing.assert_array_equal(one.root, two.root)
+    np.testing.assert_array_equal(one.angles, two.angles)
+    np.testing.assert_array_equal(one.time, plan.time)
+    assert scene.opt.timestep == before[0]
+    np.testing.assert_array_equal(scene.dof_damping, before[1])
+    np.testing.assert_array_equal(scene.geom_size, before[2])
+
+
+def test_how_long_it_goes_on_changes_nothing_of_what_was_before():
+    long, scene = walking(MAN, duration=3.0), room([MAN])
+    short = Motion(long.time[:150], long.root[:150], long.angles[:150])
+    (whole,), (part,) = (track(scene, [MAN.body], [plan], assist=300.0) for plan in (long, short))
+    np.testing.assert_allclose(part.root[:140], whole.root[:140], atol=2e-3)
+
+
+def test_nobody_is_a_valid_answer():
+    assert track(room([]), [], [], assist=300.0) == ()
+
+
+class Planned:
+    """One person's plan at rest, and the torques that it asks for."""
+
+    def __init__(self, height: float = 0.0, **degrees: float) -> None:
+        plan = standing(MAN, height=height, **degrees)
+        self.model = room([MAN])
+        self.data = mujoco.MjData(self.model)
+        hinges = [self.model.joint(f"person0/{name}") for name in DOFS]
+        self.data.qpos[:7] = plan.root[0]
+        self.data.qpos[[hinge.qposadr[0] for hinge in hinges]] = plan.angles[0]
+        self._dofs = np.arange(6), np.array([hinge.dofadr[0] for hinge in hinges])
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def torques(self) -> dict[str, float]:
+        still = np.zeros(self.model.nv)
+        efforts = Efforts(self.model, [self._dofs[0]], [self._dofs[1]])
+        (torques,) = efforts.torques(self.data.qpos, still, still, [])
+        return dict(zip(DOFS, torques, strict=True))
+
+    def moment(self, hinge: str, bone: str) -> float:
+        """Of the weight of a bone and all that hangs on it, about a hinge across the person, N m, forward positive."""
+        anchor = self.data.joint(f"person0/{hinge}").xanchor[0]
+        below = [i for i in range(self.model.nbody) if self._hangs(i, self.model.body(f"person0/{bone}").id)]
+        return GRAVITY * sum(self.model.body_mass[i] * (self.data.xipos[i, 0] - anchor) for i in below)
+
+    def _hangs(self, body: int, bone: int) -> bool:
+        while body > 0 and body != bone:
+            body = self.model.body_parentid[body]
+        return body == bone
+
+
+def test_an_arm_held_out_needs_the_torque_of_its_weight():
+    planned = Planned(height=1.0, left_shoulder_flexion=90.0)
+    expected = planned.moment("left_shoulder_flexion", "LeftArm")
+    assert expected > 5.0
+    torques = planned.torques()
+    assert torques["left_shoulder_flexion"] == pytest.approx(expected, rel=1e-6)
+    assert abs(torques["right_elbow_flexion"]) < 0.3
+
+
+def test_in_a_crouch_the_knees_carry_the_weight_and_in_the_air_they_do_not():
+    """Statics: half the weight, under the centre of mass, at its lever about the knee, less that of the shank."""
+    bent = {f"{side}_{name}": angle for side in ("left", "right")
+            for name, angle in (("hip_flexion", 40), ("knee_flexion", 80), ("ankle_dorsiflexion", 40))}  # fmt: skip
+    thigh, shank = MAN.leg_parts
+    planned = Planned(height=-(thigh + shank) * (1 - np.cos(np.radians(40.0))), **bent)
+    whole = planned.moment("left_knee_flexion", "Hips")  # negative: the weight is behind the knees
+    expected = whole / 2 - planned.moment("left_knee_flexion", "LeftLeg")
+    assert expected < -50.0
+    torques = planned.torques()
+    for side in ("left", "right"):
+        assert torques[f"{side}_knee_flexion"] == pytest.approx(expected, rel=0.1)
+    assert abs(Planned(height=1.0, **bent).torques()["left_knee_flexion"]) < 0.25 * abs(expected)

@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+from walkers import Rays
+
+from simharness.scenario.sections.room import Room
+from simharness.types.lighting import Lighting
+from simharness.world.scene.rooms.lighting import LIGHTS, room_lighting
+from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.surfaces import FLOORS, WALLS
+
+SIZE = (6.0, 8.0, 3.0)
+ROOM = Room(size=SIZE)
+
+
+@pytest.fixture(scope="module")
+def room():
+    return {solid.name: solid for solid in make_room(ROOM, 0)}
+
+
+def normals_and_areas(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
+    cross = np.cross(b - a, c - a)
+    area = np.linalg.norm(cross, axis=1)
+    return cross / area[:, None], area / 2
+
+
+@pytest.mark.parametrize(
+    ("name", "normal", "area"),
+    [
+        ("floor", (0, 0, 1), 48),
+        ("wall +x", (-1, 0, 0), 24),
+        ("wall -x", (1, 0, 0), 24),
+        ("wall +y", (0, -1, 0), 18),
+        ("wall -y", (0, 1, 0), 18),
+    ],
+)
+def test_every_face_looks_into_the_room_and_they_cover_it(room, name, normal, area):
+    normals, areas = normals_and_areas(room[name].mesh)
+    np.testing.assert_allclose(normals, np.tile(normal, (len(normals), 1)), atol=1e-6)
+    assert areas.sum() == pytest.approx(area, rel=1e-5)
+
+
+def test_the_room_has_its_size_and_its_solids_lie_outside(room):
+    assert set(room) == {"floor", "wall +x", "wall -x", "wall +y", "wall -y"}  # no ceiling
+    vertices = np.concatenate([solid.mesh.vertices for solid in room.values()])
+    np.testing.assert_allclose(vertices.min(axis=0), [-3, -4, 0], atol=1e-5)
+    np.testing.assert_allclose(vertices.max(axis=0), [3, 4, 3], atol=1e-5)
+    inside = np.random.default_rng(0).uniform([-3, -4, 0], [3, 4, 3], (2000, 3)) * 0.999 + [0, 0, 0.001]
+    for solid in room.values():
+        assert solid.kind == "room"
+        assert all(box.distance(inside).min() > 0 for box in solid.geoms)
+    assert sum(len(solid.mesh.faces) for solid in room.values()) < 3000
+
+
+def test_rays_from_within_meet_the_room_where_it_is_seen(room):
+    rays = Rays(list(room.values()))
+    start, ways = np.array([0.5, -0.4, 1.2]), np.random.default_rng(0).normal(size=(300, 3))
+    ways[:, 2] = -np.abs(ways[:, 2]) * 0.3
+    ways *= 20 / np.linalg.norm(ways, axis=1, keepdims=True)
+    where = start + rays.distance(start, start + ways)[:, None] * ways
+    edge = np.stack([3 - np.abs(where[:, 0]), 4 - np.abs(where[:, 1]), np.abs(where[:, 2])])
+    np.testing.assert_allclose(np.abs(edge).min(axis=0), 0, atol=1e-6)
+
+
+def test_textures_are_as_large_as_they_say(room):
+    """A metre of floor or wall is the same share of the texture everywhere, and walls stand on the floor."""
+    for name, solid in room.items():
+        mesh = solid.mesh
+        a, b = mesh.vertices[mesh.faces][:, 0], mesh.vertices[mesh.faces][:, 2]
+        ua, ub = mesh.uv[:, 0], mesh.uv[:, 2]
+        grain = np.linalg.norm((ub - ua) * mesh.texture.shape[1::-1], axis=1) / np.linalg.norm(b - a, axis=1)
+        assert grain.min() > 100
+        assert np.ptp(grain) < 1e-2 * grain.min()
+        if name != "floor":
+            at_floor = mesh.vertices[mesh.faces][..., 2] == 0
+            np.testing.assert_allclose(mesh.uv[at_floor][:, 1], 1.0, atol=1e-6)
+            at_top = np.isclose(mesh.vertices[mesh.faces][..., 2], 3)
+            np.testing.assert_allclose(mesh.uv[at_top][:, 1], 0.0, atol=1e-2)
+
+
+@pytest.mark.parametrize("look", [*FLOORS, *WALLS])
+def test_textures_repeat_without_a_seam(look):
+    """Across the seam neighbouring pixels differ no more than elsewhere."""
+    rng = np.random.default_rng(3)
+    texture = (FLOORS[look](rng) if look in FLOORS else WALLS[look](rng, 3.0)).texture.astype(float)
+    for axis in (0, 1) if look in FLOORS else (1,):
+        steps = np.abs(np.diff(texture, axis=axis)).mean(axis=(1 - axis, 2))
+        seam = np.abs(np.take(texture, 0, axis) - np.take(texture, -1, axis)).mean()
+        assert seam <= steps.max() + 1.0
+    assert texture.std() > 0.5
+
+
+def test_a_look_changes_only_what_it_names():
+    one = {solid.name: solid for solid in make_room(ROOM, 4)}
+    two = {solid.name: solid for solid in make_room(ROOM.model_copy(update={"wall": "brick"}), 4)}
+    np.testing.assert_array_equal(one["floor"].mesh.texture, two["floor"].mesh.texture)
+    assert not np.array_equal(one["wall +x"].mesh.texture, two["wall +x"].mesh.texture)
+    three = {solid.name: solid for solid in make_room(ROOM.model_copy(update={"floor": "wood"}), 4)}
+    np.testing.assert_array_equal(one["wall +x"].mesh.texture, three["wall +x"].mesh.texture)
+
+
+def test_any_is_each_of_them_in_turn():
+    floors, walls = set(), set()
+    for seed in range(5):
+        floor, wall = (solid.mesh.texture for solid in make_room(Room(floor="any", wall="any"), seed)[:2])
+        for kinds, looks, key, texture, place in ((floors, FLOORS, "floor", floor, 0), (walls, WALLS, "wall", wall, 1)):
+            same = {n for n in looks if np.array_equal(make_room(Room(**{key: n}), seed)[place].mesh.texture, texture)}
+            assert len(same) == 1  # drawn, it looks as it does when it is named
+            kinds.update(same)
+    lights = {room_lighting(Room(light="any"), seed).key for seed in range(24)}
+    assert len(floors) >= 3
+    assert len(walls) >= 3
+    assert lights == {light.key for light in LIGHTS.values()}
+
+
+def test_light_is_as_named():
+    assert room_lighting(ROOM, 0) == Lighting()
+    seen = {name: (light.key + light.sky) for name, light in LIGHTS.items()}
+    assert seen["dim"] < 0.5 * seen["day"]
+    assert LIGHTS["warm"].tint[0] > LIGHTS["warm"].tint[2]
+    assert LIGHTS["side"].direction[2] < 0.6 < LIGHTS["day"].direction[2]
+
+
+def test_without_walls_the_ground_goes_on_and_pales():
+    floor, ground = make_room(ROOM.model_copy(update={"walls": False}), 0)
+    assert (floor.name, ground.name) == ("floor", "ground")
+    low, high = ground.mesh.vertices.min(axis=0), ground.mesh.vertices.max(axis=0)
+    np.testing.assert_allclose([low, high], [[-7, -8, 0], [7, 8, 0]], atol=1e-5)
+    normals, areas = normals_and_areas(ground.mesh)
+    np.testing.assert_allclose(normals, np.tile((0, 0, 1), (len(normals), 1)), atol=1e-6)
+    assert areas.sum() == pytest.approx(14 * 16 - 48, rel=1e-4)
+    light = Lighting()
+    out = np.abs(ground.mesh.vertices[ground.mesh.faces].mean(axis=1)[:, :2] / [7, 8]).max(axis=1)
+    rim = ground.mesh.colors[out.argmax()] * np.sqrt(light.key * light.direction[2] + light.sky)
+    np.testing.assert_allclose(rim, light.background, atol=0.02)  # it ends in the colour of the background

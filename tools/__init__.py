@@ -1,0 +1,1 @@
+"""One-off tools that make what the project ships; never imported by the packages."""
