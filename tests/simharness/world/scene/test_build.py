@@ -220,7 +220,7 @@ def test_a_camera_at_the_limit_is_accepted_however_the_processor_rounds(scene, e
     nominal = scenario(cameras={"radius": 3.90, "start": 0.0})
     rounded = scenario(cameras={"radius": 3.90 + error, "start": 0.0})
     check_rig(nominal, scene.solids[:5], build_rig(rounded.cameras))
-    with pytest.raises(ValueError, match="cameras.radius at most 3.90"):
+    with pytest.raises(ValueError, match=r"cameras\.radius at most 3\.90"):
         check_rig(nominal, scene.solids[:5], build_rig(scenario(cameras={"radius": 3.901, "start": 0.0}).cameras))
 
 
