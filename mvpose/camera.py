@@ -165,7 +165,7 @@ def _through_lens(xy: Floats, distortion: Floats, *, inverse: bool) -> Floats:
 
 
 @njit(cache=True)
-def _bend(points, terms, inverse):  # type: ignore[no-untyped-def]
+def _bend(points, terms, inverse):
     result = np.empty_like(points)
     for k in range(len(points)):
         if inverse:

@@ -62,7 +62,7 @@ class Duplicates:
 
 
 @njit(cache=True)
-def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):  # type: ignore[no-untyped-def]
+def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):
     m = len(view)
     keep, rival = np.ones(m, np.bool_), np.zeros(m, np.bool_)
     area = np.full(m, -1.0)  # computed when asked for: hardly any pair needs it
@@ -94,7 +94,7 @@ def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):
 
 
 @njit(cache=True)
-def _surer(one, other, scores, box_scores):  # type: ignore[no-untyped-def]
+def _surer(one, other, scores, box_scores):
     sum_one, sum_other = 0.0, 0.0
     for j in range(scores.shape[1]):
         sum_one += scores[one, j]
@@ -103,7 +103,7 @@ def _surer(one, other, scores, box_scores):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):  # type: ignore[no-untyped-def]
+def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
     """Whether the OKS of two poses is above the threshold; two joints mostly suffice to say no."""
     joints = len(variances)
     size = box[a] + box[b]
@@ -132,7 +132,7 @@ def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):  # 
 
 
 @njit(cache=True)
-def _area(keypoints, scores, d):  # type: ignore[no-untyped-def]
+def _area(keypoints, scores, d):
     """Area of the box around the keypoints of a detection, without those that lie far from the others."""
     values = np.empty(scores.shape[1])
     x, y, median = 0.0, 0.0, 0.0
@@ -153,7 +153,7 @@ def _area(keypoints, scores, d):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _box_area(keypoints, scores, d, x, y, reach):  # type: ignore[no-untyped-def]
+def _box_area(keypoints, scores, d, x, y, reach):
     """Area of the box around the keypoints of a detection that lie up to ``reach`` from a point in x and in y."""
     left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
     for j in range(scores.shape[1]):

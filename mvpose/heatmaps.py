@@ -109,7 +109,7 @@ def _first_bad(values: Floats, good: NDArray[np.bool_]) -> str:
 
 
 @njit(cache=True)
-def height(values, detection, joint, column, row):  # type: ignore[no-untyped-def]
+def height(values, detection, joint, column, row):
     """Bilinear interpolation of one map at a place in cells; cells outside are 0. For the kernels."""
     rows, columns = values.shape[2], values.shape[3]
     if not (-1.0 < column < columns and -1.0 < row < rows):
@@ -128,7 +128,7 @@ def height(values, detection, joint, column, row):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _sample(values, origin, stride, pixels):  # type: ignore[no-untyped-def]
+def _sample(values, origin, stride, pixels):
     result = np.zeros(pixels.shape[:3])
     for d in range(pixels.shape[0]):
         for j in range(pixels.shape[1]):
@@ -140,7 +140,7 @@ def _sample(values, origin, stride, pixels):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _modes(values, origin, stride, most):  # type: ignore[no-untyped-def]
+def _modes(values, origin, stride, most):
     m, joints, rows, columns = values.shape
     pixels, heights = np.full((m, joints, most, 2), np.nan), np.zeros((m, joints, most))
     cells = np.empty(rows * columns, np.int64)  # of a plateau
@@ -179,7 +179,7 @@ def _modes(values, origin, stride, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _summit(values, d, j, row, column, seen, stamp, cells):  # type: ignore[no-untyped-def]
+def _summit(values, d, j, row, column, seen, stamp, cells):
     """Fill ``cells`` with the plateau of a cell; its size, or 0 where a neighbour of it is higher."""
     rows, columns = seen.shape
     level = values[d, j, row, column]
@@ -206,7 +206,7 @@ def _summit(values, d, j, row, column, seen, stamp, cells):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _vertex(values, d, j, cell, size, x, y, top):  # type: ignore[no-untyped-def]
+def _vertex(values, d, j, cell, size, x, y, top):
     """Add a cell of a maximum to the mean place of its ``size`` cells and to the greatest of their heights.
 
     On each axis, a parabola through the logarithms of the cell and its two neighbours tells where between the cells

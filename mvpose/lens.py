@@ -16,7 +16,7 @@ _LEAST_STRIDE = 1.0 / 64.0  # of Newton's step; where less of it still leads now
 
 
 @njit(cache=True)
-def distort(x, y, terms):  # type: ignore[no-untyped-def]
+def distort(x, y, terms):
     """Where the lens images the direction (x, y, 1)."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
     r2 = x * x + y * y
@@ -28,7 +28,7 @@ def distort(x, y, terms):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def undistort(u, v, terms):  # type: ignore[no-untyped-def]
+def undistort(u, v, terms):
     """The direction (x, y, 1) that the lens images at (u, v); NaN where none is.
 
     Newton's method from the centre of the image outwards. A polynomial lens folds over beyond some radius: what
@@ -61,7 +61,7 @@ def undistort(u, v, terms):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _linearised(x, y, terms):  # type: ignore[no-untyped-def]
+def _linearised(x, y, terms):
     """:func:`distort` and its derivatives: of the first by x, of either by the other, of the second by y."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
     r2 = x * x + y * y
@@ -77,7 +77,7 @@ def _linearised(x, y, terms):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _undistort_carefully(u, v, terms):  # type: ignore[no-untyped-def]
+def _undistort_carefully(u, v, terms):
     """Newton's method in short, damped steps that never leave the branch of the lens through the centre."""
     x, y = 0.0, 0.0
     fx, fy, xx, xy, yy = _linearised(x, y, terms)

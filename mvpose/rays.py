@@ -119,7 +119,7 @@ def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
 
 
 @njit(cache=True)
-def _viewing_rays(cameras, view, keypoints, scores):  # type: ignore[no-untyped-def]
+def _viewing_rays(cameras, view, keypoints, scores):
     """The rays, and the greatest view; a view that there is no camera for sees nothing."""
     m, joints = scores.shape
     last = -1

@@ -68,7 +68,7 @@ def cosines(detections: Detections) -> tuple[NDArray[np.float32], NDArray[np.boo
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
-def _unit(descriptors):  # type: ignore[no-untyped-def]
+def _unit(descriptors):
     m, dimensions = descriptors.shape
     unit = np.zeros((m, dimensions), np.float32)  # seven digits are plenty, and half the work
     described = np.zeros(m, np.bool_)
@@ -85,19 +85,19 @@ def _unit(descriptors):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def likeness(cosine, midpoint, slope):  # type: ignore[no-untyped-def]
+def likeness(cosine, midpoint, slope):
     """Affinity of two unit vectors."""
     return falling(apart(cosine), midpoint, slope)
 
 
 @njit(cache=True)
-def apart(cosine):  # type: ignore[no-untyped-def]
+def apart(cosine):
     """Distance of two unit vectors."""
     return math.sqrt(max(2.0 - 2.0 * cosine, 0.0))
 
 
 @njit(cache=True)
-def _across_views(cosine, view, described, midpoint, slope):  # type: ignore[no-untyped-def]
+def _across_views(cosine, view, described, midpoint, slope):
     m = len(view)
     result = np.zeros((m, m))
     for i in range(m):

@@ -37,13 +37,13 @@ def sigmoid(distance: Floats, *, midpoint: float, slope: float) -> Floats:
 
 
 @njit(cache=True)
-def falling(distance, midpoint, slope):  # type: ignore[no-untyped-def]
+def falling(distance, midpoint, slope):
     """:func:`sigmoid` of one finite distance."""
     return 1.0 / (1.0 + math.exp((distance - midpoint) / slope))
 
 
 @njit(cache=True)
-def by_view(view):  # type: ignore[no-untyped-def]
+def by_view(view):
     """Detections in the order of their views, (m,), and where each view that has any starts and the last ends."""
     m = len(view)
     order = np.arange(m)
@@ -64,7 +64,7 @@ def by_view(view):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def lay_out(directions, weights, order, channels):  # type: ignore[no-untyped-def]
+def lay_out(directions, weights, order, channels):
     """Poses for the kernels, (m, channels, J and zeros up to full registers): x, y, z, weight, and room for more.
 
     A joint without a weight or without a direction is missing: all zeros.
@@ -80,7 +80,7 @@ def lay_out(directions, weights, order, channels):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, fastmath=FASTMATH)
-def in_common(one, other):  # type: ignore[no-untyped-def]
+def in_common(one, other):
     """Sum of the products of two poses' weights, (J,) each, and how many joints both have."""
     mass, count = 0.0, 0
     for j in range(len(one)):

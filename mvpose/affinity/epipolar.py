@@ -98,7 +98,7 @@ def _image(rig: Rig) -> Floats:
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
-def _compare_lines(  # type: ignore[no-untyped-def]
+def _compare_lines(
     view, directions, weights, centers, image, nearest, epipole, saturation, midpoint, slope, threshold, least,
     distances,
 ):  # fmt: skip
@@ -158,7 +158,7 @@ def _compare_lines(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
-def _draw(line, pose, own, other, center, other_center, nearest, epipole):  # type: ignore[no-untyped-def]
+def _draw(line, pose, own, other, center, other_center, nearest, epipole):
     """Draw a pose's rays in another view: unit direction, offset, where along it the image starts and ends, weight."""
     ax = ay = az = bx = by = bz = 0.0  # homogeneous images of this centre in the other view, and of the other in this
     apart = False

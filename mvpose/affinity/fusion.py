@@ -76,7 +76,7 @@ class FusedAffinity:
 
 
 @njit(cache=True)
-def _average(affinity, cosine, described, midpoint, slope):  # type: ignore[no-untyped-def]
+def _average(affinity, cosine, described, midpoint, slope):
     """Turn geometric affinities into fused ones, in place: a second matrix would cost more than what it holds."""
     m = len(affinity)
     for i in range(m):
@@ -87,7 +87,7 @@ def _average(affinity, cosine, described, midpoint, slope):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _weigh(affinity, cosine, described, view, midpoint, slope, weight):  # type: ignore[no-untyped-def]
+def _weigh(affinity, cosine, described, view, midpoint, slope, weight):
     """As :func:`_average`, by evidence."""
     m = len(affinity)
     views = 0

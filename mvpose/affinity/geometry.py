@@ -102,7 +102,7 @@ def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0
 
 
 @njit(cache=True)
-def misfit(view, distance):  # type: ignore[no-untyped-def]
+def misfit(view, distance):
     """How far from each other the rays pass of those who are surely one person, metres; 0 if too few are.
 
     Surely one person are, in two views, those who are nearer to each other than to anybody else there. Some of them
@@ -131,7 +131,7 @@ def misfit(view, distance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fall(distance, midpoint, slope, threshold):  # type: ignore[no-untyped-def]
+def _fall(distance, midpoint, slope, threshold):
     """Turn distances into affinities, in place."""
     m = len(distance)
     for i in range(m):
@@ -142,9 +142,7 @@ def _fall(distance, midpoint, slope, threshold):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
-def _compare_rays(  # type: ignore[no-untyped-def]
-    view, origins, directions, weights, nearest, saturation, reach, least, counted
-):
+def _compare_rays(view, origins, directions, weights, nearest, saturation, reach, least, counted):
     """Mean distances up to ``reach``, else infinite; and, if they are to be counted, the numbers of common joints."""
     order, start = by_view(view)
     pose = lay_out(directions, weights, order, 4)

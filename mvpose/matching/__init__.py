@@ -110,7 +110,7 @@ def _checked(affinity: ArrayLike, view: ArrayLike) -> tuple[NDArray[np.float64],
 
 
 @njit(cache=True)
-def _asymmetry(affinity):  # type: ignore[no-untyped-def]
+def _asymmetry(affinity):
     """Greatest difference from the transpose; infinite where a value is outside 0..1 or not a number."""
     m, side, worst = len(affinity), 32, 0.0
     for top in range(0, m, side):  # square tiles: both the matrix and its transpose stay in the cache
@@ -125,7 +125,7 @@ def _asymmetry(affinity):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _objective(labels, affinity, alpha):  # type: ignore[no-untyped-def]
+def _objective(labels, affinity, alpha):
     total = 0.0
     for i in range(len(labels)):
         if labels[i] >= 0:

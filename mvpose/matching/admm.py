@@ -167,7 +167,7 @@ def _threshold(Z: Floats, gap: float) -> tuple[Floats, int]:
 
 
 @njit(cache=True, error_model="numpy")
-def _point(P, S, rho, Z):  # type: ignore[no-untyped-def]
+def _point(P, S, rho, Z):
     """Set Z to P - S / rho, upper triangles; a lower bound of its eigenvalues (Gershgorin's)."""
     m = len(P)
     reach = np.zeros(m)
@@ -186,7 +186,7 @@ def _point(P, S, rho, Z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _project_and_ascend(Q, P, S, gain, rho, relaxation, starts, prices):  # type: ignore[no-untyped-def]
+def _project_and_ascend(Q, P, S, gain, rho, relaxation, starts, prices):
     """P onto C, Y up the dual, upper triangles in place; both residuals, and rho times how far P moved.
 
     ``prices[block, row]`` is the price of that row's sum within its block against ``block``, from the last call.

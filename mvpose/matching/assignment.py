@@ -10,7 +10,7 @@ from numba import njit
 
 
 @njit(cache=True)
-def best_assignment(value):  # type: ignore[no-untyped-def]
+def best_assignment(value):
     """Give rows different columns so that the values add up to the most; pairs of no positive value stay apart.
 
     Shortest augmenting paths with prices (Jonker and Volgenant 1987; Crouse 2016): the cost of a pair is its negative

@@ -63,7 +63,7 @@ def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: f
 
 
 @njit(cache=True)
-def _pair_gains(affinity, alpha, rank):  # type: ignore[no-untyped-def]
+def _pair_gains(affinity, alpha, rank):
     m = len(rank)
     gain = np.empty((m, m))
     for i in range(m):
@@ -73,7 +73,7 @@ def _pair_gains(affinity, alpha, rank):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _contract(gain):  # type: ignore[no-untyped-def]
+def _contract(gain):
     """Join the two parts with the greatest positive gain until there are none; the part that each ends in, (n,).
 
     ``gain`` (n, n), symmetric, -inf where two may not be joined, is used up. Only the row of the part that grows is
@@ -131,7 +131,7 @@ def _contract(gain):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _member_gains(affinity, alpha, rank, views, part, gains):  # type: ignore[no-untyped-def]
+def _member_gains(affinity, alpha, rank, views, part, gains):
     """Overwrite ``gains`` (m, m): row i, column p is what detection i gains beside the members of other views in p.
 
     Parts are renamed 0, 1, ... in place; there are never more than detections.
@@ -165,7 +165,7 @@ def _member_gains(affinity, alpha, rank, views, part, gains):  # type: ignore[no
 
 
 @njit(cache=True)
-def _put_back_views(affinity, alpha, rank, order, start, part, parts, size, gains):  # type: ignore[no-untyped-def]
+def _put_back_views(affinity, alpha, rank, order, start, part, parts, size, gains):
     """Put back view by view until every view in turn has stayed as it was; how many parts there are then."""
     views, quiet, r = len(start) - 1, 0, 0
     for _ in range(_MOST_ROUNDS * views):
@@ -184,7 +184,7 @@ def _put_back_views(affinity, alpha, rank, order, start, part, parts, size, gain
 
 
 @njit(cache=True)
-def _would_rather_move(mine, part, parts, gains):  # type: ignore[no-untyped-def]
+def _would_rather_move(mine, part, parts, gains):
     """Whether a detection would gain more elsewhere or alone. If none would, the assignment is the best there is."""
     for i in mine:
         own = gains[i, part[i]] + _LEAST_GAIN
@@ -197,7 +197,7 @@ def _would_rather_move(mine, part, parts, gains):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _best_parts(mine, part, parts, gains):  # type: ignore[no-untyped-def]
+def _best_parts(mine, part, parts, gains):
     """Best assignment of one view's detections to parts: the part of each, -1 for alone, and what that gains."""
     choices, count = np.empty(parts, np.int64), 0
     for p in range(parts):
@@ -221,7 +221,7 @@ def _best_parts(mine, part, parts, gains):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _move(i, to, affinity, alpha, rank, part, parts, size, gains):  # type: ignore[no-untyped-def]
+def _move(i, to, affinity, alpha, rank, part, parts, size, gains):
     """Move detection i into part ``to``, or alone where that is -1; the number of parts, empty ones included."""
     if to == part[i] or (to < 0 and size[part[i]] == 1):
         return parts
@@ -244,7 +244,7 @@ def _move(i, to, affinity, alpha, rank, part, parts, size, gains):  # type: igno
 
 
 @njit(cache=True)
-def _join_parts(rank, views, part, parts, size, gains):  # type: ignore[no-untyped-def]
+def _join_parts(rank, views, part, parts, size, gains):
     """Contract whole parts while that gains; whether any were joined."""
     seen, between = np.zeros((parts, views), np.bool_), np.zeros((parts, parts))
     for i in range(len(part)):

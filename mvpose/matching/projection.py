@@ -53,7 +53,7 @@ def block_starts(view: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 @njit(cache=True)
-def _project(X, starts):  # type: ignore[no-untyped-def]
+def _project(X, starts):
     """Project symmetric ``X`` (m, m) onto C in place."""
     blocks, prices = len(starts) - 1, np.empty(len(X))
     for i in range(blocks):
@@ -75,7 +75,7 @@ def _project(X, starts):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def project_block(Y, u, v):  # type: ignore[no-untyped-def]
+def project_block(Y, u, v):
     """Project ``Y``, C-contiguous, onto the doubly substochastic matrices in place, from prices ``u`` and ``v``."""
     rows, columns = Y.shape
     turned, room = np.empty((columns, rows)), np.empty((columns + 2, columns))
@@ -95,7 +95,7 @@ def project_block(Y, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath={"reassoc"})
-def _excess(row, price, prices):  # type: ignore[no-untyped-def]
+def _excess(row, price, prices):
     """What max(0, row - price - prices) sums to above one, and how many entries are positive."""
     total, above = -1.0, 0.0
     for j in range(len(row)):
@@ -106,7 +106,7 @@ def _excess(row, price, prices):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_rows(Y, u, v):  # type: ignore[no-untyped-def]
+def _solve_rows(Y, u, v):
     """Set every u_i to the least non-negative price at which row i of max(0, Y - u - v) sums to at most one.
 
     The sum falls with the price along a convex polygon. So Newton's step from a price that is too high ends at or
@@ -129,7 +129,7 @@ def _solve_rows(Y, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _newton_step(Y, u, v, room):  # type: ignore[no-untyped-def]
+def _newton_step(Y, u, v, room):
     """Newton's step of the positive prices v, with those of the rows eliminated: the next rows' solve follows them.
 
     The system is a Laplacian plus a non-negative diagonal, so Cholesky needs no pivoting; where a group of rows and

@@ -45,7 +45,7 @@ def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
 
 
 @njit(cache=True)
-def rank_views(view):  # type: ignore[no-untyped-def]
+def rank_views(view):
     """Number the views 0, 1, ... by their first detection: the number of each detection's view, and how many."""
     m = len(view)
     rank, seen, views = np.empty(m, np.int64), np.empty(m, np.int64), 0
@@ -61,7 +61,7 @@ def rank_views(view):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _join_pairs(first, second, view):  # type: ignore[no-untyped-def]
+def _join_pairs(first, second, view):
     m = len(view)
     rank, views = rank_views(view)
     group = np.arange(m)
@@ -83,7 +83,7 @@ def _join_pairs(first, second, view):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _number_people(group):  # type: ignore[no-untyped-def]
+def _number_people(group):
     m = len(group)
     size, number, people = np.zeros(m, np.int64), np.full(m, -1, np.int64), 0
     for i in range(m):

@@ -142,7 +142,7 @@ def cut(
 
 
 @njit(cache=True)
-def _taps(origin, stride, count, length):  # type: ignore[no-untyped-def]
+def _taps(origin, stride, count, length):
     """For every pixel of a crop, along one axis: its first pixel of the image, how many, and their weights.
 
     None where the centre is outside.
@@ -166,7 +166,7 @@ def _taps(origin, stride, count, length):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
-def _cut(image, origin, stride, fill, crop):  # type: ignore[no-untyped-def]
+def _cut(image, origin, stride, fill, crop):
     """One crop, (H, W, 3), of an image, (h, 3 w): the axes are weighted one after the other, rows first."""
     height, width = crop.shape[:2]
     top, tall, down = _taps(origin[1], stride[1], height, image.shape[0])

@@ -47,7 +47,7 @@ def parts(skeleton: Skeleton) -> NDArray[np.int64]:
 
 
 @njit(cache=True)
-def down_the_trunk(states, count, parts, down):  # type: ignore[no-untyped-def]
+def down_the_trunk(states, count, parts, down):
     """Write the direction (3,) from the shoulders to the hips, or from the head to the shoulders; zeros if unknown.
 
     Args:
@@ -73,7 +73,7 @@ def down_the_trunk(states, count, parts, down):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def how_it_hangs(point, other, outward, concentration, down):  # type: ignore[no-untyped-def]
+def how_it_hangs(point, other, outward, concentration, down):
     """Log-likelihood of a bone's direction, but for a constant: at most 0.
 
     Args:

@@ -95,7 +95,7 @@ def _propose(view: Integers, sights: Floats, sigma: float, agreement: float, mos
 
 
 @njit(cache=True)
-def _meetings(view, sights, sigma, agreement):  # type: ignore[no-untyped-def]
+def _meetings(view, sights, sigma, agreement):
     """Where pairs of rays of different views meet, (N, 3), which rays these are, (N, 2), and log-likelihoods, (N,)."""
     n = len(view)
     points, likelihood = np.empty((n * (n - 1) // 2, 3)), np.empty(n * (n - 1) // 2)
@@ -125,7 +125,7 @@ def _meetings(view, sights, sigma, agreement):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _distinct(points, ends, order, rays, sigma, most):  # type: ignore[no-untyped-def]
+def _distinct(points, ends, order, rays, sigma, most):
     """Indices of points to keep, in this order: none within sigma of one before, and so many of each ray."""
     kept, count, states = np.empty(len(points), np.int64), np.zeros(rays, np.int64), 0
     for k in order:
@@ -146,7 +146,7 @@ def _distinct(points, ends, order, rays, sigma, most):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def _across(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
+def _across(points, s, sights, k, sigma):
     """Squared distance of a point from a ray and its variance, m^2, and how far along the ray the point is, metres."""
     x, y, z = points[s, 0] - sights[k, 0], points[s, 1] - sights[k, 1], points[s, 2] - sights[k, 2]
     along = x * sights[k, 3] + y * sights[k, 4] + z * sights[k, 5]
@@ -155,14 +155,14 @@ def _across(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _odds(points, s, sights, k, sigma):  # type: ignore[no-untyped-def]
+def _odds(points, s, sights, k, sigma):
     """How many times likelier a keypoint is with the joint at the point than without; 0 where it does not vouch."""
     e2, variance, along = _across(points, s, sights, k, sigma)
     return sights[k, 7] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < sights[k, 9] * variance else 0.0
 
 
 @njit(cache=True)
-def _vouch(sights, points, sigma):  # type: ignore[no-untyped-def]
+def _vouch(sights, points, sigma):
     """How many rays vouch for each state of one joint, which ones, and the evidence that each adds."""
     count = np.zeros(len(points), np.int64)
     for s in range(len(points)):
@@ -180,7 +180,7 @@ def _vouch(sights, points, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _link(start, points, parents, length, deviation, reach):  # type: ignore[no-untyped-def]
+def _link(start, points, parents, length, deviation, reach):
     """The links and costs of :class:`Hypotheses`. A bone of unknown length (infinite deviation) links nothing."""
     begin = np.zeros(len(points) + 1, np.int64)
     link, cost = np.empty(0, np.int64), np.empty(0)

@@ -65,7 +65,7 @@ def _sigmas(area: float, definition: float, skeleton: Skeleton) -> Floats:
 
 
 @njit(cache=True, fastmath=_FASTMATH)
-def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):  # type: ignore[no-untyped-def]
+def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):
     """Sum over the views that detected the joint; a view that has the point behind it gives the floor."""
     total, product = 0.0, 1.0
     for v in range(weights.shape[0]):
@@ -93,7 +93,7 @@ NO_RAYS = (0.0,) * 9
 
 
 @njit(cache=True, fastmath=_FASTMATH)
-def add_ray(sums, weight, direction, origin):  # type: ignore[no-untyped-def]
+def add_ray(sums, weight, direction, origin):
     """Add ``weight * (I - d dᵀ)`` and its product with the origin to normal equations held in nine numbers.
 
     They stay in registers, where matrices would go through memory: the upper triangle by rows, then the right side.
@@ -116,7 +116,7 @@ def add_ray(sums, weight, direction, origin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def add_sums(sums, A, b):  # type: ignore[no-untyped-def]
+def add_sums(sums, A, b):
     """Add what :func:`add_ray` has gathered to A (3, 3) and b (3,)."""
     k = 0
     for r in range(3):
@@ -129,7 +129,7 @@ def add_sums(sums, A, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_FASTMATH)
-def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):  # type: ignore[no-untyped-def]
+def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):
     """Add what the views say of a joint near the point to its normal equations A (3, 3) and b (3,).
 
     Every keypoint weighs by its responsibility (the posterior that it is right, given the joint at the point) over
@@ -167,7 +167,7 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
 
 
 @njit(cache=True, fastmath=_FASTMATH)
-def look(point, origins, directions, weights, pixel, sigma, floor):  # type: ignore[no-untyped-def]
+def look(point, origins, directions, weights, pixel, sigma, floor):
     """What :func:`accumulate` returns, of the strongest modes alone, and the greatest squared error, m^2."""
     support, rights, misfit, worst = 0.0, 0.0, 0.0, 0.0
     for v in range(weights.shape[0]):
@@ -193,7 +193,7 @@ LEASH = 1.0
 
 
 @njit(cache=True)
-def tie(point, A, b):  # type: ignore[no-untyped-def]
+def tie(point, A, b):
     """Begin normal equations with no more than that the joint is about here."""
     for r in range(3):
         for c in range(3):
@@ -203,7 +203,7 @@ def tie(point, A, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def solve(A, b, inverse, point):  # type: ignore[no-untyped-def]
+def solve(A, b, inverse, point):
     """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; False where A is singular in practice.
 
     Written out: a call into LAPACK costs more than the work, and much more to compile.

@@ -81,7 +81,7 @@ class PictorialStructure:
 
 
 @njit(cache=True)
-def _structures(  # type: ignore[no-untyped-def]
+def _structures(
     poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
     parents, order, neighbours, bones, length, definition, hang, parts, personal, most_pairs, most_states,
 ):  # fmt: skip
@@ -124,7 +124,7 @@ def _structures(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def max_product(states, unary, count, parents, order, length, precision):  # type: ignore[no-untyped-def]
+def max_product(states, unary, count, parents, order, length, precision):
     """The combination of states with the greatest sum of unaries and log-Gaussian bone lengths.
 
     Args:

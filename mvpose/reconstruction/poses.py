@@ -36,7 +36,7 @@ class Poses(NamedTuple):
 
 
 @njit(cache=True)
-def clear(joints, scores, covariance):  # type: ignore[no-untyped-def]
+def clear(joints, scores, covariance):
     """Mark all joints of one person as missing."""
     for j in range(len(scores)):
         scores[j] = 0.0
@@ -47,7 +47,7 @@ def clear(joints, scores, covariance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def gather(labels, person, origins, directions, weights, pixel):  # type: ignore[no-untyped-def]
+def gather(labels, person, origins, directions, weights, pixel):
     """The n detections of one person, joint by joint.
 
     Returns:

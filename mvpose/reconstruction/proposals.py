@@ -20,7 +20,7 @@ _SAME = 0.25  # of the joint's variance: squared distance under which refinement
 
 
 @njit(cache=True)
-def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, most_states):  # type: ignore[no-untyped-def]
+def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, most_states):
     """Propose for every joint of one person in n views.
 
     Returns:
@@ -62,7 +62,7 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
 
 
 @njit(cache=True)
-def insert(states, unary, count, value, x, y, z):  # type: ignore[no-untyped-def]
+def insert(states, unary, count, value, x, y, z):
     """Put a point among the ``count`` states (S, 3) of a joint, the likeliest first."""
     place = count
     while place > 0 and unary[place - 1] < value:
@@ -75,7 +75,7 @@ def insert(states, unary, count, value, x, y, z):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _pairs(origins, directions, weights, sigma, points, quality):  # type: ignore[no-untyped-def]
+def _pairs(origins, directions, weights, sigma, points, quality):
     """Write the points of the best pairs of views, all but the last place; how many there are."""
     n, modes = weights.shape
     most, found, worst = len(points) - 1, 0, 0
@@ -112,7 +112,7 @@ def _pairs(origins, directions, weights, sigma, points, quality):  # type: ignor
 
 
 @njit(cache=True)
-def _agreement(point, origins, directions, first, mode, second, other, sigma):  # type: ignore[no-untyped-def]
+def _agreement(point, origins, directions, first, mode, second, other, sigma):
     """How likely the two rays' distances from their common point are, at most 1."""
     e2, a, b = 0.0, 0.0, 0.0
     for r in range(3):
@@ -125,7 +125,7 @@ def _agreement(point, origins, directions, first, mode, second, other, sigma):  
 
 
 @njit(cache=True)
-def propose_single_views(  # type: ignore[no-untyped-def]
+def propose_single_views(
     states, unary, count, origins, directions, weights, floor, neighbours, bones, length, precision, hang, down
 ):
     """Propose, in place, for joints that a single view sees: where its ray is a bone's length from a neighbour.

@@ -114,7 +114,7 @@ _LONG = 4e-4  # m^2: a step of 2 cm turns no bone by much, so that it cannot ove
 
 
 @njit(cache=True)
-def climb(  # type: ignore[no-untyped-def]
+def climb(
     joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones, length, precision
 ):
     """Move the joints (J, 3) to a maximum of the posterior, in place; NaN is left alone."""
@@ -163,7 +163,7 @@ def climb(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):  # type: ignore[no-untyped-def]
+def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
     """How much larger the person's squared errors are than the model's, at a pose (J, 3).
 
     Likelihoods with errors so scaled, times the prior, have their maximum where the model's likelihoods have it with a
@@ -183,7 +183,7 @@ def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):  # ty
 
 
 @njit(cache=True)
-def _add_bones(A, b, j, joints, neighbours, bones, length, precision):  # type: ignore[no-untyped-def]
+def _add_bones(A, b, j, joints, neighbours, bones, length, precision):
     """Add the bones that end in joint j to its normal equations, linearised in the direction they have now."""
     for slot in range(neighbours.shape[1]):
         other, bone = neighbours[j, slot], bones[j, slot]
@@ -209,7 +209,7 @@ def _add_bones(A, b, j, joints, neighbours, bones, length, precision):  # type: 
 
 
 @njit(cache=True)
-def _local_posterior(  # type: ignore[no-untyped-def]
+def _local_posterior(
     point, j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones, length, precision
 ):
     """The terms of the log-posterior that change when joint j moves to ``point``."""
@@ -222,12 +222,12 @@ def _local_posterior(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _distance(a, b):  # type: ignore[no-untyped-def]
+def _distance(a, b):
     return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @njit(cache=True)
-def judge(  # type: ignore[no-untyped-def]
+def judge(
     scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones,
     length, precision, hang, down,
 ):  # fmt: skip
@@ -259,7 +259,7 @@ def judge(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _marginalize(joints, information, covariance, parents, order, precision):  # type: ignore[no-untyped-def]
+def _marginalize(joints, information, covariance, parents, order, precision):
     """Gaussian belief propagation: each joint's own information (J, 3, 3) to everybody's covariance.
 
     A bone measures one length, so its message has rank one: along it, the variance of the bone plus that of what is
@@ -291,7 +291,7 @@ def _marginalize(joints, information, covariance, parents, order, precision):  #
 
 
 @njit(cache=True)
-def _message(information, along, precision, inverse, b, unused):  # type: ignore[no-untyped-def]
+def _message(information, along, precision, inverse, b, unused):
     """Information along a bone about the joint at its one end, from all that is beyond its other."""
     if not solve(information, b, inverse, unused):
         return 0.0
@@ -303,16 +303,14 @@ def _message(information, along, precision, inverse, b, unused):  # type: ignore
 
 
 @njit(cache=True)
-def _add_outer(matrix, vector, weight):  # type: ignore[no-untyped-def]
+def _add_outer(matrix, vector, weight):
     for r in range(3):
         for c in range(3):
             matrix[r, c] += weight * vector[r] * vector[c]
 
 
 @njit(cache=True)
-def _add_ambiguity(  # type: ignore[no-untyped-def]
-    covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down
-):
+def _add_ambiguity(covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down):
     """Count in that a joint which one view alone sees may as well be at the other depth where its bone fits.
 
     The second moment about the chosen depth grows by the squared distance of the two times how likely the other is

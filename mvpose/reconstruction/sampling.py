@@ -15,7 +15,7 @@ from mvpose.reconstruction.proposals import insert
 
 
 @njit(cache=True)
-def rescore(states, unary, count, labels, person, weights, maps, floor):  # type: ignore[no-untyped-def]
+def rescore(states, unary, count, labels, person, weights, maps, floor):
     """Score proposals by heat maps, in place, and sort them again, the likeliest first.
 
     A view says ``floor + height`` of its map at the projection, sub-pixel; the floor models a joint that it missed.
@@ -44,7 +44,7 @@ def rescore(states, unary, count, labels, person, weights, maps, floor):  # type
 
 
 @njit(cache=True)
-def _look_up(x, y, z, detection, joint, values, grid, camera):  # type: ignore[no-untyped-def]
+def _look_up(x, y, z, detection, joint, values, grid, camera):
     """Height of one map where a point of the world projects; 0 behind the camera."""
     x, y, z = x - camera[14], y - camera[15], z - camera[16]
     depth = camera[11] * x + camera[12] * y + camera[13] * z

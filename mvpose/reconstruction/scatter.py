@@ -20,13 +20,13 @@ _LEAST, _MOST = 0.1, 4.0  # of a person's scale: no detector is better or worse 
 
 
 @njit(cache=True)
-def _freedom(rights):  # type: ignore[no-untyped-def]
+def _freedom(rights):
     """Residuals that are free, of views whose responsibilities sum to ``rights``: two each, less a joint's three."""
     return _SEEN * max(2.0 * rights - 3.0, 0.0)
 
 
 @njit(cache=True)
-def person_scale(misfit, rights):  # type: ignore[no-untyped-def]
+def person_scale(misfit, rights):
     """How much larger the squared errors of a person are than the model's.
 
     Inverse-gamma about the model's: many residuals outweigh it, few do not.
@@ -44,7 +44,7 @@ def person_scale(misfit, rights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def joint_scales(misfit, rights):  # type: ignore[no-untyped-def]
+def joint_scales(misfit, rights):
     """How much larger the squared errors of each joint are than the model's, (J,); see :func:`person_scale`."""
     person, scale = person_scale(misfit, rights), np.empty(len(misfit))
     for j in range(len(misfit)):

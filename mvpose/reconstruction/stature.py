@@ -12,9 +12,7 @@ _ROUNDS = 3
 
 
 @njit(cache=True)
-def personal_prior(  # type: ignore[no-untyped-def]
-    states, count, weights, sigmas, parents, length, definition, personal
-):
+def personal_prior(states, count, weights, sigmas, parents, length, definition, personal):
     """Mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, of one person.
 
     Stature is the one scale that all bones share: its posterior is Gaussian about the population's, from the lengths

@@ -76,9 +76,7 @@ class Triangulation:
 
 
 @njit(cache=True)
-def _triangulate(  # type: ignore[no-untyped-def]
-    poses, labels, origins, directions, weights, pixel, sigmas, floor, method
-):
+def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, floor, method):
     joints = len(sigmas)
     misfit, rights = np.empty(joints), np.empty(joints)
     scratch = np.empty((8, 3))
@@ -112,7 +110,7 @@ def _triangulate(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _note(point, score, scratch, j, scores, covariance):  # type: ignore[no-untyped-def]
+def _note(point, score, scratch, j, scores, covariance):
     """Enter a joint of one person; where no view vouches for it, there is none."""
     scores[j] = score if score > NOBODY else 0.0
     for r in range(3):
@@ -132,7 +130,7 @@ _BEYOND_CHANCE = 3.5  # views
 
 
 @njit(cache=True)
-def consensus(point, view, scratch):  # type: ignore[no-untyped-def]
+def consensus(point, view, scratch):
     """Write the most likely point of one joint, and say who vouches for it, as :func:`settle` does.
 
     Nobody does, and the support is 0, where fewer than two views see it.
@@ -176,7 +174,7 @@ def consensus(point, view, scratch):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def settle(point, view, scratch, temper, steps):  # type: ignore[no-untyped-def]
+def settle(point, view, scratch, temper, steps):
     """Move a point to the nearby maximum of its likelihood by expectation maximisation.
 
     Hot, with a temper above 1, the error model starts wider, so that the maximum need not be near.
@@ -204,7 +202,7 @@ def settle(point, view, scratch, temper, steps):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _all_views(point, view, scratch):  # type: ignore[no-untyped-def]
+def _all_views(point, view, scratch):
     """Write the point nearest to all rays, weighted by score; False where fewer than two views see the joint."""
     origins, directions, weights = view[:3]
     sums, views = NO_RAYS, 0
@@ -225,7 +223,7 @@ def _all_views(point, view, scratch):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _best_pair(point, view):  # type: ignore[no-untyped-def]
+def _best_pair(point, view):
     """Write the point of the pair of views with the least mean reprojection error over all views; False if none."""
     origins, directions, weights, pixel = view[:4]
     best, trial = np.inf, np.empty(3)
@@ -254,7 +252,7 @@ _LEAST_SINE2 = 1e-10  # of the angle between two rays, squared; below, they are 
 
 
 @njit(cache=True)
-def pair_point(origin, direction, weight, other_origin, other_direction, other_weight, point):  # type: ignore[no-untyped-def]
+def pair_point(origin, direction, weight, other_origin, other_direction, other_weight, point):
     """Write the point nearest to two rays, weighted by score; how well they pin it down, 0 where they have no point.
 
     Rays that are parallel, or that come nearest to each other behind a camera, have none.

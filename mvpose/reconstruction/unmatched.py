@@ -181,7 +181,7 @@ def _polish(
 
 
 @njit(cache=True)
-def _weigh(unary, view, owner, space):  # type: ignore[no-untyped-def]
+def _weigh(unary, view, owner, space):
     """Renew unaries from the keypoints that are not explained yet: 0, for good, where fewer than two views vouch."""
     for joint in range(len(space.start) - 1):
         for state in range(space.start[joint], space.start[joint + 1]):
@@ -201,7 +201,7 @@ def _weigh(unary, view, owner, space):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _best_pose(order, parents, unary, space):  # type: ignore[no-untyped-def]
+def _best_pose(order, parents, unary, space):
     """The connected part of the tree, and states of its joints, with the greatest sum of unaries less costs of bones.
 
     Returns:
@@ -243,7 +243,7 @@ def _best_pose(order, parents, unary, space):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _attach(core, order, parents, unary, view, owner, known, space):  # type: ignore[no-untyped-def]
+def _attach(core, order, parents, unary, view, owner, known, space):
     """The pose with joints that an absent one cuts it off from: those on which two of its own detections agree.
 
     Its own is, in each view, the detection that vouches for most of its joints, if for three or more.
@@ -287,7 +287,7 @@ def _attach(core, order, parents, unary, view, owner, known, space):  # type: ig
 
 
 @njit(cache=True)
-def _linked(child, parent, space):  # type: ignore[no-untyped-def]
+def _linked(child, parent, space):
     found = False
     for k in range(space.link_start[child], space.link_start[child + 1]):
         found = found or space.link[k] == parent
@@ -295,7 +295,7 @@ def _linked(child, parent, space):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _explain(pose, index, view, owner, strength, space):  # type: ignore[no-untyped-def]
+def _explain(pose, index, view, owner, strength, space):
     """Give the keypoints that vouch for a pose to it: of each joint, in every view, the best that is free."""
     for joint in range(len(pose)):
         if pose[joint] < 0:

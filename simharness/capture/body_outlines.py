@@ -130,7 +130,7 @@ def _end(camera: Camera) -> float:
 
 
 @njit(cache=True)
-def framed(points, edges, cameras, first_row, last_row, out):  # type: ignore[no-untyped-def]
+def framed(points, edges, cameras, first_row, last_row, out):
     """Box the part of a person that falls on each image.
 
     Args:
@@ -175,7 +175,7 @@ _BEYOND, _BEHIND, _IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond what the lens ima
 
 
 @njit(cache=True)
-def _project(x, y, z, c):  # type: ignore[no-untyped-def]
+def _project(x, y, z, c):
     """Whether a point of the camera's frame is imaged, and its pixel."""
     if z < NEAR:
         return _BEHIND, 0.0, 0.0
@@ -188,13 +188,13 @@ def _project(x, y, z, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _widen(box, u, v):  # type: ignore[no-untyped-def]
+def _widen(box, u, v):
     box[0], box[1] = min(box[0], u), min(box[1], v)
     box[2], box[3] = max(box[2], u), max(box[3], v)
 
 
 @njit(cache=True)
-def _cut(i, j, local, pixel, state, c, image, box):  # type: ignore[no-untyped-def]
+def _cut(i, j, local, pixel, state, c, image, box):
     """Widen a box by what an edge has within the image: Liang and Barsky, ACM Trans. Graphics 3, 1984."""
     one, two = state[i], state[j]
     if one == _BEYOND or two == _BEYOND or (one == _BEHIND and two == _BEHIND):

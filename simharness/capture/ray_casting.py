@@ -118,7 +118,7 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
 
 
 @njit(cache=True)
-def _place(rest, bone, radii, first, bones, placed, around):  # type: ignore[no-untyped-def]
+def _place(rest, bone, radii, first, bones, placed, around):
     """Carry capsules (c, 2, 3) by their bones' transforms (P, B, 3, 4) and put a ball around each person, (P, 4)."""
     for person in range(len(bones)):
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -136,7 +136,7 @@ def _place(rest, bone, radii, first, bones, placed, around):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _meet(start, way, near, length, placed, radii, first, around, owner, distance):  # type: ignore[no-untyped-def]
+def _meet(start, way, near, length, placed, radii, first, around, owner, distance):
     """Who is nearest on each ray between ``near`` and its ``length``, and how far off; untouched where nobody is."""
     for i in range(len(way)):
         dx, dy, dz = way[i, 0], way[i, 1], way[i, 2]
@@ -162,14 +162,14 @@ def _meet(start, way, near, length, placed, radii, first, around, owner, distanc
 
 
 @njit(cache=True)
-def _misses(cx, cy, cz, radius, dx, dy, dz, best):  # type: ignore[no-untyped-def]
+def _misses(cx, cy, cz, radius, dx, dy, dz, best):
     """Whether a ray of length ``best`` from the origin passes by a ball."""
     along = cx * dx + cy * dy + cz * dz
     return along < -radius or along - radius > best or cx * cx + cy * cy + cz * cz - along * along > radius * radius
 
 
 @njit(cache=True)
-def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):  # type: ignore[no-untyped-def]
+def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):
     """Where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite where it passes by."""
     ux, uy, uz = bx - ax, by - ay, bz - az
     square = ux * ux + uy * uy + uz * uz

@@ -112,7 +112,7 @@ def _inside(points: Floats, corner: Floats, size: Floats) -> Bools:
 
 
 @njit(cache=True)
-def _draw(cells, heights, rivals, second, floors, width, values):  # type: ignore[no-untyped-def]
+def _draw(cells, heights, rivals, second, floors, width, values):
     """Draw maps (m, J, h, w) that are all 0: the higher of floor and peaks, these at columns and rows (m, J, 2).
 
     A bell is the product of one across and one down, and the floor the sum of a slope across and one down.
@@ -144,6 +144,6 @@ def _draw(cells, heights, rivals, second, floors, width, values):  # type: ignor
 
 
 @njit(cache=True)
-def _bell(center, width, bell):  # type: ignore[no-untyped-def]
+def _bell(center, width, bell):
     for c in range(len(bell)):
         bell[c] = np.exp(-0.5 * ((c - center) / width) ** 2)

@@ -201,7 +201,7 @@ def _fitted(first: Floats, points: Floats, own: NDArray[np.bool_]) -> Floats:
 
 
 @njit(cache=True)
-def _nearest(points, capsules, own):  # type: ignore[no-untyped-def]
+def _nearest(points, capsules, own):
     """For each point (n, 3) the nearest of its ``own`` (n, c) capsules (c, 7), and its signed distance to that."""
     nearest, error = np.zeros(len(points), np.int64), np.full(len(points), np.inf)
     for i in range(len(points)):
@@ -215,7 +215,7 @@ def _nearest(points, capsules, own):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(points, capsules, nearest, weights, stiff, force):  # type: ignore[no-untyped-def]
+def _gather(points, capsules, nearest, weights, stiff, force):
     """Normal equations (c, 7, 7) and (c, 7) of a Gauss-Newton step of each capsule to its points, a mean over them.
 
     The foot of a point on the axis is where the distance is least, so in its derivative the foot may stand still.
@@ -241,7 +241,7 @@ def _gather(points, capsules, nearest, weights, stiff, force):  # type: ignore[n
 
 
 @njit(cache=True)
-def _foot(point, capsule):  # type: ignore[no-untyped-def]
+def _foot(point, capsule):
     """How far along a capsule's axis the foot of a point is, 0 to 1, and the way from there to the point."""
     ax, ay, az = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]
     x, y, z = point[0] - capsule[0], point[1] - capsule[1], point[2] - capsule[2]

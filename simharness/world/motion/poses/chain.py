@@ -90,7 +90,7 @@ class Chain:
 
 
 @njit(cache=True)
-def _forward(axes, anchors, end, angles, turn, place, moved_axes, moved_anchors):  # type: ignore[no-untyped-def]
+def _forward(axes, anchors, end, angles, turn, place, moved_axes, moved_anchors):
     """Orientation (3, 3) and place (3,) of the end, and the hinges' axes and anchors (n, 3), for angles (n,)."""
     shift, hinge, product = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
@@ -120,7 +120,7 @@ def _forward(axes, anchors, end, angles, turn, place, moved_axes, moved_anchors)
 
 
 @njit(cache=True)
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a, b):
     """Of two short vectors, for which BLAS is slow."""
     total = 0.0
     for i in range(len(a)):
@@ -129,7 +129,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _forward_all(axes, anchors, end, angles, turn, place):  # type: ignore[no-untyped-def]
+def _forward_all(axes, anchors, end, angles, turn, place):
     """Orientations (T, 3, 3) and places (T, 3) of the end for angles (T, n)."""
     moved_axes, moved_anchors = np.empty_like(axes), np.empty_like(axes)
     for t in range(len(angles)):
@@ -137,9 +137,7 @@ def _forward_all(axes, anchors, end, angles, turn, place):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _solve_all(  # type: ignore[no-untyped-def]
-    axes, anchors, end, ranges, turn, place, turn_weight, pull, follow, start, angles
-):
+def _solve_all(axes, anchors, end, ranges, turn, place, turn_weight, pull, follow, start, angles):
     """Bring the end to turn (T, 3, 3) and place (T, 3) by changing angles (T, n), in place."""
     n = len(axes)
     got_turn, got_place, off = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
@@ -195,7 +193,7 @@ def _solve_all(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _rotation_vector(turn, out):  # type: ignore[no-untyped-def]
+def _rotation_vector(turn, out):
     """Axis times angle (3,) of a rotation (3, 3)."""
     x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
     sine = 0.5 * np.sqrt(x * x + y * y + z * z)
@@ -211,7 +209,7 @@ def _rotation_vector(turn, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve_positive(normal, right, out):  # type: ignore[no-untyped-def]
+def _solve_positive(normal, right, out):
     """Solve a symmetric positive definite system (n, n) by Cholesky; its lower half is overwritten."""
     n = len(right)
     for i in range(n):

@@ -28,7 +28,7 @@ def cuts(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
 
 
 @njit(cache=True, error_model="numpy")
-def _cut(starts, ends, triangles, result):  # type: ignore[no-untyped-def]
+def _cut(starts, ends, triangles, result):
     """Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997, behind a test of the box around."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for t in range(len(triangles)):
