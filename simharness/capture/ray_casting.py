@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import NEAR
-from simharness.world.humans.model import SKIN_GROUP
+from simharness.world.humans.mujoco_model import SKIN_GROUP
 
 if TYPE_CHECKING:
     from simharness.world.scene.build import Scene

@@ -97,7 +97,7 @@ class DescriptorModel:
 
     @classmethod
     def fitted(cls, distances: Mapping[str, Any]) -> Self:
-        """Fit the model to measured distances: ``distances`` of a card (:mod:`tools.reid.evaluation`).
+        """Fit the model to measured distances: ``distances`` of a card (:mod:`tools.reid.metrics`).
 
         Least squares over the mean cosines of all bins, each weighed by its pairs' share in its kind, and over how the
         cosines of one person's pairs spread.

@@ -8,16 +8,16 @@ import pytest
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.cameras import Sensor
-from tools.reid import histogram, sources
+from tools.reid import code_digest, histogram
 from tools.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, developed, jittered, picture_group
-from tools.reid.evaluation import euclidean, retrieve
+from tools.reid.filming_sites import SIZE as PICTURE
+from tools.reid.filming_sites import USUAL, make_site
 from tools.reid.identities import Group, figures, groups
+from tools.reid.metrics import euclidean, retrieve
+from tools.reid.moments import make_moment
 from tools.reid.plan import Plan
 from tools.reid.poses import plan_poses
 from tools.reid.rendering import Order, rendered
-from tools.reid.sites import SIZE as PICTURE
-from tools.reid.sites import USUAL, make_site
-from tools.reid.stages import make_moment
 
 GROUP = Group(2 * 10**12 + 5, 3)
 PLAIN = Recipe(moments=1, views=4, casts=(0.0, 0.0), jitter=(0.0, 0.0), truncated=0.0)
@@ -207,10 +207,10 @@ def test_the_sources_of_crops_are_all_that_is_imported_to_render_them():
         "print(*filter(None, ours), sep='\\n')"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split("\n")
-    known = {str(path) for path in sources.files().values()}
+    known = {str(path) for path in code_digest.files().values()}
     assert len(known) > 50
     assert {*filter(None, loaded)} <= known
-    names = set(sources.files())
+    names = set(code_digest.files())
     assert {
         "simharness/world/humans/data/anny.npz",
         "mvpose/networks/crops.py",
@@ -224,14 +224,14 @@ def test_the_sources_of_crops_are_all_that_is_imported_to_render_them():
 def test_crops_of_other_code_are_not_taken_from_the_cache(tmp_path, monkeypatch, name):
     order = Order(groups("held-out", 5, 1, size=1), Recipe(moments=1, views=2))
     before = order.name
-    files = sources.files()
+    files = code_digest.files()
     changed = tmp_path / "changed"
     changed.write_bytes(files[name].read_bytes() + b"\n")
-    monkeypatch.setattr(sources, "files", lambda: {**files, name: changed})
-    sources.digest.cache_clear()
+    monkeypatch.setattr(code_digest, "files", lambda: {**files, name: changed})
+    code_digest.digest.cache_clear()
     try:
         assert order.name != before
     finally:
         monkeypatch.undo()
-        sources.digest.cache_clear()
+        code_digest.digest.cache_clear()
     assert order.name == before

@@ -9,7 +9,7 @@ import pytest
 
 from mvpose.networks.reid import DEFAULT, ReId
 from mvpose.networks.session import Session
-from tools.reid import assessment, card, judging
+from tools.reid import card, evaluation, scores
 from tools.reid.__main__ import main
 from tools.reid.crops import SIZE, Recipe, picture_group
 from tools.reid.crops import Crops as All
@@ -96,7 +96,7 @@ def test_crops_rendered_now_are_those_that_the_card_judges_by(content, tmp_path)
 
 def test_a_crop_is_described_in_time(content):
     assert content["results"]["milliseconds_a_crop_in_batches_of_20_on_one_thread"] < 4.0
-    assert assessment.milliseconds(Session(DEFAULT), rounds=1) > 0.0
+    assert scores.milliseconds(Session(DEFAULT), rounds=1) > 0.0
 
 
 def test_distances_grow_with_the_difference_of_views_and_with_what_is_hidden(content):
@@ -125,11 +125,11 @@ def test_strangers_are_told_apart_in_crops_rendered_anew():
     crops = All.joined([picture_group(group, recipe, poses=poses) for group in people])
     assert len(crops) > 100
     session = Session(DEFAULT)
-    found = assessment.held_out(session, [crops])
+    found = scores.held_out(session, [crops])
     assert found["network"]["rank1"] >= 90.0  # of some 130 queries: 95 less two standard errors
     assert found["network"]["mAP"] >= 85.0
     assert found["network"]["mAP"] > found["histogram"]["mAP"] + 10
-    met = assessment.met(assessment.euclidean(assessment.describe(session, crops)), crops)
+    met = scores.met(scores.euclidean(scores.describe(session, crops)), crops)
     kept = session.card.midpoint
     assert (met.distance[met.same] < kept).mean() > 0.85
     assert (met.distance[~met.same] > kept).mean() > 0.85
@@ -236,7 +236,7 @@ def small(tmp_path, content):
 def test_judging_again_renews_the_figures_and_leaves_the_training(small, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "torch", None)  # nothing is trained
     monkeypatch.setitem(sys.modules, "onnx", None)
-    monkeypatch.setattr(judging, "DIALS", (0.0, 1.0))
+    monkeypatch.setattr(evaluation, "DIALS", (0.0, 1.0))
     before, bytes_before = card.read(small), small.read_bytes()
     command = ["--judge", str(small), "--cache", str(tmp_path / "cache")]
     assert main(command) == 0

@@ -32,7 +32,7 @@ from scipy import sparse
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import DATA, PHENOTYPES, interpolation
-from tools.body.tailoring import Figure, tailor
+from tools.body.mesh_cutting import Figure, tailor
 
 ANCHORS: dict[str, tuple[float, ...]] = {
     "gender": (0.0, 1.0),

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tools.reid.card import card_path
+from tools.reid.evaluation import judge
 from tools.reid.identities import RUNS
-from tools.reid.judging import judge
 from tools.reid.plan import DIALS, Plan
 
 _PROGRAM = "python -m tools.reid"

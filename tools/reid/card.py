@@ -12,9 +12,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from mvpose.networks.card import Card
-from tools.reid import sites
+from tools.reid import filming_sites
 from tools.reid.crops import SIZE, Crops, Recipe
-from tools.reid.evaluation import HIDDEN_EDGES, QUANTILES, VIEW_EDGES
+from tools.reid.metrics import HIDDEN_EDGES, QUANTILES, VIEW_EDGES
 from tools.reid.plan import Plan
 
 NAME = "simharness re-ID"
@@ -77,7 +77,7 @@ def of_plan(plan: Plan) -> dict[str, object]:
         **asdict(plan),
         "training_recipe": asdict(plan.training_order.recipe),
         "recipe": asdict(Recipe()),
-        "sensor": sites.USUAL.model_dump(),
+        "sensor": filming_sites.USUAL.model_dump(),
     }
 
 

@@ -20,10 +20,10 @@ from simharness.capture.sensor import develop
 from simharness.detector.view_geometry import hidden_shares
 from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
+from tools.reid.filming_sites import Site, make_site
 from tools.reid.identities import Figure, Group, figures
+from tools.reid.moments import Moment, make_moment
 from tools.reid.poses import Poses
-from tools.reid.sites import Site, make_site
-from tools.reid.stages import Moment, make_moment
 
 Rgb = NDArray[np.uint8]
 
@@ -40,7 +40,7 @@ class Recipe:
         moments: pictures are taken in, of everyone.
         views: cameras of a site.
         casts: strength of the cameras' characters at a site, from least to most
-            (:data:`tools.reid.sites.USUAL`).
+            (:data:`tools.reid.filming_sites.USUAL`).
         jitter: of every side of the boxes, as a share of their size: standard deviation, from least to most.
         truncated: share of boxes that end at the thighs or higher, as where a detector saw no more.
         most_hidden: share of the joints hidden by others or by the picture's edge, beyond which there is no crop.

@@ -13,7 +13,7 @@ from typing import Literal
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
-from simharness.world.humans.looks import dress, paint
+from simharness.world.humans.clothing import dress, paint
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.wardrobe import Look, draw_looks
 
@@ -35,7 +35,7 @@ class Group:
         seed: of a scenario that has them.
         size: how many they are.
         look_alike: the dial of that scenario.
-        site: seed of the place where they are filmed (:mod:`tools.reid.sites`).
+        site: seed of the place where they are filmed (:mod:`tools.reid.filming_sites`).
     """
 
     seed: int

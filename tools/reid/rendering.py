@@ -10,7 +10,7 @@ from dataclasses import astuple, dataclass
 from functools import cache
 from pathlib import Path
 
-from tools.reid import sources
+from tools.reid import code_digest
 from tools.reid.crops import Crops, Recipe, picture_group
 from tools.reid.identities import Group, split_of
 from tools.reid.poses import Poses, plan_poses
@@ -33,7 +33,7 @@ class Order:
     @property
     def name(self) -> str:
         """Tells it from every other order, and from the same one rendered by other code."""
-        text = repr((sources.digest(), self.recipe, [astuple(group) for group in self.groups]))
+        text = repr((code_digest.digest(), self.recipe, [astuple(group) for group in self.groups]))
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mvpose.networks.session import Session
-from tools.reid import assessment, card
-from tools.reid.judging import judged
+from tools.reid import card, scores
+from tools.reid.evaluation import judged
 from tools.reid.network import DIMENSIONS, parameters
 from tools.reid.plan import Plan
 from tools.reid.rendering import rendered
@@ -53,7 +53,7 @@ def run(
 
     session = Session(output)
     validation = rendered(plan.validation_order, cache, workers=workers)
-    midpoint, slope = assessment.scale(session, validation)
+    midpoint, slope = scores.scale(session, validation)
     card.stamp(output, midpoint=midpoint, slope=slope, plan=plan, command=command)
     say(f"a distance of {midpoint:.3f} is as likely of one person as of two; slope {slope:.3f}")
 
@@ -83,7 +83,7 @@ def run(
         "affinity": {"midpoint": round(midpoint, 4), "slope": round(slope, 4), "from": "validation people"},
         "results": {
             **judgement.results,
-            "milliseconds_a_crop_in_batches_of_20_on_one_thread": round(assessment.milliseconds(session), 2),
+            "milliseconds_a_crop_in_batches_of_20_on_one_thread": round(scores.milliseconds(session), 2),
         },
         "distances": judgement.distances,
     }

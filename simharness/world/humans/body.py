@@ -20,7 +20,7 @@ from mvpose.arrays import Floats, Integers
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.landmarks import LANDMARKS, of_skeleton
 from simharness.world.humans import segments
-from simharness.world.humans.limbs import LIMBS, lengthened, stretches
+from simharness.world.humans.limb_lengths import LIMBS, lengthened, stretches
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.skinning import Skirt, enclosed, mix, skin
 

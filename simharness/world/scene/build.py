@@ -17,22 +17,22 @@ from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
-from simharness.world.humans.looks import dress, paint
+from simharness.world.humans.clothing import dress, paint
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import motion_clock
+from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.tracking import track
-from simharness.world.scene.hanging import check_rig
-from simharness.world.scene.placing.clutter import place_clutter
-from simharness.world.scene.placing.decoys import place_decoys
-from simharness.world.scene.placing.placement import BODY_HALF_WIDTH, FreeSpace
+from simharness.world.scene.objects.props import make_prop
+from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.placement.clutter import place_clutter
+from simharness.world.scene.placement.decoys import place_decoys
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
 from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.room import make_room
-from simharness.world.scene.things.props import make_prop
-from simharness.world.scene.things.solids import Solid
 
 CLOCK_MARGIN = 1.0  # seconds that motions go on before and after: clocks of cameras are off by less
 

@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
 from simharness.types.landmarks import LANDMARKS
 from simharness.world.humans.body import body_model
-from simharness.world.humans.model import bone_transforms
+from simharness.world.humans.mujoco_model import bone_transforms
 from simharness.world.motion.poses.kinematics import Addresses
 from simharness.world.scene.build import Scene
 

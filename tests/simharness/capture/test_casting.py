@@ -14,7 +14,7 @@ from test_renderers import camera_at
 from simharness.capture.ray_casting import Caster
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
-from simharness.world.humans.model import SKIN_GROUP, bone_transforms, person_spec
+from simharness.world.humans.mujoco_model import SKIN_GROUP, bone_transforms, person_spec
 from simharness.world.humans.shape import Shape
 
 BODIES = tuple(make_body(Shape(gender=gender)) for gender in (0.0, 1.0))

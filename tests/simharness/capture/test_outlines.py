@@ -14,8 +14,8 @@ from simharness.capture.rendering.optics import appear
 from simharness.capture.rendering.renderer import NEAR
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
-from simharness.world.humans.looks import dress
-from simharness.world.humans.model import neutral_transforms
+from simharness.world.humans.clothing import dress
+from simharness.world.humans.mujoco_model import neutral_transforms
 from simharness.world.humans.population import draw_shape
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS
-from simharness.world.humans.model import HINGES
+from simharness.world.humans.mujoco_model import HINGES
 
 _X, _Y, _Z = np.eye(3)
 _ITERATIONS = 12

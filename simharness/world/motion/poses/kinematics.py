@@ -11,7 +11,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.humans.body import Body
-from simharness.world.humans.model import bone_transforms, person_spec
+from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.chain import Chain
 from simharness.world.motion.poses.rolling import Rolling, roll

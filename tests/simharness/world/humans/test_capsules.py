@@ -15,7 +15,7 @@ from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.capsules import fit_capsules
-from simharness.world.humans.looks import dress
+from simharness.world.humans.clothing import dress
 from simharness.world.humans.population import draw_shape
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks

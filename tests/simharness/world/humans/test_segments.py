@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simharness.world.humans.body import Part, make_body
-from simharness.world.humans.looks import dress
+from simharness.world.humans.clothing import dress
 from simharness.world.humans.segments import Segment, of_bones, of_faces
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks

@@ -9,16 +9,16 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
-from simharness.world.humans.model import person_spec
+from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.alone.walking import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
-from simharness.world.scene.dynamics.efforts import Efforts
+from simharness.world.scene.dynamics.inverse_dynamics import Efforts
 from simharness.world.scene.dynamics.tracking import LEVER, Push, Tracker, track
-from simharness.world.scene.things.assembly import Assembly
+from simharness.world.scene.objects.assembly import Assembly
 
 GRAVITY = 9.81
 MAN = Kinematics(make_body(Shape(gender=0.1, height=0.42)))

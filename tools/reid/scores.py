@@ -12,7 +12,7 @@ from mvpose.arrays import Floats
 from mvpose.networks.session import Session
 from tools.reid import histogram
 from tools.reid.crops import Crops
-from tools.reid.evaluation import Pairs, Retrieval, euclidean, fitted_sigmoid, pairs, retrieve
+from tools.reid.metrics import Pairs, Retrieval, euclidean, fitted_sigmoid, pairs, retrieve
 
 BATCH = 20  # crops, in which the network is timed
 _HIDDEN = (0.0, 0.15, 0.3, 0.5)

@@ -8,8 +8,8 @@ import pytest
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Part, make_body
-from simharness.world.humans.looks import dress
-from simharness.world.humans.model import bone_transforms, person_spec
+from simharness.world.humans.clothing import dress
+from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.humans.population import draw_shape
 from simharness.world.humans.wardrobe import draw_look
 

@@ -5,7 +5,7 @@ import pytest
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Part, make_body
-from simharness.world.humans.looks import Garment, dress, face_colors, garments, paint
+from simharness.world.humans.clothing import Garment, dress, face_colors, garments, paint
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, draw_look
 

@@ -6,7 +6,7 @@ from scipy.special import expit
 
 from simharness.types.random_streams import stream
 from tools.reid import histogram
-from tools.reid.evaluation import (
+from tools.reid.metrics import (
     HIDDEN_EDGES,
     QUANTILES,
     VIEW_EDGES,

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
-from tools.body.tailoring import Cloth, cut
+from tools.body.mesh_cutting import Cloth, cut
 
 
 def square(count):

@@ -12,12 +12,12 @@ from mvpose.camera import Camera
 from simharness.scenario.sections.room import Room
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
-from simharness.world.scene.placing.clutter import SPECIES
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.solids import Thing
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import Thing
+from simharness.world.scene.placement.clutter import SPECIES
+from tools.reid.filming_sites import Site
 from tools.reid.identities import Figure
 from tools.reid.poses import Poses, placed
-from tools.reid.sites import Site
 
 _REACH = 1.5  # metres: half the side of the square in which people stand
 _APART = 0.7  # metres between the middles of two people: they often hide each other

@@ -5,7 +5,7 @@ import pytest
 from mvpose.skeleton import COCO17
 from simharness.world.humans.anatomy import DOFS, RANGES
 from simharness.world.humans.body import make_body
-from simharness.world.humans.model import bone_transforms, neutral_transforms, person_spec
+from simharness.world.humans.mujoco_model import bone_transforms, neutral_transforms, person_spec
 from simharness.world.humans.shape import Shape
 
 X, Y, Z = np.eye(3)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mvpose.arrays import Floats
-from simharness.world.humans import patterns
+from simharness.world.humans import cloth_texture
 from simharness.world.humans.body import Body, Part
-from simharness.world.humans.shells import Shell, bun, long_hair, skirt
+from simharness.world.humans.skirts_and_hair import Shell, bun, long_hair, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
 
 
@@ -51,13 +51,13 @@ class Coat:
 
 def paint(body: Body, look: Look) -> Coat:
     """The colours and patterns of a body that has been dressed in the look, or of one that shall be."""
-    colors, texture = face_colors(body, look), patterns.picture(look)
+    colors, texture = face_colors(body, look), cloth_texture.picture(look)
     if texture is None:
         return Coat(colors)
-    worn, (plain_top, plain_bottom) = garments(body, look), patterns.is_plain(look)
+    worn, (plain_top, plain_bottom) = garments(body, look), cloth_texture.is_plain(look)
     top, bottom = (worn == Garment.TOP) & (not plain_top), (worn == Garment.TROUSERS) & (not plain_bottom)
     colors[top | bottom] = 1.0
-    return Coat(colors, texture, patterns.places(body, top=top, bottom=bottom))
+    return Coat(colors, texture, cloth_texture.places(body, top=top, bottom=bottom))
 
 
 def face_colors(body: Body, look: Look) -> NDArray[np.float32]:

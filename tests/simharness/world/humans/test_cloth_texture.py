@@ -5,8 +5,8 @@ import pytest
 
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Part, make_body
-from simharness.world.humans.looks import Garment, dress, garments, paint
-from simharness.world.humans.patterns import BAND, LENGTH, WHITE, WIDTH, picture
+from simharness.world.humans.cloth_texture import BAND, LENGTH, WHITE, WIDTH, picture
+from simharness.world.humans.clothing import Garment, dress, garments, paint
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import PATTERNS, draw_look
 
