@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.checks import as_array
 from mvpose.estimate import Matching
 from mvpose.matching import admm
+from mvpose.matching.assignment import match_view_pairs
 from mvpose.matching.clustering import cluster, contract
-from mvpose.matching.pairwise import assign
 from mvpose.matching.rounding import number_people, read_only, round_to_people
 
 __all__ = ["Matcher", "match", "objective"]
@@ -42,7 +42,7 @@ class Matcher:
         if self.method == "clustering":
             return self._matching(number_people(cluster(affinity, view, alpha=self.alpha)), affinity)
         if self.method == "hungarian":
-            matched = assign(affinity, view, alpha=self.alpha)
+            matched = match_view_pairs(affinity, view, alpha=self.alpha)
             return self._matching(round_to_people(matched, view, threshold=self.alpha), affinity)
         order = np.argsort(view, kind="stable")
         back = np.argsort(order, kind="stable")

@@ -15,7 +15,7 @@ from numba import njit
 
 from mvpose.arrays import Floats, Integers
 from mvpose.rays import Rays
-from mvpose.reconstruction.bones import bone_lengths
+from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.triangulation import pair_point
 from mvpose.skeleton import Skeleton

@@ -14,14 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.bones import bones
-from mvpose.reconstruction.hanging import down_the_trunk, hang, parts
+from mvpose.reconstruction.bone_length_prior import bones, personal_prior
+from mvpose.reconstruction.heatmap_likelihood import rescore
 from mvpose.reconstruction.likelihood import Noise
+from mvpose.reconstruction.limb_direction_prior import down_the_trunk, hang, parts
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import climb, fit_scale, judge, tree
-from mvpose.reconstruction.sampling import rescore
-from mvpose.reconstruction.stature import personal_prior
 from mvpose.skeleton import Skeleton
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mvpose.reconstruction.hanging import how_it_hangs
+from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.likelihood import log_likelihood
-from mvpose.reconstruction.scatter import person_scale
+from mvpose.reconstruction.limb_direction_prior import how_it_hangs
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
 _SINGLE_VIEW_STATES = 16  # two depths from every neighbour
@@ -131,7 +131,7 @@ def propose_single_views(
     """Propose, in place, for joints that a single view sees: where its ray is a bone's length from a neighbour.
 
     Such a joint has no pair of views, but its direction is known and the prior knows the depth, up to which of two
-    points it is: the one where the limb hangs down the trunk (:mod:`mvpose.reconstruction.hanging`) as limbs do.
+    points it is: the one where the limb hangs down the trunk (:mod:`mvpose.reconstruction.limb_direction_prior`) as limbs do.
     The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their own neighbours
     in the next round.
     """

@@ -15,10 +15,10 @@ from numba import njit
 
 from mvpose.arrays import Floats, Integers
 from mvpose.rays import Rays
-from mvpose.reconstruction.hanging import how_it_hangs
+from mvpose.reconstruction.error_scale import joint_scales, person_scale
 from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
+from mvpose.reconstruction.limb_direction_prior import how_it_hangs
 from mvpose.reconstruction.poses import NOBODY, gather
-from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
 
@@ -167,7 +167,7 @@ def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
     """How much larger the person's squared errors are than the model's, at a pose (J, 3).
 
     Likelihoods with errors so scaled, times the prior, have their maximum where the model's likelihoods have it with a
-    prior of so scaled precision. See :func:`mvpose.reconstruction.scatter.person_scale`.
+    prior of so scaled precision. See :func:`mvpose.reconstruction.error_scale.person_scale`.
     """
     count = len(joints)
     misfit, rights = np.zeros(count), np.zeros(count)
@@ -314,7 +314,7 @@ def _add_ambiguity(covariance, joints, origins, directions, weights, parents, or
     """Count in that a joint which one view alone sees may as well be at the other depth where its bone fits.
 
     The second moment about the chosen depth grows by the squared distance of the two times how likely the other is
-    (:mod:`mvpose.reconstruction.hanging`). Joints that hang on such a joint inherit its doubt; one that holds a better
+    (:mod:`mvpose.reconstruction.limb_direction_prior`). Joints that hang on such a joint inherit its doubt; one that holds a better
     seen joint at its other end has none.
     """
     count = len(joints)

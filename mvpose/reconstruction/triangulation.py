@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
+from mvpose.reconstruction.error_scale import joint_scales, person_scale
 from mvpose.reconstruction.likelihood import (
     NO_RAYS,
     Noise,
@@ -28,7 +29,6 @@ from mvpose.reconstruction.likelihood import (
     tie,
 )
 from mvpose.reconstruction.poses import NOBODY, Poses, clear, gather
-from mvpose.reconstruction.scatter import joint_scales, person_scale
 from mvpose.skeleton import Skeleton
 
 Method = Literal["robust", "dlt", "best-pair"]

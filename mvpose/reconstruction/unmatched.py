@@ -25,7 +25,7 @@ from numba import njit
 from mvpose.arrays import Floats, Integers
 from mvpose.checks import check_numbers
 from mvpose.rays import Rays
-from mvpose.reconstruction.bones import bone_lengths
+from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.hypotheses import hypothesize
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses

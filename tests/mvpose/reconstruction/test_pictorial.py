@@ -9,8 +9,8 @@ from people import STANDING, detect, ring
 from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
-from mvpose.reconstruction.bones import PROPORTION_DEVIATION, bone_lengths
-from mvpose.reconstruction.hanging import hang, how_it_hangs, parts
+from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.limb_direction_prior import hang, how_it_hangs, parts
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
 from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb, leaves_first, refine, tree

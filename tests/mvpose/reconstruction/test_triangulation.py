@@ -10,7 +10,7 @@ from mvpose import COCO17, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
 from mvpose.reconstruction.likelihood import log_likelihood
-from mvpose.reconstruction.scatter import joint_scales
+from mvpose.reconstruction.error_scale import joint_scales
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
 
