@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from simharness.scenario.sections.scenario import Cameras, People, Scenario
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
-from simharness.world.motion.activities import ACTIVITIES
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import ACTIVITIES
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build

@@ -16,10 +16,10 @@ from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
-from simharness.world.motion.activities import ACTIVITIES
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.performance import Activity
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import ACTIVITIES
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 4.0  # seconds of every motion

@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from simharness.scenario.sections.scenario import People, Scenario
 from simharness.types.random_streams import stream
-from simharness.world.motion.activities import ACTIVITIES
 from simharness.world.motion.contact import Crowd, Presence
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Recorded, Spot, Track, turned
 from simharness.world.motion.performance import Activity, Performance, Prop, solo
-from simharness.world.motion.planning import Going, Replaying, Staying, Wish, plan_tracks
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import ACTIVITIES
+from simharness.world.motion.track_planning import Going, Replaying, Staying, Wish, plan_tracks
 from simharness.world.motion.trajectory import Trajectory
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick

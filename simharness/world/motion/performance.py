@@ -19,7 +19,7 @@ PropKind = Literal["chair", "table", "box", "step", "bottle"]
 
 @dataclass(frozen=True)
 class Prop:
-    """A thing that an activity needs; ``simharness.world.scene.things.props`` gives it a shape.
+    """A thing that an activity needs; ``simharness.world.scene.objects.props`` gives it a shape.
 
     Attributes:
         kind: what it is.

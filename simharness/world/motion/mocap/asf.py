@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.motion.mocap.lines import Line, Reader, shown
+from simharness.world.motion.mocap.line_reader import Line, Reader, shown
 from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
 
 RATE = 120.0  # Hz: an AMC file does not say; CMU's are recorded so

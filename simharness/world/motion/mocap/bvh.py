@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from simharness.world.motion.mocap.lines import Line, Reader, shown
+from simharness.world.motion.mocap.line_reader import Line, Reader, shown
 from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
 
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")

@@ -2,7 +2,7 @@
 
 Turns are carried over against the zero pose, in which both skeletons stand: of the trunk and the head as they are, of
 arms and legs by the directions of their segments. Legs are scaled to the body's, and the way of the pelvis with them;
-then the feet are put on the floor (``footing.py``), the pelvis sinks where a leg would be too short, and the legs are
+then the feet are put on the floor (``foot_contact.py``), the pelvis sinks where a leg would be too short, and the legs are
 solved to meet the feet. All angles keep within their ranges.
 """
 
@@ -16,13 +16,13 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, SIDES
-from simharness.world.motion.mocap.footing import Steps, make_sole, plant, stands
-from simharness.world.motion.mocap.limbs import ARM, arm_angles, thigh_and_shank
-from simharness.world.motion.mocap.roles import Roles, find_roles
+from simharness.world.motion.mocap.foot_contact import Steps, make_sole, plant, stands
+from simharness.world.motion.mocap.joint_mapping import Roles, find_roles
+from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, thigh_and_shank
 from simharness.world.motion.mocap.skeleton import Recording
 from simharness.world.motion.motion import Motion
+from simharness.world.motion.poses.inverse_kinematics import riding_height
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import riding_height
 
 _CUTOFF = 8.0  # Hz: human motion is slower, the tremble of markers is not (Winter 1991: 6 for walking)
 _LUMBAR = np.array([0.55, 0.5, 0.3])  # share of the trunk's flexion, bending and rotation below the thorax

@@ -13,8 +13,8 @@ from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.humans.body import Body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.chain import Chain
-from simharness.world.motion.poses.rolling import Rolling, roll
+from simharness.world.motion.poses.foot_roll import Rolling, roll
+from simharness.world.motion.poses.kinematic_chain import Chain
 
 _TRUNK = ("lumbar_flexion", "lumbar_bending", "lumbar_rotation", "thorax_flexion", "thorax_bending", "thorax_rotation")
 _LEG = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion", "ankle_inversion")

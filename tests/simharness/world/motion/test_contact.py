@@ -6,7 +6,7 @@ from casting import performer
 from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.mujoco_model import person_spec
-from simharness.world.motion.alone.gestures import gesture
+from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.contact import Crowd, penetration
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot

@@ -4,9 +4,9 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.gait import FOOT_OFF, make_gait, normative
+from simharness.world.motion.activities.gait import FOOT_OFF, make_gait, normative
+from simharness.world.motion.poses.foot_roll import roll
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.rolling import roll
 
 
 @pytest.fixture(scope="module", params=[0, 1, 2])

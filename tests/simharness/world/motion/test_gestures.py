@@ -6,7 +6,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.gestures import GESTURES, gesture
+from simharness.world.motion.activities.gestures import GESTURES, gesture
 from simharness.world.motion.paths import SWAY, Spot
 from simharness.world.motion.poses.kinematics import Kinematics
 

@@ -5,7 +5,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.running import FOOT_OFF, make_stride, normative, run
+from simharness.world.motion.activities.running import FOOT_OFF, make_stride, normative, run
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 

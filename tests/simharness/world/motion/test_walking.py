@@ -9,12 +9,12 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.gait import make_gait
-from simharness.world.motion.alone.walking import walk
+from simharness.world.motion.activities.gait import make_gait
+from simharness.world.motion.activities.walking import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import SWAY, Loop, make_loop
-from simharness.world.motion.planning import Going, plan_tracks
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.track_planning import Going, plan_tracks
 
 RATE = 80.0  # Hz
 TIME = np.arange(0.0, 3.2, 1 / RATE)

@@ -11,12 +11,12 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.shape import Shape
-from simharness.world.motion.alone.walking import walk
+from simharness.world.motion.activities.walking import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock
-from simharness.world.scene.dynamics.inverse_dynamics import Efforts
+from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
 from simharness.world.scene.dynamics.tracking import LEVER, Push, Tracker, track
 from simharness.world.scene.objects.assembly import Assembly
 
@@ -165,7 +165,7 @@ def block(kind, *, moving=True):
     pose = np.zeros((len(time), 7))
     pose[:, 3] = 1.0
     pose[:, 0] = np.minimum(time, 1.2) - 0.8 if moving else -0.5
-    thing = Assembly().box((0.0, 0.0, 0.95), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5)).thing()
+    thing = Assembly().box((0.0, 0.0, 0.95), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5)).model()
     return thing.along(Trajectory(time, pose), kind=kind, name="block")
 
 
@@ -216,7 +216,7 @@ class Planned:
 
     def torques(self) -> dict[str, float]:
         still = np.zeros(self.model.nv)
-        efforts = Efforts(self.model, [self._dofs[0]], [self._dofs[1]])
+        efforts = InverseDynamics(self.model, [self._dofs[0]], [self._dofs[1]])
         (torques,) = efforts.torques(self.data.qpos, still, still, [])
         return dict(zip(DOFS, torques, strict=True))
 

@@ -8,9 +8,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import arm_angles, plant, pose_angles, reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import arm_angles, plant, pose_angles, reach_with
 from simharness.world.motion.poses.posture import at_ease, blend, limb, some_side
 from simharness.world.motion.poses.timing import glide, rounds, wander
 

@@ -14,12 +14,12 @@ from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.alone.gait import Gait, Knots, flattened, periodic, pinned
-from simharness.world.motion.alone.walking import footsteps, laps
+from simharness.world.motion.activities.gait import Gait, Knots, flattened, periodic, pinned
+from simharness.world.motion.activities.walking import footsteps, laps
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.timing import ease
 
 FOOT_OFF = 0.39  # share of the stride when the toes leave the floor; 0 is when the foot strikes it

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.world.motion.paths import SWAY, Loop, Spot
-from simharness.world.motion.planning import Going, Replaying, Staying, plan_tracks
+from simharness.world.motion.track_planning import Going, Replaying, Staying, plan_tracks
 
 WALK = Going("walk", 1.04, 0.85, 1.15)
 RUN = Going("run", 2.8, 2.0, 3.5, running=True)

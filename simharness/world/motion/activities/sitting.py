@@ -11,9 +11,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.footing import carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles, reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import plant, pose_angles, reach_with
 from simharness.world.motion.poses.posture import at_ease, blend, limbs
 from simharness.world.motion.poses.timing import ease, glide, rounds
 from simharness.world.motion.trajectory import Trajectory

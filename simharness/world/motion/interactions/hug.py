@@ -11,15 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.motion.contact import Crowd
+from simharness.world.motion.interactions.partners import bent, face_to_face, nudged, towards
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance
-from simharness.world.motion.poses.footing import in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, girdle, pose_angles, reach_with, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis, girdle, pose_angles, reach_with, stand_on
 from simharness.world.motion.poses.posture import Curves, at_ease, limbs
 from simharness.world.motion.poses.timing import bump, ease, rounds
-from simharness.world.motion.together.partners import bent, face_to_face, nudged, towards
 
 Role = Literal["over", "under"]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from simharness.world.motion.interactions.handover import hand_over
+from simharness.world.motion.interactions.handshake import shake_hands
+from simharness.world.motion.interactions.hug import hug
+from simharness.world.motion.interactions.table import table
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Activity
-from simharness.world.motion.together.greeting import shake_hands
-from simharness.world.motion.together.handing import hand_over
-from simharness.world.motion.together.hugging import hug
-from simharness.world.motion.together.table import table
 
 PAIRS: Mapping[str, Activity] = MappingProxyType(
     {

@@ -19,8 +19,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
+from simharness.world.motion.poses.foot_roll import Rolling
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.rolling import Rolling
 from simharness.world.motion.poses.timing import smoothstep
 
 Knots = tuple[tuple[float, float], ...]  # (share of the stride, degrees)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, SIDES
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.chain import Chain
+from simharness.world.motion.poses.kinematic_chain import Chain
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _REACH, _FULL_REACH = 0.95, 0.985  # of an arm's length: up to where it goes freely, and at most

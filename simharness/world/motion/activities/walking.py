@@ -6,11 +6,11 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.alone.gait import Gait, make_gait
+from simharness.world.motion.activities.gait import Gait, make_gait
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis, pose_angles, stand_on
 
 _GRAVITY = 9.81
 _STRAIGHTEST = np.radians(4.0)

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from simharness.world.motion.paths import Spot, turned
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis
 from simharness.world.motion.poses.timing import bump, ease
 
 TOE_OUT = np.radians(9.0)

@@ -8,7 +8,7 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.singles import SINGLES
+from simharness.world.motion.activities.singles import SINGLES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import SWAY, Loop, Spot, make_loop
 from simharness.world.motion.performance import Performance

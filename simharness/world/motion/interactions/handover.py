@@ -9,16 +9,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.motion.alone.gestures import gesture
+from simharness.world.motion.activities.gestures import gesture
+from simharness.world.motion.interactions.handshake import held_out
+from simharness.world.motion.interactions.partners import Meeting, arm_length, attentive, bent, meet
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop, PropKind
-from simharness.world.motion.poses.footing import in_world
+from simharness.world.motion.poses.foot_placement import in_world
+from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import reach_with
 from simharness.world.motion.poses.timing import ease, rounds
-from simharness.world.motion.together.greeting import held_out
-from simharness.world.motion.together.partners import Meeting, arm_length, attentive, bent, meet
 from simharness.world.motion.trajectory import Trajectory
 
 _BOX_CHANCE = 0.5

@@ -8,9 +8,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import PEELING, carry_pelvis, hip_over, stance, tread
+from simharness.world.motion.poses.foot_placement import PEELING, carry_pelvis, hip_over, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import plant, pose_angles
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, limbs
 from simharness.world.motion.poses.timing import glide, rounds, wander
 

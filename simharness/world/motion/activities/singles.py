@@ -7,16 +7,16 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from simharness.world.motion.alone.carrying import carry
-from simharness.world.motion.alone.dancing import dance
-from simharness.world.motion.alone.gestures import GESTURES, gesture
-from simharness.world.motion.alone.lowering import crouch, kneel, squat
-from simharness.world.motion.alone.lying import lie
-from simharness.world.motion.alone.reaching import reach
-from simharness.world.motion.alone.running import run
-from simharness.world.motion.alone.seating import sit
-from simharness.world.motion.alone.stepping import step, turn
-from simharness.world.motion.alone.walking import walk
+from simharness.world.motion.activities.carrying import carry
+from simharness.world.motion.activities.crouching import crouch, kneel, squat
+from simharness.world.motion.activities.dancing import dance
+from simharness.world.motion.activities.gestures import GESTURES, gesture
+from simharness.world.motion.activities.lying import lie
+from simharness.world.motion.activities.reaching import reach
+from simharness.world.motion.activities.running import run
+from simharness.world.motion.activities.sitting import sit
+from simharness.world.motion.activities.stepping import step, turn
+from simharness.world.motion.activities.walking import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot
 from simharness.world.motion.performance import Activity, solo

@@ -11,9 +11,9 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import Foot, arm_angles, girdle, plant, pose_angles, reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, arm_angles, girdle, plant, pose_angles, reach_with
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
 from simharness.world.motion.poses.timing import glide, rounds
 from simharness.world.motion.trajectory import Trajectory

@@ -6,11 +6,18 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.alone.gestures import gesture
+from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import (
+    arm_angles,
+    arm_columns,
+    palm,
+    plant,
+    pose_angles,
+    reach_with,
+)
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import arm_angles, arm_columns, palm, plant, pose_angles, reach_with
 from simharness.world.motion.poses.timing import ease
 
 TIME = np.arange(0.0, 2.0, 1 / 30)

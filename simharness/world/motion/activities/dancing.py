@@ -8,9 +8,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import Print, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import Print, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.posture import at_ease, blend, limb
 from simharness.world.motion.poses.timing import glide, wander
 

@@ -12,9 +12,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import in_world
+from simharness.world.motion.poses.foot_placement import in_world
+from simharness.world.motion.poses.inverse_kinematics import girdle
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import girdle
 
 _SAG = 0.02  # metres that standing at ease is lower than standing upright
 _STRETCHED = 0.93  # of an arm's length: a hand that meets another's, comfortably

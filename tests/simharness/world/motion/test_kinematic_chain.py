@@ -9,7 +9,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.poses.chain import Chain
+from simharness.world.motion.poses.kinematic_chain import Chain
 from simharness.world.motion.poses.kinematics import Kinematics
 
 

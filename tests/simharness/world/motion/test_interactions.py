@@ -8,11 +8,11 @@ from casting import foot_vertices, performer
 
 from simharness.types.random_streams import stream
 from simharness.world.motion.contact import penetration
+from simharness.world.motion.interactions.pairs import PAIRS
 from simharness.world.motion.paths import SWAY, Spot
 from simharness.world.motion.performance import Performance
+from simharness.world.motion.poses.inverse_kinematics import palm
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import palm
-from simharness.world.motion.together.pairs import PAIRS
 from simharness.world.motion.trajectory import RATE
 
 TIME = np.arange(-1.0, 7.0, 1 / RATE)

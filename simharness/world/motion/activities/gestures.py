@@ -10,9 +10,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.footing import in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, some_side
 from simharness.world.motion.poses.timing import strokes, wander
 

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.motion.alone.gestures import gesture
+from simharness.world.motion.activities.gestures import gesture
+from simharness.world.motion.interactions.partners import attentive, bent, meet
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance
+from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import reach_with
 from simharness.world.motion.poses.timing import ease, rounds
-from simharness.world.motion.together.partners import attentive, bent, meet
 
 _SHAKEN = (0.015, 0.03)  # metres up and down
 _SHAKE_RATE = (1.8, 2.6)  # Hz

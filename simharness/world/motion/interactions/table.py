@@ -10,17 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.alone.gestures import gesture
-from simharness.world.motion.alone.seating import Seat, fit_seat
+from simharness.world.motion.activities.gestures import gesture
+from simharness.world.motion.activities.sitting import Seat, fit_seat
+from simharness.world.motion.interactions.partners import arm_length, attentive, bent, face_to_face, nudged
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.footing import carry_pelvis, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import carry_pelvis, in_world, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles, reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import plant, pose_angles, reach_with
 from simharness.world.motion.poses.posture import at_ease, blend
 from simharness.world.motion.poses.timing import strokes, wander
-from simharness.world.motion.together.partners import arm_length, attentive, bent, face_to_face, nudged
 from simharness.world.motion.trajectory import Trajectory
 
 _SEATED = 0.65  # chance that they sit

@@ -11,9 +11,9 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.footing import Print, in_world, pelvis_at_ease, stance, tread
+from simharness.world.motion.poses.foot_placement import Print, in_world, pelvis_at_ease, stance, tread
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, plant, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posing import Foot, Pelvis, plant, pose_angles, stand_on
 from simharness.world.motion.poses.posture import at_ease, blend, limb
 from simharness.world.motion.poses.timing import bump, glide, rounds
 from simharness.world.motion.trajectory import Trajectory
