@@ -15,8 +15,7 @@ from benchmarks.method.curve import COSTS, PRESETS, Sweep
 from benchmarks.method.published import RELEASED, Beside
 from benchmarks.simulator.result import SWEPT, Result, read
 from benchmarks.simulator.table import markdown
-from simharness.report.figures.svg_figure import INK, STAGE_COLORS, Color, figure, legend
-from simharness.report.figures.svg_sheet import sheet
+from simharness.report.figures.svg_plots import INK, STAGE_COLORS, Color, legend_above, plot_sheet, svg_plot
 from simharness.runtime.atomic_files import write_whole
 
 _SIZE = (4.5, 3.9)  # inches of 72 px
@@ -52,7 +51,7 @@ def curves(result: Result) -> str:
     known = [point.ms[preset][cost] for point in swept for preset in PRESETS for cost in COSTS]
     known += [beside.others[RELEASED] for beside in result.published]
     span = 10 ** math.floor(math.log10(min(known))), 10 ** math.ceil(math.log10(max(known)))
-    return sheet(
+    return plot_sheet(
         [[_plot(result.sweep(grows), result.published, preset, span) for grows in SWEPT] for preset in PRESETS[::-1]]
     )
 
@@ -62,7 +61,7 @@ def _plot(sweep: Sweep, others: Sequence[Beside], preset: str, span: tuple[float
     name = f"{sweep.grows}-{preset}"
     fixed = "people" if sweep.grows == "views" else "views"
     (rest,) = {getattr(point, fixed) for point in sweep.points}
-    with figure(f"time-{name}", size=_SIZE) as (axes, written):
+    with svg_plot(f"time-{name}", size=_SIZE) as (axes, written):
         sizes = [getattr(point, sweep.grows) for point in sweep.points]
         for cost in COSTS:
             whole = cost == "total"
@@ -80,7 +79,7 @@ def _plot(sweep: Sweep, others: Sequence[Beside], preset: str, span: tuple[float
         axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
         axes.minorticks_off()
         axes.grid(axis="y")
-        legend(axes, columns=3)
+        legend_above(axes, columns=3)
     return written[0]
 
 

@@ -14,11 +14,11 @@ from mvpose import Detections
 from simharness.report.figures.palette import css, person_color
 from simharness.report.run.result_folder import run
 from simharness.report.study.replay import Replay
-from simharness.report.study.room_view import Diorama
+from simharness.report.study.room_view import RoomView
 from simharness.scenario.load import load
 from simharness.scenario.presets import SCENARIOS
 from simharness.trial.run_folder import read_run
-from simharness.trial.stages.build import prepare
+from simharness.trial.stages.build_trial import build_trial
 from tools.readme_picture import picture as module
 from tools.readme_picture.breaking_chart import VARIANTS, breaking_chart
 from tools.readme_picture.picture import Tile, joined, main, overview
@@ -50,11 +50,11 @@ def drawn(record):
 
 
 @pytest.fixture(scope="module")
-def diorama(record):
+def room(record):
     replay = Replay(
-        prepare(record.scenario), "full", record.time, record.truth, record.detections, record.estimates["full"]
+        build_trial(record.scenario), "full", record.time, record.truth, record.detections, record.estimates["full"]
     )
-    return Diorama(replay, FRAME, (800, 300))
+    return RoomView(replay, FRAME, (800, 300))
 
 
 def panel(svg, name):
@@ -173,8 +173,8 @@ class TestMatch:
         )
         assert len(set(joins)) == len(joins)
 
-    def test_one_estimate_has_one_colour_in_all_views_and_in_the_room(self, drawn, record, diorama):
-        owners = diorama.replay.owners(FRAME)
+    def test_one_estimate_has_one_colour_in_all_views_and_in_the_room(self, drawn, record, room):
+        owners = room.replay.owners(FRAME)
         colors = {css(person_color(int(owner))) for owner in owners}
         assert len(colors) >= 3
         joins = {path.get("stroke") for path in classed(panel(drawn, "match"), "path", "join")}
@@ -193,34 +193,34 @@ class TestMatch:
 class TestReconstruct:
     """The fourth panel."""
 
-    def test_people_and_cameras_are_where_a_pinhole_outside_of_the_room_sees_them(self, drawn, record, diorama):
-        room = panel(drawn, "reconstruct")
-        (image,) = room.iter(f"{SVG}image")
+    def test_people_and_cameras_are_where_a_pinhole_outside_of_the_room_sees_them(self, drawn, record, room):
+        group = panel(drawn, "reconstruct")
+        (image,) = group.iter(f"{SVG}image")
         corner = np.array([float(image.get("x")), float(image.get("y"))]) + 0.5
-        true = [points(path) for path in classed(room, "path", "truth")]
+        true = [points(path) for path in classed(group, "path", "truth")]
         assert len(true) == len(record.truth[FRAME].joints)
         for drawn_limbs, joints in zip(true, record.truth[FRAME].joints, strict=True):
-            left_hip = diorama.eye.project(joints[11]) + corner
+            left_hip = room.eye.project(joints[11]) + corner
             assert np.abs(drawn_limbs - left_hip).max(axis=1).min() <= 0.051
-        apexes = [points(path)[0] for path in classed(room, "path", "camera")]
-        np.testing.assert_allclose(apexes, diorama.eye.project(record.rig.centers) + corner, atol=0.051)
+        apexes = [points(path)[0] for path in classed(group, "path", "camera")]
+        np.testing.assert_allclose(apexes, room.eye.project(record.rig.centers) + corner, atol=0.051)
         places = np.concatenate([*apexes, *true], axis=None).reshape(-1, 2) - corner
         assert (places > 0).all()
-        assert (places < diorama.size).all()
+        assert (places < room.size).all()
 
-    def test_the_walls_in_the_way_are_left_out_and_no_others(self, diorama):
-        eye = diorama.eye.center
-        walls = [solid for solid in diorama.replay.trial.scene.solids if solid.name.startswith("wall")]
-        hidden = [solid.name for solid in walls if diorama._in_the_way(solid.mesh.vertices)]
+    def test_the_walls_in_the_way_are_left_out_and_no_others(self, room):
+        eye = room.eye.center
+        walls = [solid for solid in room.replay.trial.scene.solids if solid.name.startswith("wall")]
+        hidden = [solid.name for solid in walls if room._hides_room(solid.mesh.vertices)]
         middles = {solid.name: solid.mesh.vertices[:, :2].mean(axis=0) for solid in walls}
         nearest = sorted(middles, key=lambda name: np.linalg.norm(middles[name] - eye[:2]))[:2]
         assert len(walls) == 4
         assert sorted(hidden) == sorted(nearest)
 
-    def test_beyond_the_floor_the_paper_is_white(self, diorama):
-        rgb = diorama.picture(finer=1).rgb
+    def test_beyond_the_floor_the_paper_is_white(self, room):
+        rgb = room.picture(finer=1).rgb
         assert rgb.shape == (300, 800, 3)
-        x, y = np.round(diorama.eye.project([0.0, 0.0, 0.0])).astype(int)
+        x, y = np.round(room.eye.project([0.0, 0.0, 0.0])).astype(int)
         assert rgb[y, x].min() < 230
         assert (rgb[-1, [0, -1]] == 255).all()
 

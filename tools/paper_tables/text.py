@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from simharness.report.figures.markdown import duration, origin, table
+from simharness.report.documents import markdown_table, provenance_sentence
+from simharness.runtime.progress import duration
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
 _OF = {
@@ -97,7 +98,7 @@ def _comparison(rows: Sequence[Mapping[str, Any]], title: str, seeds: int) -> It
         name = row["method"] if row["of"] == "paper" else f"{row['method']}: {of[row['of']]}"
         actors = ["–"] * 3 if row["actors"] is None else [f"{pcp:.1f}" for pcp in row["actors"]]
         cells.append([name, *actors, _said(row["average"])])
-    yield from table([title, "Actor 1", "Actor 2", "Actor 3", "Average"], cells)
+    yield from markdown_table([title, "Actor 1", "Actor 2", "Actor 3", "Average"], cells)
 
 
 def _ablation(variants: Mapping[str, Mapping[str, Any]], title: str, seeds: int) -> Iterator[str]:
@@ -110,7 +111,7 @@ def _ablation(variants: Mapping[str, Mapping[str, Any]], title: str, seeds: int)
             cell = cells[column]
             row += ["–", "–"] if cell is None else [_said(cell["pcp"]), _beside_full(name, cell)]
         rows.append(row)
-    yield from table([title, *(each for head in heads for each in (head, "against `full`"))], rows)
+    yield from markdown_table([title, *(each for head in heads for each in (head, "against `full`"))], rows)
 
 
 def _beside_full(name: str, cell: Mapping[str, Any]) -> str:
@@ -182,7 +183,7 @@ def _origins(told: Mapping[str, Any]) -> Iterator[str]:
     yield "\n## Code, libraries and machine\n"
     groups: dict[str, list[str]] = {}
     for key, made in told["inputs"].items():
-        groups.setdefault(origin(made), []).append(f"twin of {_DATA[key]}" if key in _DATA else _OF[key])
+        groups.setdefault(provenance_sentence(made), []).append(f"twin of {_DATA[key]}" if key in _DATA else _OF[key])
     for said, inputs in groups.items():
         yield f"- {'; '.join(inputs)}: {said}"
     if len({made["digests"]["method"] for made in told["inputs"].values()}) > 1:

@@ -18,20 +18,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from simharness.trial.stages.frame_tasks import picture_source_of
 
 from mvpose.arrays import Floats
+from simharness.report.documents import fill_template
 from simharness.report.figures.overlay import COCO17_BODY
 from simharness.report.figures.palette import TRUTH, css, person_color
-from simharness.report.figures.templating import fill
 from simharness.report.run.pictures import Picture
 from simharness.report.study.replay import Replay
-from simharness.report.study.room_view import Diorama
+from simharness.report.study.room_view import RoomView
 from simharness.runtime.atomic_files import write_whole
 from simharness.trial.run_folder import Record, read_run
-from simharness.trial.stages.build import prepare
-from simharness.trial.stages.frame_tasks import studio_of
+from simharness.trial.stages.build_trial import build_trial
 from simharness.types.truth import KeypointError
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 from simharness.world.scene.playback import Playback
 from tools.readme_picture.breaking_chart import FACTOR, Point, breaking_chart, path
 
@@ -90,17 +90,17 @@ def overview(record: Record, digest: Mapping[str, Any], *, frame: int, views: Se
     _check(record, frame, views)
     chart = breaking_chart(digest, at=_CHART)
     variant = next(iter(record.estimates))
-    trial = prepare(record.scenario)
+    trial = build_trial(record.scenario)
     replay = Replay(trial, variant, record.time, record.truth, record.detections, record.estimates[variant])
-    studio = studio_of(record.scenario, Playback(trial.scene))
+    picture_source = picture_source_of(record.scenario, Playback(trial.scene))
     pictures = {}
     for view in views:
         least = min(record.rig[view].size)
         width = round(record.rig[view].size[0] * _SHARPNESS * _SIDE / least)
-        pictures[view] = Picture("", "", studio.picture(trial.shots, frame, view, finer=2, width=width)).uri
+        pictures[view] = Picture("", "", picture_source.picture(trial.exposures, frame, view, finer=2, width=width)).uri
     tiles = _tiles(record, views)
     matched = tiles[2:]
-    return fill(
+    return fill_template(
         "template.svg",
         folder=Path(__file__).parent,
         width=_WIDTH,
@@ -273,31 +273,31 @@ def _points(places: Iterable[Any]) -> list[Point]:
 def _room(replay: Replay, frame: int) -> dict[str, Any]:
     """The room with everybody in 3D and the cameras."""
     left, top, width, height = _ROOM
-    diorama = Diorama(replay, frame, (width, height))
+    room = RoomView(replay, frame, (width, height))
     corner = (left + 0.5, top + 0.5)
-    apexes = [_points(camera + corner) for camera in diorama.cameras]
+    apexes = [_points(camera + corner) for camera in room.cameras]
     return {
         "left": left,
         "top": top,
         "width": width,
         "height": height,
-        "picture": diorama.picture().uri,
+        "picture": room.picture().uri,
         "cameras": [
             "".join(path([apex, *side]) + "Z" for side in pairwise([*base, base[0]])) for apex, *base in apexes
         ],
         "estimates": [
             {"color": css(person_color(owner)), "limbs": _limbs(places + corner)}
-            for owner, places in _far_first(replay, frame, diorama)
+            for owner, places in _far_first(replay, frame, room)
         ],
-        "truth": [_limbs(places + corner) for places in diorama.truth],
+        "truth": [_limbs(places + corner) for places in room.truth],
     }
 
 
-def _far_first(replay: Replay, frame: int, diorama: Diorama) -> list[tuple[int, Floats]]:
+def _far_first(replay: Replay, frame: int, room: RoomView) -> list[tuple[int, Floats]]:
     """The owners of the estimates and their joints on the sheet, the nearest last."""
     middle = [np.nanmean(joints, axis=0) for joints in replay.estimates[frame].joints]
-    order = np.argsort([-np.linalg.norm(each - diorama.eye.center) for each in middle], kind="stable")
-    owners, places = replay.owners(frame), diorama.estimates
+    order = np.argsort([-np.linalg.norm(each - room.eye.center) for each in middle], kind="stable")
+    owners, places = replay.owners(frame), room.estimates
     return [(int(owners[k]), places[k]) for k in order]
 
 

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
+from simharness.pairing.pairing import pair
+from simharness.report.documents import fill_template
 from simharness.report.figures.palette import css, person_color
-from simharness.report.figures.templating import fill
 from simharness.report.run import plots
 from simharness.report.run.film import Animation
 from simharness.report.run.headline import COLUMNS, NOTHING
 from simharness.report.run.pictures import Picture
 from simharness.scenario.toml_writer import dumps
 from simharness.scoring.pcp import GROUPS, Part
-from simharness.scoring.pose import pair
 from simharness.trial.run_folder import Record
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 from simharness.world.motion.choreography import roles
 
 _HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
@@ -56,7 +56,7 @@ def render(
     """
     summary = record.summary
     main, scores = next(iter(summary["variants"].items()))
-    return fill(
+    return fill_template(
         "run.html",
         scenario=record.scenario,
         summary=summary,

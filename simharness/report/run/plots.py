@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.report.figures.svg_figure import (
+from simharness.report.figures.svg_plots import (
     FAINT,
     INK,
     LINE,
@@ -19,14 +19,14 @@ from simharness.report.figures.svg_figure import (
     VARIANT_COLORS,
     VISIBILITY_COLORS,
     Color,
-    figure,
-    legend,
+    legend_above,
+    svg_plot,
 )
 
 
 def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) -> str:
     """Mean joint error of each person, (T, P) millimetres; NaN where not found: marked below the axis."""
-    with figure("error-over-time") as (axes, written):
+    with svg_plot("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
             axes.plot(time, errors[:, person], color=colors[person], lw=1.6, label=f"person {person}", zorder=3)
@@ -38,13 +38,13 @@ def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) ->
         axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
         axes.set_xlim(time[0], max(time[-1], time[0] + 1e-6))
         axes.grid(axis="y")
-        legend(axes, columns=min(4, max(1, errors.shape[1])))
+        legend_above(axes, columns=min(4, max(1, errors.shape[1])))
     return written[0]
 
 
 def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) -> str:
     """The share of true joints placed within a distance, for each variant; NaN is infinitely far."""
-    with figure("error-distribution") as (axes, written):
+    with svg_plot("error-distribution") as (axes, written):
         grid = np.linspace(0, limit, 301)
         for (variant, values), color in zip(errors.items(), VARIANT_COLORS * len(errors), strict=False):
             ranked = np.sort(np.where(np.isnan(values), np.inf, values))
@@ -58,7 +58,7 @@ def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) ->
 
 def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequence[str]) -> str:
     """How many of the joints each camera sees: shares (V, 5), 0 to 1, by visibility label."""
-    with figure("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
+    with svg_plot("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
         left = np.zeros(len(cameras))
         rows = np.arange(len(cameras))
         for column, (label, color) in enumerate(zip(labels, VISIBILITY_COLORS, strict=True)):
@@ -69,14 +69,14 @@ def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequenc
         axes.invert_yaxis()
         axes.tick_params(axis="y", length=0, labelcolor=INK)
         axes.spines["left"].set_visible(False)
-        legend(axes, columns=3)
+        legend_above(axes, columns=3)
     return written[0]
 
 
 def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
     """Median milliseconds a frame of each stage of each variant; a method without stages is one, ``method``."""
     times = {name: {"method": each["total"]} if set(each) == {"total"} else each for name, each in times.items()}
-    with figure("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
+    with svg_plot("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
         rows = np.arange(len(times))
         left = np.zeros(len(times))
         stages = list(dict.fromkeys(stage for each in times.values() for stage in each if stage != "total"))
@@ -92,7 +92,7 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
         axes.invert_yaxis()
         axes.tick_params(axis="y", length=0, labelcolor=INK)
         axes.spines["left"].set_visible(False)
-        legend(axes, columns=3)
+        legend_above(axes, columns=3)
     return written[0]
 
 
@@ -115,7 +115,7 @@ def floor_plan(
         estimates: where the method saw people, (k, 2) metres.
         colors: of the people, P of them.
     """
-    with figure("floor-plan", size=(5.2, 4.8)) as (axes, written):
+    with svg_plot("floor-plan", size=(5.2, 4.8)) as (axes, written):
         half = np.array(room) / 2
         corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         axes.add_patch(Polygon(corners, fill=False, ec=FAINT, lw=1.2))
@@ -142,7 +142,7 @@ def floor_plan(
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal")
         axes.spines[:].set_visible(False)
-        legend(axes, columns=min(5, paths.shape[1] + 1))
+        legend_above(axes, columns=min(5, paths.shape[1] + 1))
     return written[0]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from simharness.report.figures.svg_sheet import sheet
+from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, breaking, cases_of, factors, factors_by_case, panels
 from simharness.report.study.digest_text import HEADS, PRINTED, markdown
@@ -123,7 +123,7 @@ def curves(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
                 rows.append([plot for score in pair for plot in panels_of(index, by_case, score)])
             else:
                 rows += [row for score in pair for row in _in_rows(panels_of(index, by_case, score))]
-    return sheet(rows)
+    return plot_sheet(rows)
 
 
 def _in_rows(drawn: Sequence[str]) -> list[list[str]]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from simharness.report.figures.markdown import duration, origin, table
+from simharness.report.documents import markdown_table, provenance_sentence
 from simharness.report.study.factor_names import NAMES, axis_label
 from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS, mean_over, short
+from simharness.runtime.progress import duration
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
 
 HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
@@ -42,7 +43,7 @@ def _lines(told: Mapping[str, Any]) -> Iterator[str]:
     yield f"# {told['name']}"
     yield f"\n{told['description']}. {told['trials']} trials, seeds {min(seeds)} to {max(seeds)}, {took} of one core."
     yield f"\n    {told['command']}"
-    yield f"\n{origin(told)}"
+    yield f"\n{provenance_sentence(told)}"
     yield from _means(told)
     if told["factors"]:
         parts = told["by_case"] or {"": told}
@@ -60,7 +61,7 @@ def _means(told: Mapping[str, Any]) -> Iterator[str]:
         if case:
             yield f"\nCase {case}:\n"
         rows = [[name, *(_said(means[name][key], SCORES[key]) for key in HEADS)] for name in names]
-        yield from table(["variant", *(_head(key) for key in HEADS)], rows)
+        yield from markdown_table(["variant", *(_head(key) for key in HEADS)], rows)
         if not case:
             yield "\n" + _listed({SCORES[key].title: SCORES[key].about for key in HEADS})
 
@@ -82,13 +83,13 @@ def _factor(key: str, parts: Mapping[str, Mapping[str, Any]], names: Sequence[st
                 [value, *(_said(factor["scores"][name][score][row], SCORES[score]) for name in names)]
                 for row, value in enumerate(values)
             ]
-            yield from table([key, *names], rows)
+            yield from markdown_table([key, *names], rows)
         yield f"\n`{names[0]}`, all scores, against {where}{said}:\n"
         scores = factor["scores"][names[0]]
         rows = [
             [value, *(_said(scores[each][row], SCORES[each]) for each in PRINTED)] for row, value in enumerate(values)
         ]
-        yield from table([key, *map(_head, PRINTED)], rows)
+        yield from markdown_table([key, *map(_head, PRINTED)], rows)
     yield (
         "\nMeans with 95 % intervals over seeds. *AP n*: average precision, people within n mm, the surest first, "
         "against ghosts and missed; *mAP*: the mean of these."
@@ -110,7 +111,7 @@ def _breaking(told: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]]) -
     yield "\n## Breaking points"
     yield "\nThe value of a factor at which the mean score passes the threshold.\n"
     heads = ["factor", *(["case"] if told["by_case"] else []), "broken", *names]
-    yield from table(heads, [[*row, *(cells.get(name, "–") for name in names)] for row, cells in rows.items()])
+    yield from markdown_table(heads, [[*row, *(cells.get(name, "–") for name in names)] for row, cells in rows.items()])
     yield (
         "\nBetween the values that were tried it is by a straight line; in parentheses its 95 % interval over seeds, "
         "*beyond* where that ends outside the values tried. *not within the range*: the mean passes at no value that "
@@ -132,7 +133,7 @@ def _failures(told: Mapping[str, Any]) -> Iterator[str]:
         *([f"by {stage}", *(_rate(failed, "stages", stage) for failed in failures.values())] for stage in stages),
         [_ALONE, *(_alone(failed) for failed in failures.values())],
     ]
-    yield from table(["failures", *failures], rows)
+    yield from markdown_table(["failures", *failures], rows)
     yield "\nKinds. " + _listed({kind.replace("_", " "): SCORES[f"failures_{kind}"].about for kind in kinds})
     yield (
         "\nBy: the first whose truth, put in for what the method had, mends the failure. "

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from markupsafe import Markup
 
-from simharness.report.figures.templating import fill
+from simharness.report.documents import fill_template
 from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, breaking, factors_by_case, grid, panels
@@ -87,7 +87,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
     variants = [name for name in info["variants"] if name in set(trials["variant"])]
     swept = factors_by_case(results) if variants else {}
     seeds = trials["seed"].n_unique()
-    return fill(
+    return fill_template(
         "study.html",
         info=info,
         facts=_facts(results),

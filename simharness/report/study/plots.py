@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
-from simharness.report.figures.svg_figure import FAINT, INK, LINE, VARIANT_COLORS, Color, figure, legend
+from simharness.report.figures.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.report.study.factor_names import axis_label
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.comparison import Interval
@@ -70,7 +70,7 @@ def curve(
     label = axis_label(factor) if axis_label(factor).startswith(factor) else f"{axis_label(factor)} ({factor})"
     below = [line for each in (label, *notes) for line in textwrap.wrap(each, _LINE, break_long_words=False)]
     height = _SIZE[1] + _LINE_HEIGHT * (len(below) - 1 + 1.5 * bool(title))
-    with figure(name, size=(_SIZE[0], height)) as (axes, written):
+    with svg_plot(name, size=(_SIZE[0], height)) as (axes, written):
         places = np.array(values, float) if numeric else np.arange(len(values), dtype=float)
         apart = 0.0 if numeric else min(0.16, 0.6 / max(1, len(lines)))
         for index, ((variant, intervals), color) in enumerate(
@@ -95,7 +95,7 @@ def curve(
             axes.figure.suptitle(title, fontsize=10, fontweight="bold")
         _ticks(axes, values, places, numeric)
         axes.grid(axis="y")
-        legend(axes, columns=min(4, len(lines)))
+        legend_above(axes, columns=min(4, len(lines)))
     return written[0]
 
 
@@ -166,7 +166,7 @@ def heat_map(
         score: what is plotted.
         span: the scores of the first and the last colour: the same for maps beside each other.
     """
-    with figure(name, size=(_SIZE[0], max(1.6, 0.9 + 0.38 * len(down[1])))) as (axes, written):
+    with svg_plot(name, size=(_SIZE[0], max(1.6, 0.9 + 0.38 * len(down[1])))) as (axes, written):
         colors = "viridis" if score.better == "higher" else "viridis_r"
         mesh = axes.pcolormesh(
             means, cmap=colors, vmin=span[0], vmax=max(span[1], span[0] + 1e-9), edgecolors=LINE, linewidth=0.6
@@ -225,7 +225,7 @@ def failure_bars(
     """
     classes = list(dict.fromkeys([*colors, *(key for each in amounts.values() for key in each)]))
     classes = [key for key in classes if any(each.get(key) for each in amounts.values())]
-    with figure(name, size=(_SIZE[0], 1.15 + 0.4 * len(amounts))) as (axes, written):
+    with svg_plot(name, size=(_SIZE[0], 1.15 + 0.4 * len(amounts))) as (axes, written):
         rows = np.arange(len(amounts))
         left = np.zeros(len(amounts))
         for key in classes:
@@ -245,13 +245,13 @@ def failure_bars(
         axes.set_ylim(len(amounts) - 0.5, -0.5)
         axes.tick_params(axis="y", length=0, labelcolor=INK)
         axes.spines["left"].set_visible(False)
-        legend(axes, columns=3)
+        legend_above(axes, columns=3)
     return written[0]
 
 
 def time_distribution(times: Mapping[str, Floats]) -> str:
     """The share of frames that took each variant no longer than so many milliseconds."""
-    with figure("time-distribution", size=_SIZE) as (axes, written):
+    with svg_plot("time-distribution", size=_SIZE) as (axes, written):
         for (variant, values), color in zip(times.items(), VARIANT_COLORS * max(1, len(times)), strict=False):
             ranked = np.sort(values[np.isfinite(values)])
             if len(ranked):
@@ -263,5 +263,5 @@ def time_distribution(times: Mapping[str, Floats]) -> str:
             axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
             axes.xaxis.set_minor_formatter(FuncFormatter(lambda tick, _: ""))
         axes.grid()
-        legend(axes, columns=min(4, max(1, len(times))))
+        legend_above(axes, columns=min(4, max(1, len(times))))
     return written[0]

@@ -1,4 +1,4 @@
-"""A frame of a run seen from outside of the room: the things as a picture, and where people and cameras are in it."""
+"""View of one frame of a trial by a camera outside the room: objects as a picture, people and cameras as pixels."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from numpy.typing import NDArray
 from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.capture.picture import antialiased, meshes_at, scaled
-from simharness.report.figures.turnable import pyramid
 from simharness.report.run.pictures import Picture
 from simharness.report.study.replay import Replay
-from simharness.trial.stages.frame_tasks import renderer_of
+from simharness.trial.stages.capture import renderer_of
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.lenses import intrinsics
 from simharness.world.scene.playback import Playback
 
-_BEARING, _PITCH = np.radians(-40.0), np.radians(24.0)  # from where it is seen
-_AIM = (0.0, 0.0, 1.1)  # metres
-_FAR = 1.55  # times the diagonal of the room
+_BEARING, _PITCH = np.radians(-40.0), np.radians(24.0)  # direction from the room to the camera
+_AIM = (0.0, 0.0, 1.1)  # metres, the point in the middle of the picture
+_DISTANCE = 1.55  # times the diagonal of the room
 _FOV = 34.0  # degrees, horizontal
+_PYRAMID = 0.34  # metres from a camera's centre to the base of its pyramid
 
 
 @dataclass(frozen=True)
-class Diorama:
-    """What an eye outside of the room sees of a frame; the walls in its way are left out.
+class RoomView:
+    """A frame seen from outside the room, without the walls that hide the room.
 
     Attributes:
-        replay: of a run.
-        frame: of it.
-        size: width and height, pixels.
+        replay: the trial.
+        frame: frame index.
+        size: width and height of the view in pixels.
     """
 
     replay: Replay
@@ -41,23 +41,28 @@ class Diorama:
 
     @cached_property
     def eye(self) -> Camera:
-        """From where it is seen."""
+        """Camera that takes the view."""
         diagonal = float(np.hypot(*self.replay.trial.scenario.room.size[:2]))
         toward = np.array([np.cos(_BEARING) * np.cos(_PITCH), np.sin(_BEARING) * np.cos(_PITCH), np.sin(_PITCH)])
-        return look_at(_AIM + _FAR * diagonal * toward, _AIM, K=intrinsics(_FOV, self.size), size=self.size, name="eye")
+        position = _AIM + _DISTANCE * diagonal * toward
+        return look_at(position, _AIM, K=intrinsics(_FOV, self.size), size=self.size, name="eye")
 
     def picture(self, *, finer: int = 2) -> Picture:
-        """Floor, far walls and things, nobody, on white; ``finer`` times as many pixels each way."""
+        """Render the floor, the far walls and the objects without people, on a white background.
+
+        Args:
+            finer: rendered pixels for each pixel of the picture, in each direction.
+        """
         scene = self.replay.trial.scene
         state = Playback(scene).at(float(self.replay.time[self.frame]))
-        things = zip(meshes_at(scene, state)[len(scene.bodies) :], scene.solids, strict=True)
-        seen = [mesh for mesh, solid in things if solid.kind != "room" or not self._in_the_way(mesh.vertices)]
+        solids = zip(meshes_at(scene, state)[len(scene.bodies) :], scene.solids, strict=True)
+        shown = [mesh for mesh, solid in solids if solid.kind != "room" or not self._hides_room(mesh.vertices)]
         lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0))
-        rgb = antialiased(renderer_of("raster"), scaled(self.eye, finer), seen, lighting=lighting)
+        rgb = antialiased(renderer_of("raster"), scaled(self.eye, finer), shown, lighting=lighting)
         return Picture("The room", "", rgb)
 
-    def _in_the_way(self, vertices: NDArray[np.floating]) -> bool:
-        """Whether a part of the room stands on the eye's side of its middle."""
+    def _hides_room(self, vertices: NDArray[np.floating]) -> bool:
+        """Return whether a part of the room stands between the middle of the room and the camera."""
         return float(vertices[:, :2].mean(axis=0) @ self.eye.center[:2]) > 1e-6
 
     @property
@@ -67,10 +72,20 @@ class Diorama:
 
     @property
     def estimates(self) -> Floats:
-        """Pixels of the estimated joints, (n, J, 2); NaN of those without a place."""
+        """Pixels of the estimated joints, (n, J, 2); NaN for joints without an estimate."""
         return self.eye.project(self.replay.estimates[self.frame].joints)
 
     @property
     def cameras(self) -> Floats:
-        """Pixels of each camera's centre and of the corners of what it sees close by, (V, 5, 2)."""
-        return self.eye.project(np.stack([pyramid(camera) for camera in self.replay.trial.shots.believed]))
+        """Pixels of each camera's centre and of the four base corners of its pyramid, (V, 5, 2)."""
+        return self.eye.project(
+            np.stack([camera_pyramid(camera) for camera in self.replay.trial.exposures.believed_rig])
+        )
+
+
+def camera_pyramid(camera: Camera) -> Floats:
+    """Return the centre of a camera and a point on the ray of each picture corner, (5, 3) metres in the world."""
+    width, height = camera.size
+    pixels = np.array([[0, 0], [width, 0], [width, height], [0, height]]) - 0.5
+    local = np.column_stack([pixels, np.ones(4)]) @ np.linalg.inv(camera.K).T * _PYRAMID
+    return np.vstack([camera.center, camera.center + local @ camera.R])

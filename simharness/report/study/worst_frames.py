@@ -11,16 +11,16 @@ from typing import Any
 import polars as pl
 
 from simharness.gate.trial_command import overrides
-from simharness.report.figures.turnable import Turnable, turnable
+from simharness.pairing.pairing import LIMIT
 from simharness.report.run.pictures import MOST_VIEWS, Picture, draw_frame
 from simharness.report.study.replay import Replay, replay
+from simharness.report.study.skeleton_view_3d import SkeletonView3D, skeleton_view_3d
 from simharness.scenario.named_files import relative_files
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, load_study
 from simharness.scenario.toml_writer import toml
-from simharness.scoring.pose import LIMIT
 from simharness.study.result_folder import Results
-from simharness.trial.stages.frame_tasks import studio_of
+from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
 SHOWN = 4
@@ -58,7 +58,7 @@ class Shown:
     """
 
     picture: Picture
-    view: Turnable
+    view: SkeletonView3D
     setting: str
     trial: str
     command: str
@@ -110,10 +110,10 @@ def show(
     for number, frame in enumerate(frames, start=1):
         scenario = results.scenario_of(frame.trial)
         again = replay(scenario, frame.variant)
-        studio = studio_of(scenario, Playback(again.trial.scene))
+        picture_source = picture_source_of(scenario, Playback(again.trial.scene))
         rgb = draw_frame(
             again.trial,
-            studio,
+            picture_source,
             frame.frame,
             truth=again.truth[frame.frame],
             detections=again.detections[frame.frame],
@@ -124,7 +124,7 @@ def show(
         picture = Picture(f"{number}. {setting}", _caption(results, frame, again), rgb)
         assert study is not None
         command = _command(study, scenario)
-        yield Shown(picture, turnable(again, frame.frame), setting, frame.trial, command), again
+        yield Shown(picture, skeleton_view_3d(again, frame.frame), setting, frame.trial, command), again
         progress(1)
 
 
@@ -146,7 +146,7 @@ def _caption(results: Results, frame: Frame, again: Replay) -> str:
     )
     ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
     error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.0f} mm"
-    cameras = len(again.trial.shots.believed)
+    cameras = len(again.trial.exposures.believed_rig)
     views = f"; {MOST_VIEWS} of {cameras} cameras" if cameras > MOST_VIEWS else ""
     return (
         f"Frame {frame.frame} of {len(again.time)}, at {again.time[frame.frame]:.1f} s, variant {frame.variant}: "

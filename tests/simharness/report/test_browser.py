@@ -1,4 +1,4 @@
-"""The page of a study in a real browser: no errors, nothing wider than the screen, and what turns does turn."""
+"""Page of a study in a real browser: no script errors, nothing wider than the screen, and 3D views that turn."""
 
 import contextlib
 import json
@@ -14,9 +14,9 @@ from simharness.report.study.page import render_study
 
 pytestmark = pytest.mark.slow
 
-# Looks on before the page's own scripts run, and tells when all is done. The page knows nothing of it.
+# Installed before the page's scripts run; posts its observations when the page is complete.
 PROBE = """<script>
-const probed = { errors: [], turnables: [] };
+const probed = { errors: [], views: [] };
 addEventListener("error", (event) => probed.errors.push(String(event.message)));
 addEventListener("unhandledrejection", (event) => probed.errors.push(String(event.reason)));
 addEventListener("load", () => setTimeout(() => {
@@ -29,12 +29,12 @@ addEventListener("load", () => setTimeout(() => {
     const visible = [...document.querySelectorAll("figure .of")].filter((each) => each.checkVisibility());
     probed.shown[tab.id] = visible.map((each) => each.className);
   }
-  for (const place of document.querySelectorAll(".turnable")) {
+  for (const place of document.querySelectorAll(".view-3d")) {
     const canvas = place.querySelector("canvas"), slider = place.querySelector("input"), seen = {};
     const picture = () => canvas.toDataURL();
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     seen.colors = new Set(new Uint32Array(data.buffer)).size;
-    seen.poster = place.querySelector("svg").checkVisibility();
+    seen.still = place.querySelector("svg").checkVisibility();
     seen.frame = place.querySelector("output").textContent;
     const first = picture();
     canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
@@ -53,13 +53,13 @@ addEventListener("load", () => setTimeout(() => {
     slider.value = Number(slider.value) ? 0 : 1;
     slider.dispatchEvent(new Event("input"));
     seen.slides = picture() !== before && place.querySelector("output").textContent !== seen.frame;
-    probed.turnables.push(seen);
+    probed.views.push(seen);
   }
   parent.postMessage(JSON.stringify(probed), "*");
 }, 100));
 </script>"""
 
-# A browser's window has a least width, that of a frame within has none.
+# A browser window has a minimum width; an inner frame has none.
 FRAME = """<!doctype html><html><script>
 addEventListener("message", (event) => { document.documentElement.dataset.probed = event.data; });
 </script><iframe src="page.html" style="border: 0; width: WIDTHpx; height: 900px"></iframe></html>"""
@@ -67,7 +67,7 @@ addEventListener("message", (event) => { document.documentElement.dataset.probed
 
 @pytest.fixture(scope="module")
 def browser():
-    """The program, or the test is skipped; where SIMHARNESS_REQUIRE_BROWSER is set it must be there."""
+    """Path of the browser; without one the test is skipped, or fails where SIMHARNESS_REQUIRE_BROWSER is set."""
     for name in ("chromium", "chromium-browser", "google-chrome"):
         if found := shutil.which(name):
             return found
@@ -81,7 +81,7 @@ def page(ran, shown):
 
 
 def run_browser(browser, folder, *arguments):
-    """Its output and its log. It is many processes: all of them end with it, whatever happens."""
+    """Run the browser and return its output and its log; all of its processes are ended in every case."""
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
     with subprocess.Popen(
         [browser, *options, f"--user-data-dir={folder / 'profile'}", *arguments],
@@ -100,7 +100,7 @@ def run_browser(browser, folder, *arguments):
 
 
 def browse(browser, page, folder, *, width, dark=False):
-    """What the probe found, and the browser's log."""
+    """Return the observations of the probe, and the browser's log."""
     file = folder / "frame.html"
     file.write_text(FRAME.replace("WIDTH", str(width)), encoding="utf-8")
     (folder / "page.html").write_text(page.replace("<head>", "<head>" + PROBE, 1), encoding="utf-8")
@@ -127,23 +127,23 @@ def test_the_page_works(browser, page, tmp_path, width, dark):
     for tab, visible in probed["shown"].items():
         assert visible
         assert {classes.split("of-")[1] for classes in visible} == {tab.removeprefix("tab-")}
-    assert len(probed["turnables"]) == 4
-    for seen in probed["turnables"]:
+    assert len(probed["views"]) == 4
+    for seen in probed["views"]:
         assert seen["colors"] > 20
-        assert not seen["poster"]
+        assert not seen["still"]
         assert all(seen[key] for key in ("turns", "turnsBack", "zooms", "drags", "slides")), seen
 
 
-def test_without_scripts_the_posters_are_there(browser, page, tmp_path):
-    """The picture of the page with its scripts cut out shows the limbs of people in their colours."""
+def test_without_scripts_the_still_drawings_are_shown(browser, page, tmp_path):
+    """A screenshot of the page without its scripts shows the limbs of people in their colours."""
     import numpy as np
     from PIL import Image
 
-    still = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
-    poster = re.search(r'<div class="turnable">\s*(<svg.*?</svg>)', still, re.DOTALL).group(1)
-    style = re.search(r"<style>.*?</style>", still, re.DOTALL).group(0)
+    plain = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+    still = re.search(r'<div class="view-3d">\s*(<svg.*?</svg>)', plain, re.DOTALL).group(1)
+    style = re.search(r"<style>.*?</style>", plain, re.DOTALL).group(0)
     file, picture = tmp_path / "still.html", tmp_path / "still.png"
-    file.write_text(f"<!doctype html>{style}<main><div class=turnable>{poster}</div></main>", encoding="utf-8")
+    file.write_text(f"<!doctype html>{style}<main><div class=view-3d>{still}</div></main>", encoding="utf-8")
     options = ["--hide-scrollbars", "--window-size=800,600", f"--screenshot={picture}"]
     run_browser(browser, tmp_path, *options, file.as_uri())
     with Image.open(picture) as opened:

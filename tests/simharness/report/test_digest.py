@@ -12,7 +12,7 @@ from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.report.figures.svg_sheet import sheet
+from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS
 from simharness.scoring.catalogue import SCORES
@@ -277,7 +277,7 @@ def test_ghosts_break_precision_where_they_cannot_break_pcp(tmp_path):
 
 def test_what_has_no_size_is_refused():
     with pytest.raises(ValueError, match="viewBox"):
-        sheet([["<svg></svg>"]])
+        plot_sheet([["<svg></svg>"]])
 
 
 class TestFiles:

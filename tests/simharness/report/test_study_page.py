@@ -254,7 +254,7 @@ class TestCommand:
         result = self.call(ran.folder)
         assert result.exit_code == 0
         page = (ran.folder / "report.html").read_text(encoding="utf-8")
-        assert page.count('class="turnable"') == 4
+        assert page.count('class="view-3d"') == 4
         assert not list(ran.folder.glob(".*partial"))
 
     def test_a_folder_that_is_no_study(self, tmp_path):

@@ -1,11 +1,11 @@
 "use strict";
-// People in 3D that turn: drag or arrow keys; wheel, pinch, + and - bring them nearer; space plays.
-for (const place of document.querySelectorAll(".turnable")) makeTurnable(place);
+// 3D view of people: drag or press the arrow keys to turn; wheel, pinch, + and - zoom; space plays.
+for (const place of document.querySelectorAll(".view-3d")) showView(place);
 
-function makeTurnable(place) {
+function showView(place) {
   const data = JSON.parse(place.querySelector("script").textContent);
   const canvas = place.querySelector("canvas"), pen = canvas.getContext("2d");
-  const slider = place.querySelector("input"), told = place.querySelector("output"), button = place.querySelector("button");
+  const slider = place.querySelector("input"), position = place.querySelector("output"), button = place.querySelector("button");
   let yaw = data.yaw, pitch = data.pitch, zoom = 1, frame = data.start, timer = 0;
   let axes, scale, width, height;
   place.classList.add("alive");
@@ -20,8 +20,8 @@ function makeTurnable(place) {
     scale = zoom * data.far * data.radius * Math.min(across, upright);
   }
 
-  // A point of the world on the canvas: x, y, pixels a millimetre there, nearness; null behind the eye.
-  function seen(point) {
+  // Project a point of the world to the canvas: x, y, pixels per millimetre at its depth, nearness; null behind the eye.
+  function projected(point) {
     const offset = point.map((value, axis) => value - data.center[axis]);
     const [right, up, near] = axes.map((axis) => axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2]);
     const away = data.far * data.radius - near;
@@ -30,7 +30,7 @@ function makeTurnable(place) {
   }
 
   function line(from, to, color, thick, millimetres) {
-    const a = seen(from), b = seen(to);
+    const a = projected(from), b = projected(to);
     if (!a || !b) return;
     pen.strokeStyle = color;
     pen.lineWidth = millimetres ? Math.max(2, millimetres * (a[2] + b[2]) / 2) : thick;
@@ -71,7 +71,7 @@ function makeTurnable(place) {
       const color = mixed(owner < 0 ? data.ghost : data.colors[owner], card, 0.35);
       for (const ends of limbs(joints)) thick.push([...ends, color]);
     }
-    const nearness = ([a, b]) => (seen(a)?.[3] ?? 0) + (seen(b)?.[3] ?? 0);
+    const nearness = ([a, b]) => (projected(a)?.[3] ?? 0) + (projected(b)?.[3] ?? 0);
     thick.sort((one, other) => nearness(one) - nearness(other));
     for (const [a, b, color] of thick) line(a, b, color, 0, data.limb);
     data.truth[frame].forEach((joints, person) => {
@@ -79,8 +79,8 @@ function makeTurnable(place) {
       for (const [a, b] of limbs(joints)) line(a, b, ink, 1.5);
     });
     pen.setLineDash([]);
-    told.textContent = `frame ${data.first + frame}, ${data.time[frame].toFixed(1)} s`;
-    slider.setAttribute("aria-valuetext", told.textContent);
+    position.textContent = `frame ${data.first + frame}, ${data.time[frame].toFixed(1)} s`;
+    slider.setAttribute("aria-valuetext", position.textContent);
   }
 
   function turn(right, up) {
@@ -88,7 +88,7 @@ function makeTurnable(place) {
     pitch = Math.min(1.55, Math.max(-0.1, pitch + up));
     draw();
   }
-  function nearer(factor) { zoom = Math.min(12, Math.max(0.4, zoom * factor)); draw(); }
+  function zoomBy(factor) { zoom = Math.min(12, Math.max(0.4, zoom * factor)); draw(); }
   function go(to) { frame = (to + data.time.length) % data.time.length; slider.value = frame; draw(); }
   function play() {
     if (timer) { clearInterval(timer); timer = 0; }
@@ -111,17 +111,17 @@ function makeTurnable(place) {
     const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
     if (!other) return turn((event.clientX - before.clientX) / 130, (event.clientY - before.clientY) / 130);
     const apart = (finger) => Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY);
-    if (apart(before) > 0) nearer(apart(event) / apart(before));
+    if (apart(before) > 0) zoomBy(apart(event) / apart(before));
   });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
   canvas.addEventListener("wheel", (event) => {
-    if (document.activeElement !== canvas && !event.ctrlKey) return; // a page that scrolls goes on scrolling
+    if (document.activeElement !== canvas && !event.ctrlKey) return; // else the wheel scrolls the page
     event.preventDefault();
-    nearer(Math.exp(-event.deltaY / 500));
+    zoomBy(Math.exp(-event.deltaY / 500));
   }, { passive: false });
   const keys = {
     ArrowLeft: () => turn(-0.12, 0), ArrowRight: () => turn(0.12, 0), ArrowUp: () => turn(0, 0.08), ArrowDown: () => turn(0, -0.08),
-    "+": () => nearer(1.2), "=": () => nearer(1.2), "-": () => nearer(1 / 1.2), " ": play,
+    "+": () => zoomBy(1.2), "=": () => zoomBy(1.2), "-": () => zoomBy(1 / 1.2), " ": play,
   };
   canvas.addEventListener("keydown", (event) => {
     if (!keys[event.key]) return;
@@ -130,12 +130,12 @@ function makeTurnable(place) {
   });
   slider.addEventListener("input", () => go(Number(slider.value)));
   button.addEventListener("click", play);
-  draw(); // at once: an observer is called with the next picture of the page only, which a busy machine takes late
+  draw(); // at once: the observer is called only with the next frame of the page, which is late on a busy machine
   new ResizeObserver(draw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
 
-// One colour with a share of another in it; both "#rrggbb".
+// Mix one colour with a share of another; both "#rrggbb".
 function mixed(color, other, share) {
   const parts = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
   const [one, two] = [parts(color), parts(other)];

@@ -1,0 +1,146 @@
+"""Matplotlib plots as SVG: inline in a page, in the page's own colours, or arranged in one standalone file."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+Color = str
+
+# Placeholder colours that matplotlib writes into the SVG; each becomes a colour of the page, light or dark.
+INK, FAINT, LINE = "#010203", "#010204", "#010205"
+_PAGE_COLORS = {INK: "currentColor", FAINT: "var(--faint)", LINE: "var(--line)"}
+_STANDALONE_COLORS = {"currentColor": "#1b1d21", "var(--faint)": "#666b75", "var(--line)": "#dedfe0"}
+_STANDALONE_PAPER = "#ffffff"
+
+SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable on a phone
+_SHEET_GAP = 14.0  # points between the plots of a sheet, and around them
+_SHEET_SCALE = 1.3  # plots have the width of a phone; a sheet is shown on wider screens
+
+VISIBILITY_COLORS: tuple[Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
+STAGE_COLORS: Mapping[str, Color] = {
+    "affinity": "#3b82c4",
+    "matching": "#d9a514",
+    "reconstruction": "#2e9e6b",
+    "method": "#8b93a1",
+}
+VARIANT_COLORS: tuple[Color, ...] = ("#3b82c4", "#d9643a", "#2e9e6b", "#8a63c9", "#d9a514", "#c2568f")
+
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",  # text stays text: in the page's font, and found by the browser's search
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "text.color": INK,
+    "axes.labelcolor": FAINT,
+    "axes.edgecolor": LINE,
+    "xtick.color": LINE,
+    "ytick.color": LINE,
+    "xtick.labelcolor": FAINT,
+    "ytick.labelcolor": FAINT,
+    "grid.color": LINE,
+    "grid.linewidth": 0.6,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+}
+
+
+@contextmanager
+def svg_plot(name: str, *, size: tuple[float, float] = SIZE) -> Iterator[tuple[Axes, list[str]]]:
+    """Give axes to draw on, and a list that holds the SVG element when the context ends.
+
+    Args:
+        name: different from the name of every other plot on the page, so that no two plots share ids.
+        size: width and height in inches of 72 px.
+    """
+    written: list[str] = []
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.add_subplot()
+        axes.set_axisbelow(True)
+        yield axes, written
+        buffer = io.StringIO()
+        FigureCanvasSVG(figure).print_svg(
+            buffer, metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
+        )
+    figure.clear()
+    written.append(_inline(buffer.getvalue()))
+
+
+def _inline(svg: str) -> str:
+    """Return only the SVG element, without a fixed size, in the colours of the page."""
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", svg, count=1)
+    svg = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", svg, count=1)
+    # Remove ids that nothing refers to: they would be the same in two plots.
+    svg = re.sub(r' id="[a-zA-Z0-9.]+_\d+"', "", svg)
+    for placeholder, color in _PAGE_COLORS.items():
+        svg = svg.replace(placeholder, color)
+    return re.sub(r"\n\s*", "\n", svg).strip()
+
+
+def legend_above(axes: Axes, *, columns: int) -> None:
+    """Draw the legend above the axes, where it hides no data; nothing where no line has a label."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(
+            loc="lower left",
+            bbox_to_anchor=(0, 1.0),
+            ncols=columns,
+            labelcolor=INK,
+            handlelength=1.1,
+            columnspacing=1.2,
+            borderaxespad=0.2,
+        )
+
+
+def plot_sheet(rows: Sequence[Sequence[str]]) -> str:
+    """Arrange plots in rows as one standalone SVG file with a white background.
+
+    Args:
+        rows: SVG elements from :func:`svg_plot`, each with a viewBox.
+
+    Returns:
+        An SVG document.
+
+    Raises:
+        ValueError: a plot has no viewBox.
+    """
+    placed, top, widest = [], _SHEET_GAP, 0.0
+    for row in rows:
+        left = _SHEET_GAP
+        sizes = [_size(plot) for plot in row]
+        for plot, (width, height) in zip(row, sizes, strict=True):
+            element = f'<svg x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
+            placed.append(plot.replace("<svg", element, 1))
+            left += width + _SHEET_GAP
+        top += max((height for _, height in sizes), default=0.0) + _SHEET_GAP
+        widest = max(widest, left)
+    plots = "\n".join(placed)
+    for page_color, color in _STANDALONE_COLORS.items():
+        plots = plots.replace(page_color, color)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'width="{_SHEET_SCALE * widest:g}" height="{_SHEET_SCALE * top:g}" viewBox="0 0 {widest:g} {top:g}">\n'
+        f'<rect width="100%" height="100%" fill="{_STANDALONE_PAPER}"/>\n{plots}\n</svg>\n'
+    )
+
+
+def _size(plot: str) -> tuple[float, float]:
+    """Return width and height of a plot in points, from its viewBox."""
+    match = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', plot)
+    if match is None:
+        raise ValueError(f"a plot must have a viewBox that starts at 0 0, got {plot[:60]!r}")
+    return float(match[1]), float(match[2])
