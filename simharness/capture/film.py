@@ -19,23 +19,22 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label
-from simharness.capture.picture import Studio, meshes_at, one_below_the_other
-from simharness.capture.rendering.optics import appear
+from simharness.capture.picture import PictureSource, meshes_at, one_below_the_other
+from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.shutter import moments, rolled, strips
-from simharness.types.views import LookalikeViews, Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import LookalikeViews, Views, Visibility
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
-    from simharness.world.rigs.shots import Shots
+    from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.playback import Playback, State
 
 PREVIEW = 320  # pixels: width of the reduced pictures
 
 
 @dataclass(frozen=True)
-class Seen:
+class Observation:
     """What one camera sees in one picture: as :class:`Views`, without T and V.
 
     ``lookalike_pixels`` (D, J, 2) and ``lookalike_visible`` (D, J) are those of ``Lookalikes.of(scene)``.
@@ -49,10 +48,10 @@ class Seen:
     lookalike_visible: NDArray[np.bool_]
 
 
-class Eye(Protocol):
+class Observer(Protocol):
     """A way to find out what cameras see."""
 
-    def see(self, states: Many[State], cameras: Many[Camera]) -> list[Seen]:
+    def observe(self, states: Many[State], cameras: Many[Camera]) -> list[Observation]:
         """What cameras see whose shutters are open together.
 
         Args:
@@ -63,7 +62,7 @@ class Eye(Protocol):
         ...
 
 
-class PictureEye:
+class PictureObserver:
     """Sees by pictures of depth and ids.
 
     Args:
@@ -79,8 +78,8 @@ class PictureEye:
         radii = [body.joint_radii for body in self._scene.bodies]
         self._radii = np.stack(radii) if people else np.zeros((0, 17))
 
-    def see(self, states: Many[State], cameras: Many[Camera]) -> list[Seen]:
-        """See :class:`Eye`."""
+    def observe(self, states: Many[State], cameras: Many[Camera]) -> list[Observation]:
+        """See :class:`Observer`."""
         people = len(self._scene.bodies)
         meshes = [meshes_at(self._scene, state) for state in states]
         framed = boxes([[mesh.vertices for mesh in each[:people]] for each in meshes], [NO_EDGES] * people, cameras)
@@ -94,10 +93,10 @@ class PictureEye:
             )
             bands = np.stack([state.joints for state in states])
             joints, seeming = rolled(bands, camera), rolled(self._lookalikes.joints(bands), camera)
-            seeming_at = appear(camera, seeming)
+            seeming_at = project_to_image(camera, seeming)
             result.append(
-                Seen(
-                    pixels=appear(camera, joints),
+                Observation(
+                    pixels=project_to_image(camera, joints),
                     visibility=label(image, camera, joints=joints, radii=self._radii),
                     boxes=framed[view],
                     area_visible=_areas(image.ids, people),
@@ -110,26 +109,26 @@ class PictureEye:
 
 def film(
     playback: Playback,
-    shots: Shots,
-    eye: Eye,
+    exposures: ExposureSchedule,
+    observer: Observer,
     *,
     frames: Many[int] | None = None,
-    studio: Studio | None = None,
+    picture_source: PictureSource | None = None,
     previews: Collection[int] = (),
 ) -> Views:
     """Film ``frames`` (all by default) of a scene.
 
     Args:
         playback: the scene.
-        shots: when and with which lens every picture is taken.
-        eye: how it is found out what is seen.
+        exposures: when and with which lens every picture is taken.
+        observer: how it is found out what is seen.
         frames: indices of frames.
-        studio: makes the colour pictures; not needed without previews.
+        picture_source: makes the colour pictures; not needed without previews.
         previews: frames of which to keep the colour pictures, taken ``PREVIEW`` pixels wide.
     """
-    frames = range(len(shots.time)) if frames is None else frames
+    frames = range(len(exposures.time)) if frames is None else frames
     people, joints = len(playback.scene.bodies), 17
-    views = len(shots.believed)
+    views = len(exposures.believed_rig)
     shape = (len(frames), views, people)
     pixels = np.full((*shape, joints, 2), np.nan)
     visibility = np.full((*shape, joints), int(Visibility.OUTSIDE), np.int8)
@@ -137,22 +136,24 @@ def film(
     names = Lookalikes.of(playback.scene).names
     seeming = np.full((*shape[:2], len(names), joints, 2), np.nan)
     seeming_visible = np.zeros(seeming.shape[:-1], bool)
-    for f, view_group, states in _moments(playback, shots, frames):
-        cameras = [shots.camera(frames[f], view) for view in view_group]
-        for view, seen in zip(view_group, eye.see(states, cameras), strict=True):
+    for f, view_group, states in _moments(playback, exposures, frames):
+        cameras = [exposures.camera(frames[f], view) for view in view_group]
+        for view, seen in zip(view_group, observer.observe(states, cameras), strict=True):
             pixels[f, view], visibility[f, view] = seen.pixels, seen.visibility
             boxed[f, view], area[f, view] = seen.boxes, seen.area_visible
             seeming[f, view], seeming_visible[f, view] = seen.lookalike_pixels, seen.lookalike_visible
     kept: dict[int, tuple[NDArray[np.uint8], ...]] = {}
     for frame in frames:
-        if studio is not None and frame in previews:
-            kept[frame] = tuple(studio.picture(shots, frame, view, width=PREVIEW, finer=2) for view in range(views))
+        if picture_source is not None and frame in previews:
+            kept[frame] = tuple(
+                picture_source.picture(exposures, frame, view, width=PREVIEW, finer=2) for view in range(views)
+            )
     return Views(
         pixels=pixels,
         visibility=visibility,
         boxes=boxed,
         area_visible=area,
-        source=shots.source[list(frames)],
+        source=exposures.source[list(frames)],
         previews=kept,
         lookalikes=LookalikeViews(names, seeming, seeming_visible),
     )
@@ -162,15 +163,15 @@ _BLOCK = 64  # frames whose motions are sampled together
 
 
 def _moments(
-    playback: Playback, shots: Shots, frames: Many[int]
+    playback: Playback, exposures: ExposureSchedule, frames: Many[int]
 ) -> Iterator[tuple[int, NDArray[np.int64], list[State]]]:
     """Position in ``frames``, views whose pictures are taken together, and the scene at the moments of their bands."""
     for start in range(0, len(frames), _BLOCK):
         groups = []
         for f in range(start, min(start + _BLOCK, len(frames))):
-            delivered = np.flatnonzero(shots.source[frames[f]] >= 0)
-            when = shots.time[frames[f], delivered]
-            groups += [(f, delivered[when == time], moments(time, shots.readout)) for time in np.unique(when)]
+            delivered = np.flatnonzero(exposures.source[frames[f]] >= 0)
+            when = exposures.time[frames[f], delivered]
+            groups += [(f, delivered[when == time], moments(time, exposures.readout)) for time in np.unique(when)]
         states = playback.over(np.concatenate([np.zeros(0), *(times for *_, times in groups)]))
         for f, views, times in groups:
             yield f, views, list(itertools.islice(states, len(times)))

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.rendering.optics import appear
+from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import Image
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 _MARGIN = 0.04  # metres
 
@@ -50,7 +50,7 @@ def label(image: Image, camera: Camera, *, joints: ArrayLike, radii: ArrayLike) 
             f"the image must be of camera {camera.name!r}, {camera.size[0]} x {camera.size[1]} pixels, "
             f"got {image.depth.shape[1]} x {image.depth.shape[0]}"
         )
-    pixels = appear(camera, joints)
+    pixels = project_to_image(camera, joints)
     inside = camera.inside(pixels)
     column, row = np.moveaxis(np.floor(np.where(inside[..., None], pixels, 0) + 0.5).astype(int), -1, 0)
     seen = image.ids[row, column]

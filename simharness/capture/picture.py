@@ -24,7 +24,7 @@ from simharness.world.motion.trajectory import posed
 
 if TYPE_CHECKING:
     from simharness.scenario.sections.scenario import Sensor
-    from simharness.world.rigs.shots import Shots
+    from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.build import Scene
     from simharness.world.scene.playback import Playback, State
 
@@ -106,7 +106,7 @@ def one_below_the_other(bands: Many[Image]) -> Image:
     )
 
 
-class Studio:
+class PictureSource:
     """Makes the pictures that the cameras deliver, with their shutters and sensors.
 
     Args:
@@ -122,39 +122,41 @@ class Studio:
         self._sensor = sensor
         self._seed = seed
 
-    def picture(self, shots: Shots, frame: int, view: int, *, finer: int = 1, width: int | None = None) -> Rgb:
+    def picture(
+        self, exposures: ExposureSchedule, frame: int, view: int, *, finer: int = 1, width: int | None = None
+    ) -> Rgb:
         """The colour picture that ``view`` delivers in ``frame``, (h, w, 3); black where none arrives.
 
         Args:
-            shots: when and with which lens it is taken.
+            exposures: when and with which lens it is taken.
             frame: of the sequence.
             view: of the rig.
             finer: samples a pixel each way; 2 makes smooth outlines.
             width: of the picture, pixels, where it is to be smaller than the camera's.
         """
-        size = shots.believed[view].size
+        size = exposures.believed_rig[view].size
         scale = 1.0 if width is None else min(1.0, width / size[0])
-        if not shots.delivered[frame, view]:
+        if not exposures.delivered[frame, view]:
             return np.zeros((*reduced_size(size, scale)[::-1], 3), np.uint8)
-        camera = scaled(shots.camera(frame, view), scale)
+        camera = scaled(exposures.camera(frame, view), scale)
         exposed = []
-        for middle in self._open(shots.time[frame, view]):
-            times = moments(middle, shots.readout)
+        for middle in self._open(exposures.time[frame, view]):
+            times = moments(middle, exposures.readout)
             bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
             exposed.append(np.concatenate([self._drawn(state, strip, finer) for state, strip in bands]))
-        taken = int(shots.source[frame, view])
+        taken = int(exposures.source[frame, view])
         return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken)
 
-    def image(self, shots: Shots, frame: int, view: int) -> Image:
+    def image(self, exposures: ExposureSchedule, frame: int, view: int) -> Image:
         """Depth, ids and body parts of the middle of the exposure.
 
         Raises:
             ValueError: a picture that never arrives.
         """
-        if not shots.delivered[frame, view]:
+        if not exposures.delivered[frame, view]:
             raise ValueError(f"view {view} delivers no picture in frame {frame}")
-        camera, scene = shots.camera(frame, view), self._playback.scene
-        times = moments(shots.time[frame, view], shots.readout)
+        camera, scene = exposures.camera(frame, view), self._playback.scene
+        times = moments(exposures.time[frame, view], exposures.readout)
         bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
         return one_below_the_other(
             [self._renderer.render(strip, meshes_at(scene, state), color=False, parts=True) for state, strip in bands]

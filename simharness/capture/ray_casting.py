@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _THINGS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # groups of geoms that MuJoCo looks at
 
 
-class Caster:
+class RayCaster:
     """Casts rays into a scene. Has a state of its own, so it is not for sharing.
 
     Args:

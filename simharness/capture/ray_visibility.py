@@ -14,12 +14,12 @@ import numpy as np
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
 from simharness.capture.body_outlines import Outline, boxes
-from simharness.capture.film import Seen
+from simharness.capture.film import Observation
 from simharness.capture.joint_visibility import decide
-from simharness.capture.ray_casting import Caster
-from simharness.capture.rendering.optics import appear
+from simharness.capture.ray_casting import RayCaster
+from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.shutter import rolled
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _FILLED = 0.47  # of a box is the person: median over simulated people who walk and wave (0.33 to 0.60 of 80 % of them)
 
 
-class RayEye:
+class RayObserver:
     """Sees by rays and by the outlines of bodies.
 
     ``area_visible`` is an estimate: of a person's box 0.47 is the person, and of that as much is seen as of the joints
@@ -41,19 +41,19 @@ class RayEye:
 
     def __init__(self, playback: Playback) -> None:
         bodies = playback.scene.bodies
-        self._caster = Caster(playback.scene)
+        self._caster = RayCaster(playback.scene)
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
         self._outlines = [Outline.of(body) for body in bodies]
         self._lookalikes = Lookalikes.of(playback.scene)
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
-    def see(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Seen]:
-        """See :class:`simharness.capture.film.Eye`."""
+    def observe(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Observation]:
+        """See :class:`simharness.capture.film.Observer`."""
         people = len(self._radii)
         bands = np.stack([state.joints for state in states])
         bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
         targets = np.stack([rolled(bands, camera) for camera in cameras])
-        pixels = np.stack([appear(camera, where) for camera, where in zip(cameras, targets, strict=True)])
+        pixels = np.stack([project_to_image(camera, where) for camera, where in zip(cameras, targets, strict=True)])
         there = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
         for v, camera in enumerate(cameras):
             targets[v, people:], shown = self._lookalikes.targets(camera.center, targets[v, people:])
@@ -71,14 +71,14 @@ class RayEye:
         share = seen / np.maximum(inside.sum(axis=-1), 1)
         areas = np.rint(_FILLED * framed[..., 2] * framed[..., 3] * share).astype(np.int64)
         return [
-            Seen(at[:people], label, box, area, at[people:], visible[people:])
+            Observation(at[:people], label, box, area, at[people:], visible[people:])
             for at, label, box, area, visible in zip(pixels, labels, framed, areas, found, strict=True)
         ]
 
     def _meet(
         self, states: Sequence[State], cameras: Sequence[Camera], pixels: Floats, targets: Floats, there: Bools
     ) -> tuple[Integers, Floats]:
-        """What :meth:`Caster.cast` meets on the way to targets (V, n, 17, 3), each in the moment of its own row."""
+        """What :meth:`RayCaster.cast` meets on the way to targets (V, n, 17, 3), each in the moment of its own row."""
         owner, in_front = np.full(there.shape, -1), np.full(there.shape, -np.inf)
         for k, state in enumerate(states):
             self._caster.place(state)

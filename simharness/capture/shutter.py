@@ -13,7 +13,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from simharness.capture.rendering.optics import appear
+from simharness.capture.rendering.lens import project_to_image
 
 BANDS = 8
 _ITERATIONS = 6  # a joint moves a fraction of a band while its row is found: this converges at once
@@ -40,7 +40,7 @@ def rolled(joints: Floats, camera: Camera) -> Floats:
     middle = (joints[(count - 1) // 2] + joints[count // 2]) / 2
     where = middle
     for _ in range(_ITERATIONS if count > 1 else 0):
-        row = appear(camera, where)[..., 1]
+        row = project_to_image(camera, where)[..., 1]
         band = np.clip((row + 0.5) / camera.size[1] * count - 0.5, 0, count - 1)
         low = np.minimum(np.nan_to_num(band).astype(int), count - 2)
         share = (band - low)[..., None]

@@ -34,7 +34,7 @@ class Truth:
     Attributes:
         joints: COCO-17 in the world, (P, J, 3), metres.
         pixels: their projections, (V, P, J, 2); NaN behind the camera.
-        visibility: :class:`simharness.types.visibility.Visibility`, (V, P, J).
+        visibility: :class:`simharness.types.views.Visibility`, (V, P, J).
         boxes: x, y, width, height of each whole silhouette within the image, (V, P, 4); zeros where outside.
         person: true person of each of the frame's detections, (m,), -1 for a phantom.
         error: :class:`KeypointError` of each detected keypoint, (m, J).

@@ -5,12 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.checks import as_array
+
+
+class Visibility(IntEnum):
+    """Visibility of a joint in one camera."""
+
+    VISIBLE = 0
+    SELF_OCCLUDED = 1
+    OCCLUDED_BY_PERSON = 2
+    OCCLUDED_BY_CLUTTER = 3
+    OUTSIDE = 4
 
 
 @dataclass(frozen=True)
@@ -48,7 +59,7 @@ class Views:
 
     Attributes:
         pixels: where each joint is in the picture, (T, V, P, J, 2); NaN behind the camera.
-        visibility: :class:`simharness.types.visibility.Visibility`, (T, V, P, J) int8.
+        visibility: :class:`simharness.types.views.Visibility`, (T, V, P, J) int8.
         boxes: x, y, width, height in pixels of the part of each person's silhouette that falls on the image,
             whatever stands in front, (T, V, P, 4); zeros where none does.
         area_visible: pixels in which each person is seen, (T, V, P).

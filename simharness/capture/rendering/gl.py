@@ -22,8 +22,8 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.face_kernels import normals
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Unavailable, check_count
+from simharness.capture.rendering.scene_geometry import SceneGeometry, Shadows, pyramid
 from simharness.capture.rendering.shading_kernels import LEAST_COSINE
-from simharness.capture.rendering.triangle_soup import Shadows, Soup, pyramid
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
@@ -59,7 +59,7 @@ class GlRenderer:
             ) from error
         self._pyrender = pyrender
         self._renderer = _renderer()
-        self._soup: Soup | None = None
+        self._geometry: SceneGeometry | None = None
         self._scene: Any = None
         self._staged: dict[tuple[int, int], tuple[Mesh, Any]] = {}
         self._textures: dict[int, tuple[NDArray[np.uint8], Any]] = {}
@@ -100,8 +100,8 @@ class GlRenderer:
             wanted = flags.OFFSCREEN | flags.RGBA | flags.SKIP_CULL_FACES
             rgb, labels = np.zeros((height, width, 3), np.uint8), None
             if color:
-                assert self._soup is not None  # there is a stage
-                self._renderer.light(lighting, self._soup)
+                assert self._geometry is not None  # there is a stage
+                self._renderer.light(lighting, self._geometry)
                 rgba, depth = self._renderer.render(self._scene, wanted)
                 rgb = np.ascontiguousarray(rgba[..., :3])
             if parts or not color:
@@ -115,8 +115,8 @@ class GlRenderer:
 
     def _stage(self, meshes: Sequence[Mesh]) -> None:
         """Put the meshes on stage; those that stand there already, the same objects, stay uploaded."""
-        soup = Soup.of(meshes, self._soup)
-        if soup is self._soup:
+        geometry = SceneGeometry.of(meshes, self._geometry)
+        if geometry is self._geometry:
             return
         scene = self._pyrender.Scene()
         staged: dict[tuple[int, int], tuple[Mesh, Any]] = {}
@@ -132,7 +132,7 @@ class GlRenderer:
                 kept = mesh, self._pyrender.Mesh([self._primitive(mesh, index, textures)])
             staged[id(mesh), index] = kept
             scene.add(kept[1])
-        self._scene, self._soup, self._staged, self._textures = scene, soup, staged, textures
+        self._scene, self._geometry, self._staged, self._textures = scene, geometry, staged, textures
 
     def _primitive(self, mesh: Mesh, index: int, textures: dict[int, tuple[NDArray[np.uint8], Any]]) -> Any:
         """Every face with corners of its own, so that it can have a colour of its own."""
@@ -193,9 +193,9 @@ def _renderer() -> Any:
             self._map: int | None = None
             GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)  # rows of textures follow each other without gaps
 
-        def light(self, lighting: Lighting, soup: Soup) -> None:
+        def light(self, lighting: Lighting, geometry: SceneGeometry) -> None:
             """Use this light and the shadows of this scene in it."""
-            shadows = soup.shadows(lighting)
+            shadows = geometry.shadows(lighting)
             self._lighting = lighting
             GL.glActiveTexture(GL.GL_TEXTURE0 + _SHADOW_UNIT)
             if self._map is None:

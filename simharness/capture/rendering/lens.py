@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import Image
@@ -23,6 +23,7 @@ _MARGIN = 1  # pixels around it, for interpolation
 _LONGEST_SIDE = 16384  # pixels; of what OpenGL draws
 _SAMPLES = 64  # places along each side where the magnification is taken; it changes smoothly
 _KEPT = 64  # lenses: as many as cameras in a rig
+_ROUND_TRIP = 0.5  # pixels: a lens that folds over brings directions back that it does not image
 
 
 @dataclass(frozen=True)
@@ -141,3 +142,24 @@ def _magnification(camera: Camera, straight: NDArray[np.float64]) -> float:
     squares, determinant = a * a + b * b + c * c + d * d, a * d - b * c
     largest = (squares + np.sqrt(np.maximum(squares**2 - 4 * determinant**2, 0.0))) / 2
     return float(np.sqrt(largest.max()))
+
+
+def project_to_image(camera: Camera, points: ArrayLike, *, near: float = 0.0) -> NDArray[np.float64]:
+    """Project world points (..., 3) to pixels (..., 2); NaN where ``camera`` does not image the point.
+
+    A point is not imaged where it is less than ``near`` metres in front of the camera centre, or beyond the angle at
+    which the polynomial of the lens folds over: :meth:`Camera.project` gives such directions a second, wrong position
+    inside the picture.
+    """
+    # Row by row rather than by a matrix product: BLAS may round differently from one process to the next.
+    x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
+    u, v, depth = (row[0] * x + row[1] * y + row[2] * z + row[3] for row in camera.P)
+    front = depth > near
+    depth = np.where(front, depth, np.nan)
+    straight = np.stack([u / depth, v / depth], axis=-1)
+    if not camera.distortion.any():
+        return straight
+    bent = camera.project(np.where(front[..., None], points, np.nan))
+    with np.errstate(invalid="ignore"):
+        imaged = np.linalg.norm(camera.undistort(bent) - straight, axis=-1) < _ROUND_TRIP
+    return np.where(imaged[..., None], bent, np.nan)

@@ -15,8 +15,8 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.raster_kernels import rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
+from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
-from simharness.capture.rendering.triangle_soup import Soup
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
@@ -27,7 +27,7 @@ class RasterRenderer:
     """Renders on one core of any machine. The last scene is kept: all views of a frame share its shadows."""
 
     def __init__(self) -> None:
-        self._soup = Soup.of(())
+        self._geometry = SceneGeometry.of(())
         self._inverse_depth, self._triangle = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
 
     def render(
@@ -41,21 +41,21 @@ class RasterRenderer:
     ) -> Image:
         """Picture ``meshes`` as ``camera`` sees them: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
         check_count(meshes, most=_MOST_MESHES)
-        self._soup = Soup.of(meshes, self._soup)
+        self._geometry = SceneGeometry.of(meshes, self._geometry)
         return through_lens(camera, lambda pinhole: self._picture(pinhole, color, lighting, parts))
 
     def _picture(self, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
-        soup, shape = self._soup, camera.size[::-1]
+        geometry, shape = self._geometry, camera.size[::-1]
         inverse_depth, triangle = self._buffers(shape)
-        q = rasterise(soup.vertices, soup.fabric.faces, camera.P, NEAR, inverse_depth, triangle)
-        depth, ids = resolve(inverse_depth, triangle, soup.fabric.mesh)
+        q = rasterise(geometry.vertices, geometry.topology.faces, camera.P, NEAR, inverse_depth, triangle)
+        depth, ids = resolve(inverse_depth, triangle, geometry.topology.mesh)
         return Image(
-            rgb=_shaded(soup, camera, lighting, inverse_depth, triangle, q)
+            rgb=_shaded(geometry, camera, lighting, inverse_depth, triangle, q)
             if color
             else np.zeros((*shape, 3), np.uint8),
             depth=depth,
             ids=ids,
-            parts=soup.fabric.parts[triangle] if parts else None,
+            parts=geometry.topology.parts[triangle] if parts else None,
         )
 
     def _buffers(self, shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
@@ -68,7 +68,7 @@ class RasterRenderer:
 
 
 def _shaded(
-    soup: Soup,
+    geometry: SceneGeometry,
     camera: Camera,
     lighting: Lighting,
     inverse_depth: NDArray[np.float32],
@@ -76,20 +76,20 @@ def _shaded(
     q: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
     empty = np.round(255 * np.array(lighting.background))
-    if not len(soup.fabric.faces):
+    if not len(geometry.topology.faces):
         return np.full((*triangle.shape, 3), empty, np.uint8)
-    fabric, shadows = soup.fabric, soup.shadows(lighting)
+    topology, shadows = geometry.topology, geometry.shadows(lighting)
     return shade(
         triangle,
         inverse_depth,
         q,
-        fabric.faces,
-        fabric.colors,
-        fabric.smooth,
-        *soup.normals,
-        fabric.texture,
-        fabric.uv,
-        *fabric.pyramids,
+        topology.faces,
+        topology.colors,
+        topology.smooth,
+        *geometry.normals,
+        topology.texture,
+        topology.uv,
+        *topology.pyramids,
         camera.center,
         np.ascontiguousarray(np.linalg.inv(camera.P[:, :3])),
         np.array(lighting.direction),

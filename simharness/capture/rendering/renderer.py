@@ -85,3 +85,30 @@ def check_count(meshes: Sequence[Mesh], *, most: int) -> None:
     """Refuse more than ``most`` meshes."""
     if len(meshes) > most:
         raise ValueError(f"this renderer tells at most {most} meshes apart, got {len(meshes)}: merge some")
+
+
+def make_renderer(name: RendererName = "raster") -> Renderer:
+    """Return the renderer of this name.
+
+    Args:
+        name: ``"raster"`` (numba, runs everywhere), ``"gl"`` (pyrender on EGL), or ``"auto"``: gl where it works, else
+            raster.
+
+    Raises:
+        Unavailable: ``"gl"`` was requested and no context can be created.
+        ValueError: an unknown name.
+    """
+    if name not in ("raster", "gl", "auto"):
+        raise ValueError(f"renderer must be 'raster', 'gl' or 'auto', got {name!r}")
+    from simharness.capture.rendering.raster import RasterRenderer
+
+    if name == "raster":
+        return RasterRenderer()
+    from simharness.capture.rendering.gl import GlRenderer  # needs OpenGL, which not every machine has
+
+    try:
+        return GlRenderer()
+    except Unavailable:
+        if name == "gl":
+            raise
+        return RasterRenderer()

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera, Rig
+from simharness.formats.calibration.registry import read_calibration
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.random_streams import stream
-from simharness.world.rigs.files import read_rig
+from simharness.world.rigs.camera_positions import places
 from simharness.world.rigs.lenses import check_lens, intrinsics
-from simharness.world.rigs.places import places
 from simharness.world.rigs.presets import preset_rig
 
 _STEEPEST = 1e-6  # sine of the angle to the vertical below which a camera has no upright roll
@@ -23,7 +23,7 @@ _NO_TURN = 1e-6  # of a rotation matrix' elements
 def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, float] | None = None) -> Rig:
     """Place the cameras of a scenario.
 
-    :func:`simharness.world.rigs.places.places` says where those of a layout stand. They are upright, have square pixels
+    :func:`simharness.world.rigs.camera_positions.places` says where those of a layout stand. They are upright, have square pixels
     and look at ``aim``; ``jitter`` and ``aim_jitter`` draw how far off each stands and looks, from streams of that
     camera. Presets and calibrations in files are taken as they are.
 
@@ -84,7 +84,7 @@ def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | No
 def _from_file(cameras: Cameras) -> Rig:
     if not cameras.file:
         raise ValueError("cameras.layout = 'file' needs cameras.file: a calibration, relative to the scenario's folder")
-    rig = read_rig(cameras.file, size=cameras.size, only=cameras.only)
+    rig = read_calibration(cameras.file, size=cameras.size, only=cameras.only)
     for camera in rig:
         if np.abs(camera.R - np.eye(3)).max() < _NO_TURN and np.abs(camera.t).max() < _SAME:
             # The world is that camera's, as a stereo calibration leaves it: it hangs where a ring's first one would.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
 from simharness.types.landmarks import LANDMARKS
+from simharness.types.sequence import Sequence
 from simharness.world.humans.body import body_model
 from simharness.world.humans.mujoco_model import bone_transforms
 from simharness.world.motion.poses.kinematics import Addresses
@@ -84,3 +85,14 @@ class Playback:
                 bones=np.stack(bones) if bones else self._empty,
                 placements=placements[n],
             )
+
+
+def simulate(scene: Scene) -> Sequence:
+    """Return the landmarks of all people at the times of the frames, (T, P, L, 3); P may be 0.
+
+    These are the nominal times of the frames: the clocks of the cameras have no influence.
+    """
+    landmarks = np.empty((len(scene.time), len(scene.bodies), len(LANDMARKS), 3))
+    for frame, state in enumerate(Playback(scene).over(scene.time)):
+        landmarks[frame] = state.landmarks
+    return Sequence(landmarks=landmarks, ids=np.arange(len(scene.bodies)), time=scene.time)

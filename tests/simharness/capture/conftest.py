@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.capture.rendering.choice import make_renderer
-from simharness.capture.rendering.renderer import Unavailable
+from simharness.capture.rendering.renderer import Unavailable, make_renderer
 
 sys.path.insert(0, str(Path(__file__).parent))  # shapes.py
 

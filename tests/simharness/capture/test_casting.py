@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_renderers import camera_at
 
-from simharness.capture.ray_casting import Caster
+from simharness.capture.ray_casting import RayCaster
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.mujoco_model import SKIN_GROUP, bone_transforms, person_spec
@@ -80,7 +80,7 @@ def test_everything_is_met_where_mujoco_meets_it(stage, seed):
     """From anywhere, also from within a body, towards the people and past them."""
     rng = stream(seed, "test", "rays")
     state = stage.posed(rng, ball=(*rng.uniform([-1, -1, 0.5], [1, 1, 1.5]), 1.0, 0.0, 0.0, 0.0))
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     caster.place(state)
     camera = camera_at(rng.uniform([-3, -3, 0.1], [3, 3, 2.5]), rng.uniform([0, 0, 0.5], [1, 0.5, 1.5]))
     targets = camera.center + rng.uniform(0.5, 4.0, (30, 1)) * camera.rays(rng.uniform(0, 100, (30, 2)))
@@ -98,7 +98,7 @@ def test_everything_is_met_where_mujoco_meets_it(stage, seed):
 
 
 def test_a_box_hides_what_is_behind_it_and_nothing_in_front(stage):
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     caster.place(stage.state)
     camera = camera_at((-1.0, 4.0, 0.5), (-1.0, 1.0, 0.5))
     owner, in_front = caster.cast(camera, np.array([[-1.0, 0.0, 0.5], [-1.0, 2.0, 0.5]]))
@@ -110,7 +110,7 @@ def test_a_box_hides_what_is_behind_it_and_nothing_in_front(stage):
 
 
 def test_what_moves_is_met_where_it_is(stage):
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     camera = camera_at((3.0, -1.0, 1.2), (0.0, -1.0, 1.2))
     target = np.array([[0.0, -1.0, 1.2]])
     for x in (0.5, 0.9):
@@ -124,7 +124,7 @@ def test_what_moves_is_met_where_it_is(stage):
 
 def test_nothing_nearer_than_the_near_plane_is_met(stage):
     """A lens 3 cm from a ball's surface, inside of it: only what comes after the ball's far side counts."""
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     ball = (0.5, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # its centre is 20 cm above
     caster.place(stage.posed(stream(1, "test"), ball=ball))
     for behind, met in ((0.02, -1), (0.08, 2)):  # the far side is that far from the lens
@@ -136,7 +136,7 @@ def test_nothing_nearer_than_the_near_plane_is_met(stage):
 def test_capsules_are_passed_by_only_if_they_are_out_of_the_way(stage):
     """Rays at the very edge of each capsule: just inside is met, just outside is not. No short cut may miss one."""
     state = stage.posed(stream(3, "test"))
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     caster.place(state)
     camera = camera_at((4.0, 2.0, 1.3), (0.5, 0.2, 1.0))
     model, data = stage.model, stage.data
@@ -151,7 +151,7 @@ def test_capsules_are_passed_by_only_if_they_are_out_of_the_way(stage):
 
 
 def test_no_targets(stage):
-    caster = Caster(stage)
+    caster = RayCaster(stage)
     caster.place(stage.state)
     owner, in_front = caster.cast(camera_at((3, 0, 1), (0, 0, 1)), np.zeros((0, 3)))
     assert owner.shape == in_front.shape == (0,)

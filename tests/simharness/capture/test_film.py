@@ -12,15 +12,14 @@ from test_renderers import camera_at
 
 from mvpose.camera import Rig
 from simharness.capture.body_outlines import NO_EDGES, boxes
-from simharness.capture.film import PictureEye, film
-from simharness.capture.picture import Studio, antialiased, meshes_at
+from simharness.capture.film import PictureObserver, film
+from simharness.capture.picture import PictureSource, antialiased, meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.scenario.sections.scenario import Faults, Sensor
 from simharness.types.lighting import Lighting
-from simharness.types.views import LookalikeViews, Views
-from simharness.types.visibility import Visibility
-from simharness.world.rigs.faults import shoot
-from simharness.world.rigs.shots import Shots
+from simharness.types.views import LookalikeViews, Views, Visibility
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import schedule_exposures
 from simharness.world.scene.playback import State
 
 RIG = Rig([camera_at(c, (0, 0, 1), size=(200, 150)) for c in ((3.5, 0, 1.8), (0, 3.5, 1.8), (-2.5, -2.5, 1.8))])
@@ -75,9 +74,11 @@ class BallPlayback:
         return next(self.over([time]))
 
 
-def filmed(shots=None, playback=None, **how) -> Views:
+def filmed(exposures=None, playback=None, **how) -> Views:
     playback = playback or BallPlayback()
-    return film(playback, shots or Shots.ideal(RIG, TIME), PictureEye(playback, RasterRenderer()), **how)
+    return film(
+        playback, exposures or ExposureSchedule.ideal(RIG, TIME), PictureObserver(playback, RasterRenderer()), **how
+    )
 
 
 @pytest.fixture(scope="module")
@@ -146,12 +147,12 @@ class TestClocks:
     """Every camera sees the scene at its own time."""
 
     def test_a_late_camera_sees_what_is_then(self):
-        shots = shoot(RIG, Faults(clock_offset=0.05), TIME, seed=1)
-        late = shots.time - TIME[:, None]
+        exposures = schedule_exposures(RIG, Faults(clock_offset=0.05), TIME, seed=1)
+        late = exposures.time - TIME[:, None]
         assert np.ptp(late[0]) > 0.01
-        views = filmed(shots)
+        views = filmed(exposures)
         for v, camera in enumerate(RIG):
-            np.testing.assert_allclose(views.pixels[:, v], camera.project(true_joints(shots.time[:, v])))
+            np.testing.assert_allclose(views.pixels[:, v], camera.project(true_joints(exposures.time[:, v])))
 
     def test_cameras_with_one_clock_share_one_state(self):
         playback = BallPlayback()
@@ -159,7 +160,7 @@ class TestClocks:
         assert playback.asked == TIME.tolist()
 
     def test_what_never_arrives_shows_nothing(self):
-        views = filmed(shoot(RIG, Faults(dead=(1,)), TIME, seed=1))
+        views = filmed(schedule_exposures(RIG, Faults(dead=(1,)), TIME, seed=1))
         assert np.isnan(views.pixels[:, 1]).all()
         assert (views.visibility[:, 1] == Visibility.OUTSIDE).all()
         assert not views.boxes[:, 1].any()
@@ -167,26 +168,26 @@ class TestClocks:
         assert np.isfinite(views.pixels[:, [0, 2]]).all()
 
     def test_a_frozen_picture_is_the_one_before(self):
-        shots = shoot(RIG, Faults(frozen=0.5), TIME, seed=3)
-        views = filmed(shots)
-        again = [(t, v) for t, v in np.ndindex(FRAMES, len(RIG)) if shots.source[t, v] != t]
+        exposures = schedule_exposures(RIG, Faults(frozen=0.5), TIME, seed=3)
+        views = filmed(exposures)
+        again = [(t, v) for t, v in np.ndindex(FRAMES, len(RIG)) if exposures.source[t, v] != t]
         assert again
         for t, v in again:
-            np.testing.assert_array_equal(views.pixels[t, v], views.pixels[shots.source[t, v], v])
+            np.testing.assert_array_equal(views.pixels[t, v], views.pixels[exposures.source[t, v], v])
 
     def test_drift_moves_the_picture_but_not_the_calibration(self):
-        shots = shoot(RIG, Faults(rotation_drift=60.0), TIME, seed=1)
-        moved, still = filmed(shots).pixels, filmed().pixels
+        exposures = schedule_exposures(RIG, Faults(rotation_drift=60.0), TIME, seed=1)
+        moved, still = filmed(exposures).pixels, filmed().pixels
         np.testing.assert_array_equal(moved[0], still[0])
         assert np.linalg.norm(moved[-1] - still[-1], axis=-1).max() > 0.5
 
     def test_swapped_cameras_deliver_each_others_pictures(self, views):
-        swapped = filmed(shoot(RIG, Faults(swapped=((0, 2),)), TIME, seed=1))
+        swapped = filmed(schedule_exposures(RIG, Faults(swapped=((0, 2),)), TIME, seed=1))
         np.testing.assert_array_equal(swapped.pixels[:, [2, 1, 0]], views.pixels)
 
     def test_a_rolling_shutter_takes_each_joint_when_its_row_comes(self):
         readout = 0.08
-        views = filmed(replace(Shots.ideal(RIG, TIME), readout=readout))
+        views = filmed(replace(ExposureSchedule.ideal(RIG, TIME), readout=readout))
         for v, camera in enumerate(RIG):
             row = views.pixels[:, v, ..., 1]
             when = TIME[:, None, None] + readout * ((row + 0.5) / camera.size[1] - 0.5)
@@ -212,20 +213,20 @@ def test_boxes_at_the_border_and_beyond():
 
 class TestStudio:
     @staticmethod
-    def studio(**sensor) -> Studio:
-        return Studio(BallPlayback(), RasterRenderer(), sensor=Sensor(**sensor), seed=0)
+    def picture_source(**sensor) -> PictureSource:
+        return PictureSource(BallPlayback(), RasterRenderer(), sensor=Sensor(**sensor), seed=0)
 
     def test_a_picture_for_people_is_smooth_and_true(self):
-        shots = Shots.ideal(RIG, TIME)
-        smooth, plain = (self.studio().picture(shots, 1, 0, finer=finer) for finer in (3, 1))
+        exposures = ExposureSchedule.ideal(RIG, TIME)
+        smooth, plain = (self.picture_source().picture(exposures, 1, 0, finer=finer) for finer in (3, 1))
         apart = np.abs(smooth.astype(int) - plain)
         assert np.median(apart) <= 1  # the same picture, in the same place
         assert apart.mean() < 2
         assert len(np.unique(smooth.reshape(-1, 3), axis=0)) > len(np.unique(plain.reshape(-1, 3), axis=0))
 
     def test_an_open_shutter_blurs_along_the_way(self):
-        shots = Shots.ideal(RIG, TIME)
-        sharp, blurred = (self.studio(shutter=shutter).picture(shots, 1, 1) for shutter in (0.0, 0.1))
+        exposures = ExposureSchedule.ideal(RIG, TIME)
+        sharp, blurred = (self.picture_source(shutter=shutter).picture(exposures, 1, 1) for shutter in (0.0, 0.1))
         steps = (np.abs(np.diff(picture.astype(float), axis=1)).max(axis=2) for picture in (sharp, blurred))
         edges = [(step > 40).sum() for step in steps]
         assert 0 < edges[1] < 0.8 * edges[0]
@@ -233,10 +234,10 @@ class TestStudio:
         np.testing.assert_allclose(blurred[floor].mean(), sharp[floor].mean(), atol=1.0)
 
     def test_a_picture_that_never_arrives_is_black(self):
-        shots = shoot(RIG, Faults(dead=(1,)), TIME, seed=1)
-        assert not self.studio().picture(shots, 0, 1).any()
+        exposures = schedule_exposures(RIG, Faults(dead=(1,)), TIME, seed=1)
+        assert not self.picture_source().picture(exposures, 0, 1).any()
         with pytest.raises(ValueError, match="view 1 delivers no picture in frame 0"):
-            self.studio().image(shots, 0, 1)
+            self.picture_source().image(exposures, 0, 1)
 
 
 @pytest.mark.parametrize("finer", [1, 2, 3])
@@ -274,18 +275,23 @@ def test_lookalikes_are_none_by_default_and_checked(views):
 
 
 def test_previews_are_the_pictures_reduced_and_only_those_asked_for():
-    shots, studio = Shots.ideal(RIG, TIME), TestStudio.studio()
-    views = Views.concatenate([filmed(frames=[t], studio=studio, previews={1, 3}) for t in range(FRAMES)])
+    exposures, picture_source = ExposureSchedule.ideal(RIG, TIME), TestStudio.picture_source()
+    views = Views.concatenate(
+        [filmed(frames=[t], picture_source=picture_source, previews={1, 3}) for t in range(FRAMES)]
+    )
     assert sorted(views.previews) == [1, 3]
     for v in range(len(RIG)):
-        np.testing.assert_array_equal(views.previews[3][v], studio.picture(shots, 3, v, finer=2))
+        np.testing.assert_array_equal(views.previews[3][v], picture_source.picture(exposures, 3, v, finer=2))
     assert views.previews[3][0].std() > 10
     assert filmed().previews == {}
 
 
 def test_a_smaller_picture_shows_the_same():
-    shots, studio = Shots.ideal(RIG, TIME), TestStudio.studio()
-    small, full = studio.picture(shots, 3, 0, finer=2, width=100), studio.picture(shots, 3, 0, finer=2)
+    exposures, picture_source = ExposureSchedule.ideal(RIG, TIME), TestStudio.picture_source()
+    small, full = (
+        picture_source.picture(exposures, 3, 0, finer=2, width=100),
+        picture_source.picture(exposures, 3, 0, finer=2),
+    )
     assert small.shape == (75, 100, 3)
     halved = full.reshape(75, 2, 100, 2, 3).mean(axis=(1, 3))
     assert np.abs(small - halved).mean() < 2.0

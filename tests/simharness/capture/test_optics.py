@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.capture.rendering.optics import appear
+from simharness.capture.rendering.lens import project_to_image
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import intrinsics, look_at
 
@@ -23,14 +23,14 @@ def test_it_is_opencvs_projection(distortion):
     eye = camera(distortion)
     points = stream(0, "points").uniform([-1, -1, 0], [1, 1, 2], (200, 3))
     expected, _ = cv2.projectPoints(points, cv2.Rodrigues(eye.R)[0], eye.t, eye.K, eye.distortion)
-    np.testing.assert_allclose(appear(eye, points), expected[:, 0], atol=1e-6)
+    np.testing.assert_allclose(project_to_image(eye, points), expected[:, 0], atol=1e-6)
 
 
 def test_what_is_behind_or_too_near_does_not_appear():
     eye = camera()
     forward = eye.R[2]
     points = eye.center + np.array([-1.0, 0.04, 0.06])[:, None] * forward
-    assert np.isnan(appear(eye, points, near=0.05)).any(axis=-1).tolist() == [True, True, False]
+    assert np.isnan(project_to_image(eye, points, near=0.05)).any(axis=-1).tolist() == [True, True, False]
 
 
 def test_a_lens_that_folds_over_shows_nothing_twice():
@@ -41,14 +41,14 @@ def test_a_lens_that_folds_over_shows_nothing_twice():
     points = eye.center + 2 * (forward + radius[:, None] * right)
     folded = eye.project(points)
     assert eye.inside(folded)[2:].any()  # or this test shows nothing
-    assert np.isfinite(appear(eye, points)).all(axis=-1).tolist() == [True, True, False, False]
+    assert np.isfinite(project_to_image(eye, points)).all(axis=-1).tolist() == [True, True, False, False]
 
 
 def test_shapes_are_kept():
-    assert appear(camera(), np.zeros((3, 17, 3))).shape == (3, 17, 2)
-    assert appear(camera((0.1, 0, 0, 0, 0)), np.zeros((0, 17, 3))).shape == (0, 17, 2)
+    assert project_to_image(camera(), np.zeros((3, 17, 3))).shape == (3, 17, 2)
+    assert project_to_image(camera((0.1, 0, 0, 0, 0)), np.zeros((0, 17, 3))).shape == (0, 17, 2)
 
 
 @pytest.mark.parametrize("where", [(np.nan, 0, 0), (np.inf, 0, 0)])
 def test_what_is_nowhere_does_not_appear(where):
-    assert np.isnan(appear(camera(), where)).all()
+    assert np.isnan(project_to_image(camera(), where)).all()

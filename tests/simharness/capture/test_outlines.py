@@ -10,7 +10,7 @@ import pytest
 from test_renderers import camera_at
 
 from simharness.capture.body_outlines import Outline, framed, packed
-from simharness.capture.rendering.optics import appear
+from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import NEAR
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
@@ -46,7 +46,7 @@ def framed_by_outline(body, transforms, camera, rows=(0.0, 1.0)):
 
 def framed_by_skin(skin, camera, rows=(0.0, 1.0)):
     """The same from every vertex of the skin, of which those count that fall on the image."""
-    pixels = appear(camera, skin, near=NEAR)
+    pixels = project_to_image(camera, skin, near=NEAR)
     share = (pixels[:, 1] + 0.5) / camera.size[1]
     pixels = pixels[camera.inside(pixels) & (share >= rows[0]) & (share < rows[1])]
     return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
@@ -82,7 +82,7 @@ def test_whom_the_border_cuts_is_framed_to_the_border():
             skin = between(body.skin(transforms)[body.faces])
             for aim in ((0, 0.9, 1.6), (0, -0.8, 1.0), (0, 0.2, 0.1), (0, 0, 1.9), (0, 1.2, 1.2)):
                 camera = camera_at((2.2, 0.3, 1.5), aim, size=(800, 600), fov=50.0)
-                inside = camera.inside(appear(camera, skin))
+                inside = camera.inside(project_to_image(camera, skin))
                 if inside.any() and not inside.all():
                     expected = framed_by_skin(skin, camera)
                     size = max(expected[2] - expected[0], expected[3] - expected[1])

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Rig
-from simharness.capture.film import PictureEye
-from simharness.capture.ray_casting import Caster
-from simharness.capture.ray_visibility import RayEye
-from simharness.capture.rendering.choice import make_renderer
-from simharness.capture.rendering.optics import appear
+from simharness.capture.film import PictureObserver
+from simharness.capture.ray_casting import RayCaster
+from simharness.capture.ray_visibility import RayObserver
+from simharness.capture.rendering.lens import project_to_image
+from simharness.capture.rendering.renderer import make_renderer
 from simharness.scenario.sections.scenario import Scenario
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
 from simharness.world.scene.playback import Playback
@@ -48,11 +48,11 @@ def played(name):
 def compared(name):
     """What rays and pictures show, side by side: every camera at four times."""
     playback, rig = played(name)
-    rays, pictures = RayEye(playback), PictureEye(playback, make_renderer("raster"))
+    rays, pictures = RayObserver(playback), PictureObserver(playback, make_renderer("raster"))
     pairs = []
     for time in (0.1, 0.5, 1.0, 1.4):
         state = playback.at(time)
-        pairs += zip(rays.see([state], list(rig)), pictures.see([state], list(rig)), strict=True)
+        pairs += zip(rays.observe([state], list(rig)), pictures.observe([state], list(rig)), strict=True)
     return pairs
 
 
@@ -103,9 +103,11 @@ def test_a_lens_that_bends_shifts_pixels_and_hides_nothing_else():
     """Rays are straight in the world: of joints that both lenses image, the labels are the same."""
     playback, rig = played("walking about")
     bent = [replace(camera, distortion=np.array([-0.3, 0.1, 0.0, 0.0, 0.0])) for camera in rig]
-    eye, state = RayEye(playback), playback.at(1.0)
-    for camera, straight, curved in zip(bent, eye.see([state], list(rig)), eye.see([state], bent), strict=True):
-        np.testing.assert_array_equal(curved.pixels, appear(camera, state.joints))
+    observer, state = RayObserver(playback), playback.at(1.0)
+    for camera, straight, curved in zip(
+        bent, observer.observe([state], list(rig)), observer.observe([state], bent), strict=True
+    ):
+        np.testing.assert_array_equal(curved.pixels, project_to_image(camera, state.joints))
         both = (straight.visibility != Visibility.OUTSIDE) & (curved.visibility != Visibility.OUTSIDE)
         np.testing.assert_array_equal(curved.visibility[both], straight.visibility[both])
         assert both.sum() > 0
@@ -116,8 +118,10 @@ def test_a_lens_that_bends_shifts_pixels_and_hides_nothing_else():
 
 def test_a_rolling_shutter_of_a_still_scene_shows_what_any_shutter_shows():
     playback, rig = played("low")
-    eye, state = RayEye(playback), playback.at(0.8)
-    for at_once, rolled in zip(eye.see([state], list(rig)), eye.see([state] * 12, list(rig)), strict=True):
+    observer, state = RayObserver(playback), playback.at(0.8)
+    for at_once, rolled in zip(
+        observer.observe([state], list(rig)), observer.observe([state] * 12, list(rig)), strict=True
+    ):
         np.testing.assert_array_equal(rolled.visibility, at_once.visibility)
         np.testing.assert_allclose(rolled.pixels, at_once.pixels)
         np.testing.assert_allclose(rolled.boxes, at_once.boxes, atol=1e-6)
@@ -126,11 +130,11 @@ def test_a_rolling_shutter_of_a_still_scene_shows_what_any_shutter_shows():
 def test_a_rolling_shutter_sees_every_joint_in_its_own_rows_moment():
     """The upper half of the rows is taken in one moment, the lower half in another."""
     playback, rig = played("walking about")
-    eye = RayEye(playback)
+    observer = RayObserver(playback)
     early, late = playback.at(0.1), playback.at(1.4)
-    halves = zip(eye.see([early], list(rig)), eye.see([late], list(rig)), strict=True)
+    halves = zip(observer.observe([early], list(rig)), observer.observe([late], list(rig)), strict=True)
     differ = 0
-    for seen, (first, second) in zip(eye.see([early] * 6 + [late] * 6, list(rig)), halves, strict=True):
+    for seen, (first, second) in zip(observer.observe([early] * 6 + [late] * 6, list(rig)), halves, strict=True):
         rows = np.stack([first.pixels[..., 1], second.pixels[..., 1]]) - 299.5
         for half, clear in ((first, (rows < -60).all(axis=0)), (second, (rows > 60).all(axis=0))):
             np.testing.assert_array_equal(seen.visibility[clear], half.visibility[clear])
@@ -141,13 +145,13 @@ def test_a_rolling_shutter_sees_every_joint_in_its_own_rows_moment():
 
 def test_cameras_and_moments_do_not_depend_on_what_was_seen_before():
     playback, rig = played("busy hands")
-    eye = RayEye(playback)
+    observer = RayObserver(playback)
     states = [playback.at(time) for time in (0.5, 1.2)]
-    whole = [eye.see([state], list(rig)) for state in states]
+    whole = [observer.observe([state], list(rig)) for state in states]
     for k, state in reversed(list(enumerate(states))):
-        fresh = RayEye(playback)
+        fresh = RayObserver(playback)
         for v in reversed(range(len(rig))):
-            (alone,) = fresh.see([state], [rig[v]])
+            (alone,) = fresh.observe([state], [rig[v]])
             np.testing.assert_array_equal(alone.visibility, whole[k][v].visibility)
             np.testing.assert_array_equal(alone.boxes, whole[k][v].boxes)
 
@@ -156,9 +160,9 @@ def test_a_room_without_people():
     scenario = Scenario(name="empty", people={"count": 0}, clutter={"boxes": 1})
     rig = Rig(list(build_rig(scenario.cameras))[:2])
     playback = Playback(build(scenario, rig))
-    for seen in RayEye(playback).see([playback.at(0.0)], list(rig)):
+    for seen in RayObserver(playback).observe([playback.at(0.0)], list(rig)):
         assert seen.pixels.shape == (0, 17, 2)
         assert seen.visibility.shape == (0, 17)
         assert seen.boxes.shape == (0, 4)
         assert seen.area_visible.shape == (0,)
-    assert Caster(playback.scene).cast(rig[0], np.zeros((1, 3)))[0].tolist() in ([-1], [0])
+    assert RayCaster(playback.scene).cast(rig[0], np.zeros((1, 3)))[0].tolist() in ([-1], [0])

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
-from simharness.capture.rendering.choice import make_renderer
-from simharness.capture.rendering.renderer import NEAR
+from simharness.capture.rendering.renderer import NEAR, make_renderer
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.lighting import Lighting
 from simharness.world.rigs.layouts import build_rig, intrinsics, look_at

@@ -8,7 +8,7 @@ from shapes import _mesh, ball, box, room, sheet
 from test_renderers import camera_at
 
 from simharness.capture.joint_visibility import decide, label
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 VISIBLE, SELF, PERSON, CLUTTER, OUTSIDE = Visibility
 CAMERA = camera_at((3.5, 0.0, 1.0), (0.0, 0.0, 1.0), size=(320, 240), fov=60.0)

@@ -19,8 +19,8 @@ from mvpose.arrays import Floats, Integers
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import Body
 from simharness.world.motion.motion import Motion
-from simharness.world.scene.dynamics.efforts import Efforts
-from simharness.world.scene.things.solids import Solid
+from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
+from simharness.world.scene.objects.solids import Solid
 
 STEP_RATE = 480.0  # Hz, at least
 LEVER = 0.5  # metres: the helping torque is bounded by the greatest helping force at this lever
@@ -175,7 +175,7 @@ class Tracker:
         self._stiffness = np.concatenate([person.stiffness for person in self.people])
         self._strength = np.concatenate([person.strength for person in self.people])
         self.data = mujoco.MjData(self.model)
-        self._efforts = Efforts(
+        self._efforts = InverseDynamics(
             self.model,
             [person.root_dofs for person in self.people],
             [person.hinge_dofs for person in self.people],

@@ -16,11 +16,11 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.room import Room
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import quad_mesh
+from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.surfaces import FLOORS, WALLS, Finish
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.shapes import quad_mesh
-from simharness.world.scene.things.solids import Solid
+from simharness.world.scene.rooms.textures import FLOORS, WALLS, Finish
 
 Choice = TypeVar("Choice")
 

@@ -4,9 +4,9 @@ import pytest
 from mvpose.camera import Camera, Rig
 from simharness.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from simharness.formats.calibration.file_storage import write_storage
+from simharness.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras
-from simharness.world.rigs.files import read_rig
 from simharness.world.rigs.layouts import build_rig, carried, look_at
 
 RIG = build_rig(Cameras(count=3, size=(640, 480), distortion=(-0.1, 0.01, 0.001, 0.002, 0.0)))
@@ -24,7 +24,7 @@ FORMATS = {
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_format_is_told_by_the_content(tmp_path, name):
     FORMATS[name](tmp_path / name, RIG)
-    rig = read_rig(tmp_path / name, size=(640, 480))
+    rig = read_calibration(tmp_path / name, size=(640, 480))
     np.testing.assert_allclose(rig.packed, RIG.packed, atol=1e-9)
     assert [(camera.name, camera.size) for camera in rig] == [(camera.name, (640, 480)) for camera in RIG]
 
@@ -43,17 +43,20 @@ def test_a_scenario_names_a_file_beside_it(tmp_path, name):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", r"found a file that begins with b''; expected a calibration of VoxelPose or Panoptic"),
+        (b"", r"found a file that begins with b''; expected one of Panoptic \(JSON\): .*; VoxelPose"),
         (b"\x89PNG\r\n", r"found a file that begins with b'\\x89PNG"),
         (b"[cameras]\ncount = 4\n", r'found TOML with the keys "cameras"; expected'),
-        (b'{"a": {"b": 1}}', r'found JSON with the keys "a"; expected VoxelPose'),
-        (b'{"cameras": [', r"not whole JSON .* cut off"),
-        (b"%YAML:1.0\n---\nsize: 3\n", r"no camera in it, it has size; expected an OpenCV calibration"),
+        (
+            b'{"a": {"b": 1}}',
+            r'found JSON with the keys "a"; expected one of .*VoxelPose \(JSON\): an object of cameras, each with fx',
+        ),
+        (b'{"cameras": [', r"truncated JSON .* cut off"),
+        (b"%YAML:1.0\n---\nsize: 3\n", r"no camera found, only size; expected an OpenCV calibration"),
         (b"%YAML:1.0\n---\nK: [1, 2\n", r"OpenCV's FileStorage cannot read it .*cut off"),
-        (b"%YAML:1.0\n---\n", r"FileStorage cannot read it|without names and values"),
+        (b"%YAML:1.0\n---\n", r"FileStorage cannot read it|without named values"),
         (
             b'%YAML:1.0\n---\nnames:\n  - "01"\n  - "02"\n',
-            r"camera '01' lacks K_01, R_01 or Rot_01, T_01, here and in a",
+            r"camera '01' lacks K_01, R_01 or Rot_01, T_01, in this file and in a",
         ),
     ],
 )
@@ -61,28 +64,28 @@ def test_a_file_of_no_known_format_says_what_was_found(tmp_path, content, messag
     path = tmp_path / "mine.txt"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=message) as caught:
-        read_rig(path, size=(640, 480))
+        read_calibration(path, size=(640, 480))
     assert "mine.txt" in str(caught.value)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"mine\.yml: no such file; expected a calibration of VoxelPose"):
-        read_rig(tmp_path / "mine.yml", size=(640, 480))
+    with pytest.raises(ValueError, match=r"mine\.yml: no such file; expected a camera calibration: Panoptic"):
+        read_calibration(tmp_path / "mine.yml", size=(640, 480))
 
 
 def test_the_half_that_is_missing_is_named(tmp_path):
     easymocap.write_calibration(tmp_path, RIG)
     (tmp_path / "extri.yml").unlink()
-    with pytest.raises(ValueError, match=r"lacks R_cam0 or Rot_cam0, T_cam0, here and in extri\.yml beside it"):
-        read_rig(tmp_path / "intri.yml", size=(640, 480))
+    with pytest.raises(ValueError, match=r"lacks R_cam0 or Rot_cam0, T_cam0, in this file and in extri\.yml beside it"):
+        read_calibration(tmp_path / "intri.yml", size=(640, 480))
 
 
 def test_panoptic_cameras_of_other_types_are_there_by_name(tmp_path):
     path = tmp_path / "calibration.json"
     panoptic.write_calibration(path, RIG, kind="vga")
-    with pytest.raises(ValueError, match=r"0 of 3 cameras are of type hd, .* there are vga"):
-        read_rig(path, size=(1, 1))
-    assert len(read_rig(path, size=(1, 1), only=("cam0", "cam1"))) == 2
+    with pytest.raises(ValueError, match=r"0 of 3 cameras are of type hd, .* the file has vga"):
+        read_calibration(path, size=(1, 1))
+    assert len(read_calibration(path, size=(1, 1), only=("cam0", "cam1"))) == 2
 
 
 def stereo_files(folder):

@@ -9,9 +9,8 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.rigs.layouts import build_rig, look_at
 from simharness.world.scene.build import Scene
 from simharness.world.scene.build import build as build_scene
-from simharness.world.scene.hanging import check_rig
-from simharness.world.scene.playback import Playback
-from simharness.world.scene.simulation import simulate
+from simharness.world.scene.camera_clearance import check_rig
+from simharness.world.scene.playback import Playback, simulate
 
 QUICKSTART = {
     "name": "quick",

@@ -5,8 +5,8 @@ import pytest
 from walkers import space
 
 from simharness.scenario.sections.room import Clutter
-from simharness.world.scene.placing.clutter import place_clutter
-from simharness.world.scene.placing.placement import BODY_HALF_WIDTH, LIMB
+from simharness.world.scene.placement.clutter import place_clutter
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB
 
 
 @pytest.fixture(scope="module", params=[(seed, reach) for seed in range(4) for reach in (0.1, 3.0)])

@@ -7,14 +7,14 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
-from simharness.world.scene.placing.clutter import SPECIES, place_clutter
-from simharness.world.scene.placing.placement import BODY_HALF_WIDTH, LENS, LIMB
-from simharness.world.scene.placing.sight import Pictures, cuts
-from simharness.world.scene.things.fixtures import draw_cart
-from simharness.world.scene.things.storage import draw_box, draw_shelf
+from simharness.world.scene.objects.fixtures import draw_cart
+from simharness.world.scene.objects.storage import draw_box, draw_shelf
+from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, LIMB
+from simharness.world.scene.placement.sight_lines import Pictures, cuts
 
 ROOM = Room()
-DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in SPECIES} | {"cart": draw_cart}
+DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in CLUTTER_KINDS} | {"cart": draw_cart}
 EVERYTHING = Clutter(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
 
 

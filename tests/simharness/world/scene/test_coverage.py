@@ -3,8 +3,8 @@ import pytest
 from walkers import Rays, ring, space
 
 from simharness.scenario.sections.room import Clutter
-from simharness.world.scene.placing.clutter import place_clutter
-from simharness.world.scene.placing.coverage import share_hidden
+from simharness.world.scene.placement.clutter import place_clutter
+from simharness.world.scene.placement.coverage import share_hidden
 
 
 def measured(free, solids) -> float:

@@ -6,15 +6,15 @@ from walkers import Rays, ring, space
 
 from simharness.scenario.sections.room import Clutter, Decoys, Room
 from simharness.types.random_streams import stream
-from simharness.world.scene.placing.clutter import place_clutter
-from simharness.world.scene.placing.decoys import (
+from simharness.world.scene.placement.clutter import place_clutter
+from simharness.world.scene.placement.decoys import (
     draw_coat_stand,
     draw_mannequin,
     draw_mirror,
     draw_poster,
     place_decoys,
 )
-from simharness.world.scene.placing.placement import BODY_HALF_WIDTH
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH
 
 ALL = Decoys(posters=2, mannequins=1, coat_stands=1, mirrors=2)
 NOSE, SHOULDERS, HIPS, ANKLES = 0, [5, 6], [11, 12], [15, 16]

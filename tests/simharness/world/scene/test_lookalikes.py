@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose.camera import Camera
-from simharness.capture.film import PictureEye, film
+from simharness.capture.film import PictureObserver, film
 from simharness.capture.picture import meshes_at
-from simharness.capture.ray_visibility import RayEye
-from simharness.capture.rendering.choice import make_renderer
+from simharness.capture.ray_visibility import RayObserver
+from simharness.capture.rendering.renderer import make_renderer
 from simharness.scenario.sections.scenario import Faults, Scenario
 from simharness.types.mirror import Mirror
 from simharness.types.views import Views
-from simharness.world.rigs.faults import shoot
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
+from simharness.world.rigs.faults import schedule_exposures
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.shots import Shots
 from simharness.world.scene.build import build
 from simharness.world.scene.lookalikes import Lookalikes
 from simharness.world.scene.playback import Playback
@@ -55,11 +55,11 @@ def played(seed=1, decoys=True):
 def compared(seed):
     """What rays and pictures show of lookalikes, side by side."""
     playback, rig = played(seed)
-    eyes = RayEye(playback), PictureEye(playback, make_renderer("raster"))
+    observers = RayObserver(playback), PictureObserver(playback, make_renderer("raster"))
     pairs = []
     for time in (0.2, 0.9):
         state = playback.at(time)
-        pairs += zip(*(eye.see([state], list(rig)) for eye in eyes), strict=True)
+        pairs += zip(*(observer.observe([state], list(rig)) for observer in observers), strict=True)
     return pairs
 
 
@@ -174,8 +174,8 @@ class TestInPictures:
         figure = lookalikes.figures[1]
         front = np.cross(figure[5] - figure[6], [0, 0, 1])
         camera = looking(figure.mean(axis=0) + 1.2 * front / np.linalg.norm(front), figure.mean(axis=0))
-        for eye in (RayEye(playback), PictureEye(playback, make_renderer("raster"))):
-            (seen,) = eye.see([playback.at(0.2)], [camera])
+        for observer in (RayObserver(playback), PictureObserver(playback, make_renderer("raster"))):
+            (seen,) = observer.observe([playback.at(0.2)], [camera])
             assert seen.lookalike_visible[1].all()
 
     def test_through_a_wall_nothing_is_seen(self):
@@ -185,15 +185,17 @@ class TestInPictures:
             aim = figure.mean(axis=0)
             camera = looking(np.array([0.0, 1.4 * 4.0 * np.sign(aim[1]), 1.2]), aim)
             assert camera.inside(camera.project(figure)).all()
-            for eye in (RayEye(playback), PictureEye(playback, make_renderer("raster"))):
-                (seen,) = eye.see([playback.at(0.2)], [camera])
+            for observer in (RayObserver(playback), PictureObserver(playback, make_renderer("raster"))):
+                (seen,) = observer.observe([playback.at(0.2)], [camera])
                 assert not seen.lookalike_visible.any()
 
     def test_a_still_scene_rolls_as_it_stands(self):
         playback, rig = played(2)
         state = playback.at(0.2)
-        for eye in (RayEye(playback), PictureEye(playback, make_renderer("raster"))):
-            for at_once, rolled in zip(eye.see([state], list(rig)), eye.see([state] * 8, list(rig)), strict=True):
+        for observer in (RayObserver(playback), PictureObserver(playback, make_renderer("raster"))):
+            for at_once, rolled in zip(
+                observer.observe([state], list(rig)), observer.observe([state] * 8, list(rig)), strict=True
+            ):
                 np.testing.assert_allclose(rolled.lookalike_pixels, at_once.lookalike_pixels, atol=1e-8)
                 assert (rolled.lookalike_visible == at_once.lookalike_visible).mean() > 0.99
 
@@ -211,16 +213,16 @@ def looking(center, aim) -> Camera:
 class TestFilms:
     def test_films_carry_them_and_join(self):
         playback, rig = played(2)
-        shots = shoot(rig, Faults(dead=(1,)), np.array([0.0, 0.5, 1.0]), seed=0)
-        eye = RayEye(playback)
-        whole = film(playback, shots, eye)
+        exposures = schedule_exposures(rig, Faults(dead=(1,)), np.array([0.0, 0.5, 1.0]), seed=0)
+        observer = RayObserver(playback)
+        whole = film(playback, exposures, observer)
         names = Lookalikes.of(playback.scene).names
         assert whole.lookalikes.names == names
         assert whole.lookalikes.pixels.shape == (3, 4, len(names), 17, 2)
         assert whole.lookalikes.visible[:, [0, 2, 3]].any()
         assert not whole.lookalikes.visible[:, 1].any()  # a dead camera sees nothing
         assert np.isnan(whole.lookalikes.pixels[:, 1]).all()
-        parts = Views.concatenate([film(playback, shots, eye, frames=[f]) for f in range(3)])
+        parts = Views.concatenate([film(playback, exposures, observer, frames=[f]) for f in range(3)])
         assert parts.lookalikes.pixels.tobytes() == whole.lookalikes.pixels.tobytes()
         np.testing.assert_array_equal(parts.lookalikes.visible, whole.lookalikes.visible)
         mine = [k for k, name in enumerate(names) if "/" not in name]
@@ -230,7 +232,7 @@ class TestFilms:
 
     def test_where_there_are_none_there_is_nothing(self):
         playback, rig = played(2, decoys=False)
-        views = film(playback, Shots.ideal(rig, np.array([0.0, 0.5])), RayEye(playback))
+        views = film(playback, ExposureSchedule.ideal(rig, np.array([0.0, 0.5])), RayObserver(playback))
         assert views.lookalikes.names == ()
         assert views.lookalikes.pixels.shape == (2, 4, 0, 17, 2)
         assert views.lookalikes.visible.shape == (2, 4, 0, 17)

@@ -4,7 +4,7 @@ from walkers import Rays
 
 from simharness.world.motion.performance import Prop
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.things.props import make_prop
+from simharness.world.scene.objects.props import make_prop
 
 SIZES = {
     "chair": (0.45, 0.43, 0.46),

@@ -6,7 +6,7 @@ from simharness.scenario.sections.room import Room
 from simharness.types.lighting import Lighting
 from simharness.world.scene.rooms.lighting import LIGHTS, room_lighting
 from simharness.world.scene.rooms.room import make_room
-from simharness.world.scene.rooms.surfaces import FLOORS, WALLS
+from simharness.world.scene.rooms.textures import FLOORS, WALLS
 
 SIZE = (6.0, 8.0, 3.0)
 ROOM = Room(size=SIZE)

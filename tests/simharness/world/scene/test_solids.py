@@ -8,10 +8,10 @@ from walkers import Rays
 from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.placing.sight import cuts
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.geoms import Box, Cylinder, Surface, carried
-from simharness.world.scene.things.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.geoms import Box, Cylinder, Surface, carried
+from simharness.world.scene.objects.shapes import TOP, bar_mesh, box_mesh, hexahedron, joined, lathe, shifted
+from simharness.world.scene.placement.sight_lines import cuts
 
 numbers = st.floats(-3, 3)
 
@@ -79,7 +79,7 @@ def test_a_bar_is_where_its_geom_is(yaw, tilt, way):
 @pytest.mark.parametrize("end", [(0.4, 0.0, 0.9), (0.5, 0.6, 0.3), (0.0, -0.7, 0.3), (0.1, 0.1, 1.2)])
 def test_rays_meet_a_leaning_bar_where_it_is_seen(end):
     solid = (
-        Assembly().bar((0, 0, 0.3), end, 0.08, (0.5,) * 3, sides=48).thing().at((1, 2), 0.7, kind="prop", name="bar")
+        Assembly().bar((0, 0, 0.3), end, 0.08, (0.5,) * 3, sides=48).model().at((1, 2), 0.7, kind="prop", name="bar")
     )
     rng, middle = np.random.default_rng(0), np.array(solid.hull.center)
     start = middle + [2.0, -1.5, 1.0]
@@ -135,7 +135,7 @@ def thing():
 @given(x=numbers, y=numbers, yaw=st.floats(-7, 7))
 def test_all_of_a_thing_goes_where_it_is_put(x, y, yaw):
     figure, glass = np.full((17, 3), 0.7), Mirror((0.3, 0.1, 0.5), (1.0, 0.0, 0.0), (0.2, 0.4))
-    loose = thing().thing(figure=figure, mirror=glass)
+    loose = thing().model(figure=figure, mirror=glass)
     placed = loose.at((x, y), yaw, kind="decoy", name="it")
     expected = carried(loose.mesh.vertices, (x, y), yaw)
     np.testing.assert_allclose(placed.mesh.vertices, expected, atol=1e-5)
@@ -149,9 +149,9 @@ def test_all_of_a_thing_goes_where_it_is_put(x, y, yaw):
 
 def test_geoms_have_the_names_that_others_look_for():
     spec = mujoco.MjSpec()
-    single = Assembly().box((0, 0, 0.5), (1, 1, 1), (0.5, 0.5, 0.5)).thing().at((3, 0), 0.0, kind="room", name="floor")
-    several = thing().thing().at((0, 0), 0.0, kind="clutter", name="box0")
-    moving = thing().thing().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
+    single = Assembly().box((0, 0, 0.5), (1, 1, 1), (0.5, 0.5, 0.5)).model().at((3, 0), 0.0, kind="room", name="floor")
+    several = thing().model().at((0, 0), 0.0, kind="clutter", name="box0")
+    moving = thing().model().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
     for solid in (single, several, moving):
         solid.add_to(spec)
     model = spec.compile()
@@ -172,7 +172,7 @@ def test_a_moving_thing_is_where_its_trajectory_says():
     for k in range(21):
         mujoco.mju_mulQuat(quat[k], yawed[k], tilted[k])
     pose = np.column_stack([time, -0.5 * time, 0.3 * time, quat])
-    solid = thing().thing().along(Trajectory(time, pose), kind="prop", name="it")
+    solid = thing().model().along(Trajectory(time, pose), kind="prop", name="it")
     rays = Rays([solid])
     for moment in (0.0, 0.7, 1.9):
         rays.put(moment)

@@ -6,7 +6,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from simharness.scenario.sections.room import Room
 from simharness.world.motion.trajectory import motion_clock
-from simharness.world.scene.placing.placement import FreeSpace
+from simharness.world.scene.placement.free_space import FreeSpace
 
 # fmt: off
 STANDING = np.array(

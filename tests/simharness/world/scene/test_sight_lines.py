@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 from walkers import ring
 
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.placing.sight import Lines, Pictures, cuts, lines_of_sight
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.shapes import box_mesh
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import box_mesh
+from simharness.world.scene.placement.sight_lines import PictureFill, SightLines, cuts, lines_of_sight
 
 numbers = st.floats(-2, 2)
 
@@ -31,12 +31,12 @@ def test_no_lines_and_no_faces():
 
 
 def test_a_moving_thing_cuts_where_it_is_at_the_time():
-    thing = Assembly().box((0, 0, 0.5), (0.4, 0.2, 1.0), (0.5, 0.5, 0.5)).thing()
+    thing = Assembly().box((0, 0, 0.5), (0.4, 0.2, 1.0), (0.5, 0.5, 0.5)).model()
     turned = np.sqrt(0.5)
     poses = np.array([[0.0, 0, 0, 1, 0, 0, 0], [2.0, 0, 0, turned, 0, 0, turned]])
     solid = thing.along(Trajectory(np.array([0.0, 1.0]), poses), kind="clutter", name="it")
     starts = np.array([[0.15, -1, 0.5], [0.15, -1, 0.5], [2.15, -1, 0.5], [2.05, -1, 0.5], [2.0, -1, 1.2]])
-    lines = Lines(starts, starts + [0, 2, 0], np.array([0.0, 1.0, 1.0, 1.0, 1.0]))
+    lines = SightLines(starts, starts + [0, 2, 0], np.array([0.0, 1.0, 1.0, 1.0, 1.0]))
     np.testing.assert_array_equal(lines.cut_by(solid), [True, False, False, True, False])
 
 
@@ -54,10 +54,10 @@ def test_a_wall_before_one_camera_fills_its_picture():
     wall = (
         Assembly()
         .box((2.9, 0, 2.0), (0.02, 1.4, 4.0), (0.5, 0.5, 0.5))
-        .thing()
+        .model()
         .at((0, 0), 0.0, kind="clutter", name="w")
     )
-    pictures = Pictures(rig)
+    pictures = PictureFill(rig)
     assert not pictures.bear(wall, 0.6)
     pictures.add(wall)
     filled = pictures.filled.mean(axis=1)
@@ -70,9 +70,9 @@ def test_the_share_of_a_picture_is_that_of_its_area():
     """A square board straight before a pinhole camera: its share follows from its side and distance."""
     rig = ring(2, height=0.9)
     board = (
-        Assembly().box((2.5, 0, 0.9), (0.001, 0.8, 0.6), (0.5,) * 3).thing().at((0, 0), 0.0, kind="clutter", name="b")
+        Assembly().box((2.5, 0, 0.9), (0.001, 0.8, 0.6), (0.5,) * 3).model().at((0, 0), 0.0, kind="clutter", name="b")
     )
-    pictures = Pictures(rig)
+    pictures = PictureFill(rig)
     pictures.add(board)
     expected = (0.8 * 520) * (0.6 * 520) / (800 * 600)
     assert pictures.filled[0].mean() == pytest.approx(expected, abs=0.05)

@@ -9,11 +9,11 @@ import numpy as np
 
 from simharness.types.random_streams import stream
 from simharness.world.motion.performance import Prop
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.furniture import chair, table
-from simharness.world.scene.things.shapes import lathe
-from simharness.world.scene.things.solids import Solid, Thing
-from simharness.world.scene.things.storage import BOX_COLORS, taped
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.furniture import chair, table
+from simharness.world.scene.objects.shapes import lathe
+from simharness.world.scene.objects.solids import ObjectModel, Solid
+from simharness.world.scene.objects.storage import BOX_COLORS, taped
 
 Size = tuple[float, float, float]
 
@@ -38,12 +38,12 @@ def make_prop(prop: Prop, name: str) -> Solid:
     return thing.along(prop.trajectory, kind="prop", name=name)
 
 
-def _box(size: Size, tint: int) -> Thing:
+def _box(size: Size, tint: int) -> ObjectModel:
     boxes, painted = taped(np.array(size), BOX_COLORS[tint % len(BOX_COLORS)], base=0.0, yaw=0.0)
-    return Assembly().boxes(boxes, painted).thing()
+    return Assembly().boxes(boxes, painted).model()
 
 
-def _step(size: Size, tint: int) -> Thing:
+def _step(size: Size, tint: int) -> ObjectModel:
     """An exercise step: a dark tread on a coloured block."""
     depth, width, height = size
     color = np.array([[0.25, 0.42, 0.58], [0.62, 0.36, 0.28], [0.42, 0.44, 0.47]])[tint % 3]
@@ -52,20 +52,20 @@ def _step(size: Size, tint: int) -> Thing:
         Assembly()
         .box((0, 0, (height - tread) / 2), (0.94 * depth, 0.96 * width, height - tread), color)
         .box((0, 0, height - tread / 2), (depth, width, tread), (0.22, 0.23, 0.25))
-        .thing()
+        .model()
     )
 
 
-def _bottle(size: Size, tint: int) -> Thing:
+def _bottle(size: Size, tint: int) -> ObjectModel:
     radius, height = min(size[0], size[1]) / 2, size[2]
     shape = [(0, 0), (0.92, 0), (1, 0.03), (1, 0.22), (1, 0.52), (1, 0.62), (0.40, 0.80), (0.36, 0.90), (0.44, 0.90)]
     profile = np.array([*shape, (0.44, 1.0), (0, 1.0)]) * [radius, height]
     glass = _GLASS[tint % len(_GLASS)]
     colors = np.array([glass, glass, glass, _LABEL, glass, glass, glass, _CAP, _CAP, _CAP])
-    return Assembly().mesh(lathe(profile, colors, sides=14)).thing()
+    return Assembly().mesh(lathe(profile, colors, sides=14)).model()
 
 
-_SHAPES: MappingProxyType[str, Callable[[Size, int], Thing]] = MappingProxyType(
+_SHAPES: MappingProxyType[str, Callable[[Size, int], ObjectModel]] = MappingProxyType(
     {
         "chair": lambda size, tint: chair(size, tint=tint),
         "table": lambda size, tint: table(size, tint=tint),

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.scene.things.geoms import Box, Cylinder, Geom
-from simharness.world.scene.things.shapes import bar_mesh, box_mesh, joined, surface
-from simharness.world.scene.things.solids import Thing
+from simharness.world.scene.objects.geoms import Box, Cylinder, Geom
+from simharness.world.scene.objects.shapes import bar_mesh, box_mesh, joined, surface
+from simharness.world.scene.objects.solids import ObjectModel
 
 
 class Assembly:
@@ -30,7 +30,7 @@ class Assembly:
         return self.boxes([Box((x, y, z), (dx, dy, dz), yaw)], np.asarray([color], float))
 
     def boxes(self, boxes: Sequence[Box], colors: ArrayLike) -> Self:
-        """Add boxes; ``colors`` as those of :func:`simharness.world.scene.things.shapes.box_mesh`."""
+        """Add boxes; ``colors`` as those of :func:`simharness.world.scene.objects.shapes.box_mesh`."""
         self._meshes.append(box_mesh(boxes, colors))
         self._geoms += boxes
         return self
@@ -54,6 +54,6 @@ class Assembly:
         self._geoms.append(surface(mesh))
         return self
 
-    def thing(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> Thing:
+    def model(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> ObjectModel:
         """What has been put together."""
-        return Thing(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)
+        return ObjectModel(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)

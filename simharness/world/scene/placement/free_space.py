@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from simharness.scenario.sections.room import Room
-from simharness.world.scene.placing.sight import Pictures
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.solids import Kind, Solid, Thing
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import Kind, ObjectModel, Solid
+from simharness.world.scene.placement.sight_lines import PictureFill
 
 BODY_HALF_WIDTH = 0.42  # metres: what a trunk with its arms needs to pass by
 LIMB = 0.15  # metres around every joint: an outstretched arm does not go through a shelf
@@ -113,7 +113,7 @@ class Site:
         self.space = space
         self.solids: list[Solid] = []
         self._boxes: list[Box] = []
-        self._pictures = Pictures(space.rig)
+        self._pictures = PictureFill(space.rig)
         for solid in space.taken:
             self.add(solid)
 
@@ -138,7 +138,7 @@ class Site:
     def find(
         self,
         rng: np.random.Generator,
-        thing: Thing,
+        thing: ObjectModel,
         where: Where,
         *,
         kind: Kind,

@@ -9,11 +9,11 @@ import numpy as np
 from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.room import Room
 from simharness.types.random_streams import stream
-from simharness.world.scene.placing.placement import FreeSpace, Site
-from simharness.world.scene.placing.sight import Lines, lines_of_sight
-from simharness.world.scene.things.solids import Solid, Thing
+from simharness.world.scene.objects.solids import ObjectModel, Solid
+from simharness.world.scene.placement.free_space import FreeSpace, Site
+from simharness.world.scene.placement.sight_lines import SightLines, lines_of_sight
 
-Draw = Callable[[np.random.Generator, Room], Thing]
+Draw = Callable[[np.random.Generator, Room], ObjectModel]
 
 WITHIN = 0.05  # of the share asked for
 _AIM = 0.02  # how near to get while things still help: the sample is not everything
@@ -31,7 +31,7 @@ _LEAST_GAIN = 0.002
 _MOST_GAIN = (0.07, 1.0)
 
 
-def lines_in(space: FreeSpace) -> Lines:
+def lines_in(space: FreeSpace) -> SightLines:
     """Lines of sight at moments spread evenly over the time that is filmed.
 
     People are planned for as long before time 0 as after the end, so that time is known.
@@ -93,7 +93,7 @@ def cover(seed: int, share: float, fillers: Mapping[str, Draw], site: Site) -> N
 
 
 def _fill(
-    seed: int, share: float, fillers: Mapping[str, Draw], site: Site, lines: Lines, hidden: Bools, most: float
+    seed: int, share: float, fillers: Mapping[str, Draw], site: Site, lines: SightLines, hidden: Bools, most: float
 ) -> tuple[list[Solid], float]:
     """Add things until they hide the share, or nothing helps, none of them more than ``most`` if it can be helped.
 
@@ -125,7 +125,7 @@ def _fill(
     return added, float(hidden.mean())
 
 
-def _candidates(seed: int, turn: int, draw: Draw, site: Site, lines: Lines, name: str) -> Iterator[Solid]:
+def _candidates(seed: int, turn: int, draw: Draw, site: Site, lines: SightLines, name: str) -> Iterator[Solid]:
     """Things of one kind that could be added, each across a line of sight."""
 
     def across(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:

@@ -6,10 +6,10 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.shapes import hexahedron, lathe, shifted
-from simharness.world.scene.things.solids import Thing
-from simharness.world.scene.things.storage import BOOK_COLORS, WOOD
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.shapes import hexahedron, lathe, shifted
+from simharness.world.scene.objects.solids import ObjectModel
+from simharness.world.scene.objects.storage import BOOK_COLORS, WOOD
 
 _TOP = 0.03  # metres: thickness of a table's top
 _SEAT = 0.045
@@ -20,7 +20,7 @@ _FABRIC = np.array([[0.20, 0.38, 0.44], [0.62, 0.27, 0.22], [0.80, 0.60, 0.24], 
 _PORCELAIN = np.array([0.93, 0.92, 0.90])
 
 
-def draw_table(rng: np.random.Generator) -> Thing:
+def draw_table(rng: np.random.Generator) -> ObjectModel:
     """A table of usual height, square-cornered or round, with a few things on it."""
     depth, width, height = rng.uniform(0.70, 0.85), rng.uniform(1.1, 1.5), rng.uniform(0.71, 0.76)
     is_round = rng.uniform() < 0.35
@@ -32,12 +32,12 @@ def draw_table(rng: np.random.Generator) -> Thing:
     else:
         assembly = _table((depth, width, height), wood)
         reach = 0.7 * np.array([depth, width]) / 2
-    return _laid(rng, assembly, height, reach).thing()
+    return _laid(rng, assembly, height, reach).model()
 
 
-def table(size: tuple[float, float, float], *, tint: int = 0) -> Thing:
+def table(size: tuple[float, float, float], *, tint: int = 0) -> ObjectModel:
     """A plain table of depth x, width y and height z, metres."""
-    return _table(size, WOOD[tint % len(WOOD)]).thing()
+    return _table(size, WOOD[tint % len(WOOD)]).model()
 
 
 def _table(size: tuple[float, float, float], wood: Floats) -> Assembly:
@@ -87,13 +87,13 @@ def _laid(rng: np.random.Generator, assembly: Assembly, height: float, reach: Fl
     return assembly
 
 
-def draw_chair(rng: np.random.Generator) -> Thing:
+def draw_chair(rng: np.random.Generator) -> ObjectModel:
     """A chair with an upholstered or a wooden seat."""
     size = (rng.uniform(0.42, 0.48), rng.uniform(0.42, 0.48), rng.uniform(0.43, 0.47))
     return chair(size, tint=int(rng.integers(len(_FABRIC) + len(WOOD))))
 
 
-def chair(size: tuple[float, float, float], *, tint: int = 0) -> Thing:
+def chair(size: tuple[float, float, float], *, tint: int = 0) -> ObjectModel:
     """A chair of depth x and width y whose seat is at z, metres; it faces +x, its back leans away at -x."""
     depth, width, height = size
     colors = np.concatenate([_FABRIC, WOOD])
@@ -109,7 +109,7 @@ def chair(size: tuple[float, float, float], *, tint: int = 0) -> Thing:
     slats = [(0.16, 0.40)] if tint % len(colors) < len(_FABRIC) else [(0.14, 0.21), (0.25, 0.31), (0.35, 0.40)]
     for low, high in slats:
         assembly.mesh(_slat(-x - 0.01, width - 0.05, height, (low, high), color))
-    return assembly.thing()
+    return assembly.model()
 
 
 def _slat(x: float, width: float, seat: float, span: tuple[float, float], color: Floats) -> Mesh:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from simharness.scenario.sections.scenario import Scenario
-from simharness.world.scene.things.solids import Solid
+from simharness.world.scene.objects.solids import Solid
 
 WALL_MARGIN = 0.1  # metres between a camera and a wall
 _ROUNDING = 1e-6  # metres: positions on a limit may exceed it by rounding, which differs between processors

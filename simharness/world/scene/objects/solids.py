@@ -13,7 +13,7 @@ from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 from simharness.world.motion.trajectory import Trajectory, posed
-from simharness.world.scene.things.geoms import Box, Geom, carried
+from simharness.world.scene.objects.geoms import Box, Geom, carried
 
 if TYPE_CHECKING:
     import mujoco
@@ -22,7 +22,7 @@ Kind = Literal["room", "clutter", "prop", "decoy"]
 
 
 @dataclass(frozen=True)
-class Thing:
+class ObjectModel:
     """Something that has no place yet: it stands on z = 0 around the origin, its front towards +x.
 
     Attributes:

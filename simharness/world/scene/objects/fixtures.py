@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.solids import Thing
-from simharness.world.scene.things.storage import BOX_COLORS, taped
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import ObjectModel
+from simharness.world.scene.objects.storage import BOX_COLORS, taped
 
 _STONE = np.array([[0.80, 0.79, 0.76], [0.70, 0.69, 0.67], [0.86, 0.84, 0.79], [0.62, 0.63, 0.66]])
 _FABRIC = np.array([[0.36, 0.52, 0.55], [0.55, 0.57, 0.60], [0.72, 0.55, 0.32], [0.44, 0.40, 0.52], [0.48, 0.56, 0.42]])
@@ -18,7 +18,7 @@ _RUBBER = np.array([0.16, 0.16, 0.17])
 _WHEEL = 0.06  # metres: radius
 
 
-def draw_pillar(rng: np.random.Generator, height: float) -> Thing:
+def draw_pillar(rng: np.random.Generator, height: float) -> ObjectModel:
     """A round or square pillar from the floor to ``height`` metres, with a base and a capital."""
     is_round, width = rng.uniform() < 0.5, rng.uniform(0.30, 0.45)
     stone = _STONE[rng.integers(len(_STONE))]
@@ -31,10 +31,10 @@ def draw_pillar(rng: np.random.Generator, height: float) -> Thing:
             assembly.bar((0, 0, low), (0, 0, high), wider * width / 2, color, sides=28)
         else:
             assembly.box((0, 0, (low + high) / 2), (wider * width, wider * width, high - low), color)
-    return assembly.thing()
+    return assembly.model()
 
 
-def draw_partition(rng: np.random.Generator) -> Thing:
+def draw_partition(rng: np.random.Generator) -> ObjectModel:
     """A free-standing screen 1.5 to 1.9 m tall: one panel, or two or three that stand in a zigzag."""
     panels = int(rng.integers(1, 4))
     width, height = rng.uniform(0.75, 1.0), rng.uniform(1.5, 1.9)
@@ -49,7 +49,7 @@ def draw_partition(rng: np.random.Generator) -> Thing:
     assembly = Assembly()
     for yaw, start, end in zip(yaws, ends, ends[1:], strict=False):
         _panel(assembly, (start + end) / 2, yaw, (width, height), fabric)
-    return assembly.thing()
+    return assembly.model()
 
 
 def _panel(assembly: Assembly, middle: Floats, yaw: float, size: tuple[float, float], fabric: Floats) -> None:
@@ -68,7 +68,7 @@ def _panel(assembly: Assembly, middle: Floats, yaw: float, size: tuple[float, fl
         assembly.boxes([box.moved(middle, yaw)], [color])
 
 
-def draw_cart(rng: np.random.Generator) -> Thing:
+def draw_cart(rng: np.random.Generator) -> ObjectModel:
     """A service cart, two trays between four posts on wheels, with cartons on it; it goes along its x axis."""
     length, width, height = rng.uniform(0.75, 0.95), rng.uniform(0.45, 0.55), rng.uniform(0.82, 0.95)
     sizes, places = rng.uniform([0.22, 0.2, 0.15], [0.34, 0.32, 0.3], (3, 3)), rng.uniform(-1, 1, (3, 2))
@@ -92,4 +92,4 @@ def draw_cart(rng: np.random.Generator) -> Thing:
         slot = (0.0 if k == 0 else (-1.0) ** k * length / 4) + 0.05 * place[0]
         boxes, painted = taped(size, colors[k], base=z, yaw=turns[k])
         assembly.boxes([box.moved((slot, 0.04 * place[1]), 0.0) for box in boxes], painted)
-    return assembly.thing()
+    return assembly.model()

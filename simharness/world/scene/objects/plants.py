@@ -6,9 +6,9 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.shapes import joined, lathe, quad_mesh
-from simharness.world.scene.things.solids import Thing
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.shapes import joined, lathe, quad_mesh
+from simharness.world.scene.objects.solids import ObjectModel
 
 _POTS = np.array([[0.72, 0.42, 0.30], [0.90, 0.89, 0.86], [0.28, 0.30, 0.33], [0.52, 0.60, 0.62], [0.80, 0.70, 0.56]])
 _SOIL = np.array([0.24, 0.18, 0.14])
@@ -17,13 +17,13 @@ _GREENS = np.array([[0.22, 0.44, 0.22], [0.30, 0.50, 0.26], [0.18, 0.38, 0.27], 
 _GOLDEN = np.pi * (3 - 5**0.5)  # the angle at which leaves follow each other around a stem
 
 
-def draw_plant(rng: np.random.Generator) -> Thing:
+def draw_plant(rng: np.random.Generator) -> ObjectModel:
     """A plant 1 to 1.8 m tall in a pot."""
     kind = rng.integers(3)
     pot = rng.uniform(0.15, 0.20), rng.uniform(0.28, 0.40)
     color, green = _POTS[rng.integers(len(_POTS))], _GREENS[rng.integers(len(_GREENS))]
     grow = (_broad_leaves, _fronds, _blades)[kind]
-    return Assembly().mesh(_pot(*pot, color)).mesh(grow(rng, pot[1] - 0.03, green)).thing()
+    return Assembly().mesh(_pot(*pot, color)).mesh(grow(rng, pot[1] - 0.03, green)).model()
 
 
 def _pot(radius: float, height: float, color: Floats) -> Mesh:

@@ -21,13 +21,13 @@ from simharness.types.mirror import Mirror
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
-from simharness.world.scene.placing.placement import TRIES, FreeSpace, Site, about, inwards
-from simharness.world.scene.things.artwork import draw_person
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.shapes import box_mesh, joined, lathe, loft, shifted
-from simharness.world.scene.things.solids import Solid, Thing
-from simharness.world.scene.things.storage import WOOD
+from simharness.world.scene.objects.artwork import draw_person
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import box_mesh, joined, lathe, loft, shifted
+from simharness.world.scene.objects.solids import ObjectModel, Solid
+from simharness.world.scene.objects.storage import WOOD
+from simharness.world.scene.placement.free_space import TRIES, FreeSpace, Site, about, inwards
 
 _POSTER_GRAIN = 320  # pixels a metre
 _ON_WALL = 0.7  # chance, where there are walls
@@ -84,7 +84,7 @@ def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]
     return unit * space.half, inwards(outward)
 
 
-def draw_poster(rng: np.random.Generator, on_wall: bool) -> Thing:
+def draw_poster(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
     """A picture of a person, nearly as large as life: framed on a wall, or on a banner that stands by itself."""
     width, height = rng.uniform(0.72, 0.85), rng.uniform(1.75, 1.95)
     frame = _FRAMES[rng.integers(len(_FRAMES))]
@@ -104,7 +104,7 @@ def draw_poster(rng: np.random.Generator, on_wall: bool) -> Thing:
     mesh = box_mesh(boxes, np.array([np.ones(3), *colors]))
     front = 0.024
     figure = np.column_stack([np.full(17, front), (joints[:, 0] - 0.5) * width, low + (1 - joints[:, 1]) * height])
-    return Thing(_printed(mesh, texture), tuple(boxes), figure=figure)
+    return ObjectModel(_printed(mesh, texture), tuple(boxes), figure=figure)
 
 
 def _printed(mesh: Mesh, texture: NDArray[np.uint8]) -> Mesh:
@@ -132,7 +132,7 @@ def _rim(sheet: Box, width: float) -> list[Box]:
     return bars
 
 
-def draw_mirror(rng: np.random.Generator, on_wall: bool) -> Thing:
+def draw_mirror(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
     """A framed mirror as tall as a person: on a wall, or on two feet."""
     width, height = rng.uniform(0.65, 1.0), rng.uniform(1.55, 1.8)
     frame = _FRAMES[rng.integers(len(_FRAMES))]
@@ -145,10 +145,10 @@ def draw_mirror(rng: np.random.Generator, on_wall: bool) -> Thing:
             y = side * (width / 2 + rim / 2)
             assembly.box((0.02, y, 0.02), (0.46, 0.05, 0.04), frame)
             assembly.box((0.02, y, 0.065), (0.05, 0.05, 0.05), frame)
-    return assembly.thing(mirror=Mirror((0.026, 0.0, low + height / 2), (1.0, 0.0, 0.0), (width / 2, height / 2)))
+    return assembly.model(mirror=Mirror((0.026, 0.0, low + height / 2), (1.0, 0.0, 0.0), (width / 2, height / 2)))
 
 
-def draw_mannequin(rng: np.random.Generator, on_wall: bool = False) -> Thing:
+def draw_mannequin(rng: np.random.Generator, on_wall: bool = False) -> ObjectModel:
     """A bare body of one plain colour, as shops have them, on a round base."""
     body = make_body(
         Shape(
@@ -180,7 +180,7 @@ def draw_mannequin(rng: np.random.Generator, on_wall: bool = False) -> Thing:
         smooth=True,
     )
     assembly = Assembly().mesh(statue).bar((0, 0, 0), (0, 0, base), 0.27, 0.6 * _ALUMINIUM, sides=28)
-    return assembly.thing(figure=body.joints(bones) + offset)
+    return assembly.model(figure=body.joints(bones) + offset)
 
 
 def _posed(body: Body, turns: Mapping[str, Floats]) -> Floats:
@@ -195,7 +195,7 @@ def _posed(body: Body, turns: Mapping[str, Floats]) -> Floats:
     return transforms
 
 
-def draw_coat_stand(rng: np.random.Generator, on_wall: bool = False) -> Thing:
+def draw_coat_stand(rng: np.random.Generator, on_wall: bool = False) -> ObjectModel:
     """A pole on a round foot with a coat over its arms and a hat on top, as tall as a person."""
     tall, wide = rng.uniform(0.94, 1.10), rng.uniform(0.92, 1.08)
     cloth, wood = _CLOTHS[rng.integers(len(_CLOTHS))], WOOD[rng.integers(len(WOOD))]
@@ -209,7 +209,7 @@ def draw_coat_stand(rng: np.random.Generator, on_wall: bool = False) -> Thing:
     hat = np.array([*brim, (0.095, 0.06), (0.092, 0.105), (0.078, 0.130), (0.04, 0.128), (0.0, 0.118)])
     bands = np.array([felt, felt, felt, 0.4 * felt, felt, felt, felt, felt])
     assembly.mesh(shifted(lathe(hat, bands, sides=20, squash=1.1), (0, 0, crown)))
-    return assembly.thing(figure=_stood(shape, crown, tall))
+    return assembly.model(figure=_stood(shape, crown, tall))
 
 
 def _coat(shape: Floats, cloth: Floats, phase: float) -> Mesh:
@@ -265,7 +265,7 @@ def _stood(shape: Floats, crown: float, tall: float) -> Floats:
     return np.array([*head, *((x, s * y, z) for x, y, z in rows for s in (1, -1))])
 
 
-_DECOYS: MappingProxyType[str, tuple[str, Callable[[np.random.Generator, bool], Thing]]] = MappingProxyType(
+_DECOYS: MappingProxyType[str, tuple[str, Callable[[np.random.Generator, bool], ObjectModel]]] = MappingProxyType(
     {
         "posters": ("poster", draw_poster),
         "mirrors": ("mirror", draw_mirror),

@@ -9,10 +9,10 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.motion.trajectory import Trajectory
-from simharness.world.scene.placing.placement import BODY_HALF_WIDTH, LIMB, FreeSpace, Site
-from simharness.world.scene.things.fixtures import draw_cart
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.solids import Solid
+from simharness.world.scene.objects.fixtures import draw_cart
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB, FreeSpace, Site
 
 _SPEED = (0.35, 0.7)  # m/s, the most on the way
 _LINE = (0.4, 2.5)  # metres from the middle of a line to its ends

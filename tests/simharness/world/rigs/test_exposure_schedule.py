@@ -5,41 +5,41 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from simharness.scenario.sections.scenario import Cameras
+from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.shots import Shots, moved
 
 TIME = np.arange(4) / 10
 RIG = build_rig(Cameras(count=3))
 
 
-def test_ideal_pictures_are_of_their_own_frame_and_camera():
-    shots = Shots.ideal(RIG, TIME)
-    assert len(shots) == 4
-    assert shots.delivered.all()
+def test_the_ideal_schedule_has_every_picture_at_its_frame():
+    exposures = ExposureSchedule.ideal(RIG, TIME)
+    assert len(exposures) == 4
+    assert exposures.delivered.all()
     for frame in range(4):
         for view in range(3):
-            assert shots.time[frame, view] == TIME[frame]
-            assert shots.source[frame, view] == frame
-            assert shots.camera(frame, view) is RIG[view] is shots.believed[view]
+            assert exposures.time[frame, view] == TIME[frame]
+            assert exposures.source[frame, view] == frame
+            assert exposures.camera(frame, view) is RIG[view] is exposures.believed_rig[view]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"time": np.zeros((4, 2))}, r"time must be \(T, 3\), got \(4, 2\)"),
-        ({"time": np.full((4, 3), np.nan)}, "time has values that are not finite"),
-        ({"source": np.ones((4, 3), int)}, "source must be -1 or a frame no later"),
-        ({"source": np.full((4, 3), -2)}, "source must be -1 or a frame no later"),
-        ({"taker": [0, 1, 1]}, "taker must name each of 3 cameras once"),
-        ({"turn": np.zeros((2, 3))}, "turn must be"),
-        ({"travel": np.full((3, 3), np.inf)}, "travel has values"),
+        ({"time": np.full((4, 3), np.nan)}, "time must be finite"),
+        ({"source": np.ones((4, 3), int)}, "source must be -1 or a frame that is not later"),
+        ({"source": np.full((4, 3), -2)}, "source must be -1 or a frame that is not later"),
+        ({"camera_of_view": [0, 1, 1]}, "camera_of_view must name each of 3 cameras once"),
+        ({"rotation_rate": np.zeros((2, 3))}, "rotation_rate must be"),
+        ({"velocity": np.full((3, 3), np.inf)}, "velocity must be finite"),
         ({"readout": -0.1}, "readout must be finite and not negative"),
-        ({"true": build_rig(Cameras(count=4))}, "expected as many true cameras as believed ones, 3, got 4"),
+        ({"true_cameras": build_rig(Cameras(count=4))}, "expected as many true cameras as believed ones, 3, got 4"),
     ],
 )
-def test_what_is_no_rig_is_refused(change, message):
+def test_an_invalid_schedule_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
-        replace(Shots.ideal(RIG, TIME), **change)
+        replace(ExposureSchedule.ideal(RIG, TIME), **change)
 
 
 def test_a_camera_turns_about_its_own_centre_and_axes():
@@ -56,9 +56,9 @@ def test_a_camera_turns_about_its_own_centre_and_axes():
     np.testing.assert_array_equal(shifted.R, camera.R)
 
 
-def test_swapped_views_deliver_the_other_camera():
-    shots = replace(Shots.ideal(RIG, TIME), taker=[1, 0, 2], turn=np.eye(3) * 0.1)
-    assert shots.camera(0, 0) is RIG[1]
-    late = shots.camera(3, 0)
+def test_swapped_views_deliver_pictures_of_the_other_camera():
+    exposures = replace(ExposureSchedule.ideal(RIG, TIME), camera_of_view=[1, 0, 2], rotation_rate=np.eye(3) * 0.1)
+    assert exposures.camera(0, 0) is RIG[1]
+    late = exposures.camera(3, 0)
     assert Rotation.from_matrix(late.R @ RIG[1].R.T).magnitude() == pytest.approx(0.03)
     assert late.center == pytest.approx(RIG[1].center)

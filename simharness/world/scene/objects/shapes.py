@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
-from simharness.world.scene.things.geoms import Box, Cylinder, Surface
+from simharness.world.scene.objects.geoms import Box, Cylinder, Surface
 
 # Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
 _QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])

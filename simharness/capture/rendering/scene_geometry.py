@@ -1,7 +1,7 @@
 """All triangles of a scene in one, and what shading them needs: normals, texture pyramids, the shadows of the light.
 
-From frame to frame most of it stays: only vertices move. So what hangs on the meshes' faces is a :class:`Fabric`, kept
-as long as they are the same, and what hangs on the vertices a :class:`Soup`.
+From frame to frame most of it stays: only vertices move. So what hangs on the meshes' faces is a :class:`SceneTopology`, kept
+as long as they are the same, and what hangs on the vertices a :class:`SceneGeometry`.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _LIGHT_DISTANCE = 1000.0  # in radii of what casts shadows: its rays are all but
 
 
 @dataclass(frozen=True)
-class Fabric:
+class SceneTopology:
     """The faces of a scene: n vertices and k faces in all."""
 
     meshes: tuple[Mesh, ...]
 
-    def fits(self, meshes: Sequence[Mesh]) -> bool:
+    def matches(self, meshes: Sequence[Mesh]) -> bool:
         """Whether meshes are these but for where their vertices are."""
-        return len(meshes) == len(self.meshes) and all(map(_same_fabric, meshes, self.meshes))
+        return len(meshes) == len(self.meshes) and all(map(_same_topology, meshes, self.meshes))
 
     @cached_property
     def faces(self) -> NDArray[np.uint32]:
@@ -110,19 +110,19 @@ class Fabric:
 
 
 @dataclass(frozen=True)
-class Soup:
+class SceneGeometry:
     """The triangles of a scene where they are; what only the shading needs is made when it asks."""
 
-    fabric: Fabric
+    topology: SceneTopology
     meshes: tuple[Mesh, ...]
 
     @classmethod
-    def of(cls, meshes: Sequence[Mesh], last: Soup | None = None) -> Soup:
+    def of(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
         """Of a scene; the ``last`` one as far as it is the same."""
         if last is not None and len(meshes) == len(last.meshes) and all(map(operator.is_, meshes, last.meshes)):
             return last  # the very objects, and frozen: nothing in them changed
-        kept = last is not None and last.fabric.fits(meshes)
-        return cls(last.fabric if last is not None and kept else Fabric(tuple(meshes)), tuple(meshes))
+        kept = last is not None and last.topology.matches(meshes)
+        return cls(last.topology if last is not None and kept else SceneTopology(tuple(meshes)), tuple(meshes))
 
     @cached_property
     def vertices(self) -> Floats:
@@ -132,7 +132,7 @@ class Soup:
     @cached_property
     def normals(self) -> tuple[Floats, Floats]:
         """Of the faces, (k, 3), and of the vertices, (n, 3)."""
-        return normals(self.vertices, self.fabric.faces, self.fabric.smooth)
+        return normals(self.vertices, self.topology.faces, self.topology.smooth)
 
     def shadows(self, lighting: Lighting) -> Shadows:
         """What stands in a light; the last one asked for is kept."""
@@ -165,16 +165,16 @@ class Shadows:
         return nearest_blocks(self.nearest)
 
 
-def cast_shadows(soup: Soup, lighting: Lighting) -> Shadows:
+def cast_shadows(geometry: SceneGeometry, lighting: Lighting) -> Shadows:
     """Look from the light.
 
     Only faces turned to the light cast shadows: that is all a closed body needs, and a room, whose walls face inwards,
     lets the light in. The floor and the walls that the light falls on have nothing behind them. The map just holds
     what is left.
     """
-    vertices, direction = soup.vertices, np.array(lighting.direction)
+    vertices, direction = geometry.vertices, np.array(lighting.direction)
     nearest = np.zeros((SHADOW_SIZE, SHADOW_SIZE), np.float32)
-    faces, low, high = casters(vertices, soup.fabric.faces, soup.normals[0], direction)
+    faces, low, high = casters(vertices, geometry.topology.faces, geometry.normals[0], direction)
     middle, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
     R, half = facing(direction), SHADOW_SIZE / 2
     K = np.array([[half * (_LIGHT_DISTANCE - 1), 0, half], [0, half * (_LIGHT_DISTANCE - 1), half], [0, 0, 1]])
@@ -184,7 +184,7 @@ def cast_shadows(soup: Soup, lighting: Lighting) -> Shadows:
     return Shadows(lighting.direction, P, nearest, bias)
 
 
-def _same_fabric(one: Mesh, other: Mesh) -> bool:
+def _same_topology(one: Mesh, other: Mesh) -> bool:
     return (
         one.faces is other.faces
         and one.colors is other.colors

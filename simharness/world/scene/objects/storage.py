@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.world.scene.things.assembly import Assembly
-from simharness.world.scene.things.geoms import Box
-from simharness.world.scene.things.shapes import TOP
-from simharness.world.scene.things.solids import Thing
+from simharness.world.scene.objects.assembly import Assembly
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import TOP
+from simharness.world.scene.objects.solids import ObjectModel
 
 _BOX_SIDE = (0.40, 0.75)  # metres
 _BOX_HEIGHT = (0.40, 1.10)
@@ -45,7 +45,7 @@ BOOK_COLORS = np.array(
 )
 
 
-def draw_box(rng: np.random.Generator) -> Thing:
+def draw_box(rng: np.random.Generator) -> ObjectModel:
     """A box of 0.4 to 1.1 m with a strip of tape over it, sometimes with a smaller one on top."""
     size = np.array([rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_HEIGHT)])
     upper = np.array([*(size[:2] * rng.uniform(0.55, 0.85, 2)), rng.uniform(*_STACK_HEIGHT)])
@@ -56,7 +56,7 @@ def draw_box(rng: np.random.Generator) -> Thing:
     if stacked:
         more, more_painted = taped(upper, colors[1], base=size[2], yaw=turn)
         boxes, painted = boxes + more, painted + more_painted
-    return Assembly().boxes(boxes, painted).thing()
+    return Assembly().boxes(boxes, painted).model()
 
 
 def taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list[Box], list[Floats]]:
@@ -75,7 +75,7 @@ def taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list
     return boxes, painted
 
 
-def draw_shelf(rng: np.random.Generator) -> Thing:
+def draw_shelf(rng: np.random.Generator) -> ObjectModel:
     """An open bookshelf about 1.8 m tall: two sides, boards, a cross brace low at the back, books and cartons."""
     width, height, depth = rng.uniform(*_SHELF_WIDTH), rng.uniform(*_SHELF_HEIGHT), rng.uniform(*_SHELF_DEPTH)
     boards = int(rng.integers(5, 7))
@@ -91,10 +91,10 @@ def draw_shelf(rng: np.random.Generator) -> Thing:
     for z, above in pairwise(levels):
         parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
     boxes, colors = zip(*parts, strict=True)
-    return Assembly().boxes(boxes, np.array(colors)).thing()
+    return Assembly().boxes(boxes, np.array(colors)).model()
 
 
-def draw_rack(rng: np.random.Generator) -> Thing:
+def draw_rack(rng: np.random.Generator) -> ObjectModel:
     """A rack of thin posts and boards, bare and as high as a chest: it stands in the way, and hides little."""
     width, height, depth = rng.uniform(*_RACK_WIDTH), rng.uniform(*_RACK_HEIGHT), rng.uniform(*_RACK_DEPTH)
     levels = np.linspace(0.12, height - 0.06, int(rng.integers(3, 5)))
@@ -106,7 +106,7 @@ def draw_rack(rng: np.random.Generator) -> Thing:
     ]
     boards = [Box((0.0, 0.0, float(z)), (depth / 2, width / 2, _SHEET / 2)) for z in levels]
     boxes = posts + boards
-    return Assembly().boxes(boxes, np.array([metal] * len(posts) + [0.9 * metal] * len(boards))).thing()
+    return Assembly().boxes(boxes, np.array([metal] * len(posts) + [0.9 * metal] * len(boards))).model()
 
 
 def _things(

@@ -9,18 +9,18 @@ import numpy as np
 
 from simharness.scenario.sections.room import Clutter, Room
 from simharness.types.random_streams import stream
-from simharness.world.scene.placing.carts import place_cart
-from simharness.world.scene.placing.coverage import cover
-from simharness.world.scene.placing.placement import TRIES, FreeSpace, Site, Where, about, beside, middle
-from simharness.world.scene.things.fixtures import draw_partition, draw_pillar
-from simharness.world.scene.things.furniture import draw_chair, draw_table
-from simharness.world.scene.things.plants import draw_plant
-from simharness.world.scene.things.solids import Solid, Thing
-from simharness.world.scene.things.storage import draw_box, draw_rack, draw_shelf
+from simharness.world.scene.objects.fixtures import draw_partition, draw_pillar
+from simharness.world.scene.objects.furniture import draw_chair, draw_table
+from simharness.world.scene.objects.plants import draw_plant
+from simharness.world.scene.objects.solids import ObjectModel, Solid
+from simharness.world.scene.objects.storage import draw_box, draw_rack, draw_shelf
+from simharness.world.scene.placement.carts import place_cart
+from simharness.world.scene.placement.coverage import cover
+from simharness.world.scene.placement.free_space import TRIES, FreeSpace, Site, Where, about, beside, middle
 
 
 @dataclass(frozen=True)
-class Species:
+class ClutterKind:
     """One kind of clutter that stands still.
 
     Attributes:
@@ -32,21 +32,21 @@ class Species:
 
     name: str
     plural: str
-    draw: Callable[[np.random.Generator, Room], Thing]
+    draw: Callable[[np.random.Generator, Room], ObjectModel]
     where: Where
     fills: bool = True
 
 
 # In the order in which they find their places: the large ones first, for they find one less easily.
-SPECIES = (
-    Species("pillar", "pillars", lambda rng, room: draw_pillar(rng, room.size[2]), about),
-    Species("shelf", "shelves", lambda rng, room: draw_shelf(rng), beside),
-    Species("rack", "racks", lambda rng, room: draw_rack(rng), beside, fills=False),
-    Species("partition", "partitions", lambda rng, room: draw_partition(rng), beside),
-    Species("table", "tables", lambda rng, room: draw_table(rng), beside, fills=False),
-    Species("box", "boxes", lambda rng, room: draw_box(rng), about),
-    Species("plant", "plants", lambda rng, room: draw_plant(rng), about),
-    Species("chair", "chairs", lambda rng, room: draw_chair(rng), about, fills=False),
+CLUTTER_KINDS = (
+    ClutterKind("pillar", "pillars", lambda rng, room: draw_pillar(rng, room.size[2]), about),
+    ClutterKind("shelf", "shelves", lambda rng, room: draw_shelf(rng), beside),
+    ClutterKind("rack", "racks", lambda rng, room: draw_rack(rng), beside, fills=False),
+    ClutterKind("partition", "partitions", lambda rng, room: draw_partition(rng), beside),
+    ClutterKind("table", "tables", lambda rng, room: draw_table(rng), beside, fills=False),
+    ClutterKind("box", "boxes", lambda rng, room: draw_box(rng), about),
+    ClutterKind("plant", "plants", lambda rng, room: draw_plant(rng), about),
+    ClutterKind("chair", "chairs", lambda rng, room: draw_chair(rng), about, fills=False),
 )
 
 
@@ -61,18 +61,18 @@ def place_clutter(seed: int, clutter: Clutter, space: FreeSpace) -> tuple[Solid,
         ValueError: a thing finds no place, or ``clutter.coverage`` cannot be reached.
     """
     site = Site(space)
-    for species in SPECIES:
+    for species in CLUTTER_KINDS:
         for k in range(getattr(clutter, species.plural)):
             site.add(_place(seed, species, k, site))
     for k in range(clutter.carts):
         site.add(place_cart(seed, k, site))
     if clutter.coverage is not None:
-        fillers = {species.name: species.draw for species in SPECIES if species.fills}
+        fillers = {species.name: species.draw for species in CLUTTER_KINDS if species.fills}
         cover(seed, clutter.coverage, fillers, site)
     return tuple(site.solids[len(space.taken) :])
 
 
-def _place(seed: int, species: Species, k: int, site: Site) -> Solid:
+def _place(seed: int, species: ClutterKind, k: int, site: Site) -> Solid:
     thing = species.draw(stream(seed, "clutter", species.name, k), site.space.room)
     rng = stream(seed, "clutter", species.name, k, "place")
     name = f"{species.name}{k}"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera, Rig
 from simharness.types.mesh import Mesh
-from simharness.world.scene.things.solids import Solid
+from simharness.world.scene.objects.solids import Solid
 
 _COLUMNS, _ROWS = 20, 15  # rays that stand for a picture
 _FAR = 100.0  # metres
@@ -73,7 +73,7 @@ def _cut(starts, ends, triangles, result):
 
 
 @dataclass(frozen=True)
-class Lines:
+class SightLines:
     """Lines of sight from lenses to joints.
 
     Attributes:
@@ -103,7 +103,7 @@ class Lines:
         return result
 
 
-def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> Lines:
+def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> SightLines:
     """The lines from every lens to every joint that falls on its image.
 
     Args:
@@ -114,14 +114,14 @@ def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> Lines:
     points = joints.reshape(-1, 3)
     when = np.repeat(time, joints.shape[1] * joints.shape[2])
     on_image = [camera.inside(camera.project(points)) for camera in rig]
-    return Lines(
+    return SightLines(
         np.concatenate([np.tile(camera.center, (seen.sum(), 1)) for camera, seen in zip(rig, on_image, strict=True)]),
         np.concatenate([points[seen] for seen in on_image]),
         np.concatenate([when[seen] for seen in on_image]),
     )
 
 
-class Pictures:
+class PictureFill:
     """How much of each camera's picture is filled by things.
 
     Attributes:

@@ -21,7 +21,7 @@ _LOOSE = 0.03  # regularises: a wrench that the contacts could hold only by grea
 _LEVER = 0.3  # metres, which make a torque comparable with a force
 
 
-class Efforts:
+class InverseDynamics:
     """Reckons with plans for all people of one model.
 
     Args:
