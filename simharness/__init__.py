@@ -9,8 +9,7 @@ if TYPE_CHECKING:
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.sequence import Sequence
     from simharness.types.truth import KeypointError, Truth
-    from simharness.types.views import Views
-    from simharness.types.visibility import Visibility
+    from simharness.types.views import Views, Visibility
 
 _HOMES = {
     "KeypointError": "simharness.types.truth",
@@ -18,7 +17,7 @@ _HOMES = {
     "Sequence": "simharness.types.sequence",
     "Truth": "simharness.types.truth",
     "Views": "simharness.types.views",
-    "Visibility": "simharness.types.visibility",
+    "Visibility": "simharness.types.views",
 }
 
 __all__ = ["KeypointError", "Scenario", "Sequence", "Truth", "Views", "Visibility"]

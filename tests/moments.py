@@ -11,7 +11,7 @@ from mvpose import Detections, Estimate
 from mvpose.estimate import Matching
 from simharness.types.recording import Recording
 from simharness.types.truth import KeypointError, Truth
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 sys.path.append(str(Path(__file__).parent / "mvpose"))
 

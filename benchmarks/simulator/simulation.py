@@ -10,14 +10,13 @@ from benchmarks.method.report import MET, MISSED, bar, caption, figure, table
 from benchmarks.simulator.scenes import scenario
 from mvpose.camera import Rig
 from simharness.capture.film import film
-from simharness.capture.ray_visibility import RayEye
+from simharness.capture.ray_visibility import RayObserver
 from simharness.detector.detect import detect
 from simharness.scenario.sections.scenario import Scenario
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
 from simharness.world.rigs.layouts import build_rig
-from simharness.world.rigs.shots import Shots
 from simharness.world.scene.build import Scene, build
-from simharness.world.scene.playback import Playback
-from simharness.world.scene.simulation import simulate
+from simharness.world.scene.playback import Playback, simulate
 
 TARGET = 250.0  # scene frames a second of 4 people before 5 cameras
 RATE = 25.0  # frames per second
@@ -85,7 +84,7 @@ def _staged(people: int, frames: int) -> _Staged:
     )
     start = time.process_time()
     scene = build(staged, build_rig(staged.cameras))
-    RayEye(Playback(scene))
+    RayObserver(Playback(scene))
     return _Staged(staged, scene, time.process_time() - start)
 
 
@@ -108,11 +107,11 @@ def _run(staged: _Staged, rig: Rig) -> dict[str, float]:
     """Milliseconds a frame of every stage."""
     scene, config = staged.scene, staged.scenario
     playback = Playback(scene)
-    eye = RayEye(playback)  # laid out once for a whole sequence, too
+    observer = RayObserver(playback)  # laid out once for a whole sequence, too
     marks = [time.process_time()]
     sequence = simulate(scene)
     marks.append(time.process_time())
-    views = film(playback, Shots.ideal(rig, scene.time), eye)
+    views = film(playback, ExposureSchedule.ideal(rig, scene.time), observer)
     marks.append(time.process_time())
     detect(sequence, views, rig, config.detector, seed=config.seed)
     marks.append(time.process_time())

@@ -14,7 +14,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.types.recording import Recording
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 
 def reprojection_errors(recording: Recording, placed: Floats) -> tuple[Floats, Floats]:

@@ -13,8 +13,8 @@ from simharness.scenario.sections.room import Room
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
-from simharness.world.scene.objects.solids import Thing
-from simharness.world.scene.placement.clutter import SPECIES
+from simharness.world.scene.objects.solids import ObjectModel
+from simharness.world.scene.placement.clutter import CLUTTER_KINDS
 from tools.reid.filming_sites import Site
 from tools.reid.identities import Figure
 from tools.reid.poses import Poses, placed
@@ -83,7 +83,7 @@ def _things(rng: np.random.Generator, room: Room, spots: Floats, cameras: Sequen
     on_floor = np.column_stack([spots, np.zeros(len(spots))])
     meshes, taken = [], list[Box]()
     for _ in range(rng.integers(*_THINGS)):
-        species = SPECIES[rng.integers(len(SPECIES))]
+        species = CLUTTER_KINDS[rng.integers(len(CLUTTER_KINDS))]
         thing = species.draw(rng, room)
         hull = _free(rng, thing, on_floor, lenses, taken)
         if hull is not None:
@@ -94,7 +94,7 @@ def _things(rng: np.random.Generator, room: Room, spots: Floats, cameras: Sequen
 
 
 def _free(
-    rng: np.random.Generator, thing: Thing, spots: Floats, lenses: Floats, taken: Sequence[Box]
+    rng: np.random.Generator, thing: ObjectModel, spots: Floats, lenses: Floats, taken: Sequence[Box]
 ) -> tuple[Box, Floats, float] | None:
     """Where a thing is in nobody's way, if there is such a place: its hull there, the place, the turn."""
     drawn = rng.random((_TRIES, 3))

@@ -67,7 +67,7 @@ def _log_still(recording: Any, replay: Replay) -> None:
     """Cameras and things."""
     import rerun
 
-    for camera in replay.trial.shots.believed:
+    for camera in replay.trial.exposures.believed_rig:
         place = f"world/cameras/{camera.name}"
         pose = rerun.Transform3D(translation=camera.center, mat3x3=camera.R.T)
         eye = rerun.Pinhole(
@@ -101,7 +101,7 @@ def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
         colors += [person_color(owner)] * len(limbs)
     recording.log("world/estimates", rerun.LineStrips3D(strips, colors=colors, radii=_THICK))
     said = np.append(owners, -1)[estimate.matching.labels_of(len(detections))]
-    for view, camera in enumerate(replay.trial.shots.believed):
+    for view, camera in enumerate(replay.trial.exposures.believed_rig):
         place = f"world/cameras/{camera.name}"
         points, shades = _keypoints(detections.keypoints, np.flatnonzero(detections.view == view), said)
         recording.log(f"{place}/detections", rerun.Points2D(points, colors=shades, radii=_DOT))

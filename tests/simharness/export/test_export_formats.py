@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from mvpose import COCO17
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.cameras import hd_names
-from simharness.export.openpose import people_file
-from simharness.formats.openpose import read_people
+from simharness.formats.openpose import people_file, read_people
 from simharness.formats.panoptic_poses import body_scene, confidences
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 HIDDEN = (Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 # Of BODY_25, from OpenPose's documentation.

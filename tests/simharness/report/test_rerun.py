@@ -39,7 +39,7 @@ class TestWithTheSdk:
         _, again = shown[0]
         write_rerun(again, tmp_path / "worst.rrd")
         entities = self.read(tmp_path / "worst.rrd")
-        names = [camera.name for camera in again.trial.shots.believed]
+        names = [camera.name for camera in again.trial.exposures.believed_rig]
         assert {f"world/cameras/{name}" for name in names} <= set(entities)
         assert {f"world/cameras/{name}/detections" for name in names} <= set(entities)
         for entity in ("world/truth/person0", "world/truth/person1", "world/estimates"):

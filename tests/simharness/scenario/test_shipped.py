@@ -11,9 +11,9 @@ from simharness.detector.detect import Detected
 from simharness.scenario.study_definition import Setting, Study, load_study
 from simharness.trial.looking import look
 from simharness.trial.measure import measure
-from simharness.trial.stages.build import Trial, prepare, rig_of
+from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.types.sequence import Sequence
-from simharness.world.rigs.faults import shoot
+from simharness.world.rigs.faults import schedule_exposures
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
@@ -80,7 +80,7 @@ class Seen:
 
 def see(chosen: Setting, *, seed: int = 0) -> Seen:
     """A second of a setting."""
-    trial = prepare(chosen.scenario.model_copy(update={"seed": seed, "duration": 1.0, "rate": 6.0}))
+    trial = build_trial(chosen.scenario.model_copy(update={"seed": seed, "duration": 1.0, "rate": 6.0}))
     sequence, detected = look(trial)
     seen = Seen(trial, sequence, detected)
     assert len(seen.real) > 20, "hardly anybody was seen"
@@ -150,9 +150,9 @@ class TestSettings:
             scenario = study.at(chosen, study.seeds[0])
             scene = scenario.model_dump_json(exclude={"faults", "detector"})
             if scene in built:  # the rest concerns pictures of what stands there already
-                shoot(rig_of(scenario), scenario.faults, np.arange(scenario.frames), seed=scenario.seed)
+                schedule_exposures(true_rig(scenario), scenario.faults, np.arange(scenario.frames), seed=scenario.seed)
             else:
-                assert len(prepare(scenario).scene.bodies) == scenario.people.count
+                assert len(build_trial(scenario).scene.bodies) == scenario.people.count
                 built.add(scene)
         assert built
 

@@ -14,7 +14,7 @@ from simharness.scoring.catalogue import SCORES
 from simharness.scoring.pck import pck
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 ASSESSED = [key for key in SCORES if not key.startswith(("failures_", "blame_"))]
 POSE_SHARES = [key for key in ASSESSED if key.startswith(("pcp", "ap", "pck"))] + ["recall", "precision", "map"]

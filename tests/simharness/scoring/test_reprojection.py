@@ -7,7 +7,7 @@ from recordings import record, ring, walk
 from mvpose import Camera, Rig
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.types.recording import Recording
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 
 def test_the_truth_is_at_its_pixels_and_the_noise_of_detections_is_found():
