@@ -8,7 +8,7 @@ from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import ACTIVITIES
+from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
@@ -61,7 +61,7 @@ def test_identities_are_the_people_of_a_scenario_of_that_seed():
 def test_poses_lent_to_the_body_that_they_were_planned_on_are_the_planned_ones():
     body = make_body(Shape())
     mover = Kinematics(body)
-    activity = ACTIVITIES["dance"]
+    activity = activities()["dance"]
     performance = activity.perform(
         [mover], Spot(np.zeros(2), 0.7), motion_clock(1.0), rng=np.random.default_rng(1), pace=1.0
     )
@@ -75,7 +75,7 @@ def test_poses_lent_to_the_body_that_they_were_planned_on_are_the_planned_ones()
 
 def test_poses_face_along_x_and_bodies_where_they_are_put():
     poses = plan_poses(5, frames=2, takes=1)
-    assert len(poses) >= 2 * len(ACTIVITIES)
+    assert len(poses) >= 2 * len(activities())
     np.testing.assert_allclose(bearing(poses.turns), 0.0, atol=1e-9)
     body = figures(Group(7, 1), [0])[0].body
     rest = np.linalg.norm(body.heads - body.heads[np.maximum(body.parents, 0)], axis=1)

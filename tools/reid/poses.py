@@ -17,9 +17,8 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
-from simharness.world.motion.performance import Activity
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import ACTIVITIES
+from simharness.world.motion.registry import Activity, activities
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 4.0  # seconds of every motion
@@ -51,7 +50,9 @@ def plan_poses(seed: int, *, frames: int = 40, takes: int = 2) -> Poses:
     """
     mover = Kinematics(make_body(Shape()))
     turns = [
-        _level(_take(mover, activity, seed, take, frames)) for activity in ACTIVITIES.values() for take in range(takes)
+        _level(_take(mover, activity, seed, take, frames))
+        for activity in activities().values()
+        for take in range(takes)
     ]
     return Poses(np.concatenate(turns))
 

@@ -8,23 +8,23 @@ from pydantic import Field, model_validator
 
 from simharness.scenario.sections.section import Amount, Count, Positive, Section, Share
 
-Activity = Literal[
-    "stand",
+ActivityName = Literal[
     "walk",
-    "run",
-    "turn",
-    "sit",
-    "squat",
-    "reach",
-    "carry",
+    "stand",
     "wave",
     "point",
     "talk",
+    "squat",
     "crouch",
     "kneel",
+    "turn",
     "step",
+    "run",
+    "reach",
+    "carry",
     "dance",
     "lie",
+    "sit",
     "shake_hands",
     "hug",
     "hand_over",
@@ -45,7 +45,7 @@ class People(Section):
     """Who is in the room and what they do."""
 
     count: int = Field(4, ge=0, le=100)
-    activities: tuple[Activity, ...] = Field(
+    activities: tuple[ActivityName, ...] = Field(
         ("walk", "wave"),
         min_length=1,
         description="handed out in turn, one to each person, those of pairs to two at a time",

@@ -15,9 +15,9 @@ from simharness.types.random_streams import stream
 from simharness.world.motion.contact import Crowd, Presence
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Recorded, Spot, Track, turned
-from simharness.world.motion.performance import Activity, Performance, Prop, solo
+from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import ACTIVITIES
+from simharness.world.motion.registry import Activity, activities, solo
 from simharness.world.motion.track_planning import Going, Replaying, Staying, Wish, plan_tracks
 from simharness.world.motion.trajectory import Trajectory
 
@@ -66,7 +66,7 @@ def choreograph(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) ->
         ValueError: people that do not fit, naming the keys of the scenario to change.
     """
     people = scenario.people
-    known = dict(ACTIVITIES)
+    known = dict(activities())
     if "mocap" in people.activities:
         known["mocap"] = _recorded(scenario)
     missing = [name for name in people.activities if name not in known]
@@ -111,7 +111,8 @@ def hand_out(activities: Sequence[Activity], count: int, *, spare: Activity) -> 
 
 def roles(people: People) -> tuple[str, ...]:
     """What each person of a scenario does, by name."""
-    known = dict(ACTIVITIES) | {"mocap": replace(ACTIVITIES["stand"], name="mocap")}
+    known = dict(activities())
+    known["mocap"] = replace(known["stand"], name="mocap")
     parties = hand_out([known[name] for name in people.activities], people.count, spare=known["stand"])
     return tuple(party.activity.name for party in parties for _ in party.people)
 

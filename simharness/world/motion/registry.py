@@ -1,13 +1,149 @@
-"""One door to all motions: an activity by its name."""
+"""Registry of activities: what one person, or two people together, can do.
+
+How to add an activity:
+
+1. Write one module in ``activities/`` (one person) or ``interactions/`` (two people). Decorate its function with
+   :func:`solo_activity` if it moves one body and uses no props, otherwise with :func:`activity`::
+
+       @solo_activity("squat", clearance=0.2)
+       def squat(kinematics, spot, time, *, rng, pace) -> Motion: ...
+
+       @activity("hand_over", performers=2, clearance=0.5)
+       def hand_over(performers, spot, time, *, rng, pace) -> Performance: ...
+
+2. Add the name to ``ActivityName`` in ``simharness/scenario/sections/people.py``, the names that scenario files accept.
+
+Nothing else lists activities: :func:`activities` imports every module of the two folders. The tests in
+``tests/simharness/world/motion`` (``test_activities.py``, ``test_interactions.py``) run on every registered activity:
+feet do not slide, no skin is below the floor, and joint angles stay within their ranges.
+
+A gesture of a standing person is shorter still: one function in ``activities/gestures.py`` that changes joint angle
+curves, with the decorator that is defined there, and its name as in step 2.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
 from types import MappingProxyType
+from typing import TypeVar, get_args
 
-from simharness.world.motion.activities.singles import SINGLES
-from simharness.world.motion.interactions.pairs import PAIRS
-from simharness.world.motion.performance import Activity
+import numpy as np
 
-ACTIVITIES: Mapping[str, Activity] = MappingProxyType({**SINGLES, **PAIRS})
-"""By name; "mocap" is not among them, for it is recorded (``simharness.world.motion.mocap``)."""
+from mvpose.arrays import Floats
+from simharness.scenario.sections.people import ActivityName
+from simharness.world.motion.motion import Motion
+from simharness.world.motion.paths import Loop, Spot, Track
+from simharness.world.motion.performance import Performance
+from simharness.world.motion.poses.kinematics import Kinematics
+
+_PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
+_STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors
+_registered: dict[str, Activity] = {}
+
+Perform = TypeVar("Perform", bound=Callable[..., Performance])
+Move = TypeVar("Move", bound=Callable[..., Motion])
+
+
+@dataclass(frozen=True)
+class Activity:
+    """Activity of one person, or of two together.
+
+    Attributes:
+        name: name in scenario files.
+        performers: number of people that it takes, 1 or 2.
+        track: kind of track: a :class:`Loop` to walk or run round, or a :class:`Spot`. Two performers share a spot: its
+            place is midway between them, and its bearing points from the first to the second.
+        clearance: radius in metres around the track's position that the performers' pelvises may use; their arms may
+            reach beyond. Tracks of other people stay ``people.spacing`` further away.
+        froude: lowest and highest speed over sqrt(g x leg length), for activities on a loop.
+        perform: function of the performers' ``Kinematics`` in order, the track, and the times (N,) in seconds at which
+            to plan (ascending, at ``RATE``), with the keywords ``rng`` (random generator for the manner) and ``pace``
+            (cadence relative to the usual one); returns a :class:`Performance`. Apart from its ends, the result must
+            not depend on the length of ``time``.
+    """
+
+    name: str
+    performers: int
+    track: type[Loop] | type[Spot]
+    clearance: float
+    perform: Callable[..., Performance]
+    froude: tuple[float, float] = _STROLL
+
+
+def activity(
+    name: str,
+    *,
+    performers: int = 1,
+    track: type[Loop] | type[Spot] = Spot,
+    clearance: float = 0.0,
+    froude: tuple[float, float] = _STROLL,
+) -> Callable[[Perform], Perform]:
+    """Register the decorated function as an activity; the arguments are the attributes of :class:`Activity`.
+
+    The function takes a sequence of ``Kinematics`` and returns a :class:`Performance`, see ``Activity.perform``.
+    """
+
+    def register(perform: Perform) -> Perform:
+        if name in _registered:
+            raise ValueError(f"the activity {name!r} is registered twice: choose another name for one of them")
+        _registered[name] = Activity(name, performers, track, clearance, perform, froude)
+        return perform
+
+    return register
+
+
+def solo_activity(
+    name: str,
+    *,
+    track: type[Loop] | type[Spot] = Spot,
+    clearance: float = 0.0,
+    froude: tuple[float, float] = _STROLL,
+) -> Callable[[Move], Move]:
+    """Register the decorated function as an activity of one person without props; arguments as for :func:`activity`.
+
+    The function takes one ``Kinematics`` instead of a sequence and returns a :class:`Motion`.
+    """
+
+    def register(move: Move) -> Move:
+        activity(name, track=track, clearance=clearance, froude=froude)(solo(move))
+        return move
+
+    return register
+
+
+def solo(move: Callable[..., Motion]) -> Callable[..., Performance]:
+    """Return ``move``, a function of one ``Kinematics`` that returns a motion, as an ``Activity.perform``."""
+
+    def perform(
+        performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
+    ) -> Performance:
+        (kinematics,) = performers
+        return Performance((move(kinematics, track, time, rng=rng, pace=pace),))
+
+    return perform
+
+
+@cache
+def activities() -> Mapping[str, Activity]:
+    """Return all registered activities by name, in the order of ``ActivityName``.
+
+    "mocap" is not one of them: it is made from a recording (``simharness.world.motion.mocap``).
+
+    Raises:
+        ValueError: an activity whose name is not in ``ActivityName``.
+    """
+    for package in _PACKAGES:
+        for module in iter_modules(import_module(package).__path__):
+            import_module(f"{package}.{module.name}")
+    names = get_args(ActivityName)
+    unlisted = sorted(set(_registered) - set(names))
+    if unlisted:
+        raise ValueError(
+            f"the activity {unlisted[0]!r} is registered, but scenario files do not accept it: add its name to "
+            "ActivityName in simharness/scenario/sections/people.py"
+        )
+    return MappingProxyType({name: _registered[name] for name in names if name in _registered})

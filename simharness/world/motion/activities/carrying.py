@@ -16,6 +16,7 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, arm_angles, g
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
 from simharness.world.motion.poses.timing import glide, rounds
+from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _GRIP, _NEARER = (
@@ -27,6 +28,7 @@ _TOE_ROOM = 0.02  # metres between toes and box
 _CARRIED = (0.62, -0.58)  # ahead of and over the shoulders, as shares of the arm: the hands of one who carries
 
 
+@activity("carry", clearance=0.5)
 def carry(
     performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

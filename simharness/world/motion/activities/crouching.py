@@ -13,12 +13,14 @@ from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, limbs
 from simharness.world.motion.poses.timing import glide, rounds, wander
+from simharness.world.motion.registry import solo_activity
 
 _ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()  # pitch of the foot behind a kneeling leg, and at most
 _ANKLE = float(np.radians(20.0))  # its dorsiflexion, where a greater one would be needed
 _OTHER = {"left": "right", "right": "left"}
 
 
+@solo_activity("squat", clearance=0.2)
 def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Bend the knees until the thighs are nearly level, heels down, arms forward for balance, and come up again."""
     deep, wide, arms, head = rng.uniform(size=4)
@@ -43,6 +45,7 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
+@solo_activity("kneel", clearance=0.5)
 def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Step forward, go down on the other knee, stay, come up and step back."""
     handed, bow, look = rng.uniform(size=3)
@@ -89,6 +92,7 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
+@solo_activity("crouch", clearance=0.4)
 def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Stay low, one foot ahead and the heel of the other up, and shift and look about."""
     handed, deep = rng.uniform(size=2)

@@ -13,6 +13,7 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import at_ease, blend, limb
 from simharness.world.motion.poses.timing import glide, wander
+from simharness.world.motion.registry import solo_activity
 
 _BAR = 4  # beats: step, touch, step back, touch
 _STRAIGHTEST = np.radians(16.0)  # knees
@@ -20,6 +21,7 @@ _FITTED = 200  # instants of a bar that the height of the pelvis is fitted to
 _TEMPO = (1.5, 1.8)  # beats a second at pace 1
 
 
+@solo_activity("dance", clearance=0.2)
 def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Step to one side, bring the other foot along, and back, bouncing on every beat.
 

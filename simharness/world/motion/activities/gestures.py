@@ -15,17 +15,39 @@ from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, some_side
 from simharness.world.motion.poses.timing import strokes, wander
+from simharness.world.motion.registry import solo_activity
 
 _STRAIGHTEST = np.radians(8.0)  # knees at ease
 _FURTHEST = 0.034  # metres: the pelvis keeps within this of the spot's middle, ahead and aside
 _SHIFT = 0.018  # metres: the weight goes from foot to foot
 
 
-def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator) -> Motion:
+Bend = Callable[[Curves, Floats, np.random.Generator], None]
+GESTURES: dict[str, Bend] = {}
+"""Gestures by name; each changes, in place, the joint angle curves (degrees) of a person who stands at ease."""
+
+
+def _gesture(name: str) -> Callable[[Bend], Bend]:
+    """Register the decorated function as a gesture, and the gesture as an activity."""
+
+    def register(bend: Bend) -> Bend:
+        def perform(
+            kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
+        ) -> Motion:
+            return gesture(name, kinematics, spot, time, rng=rng)
+
+        GESTURES[name] = bend
+        solo_activity(name)(perform)
+        return bend
+
+    return register
+
+
+def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator) -> Motion:
     """Stand on the spot and do one of ``GESTURES``, over and over, with natural pauses.
 
     Args:
-        activity: a key of ``GESTURES``.
+        name: a key of ``GESTURES``.
         kinematics: the body.
         spot: where and facing where.
         time: seconds, (T,).
@@ -33,7 +55,7 @@ def gesture(activity: str, kinematics: Kinematics, spot: Spot, time: Floats, *, 
     """
     curves = at_ease(time, rng)
     curves |= {"forward": 0.006 * wander(time, rng, 0.2), "aside": _SHIFT * wander(time, rng, 0.12)}
-    GESTURES[activity](curves, time, rng)
+    GESTURES[name](curves, time, rng)
 
     forward, aside = curves.pop("forward"), curves.pop("aside")
     pelvis = _shifted(
@@ -67,11 +89,13 @@ def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean
     )
 
 
+@_gesture("stand")
 def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """Nothing but shifting weight and looking around a little more."""
     curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * wander(time, rng, 0.12)
 
 
+@_gesture("wave")
 def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """The hand goes up beside the head, palm forward, and waves from the elbow."""
     side, _ = some_side(rng)
@@ -90,6 +114,7 @@ def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     blend(curves, on, **arm, neck_flexion=-2.0)
 
 
+@_gesture("point")
 def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """A straight arm points at something that the eyes follow too."""
     side, sign = some_side(rng)
@@ -114,6 +139,7 @@ def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     )
 
 
+@_gesture("talk")
 def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """Both hands in front of the belly, beating along with what is said; the head nods."""
     for side in SIDES:
@@ -132,12 +158,3 @@ def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
             ),
         )
     curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * wander(time, rng, 0.8)
-
-
-GESTURES: dict[str, Callable[[Curves, Floats, np.random.Generator], None]] = {
-    "stand": _stand,
-    "wave": _wave,
-    "point": _point,
-    "talk": _talk,
-}
-"""What can be done on a spot; each changes the curves of a person who stands at ease."""

@@ -15,6 +15,7 @@ from simharness.world.motion.poses.inverse_kinematics import arm_angles, plant, 
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
 from simharness.world.motion.poses.timing import ease, glide, rounds, wander
+from simharness.world.motion.registry import solo_activity
 
 _SITTING = 0.68  # of the leg's length: from ankles to hips of one who sits on the floor, knees up
 _BACK = 0.05  # and how much further when lying
@@ -52,6 +53,7 @@ _TRUNK = {  # degrees at these
 }
 
 
+@solo_activity("lie", clearance=1.0)
 def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Go down to the floor, lie on the back for a while, and get up the same way."""
     open_, wide = rng.uniform(size=2)

@@ -13,8 +13,10 @@ from simharness.world.motion.poses.inverse_kinematics import arm_angles, plant, 
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import at_ease, blend, limb, some_side
 from simharness.world.motion.poses.timing import glide, rounds, wander
+from simharness.world.motion.registry import solo_activity
 
 
+@solo_activity("reach", clearance=0.2)
 def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Reach for something on a high shelf, on one's toes, then for something low in front, with bent knees."""
     side, sign = some_side(rng)

@@ -21,6 +21,7 @@ from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
+from simharness.world.motion.registry import solo_activity
 
 FOOT_OFF = 0.39  # share of the stride when the toes leave the floor; 0 is when the foot strikes it
 # Degrees at shares of the stride.
@@ -43,6 +44,7 @@ _WIDTH = 0.25  # of the prints, as a share of that of the feet in the neutral st
 _SAMPLES = 240
 
 
+@solo_activity("run", track=Loop, froude=(0.6, 0.95))
 def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
     """Run round the loop at its speed.
 

@@ -16,6 +16,7 @@ from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles,
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import at_ease, blend, limbs
 from simharness.world.motion.poses.timing import ease, glide, rounds
+from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _SHANK = np.radians(5.0)  # of a seated leg, the knee ahead of the ankle
@@ -50,6 +51,7 @@ class Seat:
         return np.stack([np.interp(lean, self.lean, self.hip[:, k]) for k in range(2)], axis=-1)
 
 
+@activity("sit", clearance=0.5)
 def sit(
     performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

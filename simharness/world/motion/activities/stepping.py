@@ -16,6 +16,7 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, plant
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import at_ease, blend, limb
 from simharness.world.motion.poses.timing import bump, glide, rounds
+from simharness.world.motion.registry import activity, solo_activity
 from simharness.world.motion.trajectory import Trajectory
 
 Steps = Mapping[str, list[tuple[float, float, Print]]]  # by side: when a foot takes off, when it lands, where
@@ -27,6 +28,7 @@ _FITTED = 240  # instants of a round that the height of the pelvis is fitted to
 _OTHER = {"left": "right", "right": "left"}
 
 
+@solo_activity("turn")
 def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Turn on the spot by small steps, three times in a round, and end up facing as at first."""
     sense, share, uneven = rng.uniform(size=3)
@@ -84,6 +86,7 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     )
 
 
+@activity("step", clearance=0.3)
 def step(
     performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

@@ -11,6 +11,7 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import solo_activity
 
 _GRAVITY = 9.81
 _STRAIGHTEST = np.radians(4.0)
@@ -24,6 +25,7 @@ _ARM_SWING = 19.0
 _ELBOW_SWING = 13.0
 
 
+@solo_activity("walk", track=Loop)
 def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Generator, pace: float = 1.0) -> Motion:
     """Walk round the loop at its speed.
 

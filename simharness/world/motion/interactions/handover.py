@@ -19,6 +19,7 @@ from simharness.world.motion.poses.foot_placement import in_world
 from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease, rounds
+from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _BOX_CHANCE = 0.5
@@ -73,6 +74,7 @@ class _Course:
         return 1.0 - lost if person == 0 else taken
 
 
+@activity("hand_over", performers=2, clearance=0.5)
 def hand_over(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

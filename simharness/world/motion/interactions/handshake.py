@@ -15,6 +15,7 @@ from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease, rounds
+from simharness.world.motion.registry import activity
 
 _SHAKEN = (0.015, 0.03)  # metres up and down
 _SHAKE_RATE = (1.8, 2.6)  # Hz
@@ -23,6 +24,7 @@ _INWARD = np.radians(22.0)  # the fingers of a right hand point a little to the 
 _HELD_OUT = np.radians([40.0, 6.0, 15.0, 50.0, 5.0, 0.0])
 
 
+@activity("shake_hands", performers=2, clearance=0.5)
 def shake_hands(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

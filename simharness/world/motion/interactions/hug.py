@@ -20,6 +20,7 @@ from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, girdl
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import Curves, at_ease, limbs
 from simharness.world.motion.poses.timing import bump, ease, rounds
+from simharness.world.motion.registry import activity
 
 Role = Literal["over", "under"]
 
@@ -110,6 +111,7 @@ class _Course:
         return np.concatenate([there, np.linspace(0.86 * self.close, self.back + 0.1, count)])
 
 
+@activity("hug", performers=2, clearance=0.4)
 def hug(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

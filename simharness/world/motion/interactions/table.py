@@ -21,6 +21,7 @@ from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles,
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.posture import at_ease, blend
 from simharness.world.motion.poses.timing import strokes, wander
+from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _SEATED = 0.65  # chance that they sit
@@ -59,6 +60,7 @@ class _Place:
     middle: float
 
 
+@activity("table", performers=2, clearance=0.7)
 def table(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:

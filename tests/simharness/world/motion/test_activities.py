@@ -1,20 +1,23 @@
 """What every activity of one person must be, told from the skin and the joints, on several bodies."""
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from simharness.scenario.sections.people import ActivityName
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.activities.singles import SINGLES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import SWAY, Loop, Spot, make_loop
 from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import activities, solo_activity
 from simharness.world.motion.trajectory import motion_clock
 
+SOLO = {name: each for name, each in activities().items() if each.performers == 1}
 TIME = motion_clock(8.0, margin=1.0)
 RATE = 60.0
 FASTEST = {"walk": 6.0, "run": 10.0}  # m/s, of any joint; of others 6
@@ -37,16 +40,16 @@ class Done:
 
 
 def some_track(name: str, kinematics: Kinematics) -> Loop | Spot:
-    if SINGLES[name].track is Spot:
+    if SOLO[name].track is Spot:
         return Spot(np.array([0.6, -0.4]), 0.9)
     around = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     egg = np.stack([1.7 * np.cos(around), (1.3 + 0.2 * np.cos(around)) * np.sin(around)], axis=-1)
-    return make_loop(egg, speed=np.mean(SINGLES[name].froude) * np.sqrt(9.81 * kinematics.leg_length), start=0.3)
+    return make_loop(egg, speed=np.mean(SOLO[name].froude) * np.sqrt(9.81 * kinematics.leg_length), start=0.3)
 
 
 def perform(name: str, kinematics: Kinematics, time: np.ndarray, *, seed: int) -> Performance:
     track = some_track(name, kinematics)
-    return SINGLES[name].perform([kinematics], track, time, rng=stream(seed, name), pace=1.1)
+    return SOLO[name].perform([kinematics], track, time, rng=stream(seed, name), pace=1.1)
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +61,7 @@ def bodies() -> list[Kinematics]:
     return [Kinematics(body) for body in (women[0], men[0], min(women, key=lambda body: body.stature))]
 
 
-@pytest.fixture(
-    scope="module", params=[(name, k) for name in SINGLES for k in range(3)], ids=lambda p: f"{p[0]}-{p[1]}"
-)
+@pytest.fixture(scope="module", params=[(name, k) for name in SOLO for k in range(3)], ids=lambda p: f"{p[0]}-{p[1]}")
 def done(request, bodies) -> Done:
     name, k = request.param
     kinematics = bodies[k]
@@ -71,8 +72,13 @@ def done(request, bodies) -> Done:
     return Done(name, kinematics, some_track(name, kinematics), performance, joints, skins)
 
 
-def test_there_are_at_least_fourteen():
-    assert len(SINGLES) >= 14
+def test_every_name_of_the_scenario_is_registered():
+    assert tuple(activities()) == tuple(name for name in get_args(ActivityName) if name != "mocap")
+
+
+def test_a_name_is_registered_once():
+    with pytest.raises(ValueError, match=r"'walk' is registered twice"):
+        solo_activity("walk")(lambda *performer: None)
 
 
 def test_joints_keep_their_limits(done):
@@ -119,9 +125,9 @@ def test_something_happens(done):
 
 def test_pelvis_stays_within_the_clearance(done):
     off = np.linalg.norm(done.motion.root[:, :2] - done.track.position(TIME), axis=1)
-    assert off.max() < SINGLES[done.name].clearance + SWAY
+    assert off.max() < SOLO[done.name].clearance + SWAY
     reach = np.linalg.norm(done.joints[..., :2] - done.track.position(TIME)[:, None], axis=-1).max()
-    assert reach < SINGLES[done.name].clearance + 0.5 * done.kinematics.body.stature  # an arm and a shoulder
+    assert reach < SOLO[done.name].clearance + 0.5 * done.kinematics.body.stature  # an arm and a shoulder
 
 
 def test_an_instant_does_not_depend_on_how_long_it_goes_on(done):

@@ -7,10 +7,10 @@ from mvpose.skeleton import COCO17
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.activities.singles import SINGLES
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.inverse_kinematics import palm
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import motion_clock
 
 TIME = motion_clock(12.0)
@@ -28,7 +28,7 @@ def kinematics(seed):
 
 
 def perform(name, kinematics, seed):
-    performance = SINGLES[name].perform([kinematics], SPOT, TIME, rng=stream(seed, name), pace=1.1)
+    performance = activities()[name].perform([kinematics], SPOT, TIME, rng=stream(seed, name), pace=1.1)
     (prop,) = performance.props
     return performance.motions[0], prop
 

@@ -8,8 +8,8 @@ from simharness.types.random_streams import stream
 from simharness.world.motion.choreography import choreograph, hand_out, in_the_way, moved
 from simharness.world.motion.contact import penetration
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.performance import Activity, Performance, Prop, solo
-from simharness.world.motion.registry import ACTIVITIES
+from simharness.world.motion.performance import Performance, Prop
+from simharness.world.motion.registry import Activity, activities, solo
 from simharness.world.motion.trajectory import Trajectory, motion_clock
 
 CLOCK = motion_clock(4.0, margin=1.0)
@@ -95,7 +95,7 @@ def test_nobody():
 @pytest.mark.parametrize("name", ["wave", "table", "hand_over"])
 def test_what_is_done_on_a_spot_is_carried_there(name):
     """Done at the origin and carried to a spot it is what is done on that spot."""
-    activity = ACTIVITIES[name]
+    activity = activities()[name]
     people = [performer(0), performer(1)][: activity.performers]
     spot = Spot(np.array([0.7, -1.1]), 2.2)
     clock = CLOCK[:90]
