@@ -1,1 +1,1 @@
-"""Readers and writers of the field's file formats."""
+"""Readers and writers of the file formats of the field."""

@@ -1,4 +1,4 @@
-"""Reading other people's files: whatever is wrong with one ends in one ValueError that names it."""
+"""Reading of foreign files: every fault of a file ends in one ValueError that names the file."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 
 def read_bytes(path: Path, *, what: str) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Args:
         path: the file.
-        what: what it should hold and where it comes from, for the message.
+        what: the expected content and its origin, for the message.
 
     Raises:
-        ValueError: no such file, or one that cannot be read.
+        ValueError: the file does not exist or cannot be read.
     """
     try:
         return path.read_bytes()
@@ -26,21 +26,21 @@ def read_bytes(path: Path, *, what: str) -> bytes:
 
 
 def read_json(path: Path, *, what: str) -> dict[str, Any]:
-    """The JSON object in a file.
+    """Return the JSON object in a file.
 
     Args:
         path: the file.
-        what: what it should hold, for the message.
+        what: the expected content, for the message.
 
     Raises:
-        ValueError: no such file, JSON that is cut off or broken, or JSON that is not an object.
+        ValueError: the file does not exist, its JSON is truncated or broken, or it is not an object.
     """
     content = read_bytes(path, what=what)
     try:
         value = json.loads(content)
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise ValueError(
-            f"{path}: not whole JSON ({error}; the file has {len(content)} bytes); expected {what}. "
+            f"{path}: broken or truncated JSON ({error}; the file has {len(content)} bytes); expected {what}. "
             "It was probably cut off: copy or download it again"
         ) from None
     if not isinstance(value, dict):

@@ -1,1 +1,1 @@
-"""Camera calibrations in the field's file formats."""
+"""Camera calibrations in the file formats of the field; :mod:`.registry` reads all of them."""

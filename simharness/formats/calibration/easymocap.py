@@ -1,36 +1,39 @@
-"""Calibrations of EasyMocap: ``intri.yml`` and ``extri.yml``, which lie side by side.
+"""EasyMocap calibrations: ``intri.yml`` and ``extri.yml`` in one folder.
 
-Of each camera NAME of the list ``names``: ``K_NAME`` (3x3), ``dist_NAME`` (k1 k2 p1 p2 k3) and, in newer files,
-``H_NAME`` and ``W_NAME``; ``R_NAME`` (Rodrigues vector), ``Rot_NAME`` (3x3, the same) and ``T_NAME``:
+For each camera NAME of the list ``names``: ``K_NAME`` (3x3), ``dist_NAME`` (k1 k2 p1 p2 k3) and, in newer files,
+``H_NAME`` and ``W_NAME``; ``R_NAME`` (Rodrigues vector), ``Rot_NAME`` (3x3, the same rotation) and ``T_NAME``:
 ``x_cam = Rot X + T``, metres, z up.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
+from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import camera, check_names
 from simharness.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
 
-_WHAT = "EasyMocap's intri.yml and extri.yml: names, and K_, dist_, R_ or Rot_, and T_ of each"
+_EXPECTS = "a list names, and for each name K_, dist_, R_ or Rot_, and T_"
+_WHAT = f"EasyMocap's intri.yml and extri.yml: {_EXPECTS}"
 
 
 def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
     """Read an EasyMocap calibration.
 
     Args:
-        path: either of the two files; the other lies beside it.
-        size: width and height of the images in pixels, for files that do not carry them.
+        path: either of the two files; the other one is in the same folder.
+        size: width and height of the images in pixels, for files that do not hold them.
 
     Returns:
         The cameras in the order of ``names``.
 
     Raises:
-        ValueError: a file is missing or cannot be read, a camera lacks a value or has one of a wrong shape, or the
+        ValueError: a file does not exist or cannot be read, a camera lacks a value or has one of a wrong shape, or the
             cameras make no rig.
     """
     path = Path(path)
@@ -48,7 +51,8 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     """Write ``intri.yml`` and ``extri.yml`` of a rig into the folder ``path``.
 
     Raises:
-        ValueError: a camera's name has other characters than letters, digits, blanks, - and _, or there are two of it.
+        ValueError: a camera name with characters other than letters, digits, spaces, - and _, or names that are not
+            distinct.
     """
     check_names(rig)
     folder = Path(path)
@@ -67,6 +71,21 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     write_storage(folder / "extri.yml", outer)
 
 
+def _recognises(file: CalibrationFile) -> bool:
+    return isinstance((file.storage or {}).get("names"), list)
+
+
+def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
+    return read_calibration(path, size=size)
+
+
+def _write(path: Path, rig: Rig) -> None:
+    write_calibration(path.parent, rig)
+
+
+FORMAT = CalibrationFormat("EasyMocap (YAML)", _EXPECTS, _recognises, _read, _write)
+
+
 def _camera(name: str, values: dict[str, Any], size: tuple[int, int], path: Path) -> Camera:
     turn = next((values[key] for key in (f"Rot_{name}", f"R_{name}") if key in values), None)
     needed = {
@@ -76,7 +95,7 @@ def _camera(name: str, values: dict[str, Any], size: tuple[int, int], path: Path
     }
     missing = [key for key, value in needed.items() if value is None]
     if missing:
-        raise ValueError(f"camera {name!r} lacks {', '.join(missing)}, here and in {missing_half(path)}")
+        raise ValueError(f"camera {name!r} lacks {', '.join(missing)}, in this file and in {missing_half(path)}")
     return camera(
         name,
         K=values[f"K_{name}"],

@@ -1,4 +1,4 @@
-"""What the readers of calibration files share: one camera from its numbers, with the file's own words in messages."""
+"""Conversion of calibration entries to cameras, shared by all readers; messages name the camera and the value."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from mvpose.checks import as_array
 
 
 def rotation(value: Any, name: str) -> Floats:
-    """A rotation matrix (3, 3) from one, or from a Rodrigues vector of three numbers, radians.
+    """Return a rotation matrix (3, 3), given a matrix or a Rodrigues vector of three numbers, radians.
 
     Raises:
-        ValueError: neither.
+        ValueError: the value is neither.
     """
     given = as_array(np.asarray(value, dtype=object).ravel(), ("n",), name)
     if given.size == 3 and np.isfinite(given).all():
-        return Rotation.from_rotvec(given.copy()).as_matrix()  # which takes no read-only array
+        return Rotation.from_rotvec(given.copy()).as_matrix()  # SciPy refuses read-only arrays
     if given.size == 9:
         return given.reshape(3, 3)
     raise ValueError(f"{name} must be a 3 x 3 rotation or a Rodrigues vector of 3 finite numbers, got {given.size}")
 
 
 def distortion(value: Any, name: str) -> Floats:
-    """Brown's five terms, k1 k2 p1 p2 k3, from as many as OpenCV writes; what is left out is 0.
+    """Return the five terms of Brown's model, k1 k2 p1 p2 k3, given as many as OpenCV writes; missing terms are 0.
 
     Raises:
-        ValueError: not 0, 4, 5, 8, 12 or 14 numbers, or terms beyond the fifth (rational or thin prism) that are not 0.
+        ValueError: a number of terms other than 0, 4, 5, 8, 12 or 14, or terms beyond the fifth (rational or thin
+            prism model) that are not 0.
     """
     terms = as_array(np.asarray(value, dtype=object).ravel(), ("n",), name)
     if terms.size not in (0, 4, 5, 8, 12, 14):
@@ -41,10 +42,10 @@ def distortion(value: Any, name: str) -> Floats:
 
 
 def image_size(value: Any, name: str) -> tuple[int, int]:
-    """Width and height from two numbers, which some write as floats.
+    """Return width and height in pixels, given two numbers, which some programs write as floats.
 
     Raises:
-        ValueError: anything else.
+        ValueError: the value is not two finite numbers.
     """
     sides = as_array(np.asarray(value, dtype=object).ravel(), (2,), name)
     if not np.isfinite(sides).all():
@@ -53,27 +54,27 @@ def image_size(value: Any, name: str) -> tuple[int, int]:
 
 
 def camera(
-    name: str, *, K: Any, R: Any, t: Any, terms: Any, size: tuple[int, int], places: Floats | None = None
+    name: str, *, K: Any, R: Any, t: Any, terms: Any, size: tuple[int, int], axes: Floats | None = None
 ) -> Camera:
-    """A camera from the values of a file, ``x_cam = R x + t`` with ``t`` in metres.
+    """Return a camera, given the values of a file: ``x_cam = R x + t`` with ``t`` in metres.
 
     Args:
-        name: of the camera.
-        K: intrinsics, 3 x 3.
+        name: name of the camera.
+        K: intrinsic matrix, 3 x 3.
         R: rotation matrix or Rodrigues vector.
-        t: translation, 3 numbers in any shape.
-        terms: distortion as OpenCV orders it.
+        t: translation, 3 numbers in any shape, metres.
+        terms: distortion terms in OpenCV's order.
         size: width and height in pixels.
-        places: the axes of the file's world in ours, (3, 3): ``x_file = places x_ours``; the same by default.
+        axes: axes of the file's world in ours, (3, 3): ``x_file = axes x_ours``; None: the same axes.
 
     Raises:
-        ValueError: a value of another form, naming the camera.
+        ValueError: a value of a wrong form; the message names the camera.
     """
     where = f"camera {name!r}"
     turn = rotation(R, f"{where}: rotation")
     return Camera(
         K=as_array(K, (3, 3), f"{where}: K"),
-        R=turn if places is None else turn @ places,
+        R=turn if axes is None else turn @ axes,
         t=as_array(np.asarray(t, dtype=object).ravel(), (3,), f"{where}: translation"),
         distortion=distortion(terms, f"{where}: distortion"),
         size=size,
@@ -82,12 +83,14 @@ def camera(
 
 
 def check_names(rig: Rig) -> None:
-    """Check that a file that tells cameras by their names can hold a rig.
+    """Check that the cameras of a rig have distinct names, which calibration files need.
 
     Raises:
-        ValueError: a camera without a name, or two of one name.
+        ValueError: a camera without a name, or two cameras of one name.
     """
     names = [each.name for each in rig]
     for name in names:
         if not name or names.count(name) > 1:
-            raise ValueError(f"a calibration file tells cameras by name: expected each its own, got {names}")
+            raise ValueError(
+                f"a calibration file needs a distinct name for every camera, got {names}; rename the cameras"
+            )

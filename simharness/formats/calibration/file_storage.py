@@ -1,4 +1,4 @@
-"""OpenCV's FileStorage, the YAML (or XML) that ``cv2.FileStorage`` writes, as plain Python values."""
+"""Reader and writer of OpenCV's FileStorage (YAML or XML), in plain Python values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simharness.formats.read_errors import read_bytes
 
-_MATRIX = {"dt", "data"}  # besides rows and cols, or sizes where the dimensions are not two
+_MATRIX = {"dt", "data"}  # beside rows and cols, or sizes where the dimensions are not two
 
 
 def read_storage(path: Path, *, what: str) -> dict[str, Any]:
@@ -19,10 +19,10 @@ def read_storage(path: Path, *, what: str) -> dict[str, Any]:
 
     Args:
         path: the file.
-        what: what it should hold, for the message.
+        what: the expected content, for the message.
 
     Raises:
-        ValueError: no such file, one that is cut off or that FileStorage cannot read, or no map of names.
+        ValueError: the file does not exist, is truncated, cannot be read by FileStorage, or has no names.
     """
     content = read_bytes(path, what=what)
     try:
@@ -32,18 +32,18 @@ def read_storage(path: Path, *, what: str) -> dict[str, Any]:
         reason = str(error.__cause__ or error).strip().split(" error: ")[-1]
         raise ValueError(
             f"{path}: OpenCV's FileStorage cannot read it ({reason}; the file has {len(content)} bytes); expected "
-            f"{what}. It may be cut off, or not begin with %YAML:1.0"
+            f"{what}. It may be cut off, or lack %YAML:1.0 in its first line"
         ) from None
     if not isinstance(value, dict):
-        raise ValueError(f"{path}: expected {what}, got a file without names and values")
+        raise ValueError(f"{path}: expected {what}, got a file without named values")
     return value
 
 
 def read_beside(path: Path, *, what: str) -> dict[str, Any]:
-    """Read a file and, where its name says ``intri`` or ``extri``, the one of the other name in the same folder.
+    """Read a file and, where its name contains ``intri`` or ``extri``, the counterpart in the same folder, too.
 
     Raises:
-        ValueError: as :func:`read_storage`, for either.
+        ValueError: as :func:`read_storage`, for either file.
     """
     values = read_storage(path, what=what)
     other = _other(path)
@@ -53,29 +53,29 @@ def read_beside(path: Path, *, what: str) -> dict[str, Any]:
 
 
 def _other(path: Path) -> Path | None:
-    for here, there in (("intri", "extri"), ("extri", "intri")):
-        if here in path.name:
-            return path.with_name(path.name.replace(here, there))
+    for part, counterpart in (("intri", "extri"), ("extri", "intri")):
+        if part in path.name:
+            return path.with_name(path.name.replace(part, counterpart))
     return None
 
 
 def missing_half(path: Path) -> str:
-    """What to say where values may be in the file beside: its name, or how the two should be called."""
+    """Return the name of the counterpart file for messages, or the names that both files should have."""
     other = _other(path)
-    return f"{other.name} beside it" if other else "a file beside it (intri.yml and extri.yml, by these names)"
+    return f"{other.name} beside it" if other else "a file beside it (the two must be called intri.yml and extri.yml)"
 
 
 def matrix(value: ArrayLike) -> NDArray[np.float64]:
-    """A matrix as FileStorage writes it, (rows, columns)."""
+    """Return a value as a matrix (rows, columns), as FileStorage writes it."""
     return np.atleast_2d(np.asarray(value, float))
 
 
 def write_storage(path: Path, values: dict[str, Any]) -> None:
-    """Write names and their values: text, numbers, arrays, lists and dicts of these.
+    """Write named values: text, numbers, arrays, and lists and dicts of these.
 
     Raises:
-        ValueError: a name that FileStorage does not take: it begins with no letter, or has other characters than
-            letters, digits, blanks, - and _.
+        ValueError: a name that FileStorage refuses: it does not begin with a letter, or has characters other than
+            letters, digits, spaces, - and _.
     """
     storage = cv2.FileStorage(str(path.suffix or ".yml"), cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     for key, value in values.items():
@@ -99,7 +99,7 @@ def _write(storage: cv2.FileStorage, key: str, value: Any) -> None:
             storage.write(key, value)
     except cv2.error:
         raise ValueError(
-            f"{key!r} is no name for OpenCV's FileStorage: expected a letter, then letters, digits, blanks, - and _"
+            f"OpenCV's FileStorage refuses the name {key!r}: expected a letter, then letters, digits, spaces, - and _"
         ) from None
 
 

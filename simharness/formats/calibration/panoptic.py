@@ -1,4 +1,4 @@
-"""Calibrations of the CMU Panoptic Studio (panoptic-toolbox JSON).
+"""CMU Panoptic Studio calibrations (JSON of panoptic-toolbox).
 
 ``cameras`` is a list, each with ``name type resolution K distCoef R t``: centimetres, ``x_cam = R X + t``, distCoef
 k1 k2 p1 p2 k3. The file's world has y down; ours is (x, y, z) = (X, Z, -Y) / 100, so the floor Y = 0 is z = 0.
@@ -7,7 +7,7 @@ k1 k2 p1 p2 k3. The file's world has y down; ours is (x, y, z) = (X, Z, -Y) / 10
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,13 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
+from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import camera, check_names, image_size
 from simharness.formats.read_errors import read_json
 
 _KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
-_WHAT = "a Panoptic calibration: {'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
+_EXPECTS = "{'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
+_WHAT = f"a Panoptic calibration: {_EXPECTS}"
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # X = x, Y = -z, Z = y
 _CENTIMETRES = 100.0
 
@@ -29,14 +31,14 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
 
     Args:
         path: the JSON file.
-        types: of the cameras to take: "hd", "vga", "kinect-color"; empty: all.
+        types: types of the cameras to take: "hd", "vga", "kinect-color"; empty: all.
 
     Returns:
         The cameras in the order of the file, in metres, z up.
 
     Raises:
-        ValueError: the file is missing or cut off, a camera lacks a key or has a wrong shape, or fewer than two
-            cameras are of these types.
+        ValueError: the file does not exist or is truncated, a camera lacks a key or has a value of a wrong shape, or
+            fewer than two cameras are of these types.
     """
     path = Path(path)
     entries = read_json(path, what=_WHAT).get("cameras")
@@ -52,7 +54,7 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
             found = sorted({str(entry.get("type")) for entry in entries if isinstance(entry, dict)})
             raise ValueError(
                 f"{len(chosen)} of {len(entries)} cameras are of type {' or '.join(types) or 'any'}, expected at least "
-                f"2; there are {', '.join(found) or 'none'}: name cameras to take others"
+                f"2; the file has {', '.join(found) or 'none'}: name the cameras (cameras.only) to take others"
             )
         return Rig(chosen)
     except ValueError as error:
@@ -60,10 +62,10 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
 
 
 def write_calibration(path: str | Path, rig: Rig, *, kind: str = "hd") -> None:
-    """Write a rig as a Panoptic calibration, all cameras of type ``kind``.
+    """Write a rig as a Panoptic calibration, with all cameras of type ``kind``.
 
     Raises:
-        ValueError: cameras without names of their own.
+        ValueError: camera names that are missing or not distinct.
     """
     check_names(rig)
     entries = [
@@ -81,6 +83,17 @@ def write_calibration(path: str | Path, rig: Rig, *, kind: str = "hd") -> None:
     Path(path).write_text(json.dumps({"cameras": entries}, indent=1) + "\n", encoding="utf-8")
 
 
+def _recognises(file: CalibrationFile) -> bool:
+    return isinstance((file.json or {}).get("cameras"), list)
+
+
+def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
+    return read_calibration(path, types=() if only else ("hd",))
+
+
+FORMAT = CalibrationFormat("Panoptic (JSON)", _EXPECTS, _recognises, _read, write_calibration)
+
+
 def _camera(index: int, entry: Any) -> Camera:
     missing = [key for key in _KEYS if key not in entry] if isinstance(entry, dict) else list(_KEYS)
     if missing:
@@ -94,5 +107,5 @@ def _camera(index: int, entry: Any) -> Camera:
         t=t / _CENTIMETRES,
         terms=entry["distCoef"],
         size=image_size(entry["resolution"], f"camera {name!r}: resolution"),
-        places=_AXES,
+        axes=_AXES,
     )

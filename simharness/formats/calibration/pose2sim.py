@@ -1,14 +1,15 @@
-"""Calibrations of Pose2Sim (``Calib.toml``), which Anipose and caliscope write much alike.
+"""Pose2Sim calibrations (``Calib.toml``); Anipose and caliscope write almost the same.
 
-One section a camera with ``name size matrix distortions rotation translation fisheye``: rotation is a Rodrigues vector,
-``x_cam = R X + T``, metres, z up. Pose2Sim itself writes the four distortion terms k1 k2 p1 p2 and loses k3; files with
-five are read as such.
+One section for each camera with ``name size matrix distortions rotation translation fisheye``: ``rotation`` is a
+Rodrigues vector, ``x_cam = R X + T``, metres, z up. Pose2Sim itself writes four distortion terms, k1 k2 p1 p2, without
+k3; files with five terms are read, too.
 """
 
 from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +17,25 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
+from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import camera, check_names, image_size
 from simharness.formats.read_errors import read_bytes
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 _METADATA = "metadata"
-_WHAT = "a Pose2Sim calibration: a TOML section for each camera, with " + ", ".join(_KEYS)
+_EXPECTS = "a section for each camera, with " + ", ".join(_KEYS)
+_WHAT = f"a Pose2Sim calibration (TOML): {_EXPECTS}"
 
 
 def read_calibration(path: str | Path) -> Rig:
     """Read a Pose2Sim calibration file.
 
     Returns:
-        The cameras in the order of the file, named by their ``name`` or their section.
+        The cameras in the order of the file; their names are the key ``name``, or else the name of the section.
 
     Raises:
-        ValueError: the file is missing or not TOML, a camera lacks a key, has a wrong shape or a fisheye lens, or the
-            cameras make no rig.
+        ValueError: the file does not exist or is not TOML, a camera lacks a key, has a value of a wrong shape or a
+            fisheye lens, or the cameras make no rig.
     """
     path = Path(path)
     content = read_bytes(path, what=_WHAT)
@@ -47,10 +50,11 @@ def read_calibration(path: str | Path) -> Rig:
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
-    """Write a rig as a Pose2Sim calibration: four distortion terms, and the fifth where k3 is not 0.
+    """Write a rig as a Pose2Sim calibration, with four distortion terms, or five where k3 is not 0.
 
     Raises:
-        ValueError: cameras without names of their own, or one called "metadata", which is another section.
+        ValueError: camera names that are missing or not distinct, or a camera called "metadata", the name of another
+            section.
     """
     check_names(rig)
     lines = []
@@ -74,8 +78,19 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
     )
 
 
+def _recognises(file: CalibrationFile) -> bool:
+    return any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values())
+
+
+def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
+    return read_calibration(path)
+
+
+FORMAT = CalibrationFormat("Pose2Sim (TOML)", _EXPECTS, _recognises, _read, write_calibration)
+
+
 def _quoted(text: str) -> str:
-    # JSON's escapes are TOML's, but for the one control character that JSON lets stand.
+    # JSON and TOML share their escapes, except for one control character that JSON leaves as it is.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -86,7 +101,7 @@ def _camera(section: str, entry: Any) -> Camera:
     if missing:
         raise ValueError(f"camera {section!r} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
     if entry.get("fisheye"):
-        raise ValueError(f"camera {section!r} has a fisheye lens; expected pinhole with k1 k2 p1 p2: calibrate it so")
+        raise ValueError(f"camera {section!r} has a fisheye lens; calibrate it as a pinhole with k1 k2 p1 p2")
     name = str(entry.get("name", section))
     return camera(
         name,

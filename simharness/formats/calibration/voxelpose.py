@@ -1,12 +1,13 @@
-"""Calibrations as VoxelPose publishes them for Shelf and Campus.
+"""VoxelPose calibrations (JSON), as published for Shelf and Campus.
 
-One JSON object; a key for each camera with ``fx fy cx cy`` (pixels), ``R`` (3x3, world to camera), ``T``
-(3x1), ``k`` (k1 k2 k3) and ``p`` (p1 p2). ``T`` is the camera's centre in millimetres: ``x_cam = R (X - T)``.
+One JSON object with a key for each camera, with ``fx fy cx cy`` (pixels), ``R`` (3x3, world to camera), ``T``
+(3x1), ``k`` (k1 k2 k3) and ``p`` (p1 p2). ``T`` is the camera centre in millimetres: ``x_cam = R (X - T)``.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,14 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.checks import as_array
+from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import check_names
 from simharness.formats.read_errors import read_json
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
-_WHAT = "a VoxelPose calibration: an object of cameras, each with " + ", ".join(_KEYS)
-_METRES = 50.0  # a rig whose centres all lie within 50 mm of the origin is one that was written in metres
+_EXPECTS = "an object of cameras, each with " + ", ".join(_KEYS)
+_WHAT = f"a VoxelPose calibration: {_EXPECTS}"
+_METRES = 50.0  # centres that all lie within 50 mm of the origin were written in metres
 
 
 def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
@@ -27,14 +30,14 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
 
     Args:
         path: the JSON file.
-        size: width and height of the images in pixels, which the file does not carry.
+        size: width and height of the images in pixels, which the file does not hold.
 
     Returns:
-        The cameras in the order of the file, named by their keys; metres.
+        The cameras in the order of the file, with their keys as names; metres.
 
     Raises:
-        ValueError: the file is missing or cut off, a camera lacks a key or has a wrong shape, the centres
-            cannot be in millimetres, or the cameras make no rig.
+        ValueError: the file does not exist or is truncated, a camera lacks a key or has a value of a wrong shape, the
+            centres cannot be in millimetres, or the cameras make no rig.
     """
     path = Path(path)
     cameras = read_json(path, what=_WHAT)
@@ -52,16 +55,18 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
 
 
 def write_calibration(path: str | Path, rig: Rig) -> None:
-    """Write a rig as a VoxelPose calibration, which does not hold the size of its images.
+    """Write a rig as a VoxelPose calibration, without the size of the images.
 
     Raises:
-        ValueError: a camera has a skew, or not a name of its own.
+        ValueError: a camera with a skew, or names that are missing or not distinct.
     """
     check_names(rig)
     entries = {}
     for camera in rig:
         if camera.K[0, 1]:
-            raise ValueError(f"camera {camera.name!r}: a VoxelPose calibration has no skew, got {camera.K[0, 1]:g}")
+            raise ValueError(
+                f"camera {camera.name!r}: a VoxelPose calibration cannot hold a skew, got {camera.K[0, 1]:g}"
+            )
         k1, k2, p1, p2, k3 = camera.distortion.tolist()
         entries[camera.name] = {
             "fx": camera.K[0, 0],
@@ -74,6 +79,17 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
             "p": [[p1], [p2]],
         }
     Path(path).write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+
+
+def _recognises(file: CalibrationFile) -> bool:
+    return any(isinstance(entry, dict) and "fx" in entry for entry in (file.json or {}).values())
+
+
+def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
+    return read_calibration(path, size=size)
+
+
+FORMAT = CalibrationFormat("VoxelPose (JSON)", _EXPECTS, _recognises, _read, write_calibration)
 
 
 def _center(name: str, entry: Any) -> np.ndarray:

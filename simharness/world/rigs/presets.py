@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.camera import Camera, Rig
-from simharness.world.rigs.selection import select
+from simharness.formats.calibration.selection import select
 
 # HD cameras of the Panoptic Studio. CMU0 to CMU4: the rigs between which methods are transferred; the others are CMU0
 # with fewer and more cameras, each set a beginning of the next.

@@ -222,17 +222,17 @@ def stereo(**change):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (stereo(T=np.array([[120.0], [0], [0]])), r"stand 120 apart, which cannot be metres: .* divide T by 1000"),
-        ({key: value for key, value in stereo().items() if key != "T"}, r"has M1 and M2, but no T, nor has a file"),
+        (stereo(T=np.array([[120.0], [0], [0]])), r"are 120 apart, which cannot be metres: .* divide T by 1000"),
+        ({key: value for key, value in stereo().items() if key != "T"}, r"M1 and M2 without T, missing in a file"),
         (
             {"R": np.eye(3), "T": np.ones((3, 1)), "P1": np.eye(3), "P2": np.eye(3)},
-            r"R and T of a stereo pair, but no M1",
+            r"R and T of a stereo pair without M1",
         ),
         (stereo(D1=np.ones((1, 8))), r"camera '1': distortion has terms of the rational model"),
         (stereo(D1=np.ones((1, 3))), r"camera '1': distortion must be 4 or 5 numbers .*, got 3"),
         (stereo(R=np.ones((2, 2))), r"camera '2': rotation must be a 3 x 3 rotation or a Rodrigues vector .*, got 4"),
         (stereo(M1=np.ones((2, 2))), r"camera '1': K must be \(3, 3\), got \(2, 2\)"),
-        ({"a": {"K": np.eye(3), "T": [0, 0, 1]}, "b": {"K": np.eye(3)}}, r"camera 'a' has no R, nor rvec"),
+        ({"a": {"K": np.eye(3), "T": [0, 0, 1]}, "b": {"K": np.eye(3)}}, r"camera 'a' has none of R, rvec"),
         ({"cameras": [1, 2]}, r"cameras must be a list of maps"),
         ({"cameras": [{"K": np.eye(3), "R": np.eye(3), "T": [0, 0, "x"]}]}, r"camera '0': translation must be numbers"),
     ],
@@ -292,7 +292,7 @@ def test_toml_that_is_none_or_no_calibration_is_named(tmp_path):
         (lambda entry: entry.update(R=[[2, 0, 0], [0, 1, 0], [0, 0, 1]]), r"camera 'c0': R is not a rotation"),
         (
             lambda entry: entry.update(type="vga"),
-            r"1 of 2 cameras are of type hd, expected at least 2; there are hd, vga",
+            r"1 of 2 cameras are of type hd, expected at least 2; the file has hd, vga",
         ),
     ],
 )
@@ -313,10 +313,14 @@ def renamed(*names):
 @pytest.mark.parametrize(
     ("write", "rig", "message"),
     [
-        (voxelpose.write_calibration, renamed("a", "a"), "expected each its own"),
-        (panoptic.write_calibration, renamed("a", ""), "expected each its own"),
+        (voxelpose.write_calibration, renamed("a", "a"), "needs a distinct name for every camera"),
+        (panoptic.write_calibration, renamed("a", ""), "needs a distinct name for every camera"),
         (pose2sim.write_calibration, renamed("a", "metadata"), "cannot hold a camera called 'metadata'"),
-        (lambda path, rig: easymocap.write_calibration(path.parent, rig), renamed("a.b", "c"), "no name for OpenCV's"),
+        (
+            lambda path, rig: easymocap.write_calibration(path.parent, rig),
+            renamed("a.b", "c"),
+            "FileStorage refuses the name",
+        ),
     ],
 )
 def test_a_rig_that_a_file_cannot_hold_is_refused(tmp_path, write, rig, message):
@@ -344,6 +348,6 @@ def test_panoptic_people_stand_on_the_floor(shared_data):
 def test_a_name_that_opencv_would_change_is_refused(tmp_path, name):
     other = Camera(K=np.diag([500.0, 500, 1]), R=np.eye(3), t=np.zeros(3), size=(640, 480), name="right")
     rig = Rig([other, Camera(**{**vars_of(other), "name": name, "t": np.ones(3)})])
-    with pytest.raises(ValueError, match=f"camera '{name}': OpenCV's files lose spaces"):
+    with pytest.raises(ValueError, match=f"camera '{name}': OpenCV drops spaces"):
         opencv.write_calibration(tmp_path / "rig.yml", rig)
     assert not list(tmp_path.iterdir())

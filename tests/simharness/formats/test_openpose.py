@@ -77,8 +77,8 @@ def test_nobody_anywhere_is_an_empty_frame(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"people": [{"pose_keypoi', "not whole JSON .*cut off"),
-        ("", "not whole JSON .*0 bytes"),
+        ('{"people": [{"pose_keypoi', "truncated JSON .*cut off"),
+        ("", "truncated JSON .*0 bytes"),
         ('{"persons": []}', "no list 'people'"),
         ('{"people": [{"face": []}]}', r"people\[0\] has no 'pose_keypoints_2d'"),
         (

@@ -92,7 +92,7 @@ def test_missing_truncated_and_other_files_are_named(tmp_path):
         read_calibration(path, size=SIZE)
     text = json.dumps(calibration())
     path.write_text(text[: len(text) // 2])
-    with pytest.raises(ValueError, match=r"calibration\.json: not whole JSON .*cut off"):
+    with pytest.raises(ValueError, match=r"calibration\.json: broken or truncated JSON .*cut off"):
         read_calibration(path, size=SIZE)
     path.write_text("[1, 2]")
     with pytest.raises(ValueError, match=r"calibration\.json: .*got a list"):

@@ -1,4 +1,4 @@
-"""Some of the cameras of a rig, by name."""
+"""Selection of cameras of a rig by name."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _SHOWN = 12  # names that a message repeats
 
 
 def select(cameras: Sequence[Camera] | Rig, only: Sequence[str]) -> Rig:
-    """The rig of the cameras named in ``only``, in that order; of all where it names none.
+    """Return the rig of the cameras named in ``only``, in that order; of all cameras where ``only`` is empty.
 
     Raises:
-        ValueError: a name that no camera has, or one that is named twice.
+        ValueError: a name that no camera has, a name given twice, or fewer than two names.
     """
     if not only:
         return Rig(list(cameras))
@@ -25,10 +25,10 @@ def select(cameras: Sequence[Camera] | Rig, only: Sequence[str]) -> Rig:
             hint = f"did you mean {near[0]!r}? " if near else ""
             known = ", ".join(list(by_name)[:_SHOWN]) + (", ..." if len(by_name) > _SHOWN else "")
             raise ValueError(
-                f"cameras.only names {name!r}, which the rig has not: {hint}its {len(by_name)} are {known}"
+                f"cameras.only: the rig has no camera {name!r}; {hint}its {len(by_name)} cameras are {known}"
             )
         if list(only).count(name) > 1:
-            raise ValueError(f"cameras.only names {name!r} more than once")
+            raise ValueError(f"cameras.only: {name!r} is given more than once; remove the repetition")
     if len(only) < 2:
-        raise ValueError(f"cameras.only names {len(only)} camera; a rig needs at least 2 to triangulate")
+        raise ValueError(f"cameras.only: expected at least 2 cameras, to triangulate, got {len(only)}")
     return Rig([by_name[name] for name in only])
