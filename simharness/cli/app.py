@@ -19,7 +19,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from simharness.scenario.load import code_version
+        from simharness.runtime.version import code_version
 
         typer.echo(f"simharness {code_version()}")
         raise typer.Exit

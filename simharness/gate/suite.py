@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.gate_result import Failed
 from simharness.gate.reference_kernel import time_reference
-from simharness.gate.trial_command import Trial, name_of, scenes_of
-from simharness.scenario.load import code_version
+from simharness.gate.trial_command import TrialKey, name_of, scenes_of
+from simharness.runtime.progress import Reporter, Silence
+from simharness.runtime.version import code_version
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
-from simharness.study.scheduler import Success, Unit, work_off
+from simharness.study.scheduler import TrialSuccess, Unit, work_off
 from simharness.trial.identity import trial_identity
-from simharness.trial.measure import Measured, measure
+from simharness.study.measure import StoredTrial, TrialOutput
+from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of
 
 Scores = Mapping[str, float | None]
@@ -31,7 +33,7 @@ class SuiteRun:
         failed: the trials that could not be run.
     """
 
-    scores: Mapping[Trial, Scores]
+    scores: Mapping[TrialKey, Scores]
     failed: tuple[Failed, ...]
 
     def measurement(self, study: Study) -> Measurement:
@@ -39,13 +41,13 @@ class SuiteRun:
         return Measurement(study.name, fingerprint(study), code_version(), self.scores)
 
 
-def run_suite(study: Study, *, workers: int = 1, progress: Callable[[int], None] = lambda trials: None) -> SuiteRun:
+def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = None) -> SuiteRun:
     """Run all trials of a study. Nothing is stored: times of another day would say nothing.
 
     Args:
         study: the suite.
         workers: processes that share the trials.
-        progress: is told of every trial that is done.
+        reporter: receiver of progress, a step a trial.
 
     Raises:
         ValueError: fewer than one worker, or a method of one's own that cannot be loaded.
@@ -58,36 +60,46 @@ def run_suite(study: Study, *, workers: int = 1, progress: Callable[[int], None]
         unit = Unit(trial_identity(scenario), scenario, study.variants)
         units[unit.trial] = unit
         places.setdefault(unit.trial, []).append((name_of(setting, study), seed))
-    scores: dict[Trial, Scores] = {}
+    scores: dict[TrialKey, Scores] = {}
     failed: list[Failed] = []
-    for result in work_off(units.values(), measure_beside_reference, workers=workers):
-        for case, seed in places[result.unit.trial]:
-            if isinstance(result, Success):
-                scores |= {Trial(case, seed, name): each.scores for name, each in result.measured.items()}
-            else:
-                failed.append(Failed(case, seed, result.error))
-            progress(1)
+    with (reporter or Silence()).stage("check", study.trials) as advance:
+        for result in work_off(units.values(), measure_beside_reference, workers=workers):
+            for case, seed in places[result.unit.trial]:
+                if isinstance(result, TrialSuccess):
+                    scores |= {TrialKey(case, seed, name): each.scores for name, each in result.output.results.items()}
+                else:
+                    failed.append(Failed(case, seed, result.error))
+                advance(1, failed=int(not isinstance(result, TrialSuccess)))
     return SuiteRun(scores, tuple(failed))
 
 
-def measure_beside_reference(scenario: Scenario, variants: Sequence[str]) -> dict[str, Measured]:
+def measure_beside_reference(
+    scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None
+) -> TrialOutput:
     """Measure a trial, and time the reference kernel before and after: its scores get ``TIME``.
 
-    That is the time of the quickest frame by the quickest call. On a busy machine medians are those of whoever else
-    works; under four times its load the same trial's ratio of medians differed by a factor of 1.9, typically, in two
-    runs, and that of the quickest by one of 1.15.
+    That is the time of the quickest frame divided by that of the quickest call. On a busy machine medians measure the
+    other processes: under four times its load the ratio of medians of one trial differed by a factor of 1.9, typically,
+    between two runs, and that of the quickest by a factor of 1.15.
+
+    Args:
+        scenario: resolved, with its seed.
+        variants: variants of the method.
+        stored: not used: times of another day mean nothing.
 
     Raises:
         ValueError: the scenario cannot be built.
-        RunError: anything that went wrong after that.
+        RunError: any error after that.
     """
     before = time_reference()
-    measured = measure(scenario, variants, blame=False)
+    results = run_trial(scenario, variants=variants, until="classify").results
     reference = min(before.min(), time_reference().min())
-    return {
-        name: replace(each, scores={**each.scores, TIME: each.frames["time_ms"].min() / reference})
-        for name, each in measured.items()
-    }
+    return TrialOutput(
+        {
+            name: replace(each, scores={**each.scores, TIME: each.frames["time_ms"].min() / reference})
+            for name, each in results.items()
+        }
+    )
 
 
 def fingerprint(study: Study) -> str:

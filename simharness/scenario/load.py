@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from simharness.runtime.version import code_version
 from simharness.scenario.resolution import read_plan
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_reader import ScenarioError
@@ -47,8 +47,3 @@ def fingerprint(scenario: Scenario) -> str:
     for file in (*scenario.files, *scenario.method.estimators.files):
         digest.update(file.read_bytes() if file.is_file() else b"")
     return digest.hexdigest()
-
-
-def code_version() -> str:
-    """The version of the installed package."""
-    return importlib.metadata.version("simharness")

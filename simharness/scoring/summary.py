@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from importlib.metadata import version
 from operator import add
 from typing import Any
 
@@ -113,11 +112,13 @@ def summarize(
         actors: the people whose PCP counts, by index; all when not given.
         more: further keys that stand beside the shared ones.
     """
+    from simharness.runtime.version import code_version  # not part of what makes scores
+
     return dict(
         name=name,
         frames=frames,
         seeds=seeds,
-        code=version("simharness"),
+        code=code_version(),
         variants={key: scores.summary(actors=actors) for key, scores in variants.items()},
         **more,
     )

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from simharness.scenario.load import code_version
+from simharness.runtime.version import code_version
 from simharness.trial.identity import code, versions
 
 PROVENANCE = ("command", "seeds", "variants", "code", "digests", "versions", "machine", "seconds")
