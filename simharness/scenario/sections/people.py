@@ -50,7 +50,11 @@ class People(Section):
         min_length=1,
         description="handed out in turn, one to each person, those of pairs to two at a time",
     )
-    area: Positive = Field(2.0, description="half the side of the square about the origin that they stay in, metres")
+    area: Positive = Field(
+        2.0,
+        description="half the side of the square about the origin that they stay in, metres; a recorded motion that "
+        "does not fit into it may use the whole room",
+    )
     around: Amount = Field(
         0.0,
         description="radius about the origin that they keep free, metres; the first thing of the clutter stands there",

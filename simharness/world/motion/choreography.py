@@ -51,7 +51,9 @@ class Party:
     activity: Activity
 
 
-def choreograph(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) -> Choreography:
+def choreograph(
+    scenario: Scenario, cast: Sequence[Kinematics], time: Floats, *, widest: float | None = None
+) -> Choreography:
     """Plan what everybody does.
 
     A party's draws come from the streams of its first person, so one more person changes none of the others, except
@@ -61,6 +63,8 @@ def choreograph(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) ->
         scenario: its people, seed and duration.
         cast: the bodies, in the order of the people.
         time: seconds, (N,), the times at which motions are planned (``motion_clock``).
+        widest: largest ``people.area`` that the room allows, metres: what a recorded path may use that does not fit
+            into ``people.area``; None: ``people.area``.
 
     Raises:
         ValueError: people that do not fit, naming the keys of the scenario to change.
@@ -82,6 +86,7 @@ def choreograph(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) ->
         around=people.around,
         span=(float(time[0]), float(time[-1])),
         people=[party.people[0] for party in parties],
+        widest=widest,
         admit=stage.admit,
     )
     return Choreography(

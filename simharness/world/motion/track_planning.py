@@ -88,6 +88,7 @@ def plan_tracks(
     span: tuple[float, float],
     around: float = 0.0,
     people: Sequence[int] | None = None,
+    widest: float | None = None,
     admit: Admit = lambda index, track, before: True,
 ) -> tuple[Track, ...]:
     """Give every wish a track that stays in the area and away from all others at all times.
@@ -105,6 +106,8 @@ def plan_tracks(
         span: the first and the last time that the plan must hold for, seconds.
         around: radius about the origin that pelvises stay out of, metres.
         people: the index of the person whose stream draws for each wish; by default the index of the wish.
+        widest: as ``area``, for recorded paths that do not fit into ``area`` at any bearing: they get a square as large
+            as they need, centred, and a larger one with each plan, up to this; None: ``area``.
         admit: a further condition, asked for tracks that keep their distance.
 
     Raises:
@@ -112,8 +115,9 @@ def plan_tracks(
             to change.
     """
     half = area - SWAY
+    limit = half if widest is None else max(half, widest - SWAY)
     for wish in wishes:
-        _check_room(wish, half)
+        _check_room(wish, half, limit)
     people = range(len(wishes)) if people is None else people
     placed, refused = 0, 0
     for plan in range(_PLANS):
@@ -123,7 +127,8 @@ def plan_tracks(
             order.sort(key=lambda index: _urgency(wishes[index], movers_first=plan % 2 == 0))
         for index in order:
             rng = stream(seed, "people", people[index], "track", plan)
-            refusals = _place(rng, index, wishes[index], board, plan=plan, half=half, admit=admit)
+            square = _square(wishes[index], half, limit, plan)
+            refusals = _place(rng, index, wishes[index], board, plan=plan, half=square, admit=admit)
             if index not in board.tracks:
                 placed = max(placed, sum(_heads(wishes[done]) for done in board.tracks))
                 refused += refusals
@@ -275,8 +280,28 @@ def _draw(
     return [replace(loop, start=float(start) * loop.length) for start in starts]
 
 
-def _check_room(wish: Wish, half: float) -> None:
-    """Refuse an area that one alone is too large for."""
+def _square(wish: Wish, half: float, limit: float, plan: int) -> float:
+    """Return half the side of the square that a wish is to stay in, metres.
+
+    It is ``half``, except for a recorded path that fits into it at no bearing: its square goes in equal steps, plan by
+    plan, from the one that it fits at any bearing to ``limit``.
+    """
+    if not isinstance(wish, Replaying):
+        return half
+    extents = _extents(wish)
+    if extents.min() <= 2 * half:
+        return half
+    least = min(float(extents.max()) / 2, limit)
+    return least + (limit - least) * plan / (_PLANS - 1)
+
+
+def _extents(wish: Replaying) -> Floats:
+    """Return the sides of the squares around a recorded path, one for each of several bearings, metres."""
+    return np.array([np.ptp(wish.offset @ axes, axis=0).max() for axes in _AXES])
+
+
+def _check_room(wish: Wish, half: float, limit: float) -> None:
+    """Raise ValueError if the area is too small for one of the wishes alone."""
     area = half + SWAY
     least = None
     if isinstance(wish, Staying) and half <= wish.clearance:
@@ -287,18 +312,32 @@ def _check_room(wish: Wish, half: float) -> None:
         grown = np.arange(half, half + 100.0, 0.05)
         least = next((float(h) for h in grown if _bends(wish, h).speed >= _bends(wish, h).slowest), grown[-1]) + SWAY
     elif isinstance(wish, Replaying):
-        reach = np.ptp(wish.offset, axis=0)
-        if min(np.ptp(wish.offset @ _AXES[k], axis=0).max() for k in range(len(_AXES))) > 2 * half:
-            raise ValueError(
-                f"people.motion: the recorded way is {reach.max():.2f} m long and fits people.area = {area:g} m (half "
-                "the side of the square) at no bearing; enlarge people.area, or take another people.motion.start or "
-                "a shorter duration"
-            )
+        _check_recorded(wish, half, limit)
     if least is not None:
         raise ValueError(
             f'people.area = {area:g} m is too small for "{wish.what}": it takes {least:.2f} m or more; enlarge '
             "people.area or take other people.activities"
         )
+
+
+def _check_recorded(wish: Replaying, half: float, limit: float) -> None:
+    """Raise ValueError if a recorded path fits into the largest square at no bearing."""
+    extents = _extents(wish)
+    if extents.min() <= 2 * limit:
+        return
+    needed = np.ceil(100 * (extents.max() / 2 + SWAY) + 1) / 100
+    path = f"people.motion: the recorded path extends over {extents.max():.2f} m"
+    if limit > half:
+        grown = np.ceil(100 * 2 * (needed - limit - SWAY)) / 100
+        raise ValueError(
+            f"{path} and needs people.area = {needed:.2f} m (half the side of a square), but the walls of the room "
+            f"leave {limit + SWAY:.2f} m: enlarge the first two numbers of room.size by {grown:.2f} m, shorten "
+            "duration, or set another people.motion.start"
+        )
+    raise ValueError(
+        f"{path} and does not fit into people.area = {half + SWAY:g} m (half the side of a square): set people.area to "
+        f"{needed:.2f} m or more, shorten duration, or set another people.motion.start"
+    )
 
 
 _AXES = np.array([[[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]] for a in np.radians(np.arange(0, 90, 5))])

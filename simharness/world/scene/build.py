@@ -94,7 +94,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         for i, look in enumerate(looks)
     )
     cast = [Kinematics(body) for body in bodies]
-    plan = choreograph(scenario, cast, clock)
+    plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario))
     props = tuple(make_prop(prop, name=f"prop{k} {prop.kind}") for k, prop in enumerate(plan.props))
     motions = plan.motions
     pelvises = [motion.root[:, :3] for motion in motions]
@@ -145,8 +145,13 @@ def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco
     return spec.compile()
 
 
+def _largest_area(scenario: Scenario) -> float:
+    """Return the largest ``people.area`` that the walls of the room allow, metres."""
+    return min(scenario.room.size[:2]) / 2 - BODY_HALF_WIDTH
+
+
 def _check_area(scenario: Scenario) -> None:
-    largest = min(scenario.room.size[:2]) / 2 - BODY_HALF_WIDTH
+    largest = _largest_area(scenario)
     if scenario.people.count and scenario.people.area > largest:
         raise ValueError(
             f"people.area = {scenario.people.area:g} m reaches into the walls of room.size = "

@@ -136,11 +136,37 @@ def test_an_area_too_small_for_one_alone(wish, area, least):
     plan_tracks(0, [wish], area=named + 0.05, spacing=0.5, span=SPAN)  # what the message asks for suffices
 
 
-def test_a_recorded_way_too_long_names_its_keys():
-    times = np.linspace(*SPAN, 100)
-    wish = Replaying("mocap", times, np.column_stack([times, times]))
-    with pytest.raises(ValueError, match=r"people.motion.*people.area = 1 m.*people.motion.start"):
-        plan_tracks(0, [wish], area=1.0, spacing=0.5, span=SPAN)
+STRAIGHT = Replaying("mocap", np.linspace(*SPAN, 100), np.column_stack([np.linspace(0.0, 5.0, 100), np.zeros(100)]))
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_recorded_path_longer_than_the_area_uses_the_room(count):
+    wishes = [STRAIGHT] * count + [STAND]
+    tracks = plan_tracks(0, wishes, area=1.2, spacing=0.8, span=SPAN, widest=3.5)
+    least, furthest = apart(tracks, wishes, span=SPAN)
+    assert least >= 0.87
+    assert furthest <= 3.5 - SWAY
+    assert np.abs(tracks[-1].place).max() <= 1.2 - SWAY
+
+
+def test_a_recorded_path_that_fits_stays_in_the_area():
+    times = np.linspace(*SPAN, 50)
+    plans = [plan_tracks(0, [STRAIGHT], area=3.0, spacing=0.8, span=SPAN, widest=widest) for widest in (None, 9.0)]
+    np.testing.assert_array_equal(*(track.position(times) for (track,) in plans))
+
+
+def test_a_recorded_path_too_long_for_the_area_names_its_keys():
+    with pytest.raises(ValueError, match=r"people.motion.*people.area = 1 m.*people.motion.start") as error:
+        plan_tracks(0, [STRAIGHT], area=1.0, spacing=0.5, span=SPAN)
+    needed = float(str(error.value).split("set people.area to ")[1].split(" m")[0])
+    plan_tracks(0, [STRAIGHT], area=needed, spacing=0.5, span=SPAN)  # what the message asks for suffices
+
+
+def test_a_recorded_path_too_long_for_the_room_names_its_keys():
+    with pytest.raises(ValueError, match=r"people.motion: the recorded path extends over 5.00 m.*room.size") as error:
+        plan_tracks(0, [STRAIGHT], area=1.0, spacing=0.5, span=SPAN, widest=1.5)
+    grown = float(str(error.value).split("room.size by ")[1].split(" m")[0])
+    plan_tracks(0, [STRAIGHT], area=1.0, spacing=0.5, span=SPAN, widest=1.5 + grown / 2)
 
 
 def test_people_keep_the_middle_free():
