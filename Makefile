@@ -1,4 +1,4 @@
-# make demo | test | lint | results : each makes .venv on first use and installs what it needs.
+# make demo | test | lint | docs | wheels | results: each makes .venv on first use and installs what it needs.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -7,7 +7,9 @@ DEV    := $(VENV)/.dev
 WORKERS ?= 2
 STUDIES := angle calibration clutter crowd detector look_alike panoptic phantoms stress sync views views_corners views_side
 
-.PHONY: demo test lint results clean
+PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
+
+.PHONY: demo test lint docs wheels results clean
 
 demo: $(RUN)
 	$(BIN)/simharness run scenarios/quickstart.toml
@@ -19,6 +21,17 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The site in build/docs; a reference to a name that does not exist is an error.
+docs: $(DEV)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+
+# dist/mvpose-*.whl and dist/simharness-*.whl; `pip install --find-links dist simharness` installs both. Folders of an
+# earlier build are removed first: setuptools would pack the modules that they still hold.
+wheels: $(VENV)
+	rm -rf dist build/lib build/bdist.* mvpose/build
+	$(BIN)/python -m pip wheel --disable-pip-version-check --quiet --no-deps --wheel-dir dist ./mvpose .
+	rm -rf build/lib build/bdist.* mvpose/build
 
 # An hour and a half on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
 results: $(STUDIES:%=results-%) results-paper results-time results-overview
@@ -35,7 +48,7 @@ TWINS := --seeds 20 --set 'method.variants=["full","appearance","geometry","no-3
 
 .PHONY: results-paper paper-real paper-campus paper-shelf
 results-paper: paper-real paper-campus paper-shelf
-	$(BIN)/simharness evaluate paper --shelf results/shelf/voxelpose.json --shelf-2019 results/shelf/2019.json \
+	$(BIN)/python -m tools.paper_tables --shelf results/shelf/voxelpose.json --shelf-2019 results/shelf/2019.json \
 		--campus-twin results/campus/variants.json --shelf-twin results/shelf/variants.json --out results/paper
 
 paper-real: $(RUN)
@@ -71,13 +84,13 @@ $(VENV):
 	$(PYTHON) -m venv $(VENV)
 
 # Stamps, not the folder, say what is installed: an interrupted install is run again.
-$(RUN): pyproject.toml | $(VENV)
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable .
+$(RUN): $(PROJECTS) | $(VENV)
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[gl]'
 	touch $@
 
-$(DEV): pyproject.toml | $(VENV)
+$(DEV): $(PROJECTS) | $(VENV)
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[dev]'
 	touch $@ $(RUN)
 
 clean:
-	rm -rf $(VENV)
+	rm -rf $(VENV) build dist mvpose/build *.egg-info mvpose/*.egg-info

@@ -28,11 +28,6 @@ class HeadMapping(enum.StrEnum):
 app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
 
 
-def _made_by(command: str, which: str) -> Any:
-    """An option for a file that another command wrote."""
-    return typer.Option(metavar="FILE", help=f"What simharness {command} wrote, {which}.", dir_okay=False)
-
-
 @app.command()
 def shelf(
     folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
@@ -67,7 +62,7 @@ def shelf(
         pipelines = {name: _estimator(name) for name in method or ["full"]}
         if blind := NEED_DESCRIPTORS & pipelines.keys():
             raise ValueError(
-                f"--method {', '.join(blind)}: goes by descriptors alone, and the detections of Shelf carry none; "
+                f"--method {', '.join(blind)}: uses descriptors alone, and the detections of Shelf carry none; "
                 "choose another variant"
             )
         data = read_shelf(folder)
@@ -132,26 +127,6 @@ def evaluate_seeds(
         if json_file is not None:
             _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
     print_seeds(result, Console())
-
-
-@app.command()
-def paper(
-    shelf: Annotated[Path, _made_by("evaluate shelf", "with the VoxelPose head")],
-    shelf_2019: Annotated[Path, _made_by("evaluate shelf", "with the 2019 head")],
-    campus_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/campus.toml")],
-    shelf_twin: Annotated[Path, _made_by("evaluate seeds", "of scenarios/shelf.toml")],
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where tables.md and tables.json go.", file_okay=False)],
-) -> None:
-    """Tables 1 and 2 of the paper three ways: as printed, on real Shelf, on the twins of Campus and Shelf.
-
-    Reads what the other commands wrote, all variants of table 2 in each.
-    """
-    with border():
-        from tools.paper_tables.tables import paper_tables, read_inputs, write_tables
-
-        files = {"voxelpose": shelf, "2019": shelf_2019, "campus": campus_twin, "shelf": shelf_twin}
-        write_tables(paper_tables(read_inputs(files), command=command_line()), out)
-    typer.echo(f"tables: {out / 'tables.md'}")
 
 
 def _estimator(name: str) -> Estimator:

@@ -6,6 +6,7 @@ import math
 
 from simharness.gate.baseline import TIME
 from simharness.gate.compare import Change
+from simharness.runtime.number_text import fixed, signed
 from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import SCORES
 
@@ -20,7 +21,7 @@ def title(score: str) -> str:
 
 def number(score: str, value: float) -> str:
     """A value of a score."""
-    return f"{value:.{_digits(score)}f}"
+    return fixed(value, _digits(score))
 
 
 def difference(change: Change) -> str:
@@ -59,4 +60,4 @@ def _digits(score: str) -> int:
 
 
 def _difference(score: str, value: float) -> str:
-    return f"×{value:.2f}" if score == TIME else f"{value:+.{max(_digits(score), 1)}f}"
+    return f"×{value:.2f}" if score == TIME else signed(value, max(_digits(score), 1))

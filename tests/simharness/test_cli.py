@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.profiles import read_profile
 from simharness.trial.provenance import PROVENANCE
 
@@ -45,7 +45,7 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-EVALUATIONS = ("evaluate shelf", "evaluate seeds", "evaluate twin", "evaluate paper")
+EVALUATIONS = ("evaluate shelf", "evaluate seeds", "evaluate twin")
 COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 

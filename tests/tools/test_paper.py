@@ -1,6 +1,7 @@
-"""The paper's tables three ways: the numbers are those of the inputs and of the paper, and wrong inputs are refused."""
+"""The paper's tables: numbers are those of the inputs and of the paper, and wrong inputs are refused."""
 
 import json
+import math
 import re
 import shlex
 import sys
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 from simharness.cli import app
 from simharness.reality.published_scores import ABLATION, COMPARISON
 from simharness.trial.provenance import PROVENANCE, provenance
+from tools.paper_tables.__main__ import main
 from tools.paper_tables.tables import INPUTS, VARIANTS, paper_tables, read_inputs, write_tables
 from tools.paper_tables.text import markdown
 
@@ -21,31 +23,31 @@ FILES = {"voxelpose": "voxelpose.json", "2019": "2019.json", "campus": "campus.j
 OPTIONS = {"voxelpose": "--shelf", "2019": "--shelf-2019", "campus": "--campus-twin", "shelf": "--shelf-twin"}
 
 
-def made(command, seeds):
+def source(command, seeds):
     return provenance(command=f"simharness evaluate {command}", seeds=seeds, variants=VARIANTS, seconds=700.0)
 
 
 def recorded(head, rng):
-    """In the form of ``evaluate shelf``, with drawn numbers."""
+    """Return a summary as ``evaluate shelf`` writes it, with random numbers."""
     actors = {name: rng.uniform(60, 90, 3).tolist() for name in ON_SHELF}
     variants = {name: {"pcp": float(np.mean(pcp)), "pcp_actors": pcp} for name, pcp in actors.items()}
-    told = {"name": "shelf", "head": head, "frames": 300, "seeds": 0, "variants": variants}
-    return {**made(f"shelf FOLDER --head {head}", ()), **told}
+    summary = {"name": "shelf", "head": head, "frames": 300, "seeds": 0, "variants": variants}
+    return {**source(f"shelf FOLDER --head {head}", ()), **summary}
 
 
 def twin(name, rng):
-    """In the form of ``evaluate seeds``, with drawn numbers; 0.0 behind ``full`` is once rounded from below."""
+    """Return a summary as ``evaluate seeds`` writes it, with random numbers; one difference rounds to -0.0."""
 
     def score(middle):
         low, high = np.sort(rng.uniform(0.1, 3, 2)) * [-1, 1]
         return {"pcp": middle, "low": middle + low, "high": middle + high}
 
     seeds = (0, 1, 2, 5)
-    told = {"name": name, "detector": "typical", "head": "voxelpose", "frames": 60}
-    told["pcp"] = {variant: score(rng.uniform(60, 90)) for variant in VARIANTS}
-    told["ahead_of_full"] = {variant: score(rng.uniform(-9, 1)) for variant in VARIANTS[1:]}
-    told["ahead_of_full"]["fast"]["pcp"] = -0.04
-    return {**made(f"seeds scenarios/{name}.toml --seeds 4", seeds), **told}
+    summary = {"name": name, "detector": "typical", "head": "voxelpose", "frames": 60}
+    summary["pcp"] = {variant: score(rng.uniform(60, 90)) for variant in VARIANTS}
+    summary["ahead_of_full"] = {variant: score(rng.uniform(-9, 1)) for variant in VARIANTS[1:]}
+    summary["ahead_of_full"]["fast"]["pcp"] = -0.04
+    return {**source(f"seeds scenarios/{name}.toml --seeds 4", seeds), **summary}
 
 
 @pytest.fixture
@@ -65,7 +67,7 @@ def files(inputs, tmp_path):
 
 
 def tables(text):
-    """The tables of a Markdown text, as rows of cells without the heads."""
+    """Return the tables of a Markdown text, as rows of cells without the heads."""
     blocks = [[line for line in block.splitlines() if line.startswith("|")] for block in text.split("\n\n")]
     return [[[cell.strip() for cell in line.split("|")[1:-1]] for line in block[2:]] for block in blocks if block]
 
@@ -86,8 +88,8 @@ def test_table_1_has_the_papers_rows_and_then_ours(inputs):
             assert "4 seeds" in row[0]
     assert len(campus) == 6 + 2
     assert len(shelf) == 6 + 4 + 2
-    asked = [(head, variant) for head in ("voxelpose", "2019") for variant in ("no-3dps", "full")]
-    for row, (head, variant) in zip(shelf[6:10], asked, strict=True):
+    rows = [(head, variant) for head in ("voxelpose", "2019") for variant in ("no-3dps", "full")]
+    for row, (head, variant) in zip(shelf[6:10], rows, strict=True):
         scores = inputs[head]["variants"][variant]
         assert row[1:] == [f"{pcp:.1f}" for pcp in (*scores["pcp_actors"], scores["pcp"])]
         assert ("without 3DPS" in row[0]) is (variant == "no-3dps")
@@ -121,12 +123,12 @@ def test_table_2_has_every_variant_beside_full(inputs):
                 assert float(against) == pytest.approx(scores[name]["pcp"] - scores["full"]["pcp"], abs=0.0501)
 
 
-def test_without_descriptors_full_is_geometry_and_no_difference_is_told(inputs):
-    """As on real Shelf: by one head mapping here, while by the other they are two measurements."""
+def test_without_descriptors_full_is_geometry_and_no_difference_is_written(inputs):
+    """As on real Shelf: with one head mapping here, while with the other they are two measurements."""
     variants = inputs["voxelpose"]["variants"]
     variants["geometry"] = variants["full"]
-    told = paper_tables(inputs)
-    *_, shelf = tables(markdown(told))
+    numbers = paper_tables(inputs)
+    *_, shelf = tables(markdown(numbers))
     rows = {row[0]: row for row in shelf}
     assert rows["`full`"][4] == "as `geometry`"
     assert rows["`geometry`"][4] == "–"
@@ -134,7 +136,7 @@ def test_without_descriptors_full_is_geometry_and_no_difference_is_told(inputs):
     assert float(rows["`geometry`"][6]) == pytest.approx(
         inputs["2019"]["variants"]["geometry"]["pcp"] - inputs["2019"]["variants"]["full"]["pcp"], abs=0.0501
     )
-    assert told["ablation"]["shelf"]["geometry"]["voxelpose"]["against_full"] is None
+    assert numbers["ablation"]["shelf"]["geometry"]["voxelpose"]["against_full"] is None
     inputs["shelf"]["ahead_of_full"]["geometry"] = {"pcp": 0.0, "low": -0.1, "high": 0.1}  # the paper is outside
     (line,) = re.findall(
         r"^- `geometry` against .*", markdown(paper_tables(inputs)).split("### Shelf")[-1], re.MULTILINE
@@ -150,31 +152,31 @@ def test_with_descriptors_full_is_no_geometry(inputs):
     assert {row[0]: row[4] for row in shelf}["`geometry`"] == "0.0"
 
 
-def test_seeds_that_were_passed_over_are_told(inputs):
-    assert markdown(paper_tables(inputs)).count("Passed over: seeds 3 and 4, at which people") == 4
+def test_skipped_seeds_are_listed(inputs):
+    assert markdown(paper_tables(inputs)).count("Skipped: seeds 3 and 4, at which people") == 4
     inputs["shelf"]["seeds"] = [0, 1, 2, 4]
     inputs["campus"]["seeds"] = [4, 5, 6, 7]
     text = markdown(paper_tables(inputs))
-    assert re.findall(r"Passed over: (.*), at which", text) == ["seed 3"] * 2  # in both tables
+    assert re.findall(r"Skipped: (.*), at which", text) == ["seed 3"] * 2  # in both tables
     assert "people or the rack" in text
 
 
 def test_the_numbers_are_all_in_the_json(inputs):
-    told = json.loads(json.dumps(paper_tables(inputs), allow_nan=False))
-    assert told["ablation"]["shelf"]["geometry"]["twin"]["against_full"] == [
+    numbers = json.loads(json.dumps(paper_tables(inputs), allow_nan=False))
+    assert numbers["ablation"]["shelf"]["geometry"]["twin"]["against_full"] == [
         inputs["shelf"]["ahead_of_full"]["geometry"][key] for key in ("pcp", "low", "high")
     ]
-    assert told["ablation"]["shelf"]["fast"]["paper"] is told["ablation"]["shelf"]["appearance"]["2019"] is None
-    assert told["comparison"]["campus"][5]["average"] == [96.3, None, None]
+    assert numbers["ablation"]["shelf"]["fast"]["paper"] is numbers["ablation"]["shelf"]["appearance"]["2019"] is None
+    assert numbers["comparison"]["campus"][5]["average"] == [96.3, None, None]
     for key, each in inputs.items():
-        source = told["inputs"][key]
-        assert source.keys() >= set(PROVENANCE)
-        assert source["command"] == each["command"]
-        assert source["seeds"] == (each["seeds"] or [])
-        assert source["variants"] == list(each["variants"])
+        written = numbers["inputs"][key]
+        assert written.keys() >= set(PROVENANCE)
+        assert written["command"] == each["command"]
+        assert written["seeds"] == (each["seeds"] or [])
+        assert written["variants"] == list(each["variants"])
 
 
-def test_it_says_where_the_paper_is_outside_the_twins_interval(inputs):
+def test_rows_of_the_paper_outside_the_twins_interval_are_listed(inputs):
     against = {name: row.average - ABLATION["campus"]["full"].average for name, row in ABLATION["campus"].items()}
     ends = inputs["campus"]["ahead_of_full"]
     ends["geometry"] = {"pcp": 0.0, "low": against["geometry"] + 0.1, "high": 1.0}
@@ -185,89 +187,105 @@ def test_it_says_where_the_paper_is_outside_the_twins_interval(inputs):
     text = markdown(paper_tables(inputs))
     part = text[text.rindex("### Campus") : text.rindex("### Shelf")]
     assert re.findall(r"^- `(\S+)`", part, re.MULTILINE) == ["appearance", "geometry"]
-    assert re.findall(r"Within it: (.*)\.", part) == ["`full`, `no-3dps`, `no-matching`"]
+    assert re.findall(r"Inside the interval: (.*)\.", part) == ["`full`, `no-3dps`, `no-matching`"]
 
 
-def test_below_each_table_stands_where_it_comes_from(inputs):
+def test_the_sources_are_below_each_table(inputs):
     text = markdown(paper_tables(inputs))
     for each, times in zip(inputs.values(), (2, 2, 2, 2), strict=True):  # in both tables
         assert text.count(f"`{each['command']}`") == times
     assert "seeds 0, 1, 2, 5 of 60 frames" in text
     assert "12 min" in text
-    assert "same code" not in text
+    assert "code differs" not in text
     inputs["campus"]["digests"] = {"simulation": "0" * 32, "method": "1" * 32}
-    assert "Not all of these are of the same code" in markdown(paper_tables(inputs))
+    assert "The method's code differs between these inputs" in markdown(paper_tables(inputs))
 
 
 class TestFiles:
-    """What is read and written."""
+    """Input files and output folder of the command."""
 
     @pytest.fixture
-    def call(self, files, tmp_path):
+    def call(self, files, tmp_path, capsys):
+        """The command: returns its exit status and what it wrote to stderr."""
+
         def call(**other):
             paths = files | other
             words = [word for key, option in OPTIONS.items() for word in (option, str(paths[key]))]
-            out = ["--out", str(tmp_path / "paper")]
-            return CliRunner().invoke(app, ["evaluate", "paper", *words, *out], catch_exceptions=False)
+            status = main([*words, "--out", str(tmp_path / "paper")])
+            return status, capsys.readouterr().err
 
         return call
 
     def test_the_command_writes_both(self, call, inputs, tmp_path):
         (tmp_path / "paper").mkdir()
-        for _ in range(2):  # the second in the place of the first
-            result = call()
-            assert result.exit_code == 0, result.stderr
+        for _ in range(2):  # the second run replaces the files of the first
+            assert call() == (0, "")
         assert sorted(path.name for path in (tmp_path / "paper").iterdir()) == ["tables.json", "tables.md"]
-        told = json.loads((tmp_path / "paper" / "tables.json").read_text(encoding="utf-8"))
-        assert told == json.loads(json.dumps(paper_tables(inputs, command=told["command"])))
-        assert (tmp_path / "paper" / "tables.md").read_text(encoding="utf-8") == markdown(told)
+        numbers = json.loads((tmp_path / "paper" / "tables.json").read_text(encoding="utf-8"))
+        assert numbers["command"].startswith("python -m tools.paper_tables --shelf ")
+        assert numbers == json.loads(json.dumps(paper_tables(inputs, command=numbers["command"])))
+        assert (tmp_path / "paper" / "tables.md").read_text(encoding="utf-8") == markdown(numbers)
+
+    def test_every_input_is_required(self, capsys):
+        with pytest.raises(SystemExit) as stop:
+            main(["--out", "paper"])
+        assert stop.value.code == 2
+        assert ", ".join(OPTIONS.values()) in capsys.readouterr().err
 
     def test_nothing_else_is_replaced(self, inputs, tmp_path):
         (tmp_path / "kept").mkdir()
-        (tmp_path / "kept" / "mine.txt").touch()
+        (tmp_path / "kept" / "thesis.txt").touch()
         with pytest.raises(ValueError, match="holds no tables"):
             write_tables(paper_tables(inputs), tmp_path / "kept")
-        assert [path.name for path in (tmp_path / "kept").iterdir()] == ["mine.txt"]
+        assert [path.name for path in (tmp_path / "kept").iterdir()] == ["thesis.txt"]
         with pytest.raises(ValueError, match="cannot be written"):
-            write_tables(paper_tables(inputs), tmp_path / "kept" / "mine.txt" / "deep")
+            write_tables(paper_tables(inputs), tmp_path / "kept" / "thesis.txt" / "deep")
 
     @pytest.mark.parametrize(
-        ("key", "change", "said"),
+        ("key", "change", "message"),
         [
-            ("campus", lambda told: told.update(command="simharness evaluate twin FOLDER"), "evaluate seeds"),
-            ("voxelpose", lambda told: told.update(command=None), "expected what simharness evaluate shelf wrote"),
-            ("voxelpose", lambda told: told.update(head="2019"), "the head voxelpose, got 2019"),
-            ("2019", lambda told: told.update(head="voxelpose"), "the head 2019, got voxelpose"),
-            ("campus", lambda told: told.update(name="shelf"), "the name campus, got shelf"),
-            ("shelf", lambda told: told.pop("digests"), "digests"),
-            ("2019", lambda told: told.pop("frames"), "frames"),
-            ("2019", lambda told: told["variants"].pop("fast"), "lacks the variants fast"),
-            ("shelf", lambda told: [told["pcp"].pop(name) for name in ("full", "fast")], "variants full, fast"),
-            ("shelf", lambda told: told["ahead_of_full"].pop("fast"), "not as simharness evaluate seeds"),
-            ("shelf", lambda told: told["pcp"]["fast"].update(low=None), "PCP of fast"),
-            ("shelf", lambda told: told["ahead_of_full"]["fast"].update(high=float("nan")), "PCP of fast beside full"),
-            ("voxelpose", lambda told: told["variants"]["full"].update(pcp=None), "PCP of full"),
-            ("voxelpose", lambda told: told["variants"]["full"]["pcp_actors"].pop(), "PCP of full"),
-            ("voxelpose", lambda told: told.update(variants=["full"]), "not as simharness evaluate shelf"),
+            ("campus", lambda summary: summary.update(command="simharness evaluate twin FOLDER"), "evaluate seeds"),
+            ("voxelpose", lambda summary: summary.update(command=None), "expected a file of simharness evaluate shelf"),
+            ("voxelpose", lambda summary: summary.update(head="2019"), "the head voxelpose, got 2019"),
+            ("2019", lambda summary: summary.update(head="voxelpose"), "the head 2019, got voxelpose"),
+            ("campus", lambda summary: summary.update(name="shelf"), "the name campus, got shelf"),
+            ("shelf", lambda summary: summary.pop("digests"), "digests"),
+            ("2019", lambda summary: summary.pop("frames"), "frames"),
+            ("2019", lambda summary: summary["variants"].pop("fast"), "lacks the variants fast"),
+            ("shelf", lambda summary: [summary["pcp"].pop(name) for name in ("full", "fast")], "variants full, fast"),
+            ("shelf", lambda summary: summary["ahead_of_full"].pop("fast"), "not as simharness evaluate seeds"),
+            ("shelf", lambda summary: summary["pcp"]["fast"].update(low=None), "PCP of fast"),
+            (
+                "shelf",
+                lambda summary: summary["ahead_of_full"]["fast"].update(high=math.nan),
+                "PCP of fast against full",
+            ),
+            ("voxelpose", lambda summary: summary["variants"]["full"].update(pcp=None), "PCP of full"),
+            ("voxelpose", lambda summary: summary["variants"]["full"]["pcp_actors"].pop(), "PCP of full"),
+            ("voxelpose", lambda summary: summary.update(variants=["full"]), "not as simharness evaluate shelf"),
         ],
     )
-    def test_wrong_inputs_get_one_message(self, call, files, inputs, tmp_path, key, change, said):
+    def test_wrong_inputs_get_one_message(self, call, files, inputs, tmp_path, key, change, message):
         change(inputs[key])
         files[key].write_text(json.dumps(inputs[key]))
-        self.refused(call(), tmp_path, f"{OPTIONS[key]} {files[key]}: ", said, INPUTS[key].makes)
+        self.refused(call(), tmp_path, f"{OPTIONS[key]} {files[key]}: ", message, INPUTS[key].makes)
 
-    def test_what_is_no_such_file(self, call, tmp_path):
-        for name, content, said in (("none", None, "no such file"), ("text", "x", "not JSON"), ("list", "[]", "list")):
-            if content is not None:
-                (tmp_path / name).write_text(content)
-            self.refused(call(campus=tmp_path / name), tmp_path, f"--campus-twin {tmp_path / name}: ", said)
+    @pytest.mark.parametrize(
+        ("content", "message"), [(None, "no such file"), ("x", "not JSON"), ("[]", "expected a JSON object, got list")]
+    )
+    def test_a_file_that_cannot_be_read_is_named(self, call, tmp_path, content, message):
+        file = tmp_path / "other.json"
+        if content is not None:
+            file.write_text(content)
+        self.refused(call(campus=file), tmp_path, f"--campus-twin {file}: ", message)
 
     @staticmethod
-    def refused(result, folder, *said):
-        assert result.exit_code == 2
-        assert len(result.stderr.strip().splitlines()) == 1
-        for text in ("error: ", *said):
-            assert text in result.stderr
+    def refused(result, folder, *messages):
+        status, stderr = result
+        assert status == 2
+        assert len(stderr.strip().splitlines()) == 1
+        for text in ("error: ", *messages):
+            assert text in stderr
         assert not (folder / "paper").exists()
 
 
@@ -297,6 +315,6 @@ def test_what_the_commands_write_is_read(tmp_path, monkeypatch, shared_data):
             run(*words, *small, *drawn)
         else:
             run(*(str(shared_data / "shelf") if word == "FOLDER" else word for word in words))
-    told = paper_tables(read_inputs({key: tmp_path / f"{key}.json" for key in INPUTS}))
-    assert len(tables(markdown(told))) == 4
-    assert [told["inputs"][key]["seeds"] for key in ("voxelpose", "campus")] == [[], [0, 1]]
+    numbers = paper_tables(read_inputs({key: tmp_path / f"{key}.json" for key in INPUTS}))
+    assert len(tables(markdown(numbers))) == 4
+    assert [numbers["inputs"][key]["seeds"] for key in ("voxelpose", "campus")] == [[], [0, 1]]

@@ -1,1 +1,1 @@
-"""Tables 1 and 2 of the paper (Dong et al., CVPR 2019): printed, on real data, on simulated twins."""
+"""Tables 1 and 2 of the paper (Dong et al., CVPR 2019): as printed, on real data, and on simulated twins."""

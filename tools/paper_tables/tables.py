@@ -1,7 +1,7 @@
-"""Tables 1 and 2 of the paper (Dong et al., CVPR 2019) three ways: as printed, on real data, on simulated twins.
+"""Numbers of tables 1 and 2 of the paper (Dong et al., CVPR 2019): as printed, on real data, and on simulated twins.
 
-The numbers are read from what ``simharness evaluate shelf`` and ``simharness evaluate seeds`` wrote, and keep what that
-says of where they come from. Table 1 compares methods, table 2 variants of one.
+The inputs are files of ``simharness evaluate shelf`` and ``simharness evaluate seeds``; their provenance is kept. Table
+1 compares methods, table 2 compares variants of one method.
 """
 
 from __future__ import annotations
@@ -22,24 +22,26 @@ from simharness.trial.provenance import PROVENANCE
 from tools.paper_tables.text import markdown
 
 VARIANTS = ("full", "appearance", "geometry", "no-3dps", "no-matching", "hungarian", "fast")
-"""The rows of table 2: the paper's variants, then ours."""
+"""Rows of table 2: the variants of the paper, then the variants of this project."""
 
 _OURS = {"no-3dps": "this code, without 3DPS", "full": "this code"}  # rows of table 1
 
 
 @dataclass(frozen=True)
 class _Input:
-    """A file to read.
+    """An input file.
 
     Attributes:
-        option: that names it.
-        command: of ``simharness``, that writes such files.
-        key: what tells it from the other files of that command,
-        value: and what that is.
-        makes: an example of the command.
+        option: option of the command line that names the file.
+        contents: what the file holds.
+        command: subcommand of ``simharness`` that writes such files.
+        key: JSON key that distinguishes the file from other files of that command.
+        value: expected value of the key.
+        makes: example of the whole command.
     """
 
     option: str
+    contents: str
     command: str
     key: str
     value: str
@@ -52,6 +54,7 @@ _SEEDS = f"--set 'method.variants={json.dumps(VARIANTS, separators=(',', ':'))}'
 INPUTS = {
     "voxelpose": _Input(
         option="--shelf",
+        contents="real Shelf with the VoxelPose head",
         command="evaluate shelf",
         key="head",
         value="voxelpose",
@@ -59,6 +62,7 @@ INPUTS = {
     ),
     "2019": _Input(
         option="--shelf-2019",
+        contents="real Shelf with the 2019 head",
         command="evaluate shelf",
         key="head",
         value="2019",
@@ -66,6 +70,7 @@ INPUTS = {
     ),
     "campus": _Input(
         option="--campus-twin",
+        contents="twin of Campus",
         command="evaluate seeds",
         key="name",
         value="campus",
@@ -73,73 +78,74 @@ INPUTS = {
     ),
     "shelf": _Input(
         option="--shelf-twin",
+        contents="twin of Shelf",
         command="evaluate seeds",
         key="name",
         value="shelf",
         makes=f"simharness evaluate seeds scenarios/shelf.toml --set appearance.source=pictures {_SEEDS} --json FILE",
     ),
 }
-"""What the tables are made of: real Shelf by either head mapping, and both twins."""
+"""Input files of the tables: real Shelf with each head mapping, and both twins."""
 
 HEADS = ("voxelpose", "2019")
-"""The inputs that are of real Shelf."""
+"""Inputs with results on real Shelf."""
 
 
 def read_inputs(files: Mapping[str, Path]) -> dict[str, dict[str, Any]]:
-    """Read what the tables are made of.
+    """Read and check the input files.
 
     Args:
-        files: by the keys of :data:`INPUTS`.
+        files: paths by the keys of :data:`INPUTS`.
 
     Raises:
-        ValueError: a file that is not there, that another command wrote, or that lacks variants or provenance.
+        ValueError: a file does not exist, was written by another command, or lacks variants or provenance.
     """
     return {key: _read(wanted, files[key]) for key, wanted in INPUTS.items()}
 
 
 def paper_tables(inputs: Mapping[str, Mapping[str, Any]], *, command: str | None = None) -> dict[str, Any]:
-    """The numbers of both tables, JSON-ready.
+    """Return the numbers of both tables, JSON-ready.
 
-    Every PCP, percent, and every difference, points, is a list of a value and the ends of its 95 % interval, which are
-    None where there is none: of what is printed, and of one recording.
+    Every PCP (percent) and every difference (points) is a list of a value and the two ends of its 95 % interval. The
+    ends are None for printed numbers and for a single recording, which have no interval.
 
     Args:
         inputs: from :func:`read_inputs`.
-        command: how the user asked for this.
+        command: command line of the user, to be recorded.
 
     Returns:
-        ``comparison`` (table 1), by data set a list of rows: ``method``, ``of`` ("paper", "voxelpose", "2019", "twin"),
-        ``actors`` (None of twins) and ``average``. ``ablation`` (table 2), by data set, variant and column ("paper",
-        "voxelpose", "2019", "twin"): ``pcp``, ``against_full`` and, of recorded data, ``same_as``: without descriptors
-        "full" and "geometry" are one measurement, and no difference of them is told; None where a variant was not run.
-        ``inputs``: their provenance, and what they are of, ``skipped`` the seeds between theirs that were passed over.
+        ``comparison`` (table 1): by data set a list of rows with ``method``, ``of`` (source: "paper", "voxelpose",
+        "2019" or "twin"), ``actors`` (None for twins) and ``average``. ``ablation`` (table 2): by data set, variant and
+        source: ``pcp``, ``against_full`` and, for recorded data, ``same_as``: without descriptors "full" and "geometry"
+        are the same measurement, and their difference is left out; None for a variant that was not run. ``inputs``:
+        provenance and contents of the inputs; ``skipped`` are seeds inside the range that gave no scene.
     """
     return {
         "command": command,
         "comparison": {data: list(_comparison(data, inputs)) for data in COMPARISON},
         "ablation": {data: _ablation(data, inputs) for data in ABLATION},
-        "inputs": {key: _described(told) for key, told in inputs.items()},
+        "inputs": {key: _described(summary) for key, summary in inputs.items()},
     }
 
 
-def write_tables(told: Mapping[str, Any], folder: Path) -> None:
+def write_tables(tables: Mapping[str, Any], folder: Path) -> None:
     """Write ``tables.md`` and ``tables.json`` into a folder.
 
     Args:
-        told: from :func:`paper_tables`.
-        folder: appears whole, in the place of older tables.
+        tables: from :func:`paper_tables`.
+        folder: replaced as a whole where it holds older tables.
 
     Raises:
         ValueError: the folder holds something else, or cannot be written.
     """
-    ours = (folder / "tables.json").is_file()
-    if folder.exists() and not ours and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(f"--out {folder}: is there and holds no tables of the paper; name another folder")
-    text = json.dumps(told, indent=1, ensure_ascii=False, allow_nan=False)
+    has_tables = (folder / "tables.json").is_file()
+    if folder.exists() and not has_tables and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"--out {folder}: exists and holds no tables of the paper; name another folder")
+    text = json.dumps(tables, indent=1, ensure_ascii=False, allow_nan=False)
     try:
         with appearing(folder) as partial:
             (partial / "tables.json").write_text(text + "\n", encoding="utf-8")
-            (partial / "tables.md").write_text(markdown(told), encoding="utf-8")
+            (partial / "tables.md").write_text(markdown(tables), encoding="utf-8")
     except OSError as error:
         raise ValueError(f"--out {folder}: cannot be written: {error.strerror}") from None
 
@@ -178,7 +184,7 @@ def _ablation(data: str, inputs: Mapping[str, Mapping[str, Any]]) -> dict[str, d
 
 
 def _alone(pcp: Mapping[str, float], name: str) -> dict[str, Any] | None:
-    """A cell of figures without intervals."""
+    """Return the cell of a variant whose numbers have no intervals; None for a variant without a number."""
     if name not in pcp:
         return None
     against = None if name == "full" else [round(pcp[name] - pcp["full"], 10), None, None]
@@ -186,7 +192,7 @@ def _alone(pcp: Mapping[str, float], name: str) -> dict[str, Any] | None:
 
 
 def _recorded(variants: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Any] | None:
-    """A cell of recorded data."""
+    """Return the cell of a variant on recorded data; None for a variant that was not run."""
     cell = _alone({each: scores["pcp"] for each, scores in variants.items()}, name)
     if cell is None:
         return None
@@ -195,7 +201,10 @@ def _recorded(variants: Mapping[str, Mapping[str, Any]], name: str) -> dict[str,
 
 
 def _without_descriptors(variants: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether recorded detections carry no descriptors: nothing that needs them was run, and "full" is "geometry"."""
+    """Return whether the recorded detections have no descriptors, from the results alone.
+
+    Then no variant that needs descriptors was run, and "full" has the same PCP as "geometry".
+    """
     return NEED_DESCRIPTORS.isdisjoint(variants) and variants["full"]["pcp"] == variants["geometry"]["pcp"]
 
 
@@ -203,66 +212,70 @@ def _ends(score: Mapping[str, float]) -> list[float]:
     return [score["pcp"], score["low"], score["high"]]
 
 
-def _described(told: Mapping[str, Any]) -> dict[str, Any]:
-    """Where an input comes from. Recorded data have no seeds."""
-    kept = {key: told[key] for key in PROVENANCE}
-    seeds = list(told["seeds"] or ())
+def _described(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return provenance and contents of an input. Recorded data have no seeds."""
+    kept = {key: summary[key] for key in PROVENANCE}
+    seeds = list(summary["seeds"] or ())
     skipped = sorted(set(range(min(seeds), max(seeds))) - set(seeds)) if seeds else []
-    kept |= {"seeds": seeds, "skipped": skipped, "variants": list(told["variants"])}
-    return {**kept, "frames": told["frames"], "detector": told.get("detector"), "head": told["head"]}
+    kept |= {"seeds": seeds, "skipped": skipped, "variants": list(summary["variants"])}
+    return {**kept, "frames": summary["frames"], "detector": summary.get("detector"), "head": summary["head"]}
 
 
 def _read(wanted: _Input, file: Path) -> dict[str, Any]:
-    """One input, checked."""
-    where, remedy = f"{wanted.option} {file}", f"make it by: {wanted.makes}"
+    """Read and check one input."""
+    where, remedy = f"{wanted.option} {file}", f"make it with: {wanted.makes}"
     try:
-        told = json.loads(file.read_text(encoding="utf-8"))
+        summary = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ValueError(f"{where}: no such file; {remedy}") from None
     except OSError as error:
         raise ValueError(f"{where}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise ValueError(f"{where}: is not JSON; {remedy}") from None
-    if not isinstance(told, dict):
-        raise ValueError(f"{where}: expected an object of JSON, got {type(told).__name__}; {remedy}")
-    if lacking := [key for key in (*PROVENANCE, "frames", "head") if key not in told]:
-        raise ValueError(f"{where}: does not say what it is and where it comes from: no {', '.join(lacking)}; {remedy}")
-    command = " ".join(shlex.split(str(told["command"]))[1:3])
+    if not isinstance(summary, dict):
+        raise ValueError(f"{where}: expected a JSON object, got {type(summary).__name__}; {remedy}")
+    if missing := [key for key in (*PROVENANCE, "frames", "head") if key not in summary]:
+        raise ValueError(f"{where}: lacks the keys {', '.join(missing)}; {remedy}")
+    command = " ".join(shlex.split(str(summary["command"]))[1:3])
     if command != wanted.command:
-        raise ValueError(f"{where}: expected what simharness {wanted.command} wrote, got {told['command']}; {remedy}")
-    if told.get(wanted.key) != wanted.value:
-        raise ValueError(f"{where}: expected the {wanted.key} {wanted.value}, got {told.get(wanted.key)}; {remedy}")
+        raise ValueError(
+            f"{where}: expected a file of simharness {wanted.command}, got one of {summary['command']}; {remedy}"
+        )
+    if summary.get(wanted.key) != wanted.value:
+        raise ValueError(f"{where}: expected the {wanted.key} {wanted.value}, got {summary.get(wanted.key)}; {remedy}")
     check = _check_recorded if command == "evaluate shelf" else _check_twin
     try:
-        if missing := check(told):
+        if missing := check(summary):
             raise ValueError(f"{where}: lacks the variants {', '.join(missing)}; {remedy}")
     except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{where}: is not as simharness {command} writes it ({error!r}); {remedy}") from None
-    return told
+    return summary
 
 
-def _check_recorded(told: Mapping[str, Any]) -> list[str]:
-    """Variants that a file of recorded data lacks.
+def _check_recorded(summary: Mapping[str, Any]) -> list[str]:
+    """Return the variants that a file of recorded data lacks.
 
     Raises:
-        AttributeError, KeyError, TypeError: it is not built as such files are.
+        AttributeError, KeyError, TypeError: the file does not have the structure of such files.
     """
-    variants = told["variants"]
-    for name in (there := [each for each in VARIANTS if each in variants]):
+    variants = summary["variants"]
+    present = [name for name in VARIANTS if name in variants]
+    for name in present:
         scores = variants[name]
         if len(scores["pcp_actors"]) != len(ACTORS) or not _all_numbers(scores["pcp"], *scores["pcp_actors"]):
             raise TypeError(f"PCP of {name}")
-    return [name for name in VARIANTS if name not in there and name not in NEED_DESCRIPTORS]
+    return [name for name in VARIANTS if name not in present and name not in NEED_DESCRIPTORS]
 
 
-def _check_twin(told: Mapping[str, Any]) -> list[str]:
-    """Variants that a file of many seeds lacks. Raises as :func:`_check_recorded`."""
-    for name in (there := [each for each in VARIANTS if each in told["pcp"]]):
-        if not _all_numbers(*_ends(told["pcp"][name])):
+def _check_twin(summary: Mapping[str, Any]) -> list[str]:
+    """Return the variants that a file of many seeds lacks; raises like :func:`_check_recorded`."""
+    present = [name for name in VARIANTS if name in summary["pcp"]]
+    for name in present:
+        if not _all_numbers(*_ends(summary["pcp"][name])):
             raise TypeError(f"PCP of {name}")
-        if "full" in there and name != "full" and not _all_numbers(*_ends(told["ahead_of_full"][name])):
-            raise TypeError(f"PCP of {name} beside full")
-    return [name for name in VARIANTS if name not in there]
+        if "full" in present and name != "full" and not _all_numbers(*_ends(summary["ahead_of_full"][name])):
+            raise TypeError(f"PCP of {name} against full")
+    return [name for name in VARIANTS if name not in present]
 
 
 def _all_numbers(*values: Any) -> bool:

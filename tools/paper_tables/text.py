@@ -1,4 +1,4 @@
-"""The paper's tables as a text to read: :mod:`tools.paper_tables.tables` makes the numbers."""
+"""Markdown text of the paper's tables; the numbers are from :mod:`tools.paper_tables.tables`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from simharness.report.documents import markdown_table, provenance_sentence
+from simharness.runtime.number_text import fixed, signed
 from simharness.runtime.progress import duration
 
 _DATA = {"campus": "Campus", "shelf": "Shelf"}
@@ -16,79 +17,80 @@ _OF = {
     "twin": "twin",
 }
 
-_PLACED = {"campus": "people", "shelf": "people or the rack"}  # what a twin may find no place for: no scene then
+_PLACED = {"campus": "people", "shelf": "people or the rack"}  # a seed at which these find no free place has no scene
 
 _TRIANGULATED = (
-    "The twin's detector leaves joints out, and the paper's gives every joint of whom it finds. A joint that fewer "
-    "than two cameras have cannot be triangulated, while the pictorial structure puts it where the bones let it be: "
-    "with nothing left out most of the loss is gone."
+    "The twin's detector misses joints; the paper's gives every joint of each person that it finds. A joint that fewer "
+    "than two cameras detect cannot be triangulated, but the pictorial structure places it by the bone lengths: "
+    "without missed joints most of the loss is gone."
 )
 _UNMATCHED = (
-    "How much it loses depends on the joints that the detector leaves out, and on how near people come to each other: "
-    "those of the twin are not the actors. And the paper gives this variant another 2D detector than its full method; "
-    "here all variants see the same detections."
+    "The loss depends on the joints that the detector misses and on the distances between people; the people of the "
+    "twin are not the actors. The paper also uses another 2D detector for this variant than for its full method; here "
+    "all variants get the same detections."
 )
 
-# What the paper's set-up and the twin's do not have in common that a row depends on. Told only of rows that differ.
+# Differences between the set-ups of the paper and of the twin that affect a row; written only for rows that differ.
 _WHY: dict[str, dict[str, str]] = {
     "full": {
-        "campus": "Other detections: the paper's are a Cascaded Pyramid Network's on the real pictures, the twin's are "
-        "simulated and not fitted to Campus. Other people, and exact truth in place of annotations by hand.",
-        "shelf": "Other detections: the paper's are a Cascaded Pyramid Network's, the twin's are simulated by what "
-        "OpenPose does on Shelf. Other people, and exact truth in place of annotations by hand.",
+        "campus": "Different detections: the paper's are from a Cascaded Pyramid Network on the real pictures, the "
+        "twin's are simulated and not fitted to Campus. Different people, and exact truth, not manual annotation.",
+        "shelf": "Different detections: the paper's are from a Cascaded Pyramid Network, the twin's are simulated with "
+        "the errors of OpenPose on Shelf. Different people, and exact truth, not manual annotation.",
     },
     "appearance": {
-        "campus": "Other descriptors: the paper's network was trained on real people, ours on rendered ones, and reads "
-        "rendered people here.",
-        "shelf": "In the paper actor 2 looks like another person, and most of the loss is his. Two people of the twin "
-        "wear the same, too, but our descriptors are other ones: of a network that was trained on rendered people, and "
-        "reads rendered people here.",
+        "campus": "Different descriptors: the paper's network was trained on real people, ours on rendered people, and "
+        "it is used on rendered people here.",
+        "shelf": "In the paper actor 2 looks like another person and has most of the loss. Two people of the twin wear "
+        "the same clothes, too, but our descriptors differ: they are from a network that was trained on rendered "
+        "people and is used on rendered people here.",
     },
     "geometry": {
-        "campus": "The measure is not why: an epipolar distance in pixels, as the paper's, loses as little on this "
-        "twin. Its cameras are calibrated to 0.2 degrees, so that rays agree and leave little to decide.",
-        "shelf": "On real Shelf this code goes by geometry alone and scores what the table says, with other detections "
-        "than the paper's and affinities on another scale, metres between rays. What descriptors would add there was "
-        "not measured.",
+        "campus": "The distance measure is not the reason: an epipolar distance in pixels, as in the paper, loses as "
+        "little on this twin. The twin's cameras are calibrated to 0.2 degrees, so rays agree and few matches are "
+        "ambiguous.",
+        "shelf": "On real Shelf this code uses geometry alone and has the score in the table, with other detections "
+        "than the paper and with affinities from distances between rays in metres. What descriptors would add there "
+        "was not measured.",
     },
     "no-3dps": {"campus": _TRIANGULATED, "shelf": _TRIANGULATED},
     "no-matching": {"campus": _UNMATCHED, "shelf": _UNMATCHED},
 }
 
 
-def markdown(told: Mapping[str, Any]) -> str:
-    """The tables, where simulation and paper differ, and where the numbers come from.
+def markdown(tables: Mapping[str, Any]) -> str:
+    """Return the tables, the differences between simulation and paper, and the sources of the numbers.
 
     Args:
-        told: from :func:`tools.paper_tables.tables.paper_tables`.
+        tables: from :func:`tools.paper_tables.tables.paper_tables`.
     """
-    return "\n".join(_lines(told)) + "\n"
+    return "\n".join(_lines(tables)) + "\n"
 
 
-def _lines(told: Mapping[str, Any]) -> Iterator[str]:
+def _lines(tables: Mapping[str, Any]) -> Iterator[str]:
     yield "# Tables 1 and 2 of the paper, three ways"
     yield (
-        "\nPercentage of correct parts (PCP): as Dong et al. (CVPR 2019) print it, of this code on real data, and of "
-        "this code on simulated twins of the data sets, with 95 % intervals over seeds. The paper's head mapping is "
-        "that of 2019; twins have the VoxelPose head. A twin's average is over everybody in it."
+        "\nPercentage of correct parts (PCP): as printed by Dong et al. (CVPR 2019), for this code on real data, and "
+        "for this code on simulated twins of the data sets, with 95 % intervals over seeds. The paper uses the head "
+        "mapping of 2019; twins use the VoxelPose head. A twin's average is over all of its people."
     )
     yield "\n## Table 1: methods"
     for data, title in _DATA.items():
         yield f"\n### {title}\n"
-        yield from _comparison(told["comparison"][data], title, _seeds(told, data))
-        yield "\nSimulated people are not the actors: twins have no column for each."
-        if _same(told["ablation"][data]):
-            yield "On real Shelf this code goes by geometry alone: the detections carry no descriptors."
-        yield from _sources(told, data)
+        yield from _comparison(tables["comparison"][data], title, _seed_count(tables, data))
+        yield "\nSimulated people are not the actors, so twins have no column for each actor."
+        if _full_is_geometry(tables["ablation"][data]):
+            yield "On real Shelf this code uses geometry alone: the detections have no descriptors."
+        yield from _sources(tables, data)
     yield "\n## Table 2: variants of the method"
-    yield "\nBeside each PCP: points against `full` on the same detections, of twins seed by seed."
+    yield "\nBeside each PCP: the difference from `full` in points, on the same detections; for twins paired by seed."
     for data, title in _DATA.items():
         yield f"\n### {title}\n"
-        yield from _ablation(told["ablation"][data], title, _seeds(told, data))
-        yield from _notes(data, told["ablation"][data])
-        yield from _differences(told["ablation"][data], data)
-        yield from _sources(told, data)
-    yield from _origins(told)
+        yield from _ablation(tables["ablation"][data], title, _seed_count(tables, data))
+        yield from _notes(data, tables["ablation"][data])
+        yield from _differences(tables["ablation"][data], data)
+        yield from _sources(tables, data)
+    yield from _provenance(tables)
 
 
 def _comparison(rows: Sequence[Mapping[str, Any]], title: str, seeds: int) -> Iterator[str]:
@@ -97,7 +99,7 @@ def _comparison(rows: Sequence[Mapping[str, Any]], title: str, seeds: int) -> It
     for row in rows:
         name = row["method"] if row["of"] == "paper" else f"{row['method']}: {of[row['of']]}"
         actors = ["–"] * 3 if row["actors"] is None else [f"{pcp:.1f}" for pcp in row["actors"]]
-        cells.append([name, *actors, _said(row["average"])])
+        cells.append([name, *actors, _pcp(row["average"])])
     yield from markdown_table([title, "Actor 1", "Actor 2", "Actor 3", "Average"], cells)
 
 
@@ -109,117 +111,112 @@ def _ablation(variants: Mapping[str, Mapping[str, Any]], title: str, seeds: int)
         row = [f"`{name}`"]
         for column in columns:
             cell = cells[column]
-            row += ["–", "–"] if cell is None else [_said(cell["pcp"]), _beside_full(name, cell)]
+            row += ["–", "–"] if cell is None else [_pcp(cell["pcp"]), _against_full(name, cell)]
         rows.append(row)
     yield from markdown_table([title, *(each for head in heads for each in (head, "against `full`"))], rows)
 
 
-def _beside_full(name: str, cell: Mapping[str, Any]) -> str:
-    """What stands in the column "against `full`": of two variants that are one measurement no difference."""
+def _against_full(name: str, cell: Mapping[str, Any]) -> str:
+    """Return the text of the column "against `full`": no difference where both variants are one measurement."""
     if same := cell.get("same_as"):
         return f"as `{same}`" if name == "full" else "–"
-    return _against(cell["against_full"])
+    return _difference(cell["against_full"])
 
 
-def _same(variants: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether "full" goes by geometry alone in any column."""
+def _full_is_geometry(variants: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Return whether "full" had no descriptors, and so used geometry alone, in any column."""
     return any(cell is not None and cell.get("same_as") for cell in variants["full"].values())
 
 
 def _notes(data: str, variants: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    yield "\n`hungarian` and `fast` are not the paper's."
+    yield "\n`hungarian` and `fast` are not in the paper."
     if data == "campus":
         yield "There are no detections of real Campus to run on."
-    elif _same(variants):
-        yield "The detections of real Shelf carry no descriptors: there `appearance` cannot be run, and `full` goes by"
-        yield "geometry alone. So `full` and `geometry` are one measurement, and what stands against `full` in these"
-        yield "columns stands against `geometry`."
+    elif _full_is_geometry(variants):
+        yield "The detections of real Shelf have no descriptors: `appearance` cannot be run there, and `full` uses"
+        yield "geometry alone. So `full` and `geometry` are the same measurement, and differences from `full` in these"
+        yield "columns are also differences from `geometry`."
 
 
 def _differences(variants: Mapping[str, Mapping[str, Any]], data: str) -> Iterator[str]:
-    """Where what is printed lies outside the interval of the twin, and why that may be."""
-    apart, alike = [], []
+    """Return the lines about printed numbers outside the interval of the twin, with possible reasons."""
+    outside, inside = [], []
     for name, cells in variants.items():
         if cells["paper"] is None:
             continue
-        key, said = ("pcp", _said) if name == "full" else ("against_full", _against)
+        key, text = ("pcp", _pcp) if name == "full" else ("against_full", _difference)
         printed, (_, low, high) = cells["paper"][key][0], cells["twin"][key]
         if low <= printed <= high:
-            alike.append(f"`{name}`")
+            inside.append(f"`{name}`")
             continue
         what = f"`{name}`" if name == "full" else f"`{name}` against `full`"
         values = "; ".join(
-            f"{_OF[column]} {said(cell[key])}"
+            f"{_OF[column]} {text(cell[key])}"
             for column, cell in cells.items()
             if cell is not None and cell[key] is not None
         )
-        apart.append(f"- {what}: {values}. {_WHY[name][data]}")
-    if apart:
-        twin = f"the twin of {_DATA[data]}"
-        yield f"\nWhere the paper lies outside the interval of {twin}, and what is not the same there:\n"
-        yield from apart
-    if alike:
-        yield f"\nWithin it: {', '.join(alike)}."
+        outside.append(f"- {what}: {values}. {_WHY[name][data]}")
+    if outside:
+        yield f"\nOutside the interval of the twin of {_DATA[data]}, with the differences between paper and twin:\n"
+        yield from outside
+    if inside:
+        yield f"\nInside the interval: {', '.join(inside)}."
 
 
-def _sources(told: Mapping[str, Any], data: str) -> Iterator[str]:
-    """Commands, seeds, code and time of what a table is made of."""
-    yield "\nMade of:\n"
+def _sources(tables: Mapping[str, Any], data: str) -> Iterator[str]:
+    """Return the lines with commands, seeds, code and running time of the inputs of a table."""
+    yield "\nSources:\n"
     for key in ("voxelpose", "2019", "shelf") if data == "shelf" else ("campus",):
-        made = told["inputs"][key]
-        what = f"twin, seeds {_listed(made['seeds'])} of" if made["seeds"] else f"{_OF[key]},"
-        digests = ", ".join(f"{name} {digest[:8]}" for name, digest in made["digests"].items())
+        source = tables["inputs"][key]
+        what = f"twin, seeds {_seed_list(source['seeds'])} of" if source["seeds"] else f"{_OF[key]},"
+        digests = ", ".join(f"{name} {digest[:8]}" for name, digest in source["digests"].items())
         yield (
-            f"- {what} {made['frames']} frames; code {made['code']} ({digests}); {duration(made['seconds'])}: "
-            f"`{made['command']}`"
+            f"- {what} {source['frames']} frames; code {source['code']} ({digests}); {duration(source['seconds'])}: "
+            f"`{source['command']}`"
         )
-        if skipped := made["skipped"]:
+        if skipped := source["skipped"]:
             seeds = f"seed {skipped[0]}" if len(skipped) == 1 else f"seeds {_and(skipped)}"
-            yield f"  Passed over: {seeds}, at which {_PLACED[key]} find no place."
+            yield f"  Skipped: {seeds}, at which {_PLACED[key]} find no place."
 
 
-def _origins(told: Mapping[str, Any]) -> Iterator[str]:
-    """Code, libraries and machines; inputs that have them in common are told together."""
+def _provenance(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Return the lines with code, libraries and machine; inputs that share all of them are in one line."""
     yield "\n## Code, libraries and machine\n"
     groups: dict[str, list[str]] = {}
-    for key, made in told["inputs"].items():
-        groups.setdefault(provenance_sentence(made), []).append(f"twin of {_DATA[key]}" if key in _DATA else _OF[key])
-    for said, inputs in groups.items():
-        yield f"- {'; '.join(inputs)}: {said}"
-    if len({made["digests"]["method"] for made in told["inputs"].values()}) > 1:
-        yield "\nNot all of these are of the same code of the method: compare them with care."
+    for key, source in tables["inputs"].items():
+        name = f"twin of {_DATA[key]}" if key in _DATA else _OF[key]
+        groups.setdefault(provenance_sentence(source), []).append(name)
+    for sentence, names in groups.items():
+        yield f"- {'; '.join(names)}: {sentence}"
+    if len({source["digests"]["method"] for source in tables["inputs"].values()}) > 1:
+        yield "\nThe method's code differs between these inputs: compare them with care."
 
 
-def _seeds(told: Mapping[str, Any], data: str) -> int:
-    return len(told["inputs"][data]["seeds"])
+def _seed_count(tables: Mapping[str, Any], data: str) -> int:
+    return len(tables["inputs"][data]["seeds"])
 
 
 def _and(seeds: Sequence[int]) -> str:
-    """Two seeds or more."""
+    """Return two seeds or more as "1, 2 and 5"."""
     *others, last = map(str, seeds)
     return f"{', '.join(others)} and {last}"
 
 
-def _listed(seeds: Sequence[int]) -> str:
-    """Seeds in few words: those at which nothing could be built are missing in between."""
+def _seed_list(seeds: Sequence[int]) -> str:
+    """Return ascending seeds as a range where none is missing, else as a list."""
     whole = len(seeds) == seeds[-1] - seeds[0] + 1
     return f"{seeds[0]} to {seeds[-1]}" if whole and len(seeds) > 2 else ", ".join(map(str, seeds))
 
 
-def _said(ends: Sequence[float | None]) -> str:
-    """A PCP and its interval."""
-    pcp, low, high = ends
-    return f"{pcp:.1f}" if low is None else f"{pcp:.1f} ({low:.1f} to {high:.1f})"
+def _pcp(ends: Sequence[float | None]) -> str:
+    """Return a PCP and its interval."""
+    pcp, low, high = (None if end is None else fixed(end, 1) for end in ends)
+    return f"{pcp}" if low is None else f"{pcp} ({low} to {high})"
 
 
-def _against(ends: Sequence[float | None] | None) -> str:
-    """A difference and its interval, with signs."""
+def _difference(ends: Sequence[float | None] | None) -> str:
+    """Return a difference and its interval, with signs."""
     if ends is None:
         return ""
-    points, low, high = (None if end is None else _signed(end) for end in ends)
+    points, low, high = (None if end is None else signed(end, 1) for end in ends)
     return f"{points}" if low is None else f"{points} ({low} to {high})"
-
-
-def _signed(points: float) -> str:
-    text = f"{points:+.1f}"
-    return text if float(text) else "0.0"
