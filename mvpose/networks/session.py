@@ -138,7 +138,14 @@ class Session:
         return results
 
     def _open(self, provider: Provider, threads: int) -> Any:
-        import onnxruntime
+        try:
+            import onnxruntime
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(
+                f"network {self.path}: onnxruntime is not installed, which runs networks; "
+                "pip install 'mvpose[networks]'",
+                name=error.name,
+            ) from error
 
         providers = _providers(provider, onnxruntime.get_available_providers())
         if not self.path.is_file():

@@ -1,4 +1,4 @@
-"""From detections to people in 3D (paper, section 3.3): triangulation and pictorial structures."""
+"""Reconstruction of people in 3D from matched detections (paper, section 3.3): triangulation, pictorial structures."""
 
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.pictorial import PictorialStructure

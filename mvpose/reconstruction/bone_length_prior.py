@@ -1,13 +1,13 @@
-"""Prior on bone lengths from published anthropometry, for the pictorial structure (paper, section 3.3).
+"""Prior on bone lengths, of the adult population or scaled to one person (paper, section 3.3).
 
-The paper learns its prior from Human3.6M, and its released numbers come from the test sets. This one is measured on
-neither, nor on any simulated population:
+The paper learns its prior from Human3.6M, and the numbers in its released code come from the test sets. This prior is
+taken from published anthropometry, and uses neither those data sets nor a simulated population:
 
 - limbs and trunk between joint centres: de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters",
   J. Biomechanics 29(9), 1996, table 4, women and men averaged as fractions of stature;
-- stature 1.70 m, deviation 5.5 % over adults of both sexes: NCD-RisC, "A century of trends in adult human height",
-  eLife 5:e13410, 2016;
-- shoulder span: biacromial breadth of ANSUR II (Gordon et al. 2014, 0.39 m) less the two distances from acromion to
+- stature 1.70 m, standard deviation 5.5 % over adults of both sexes: NCD-RisC, "A century of trends in adult human
+  height", eLife 5:e13410, 2016;
+- shoulder span: biacromial breadth of ANSUR II (Gordon et al. 2014, 0.39 m) minus the two distances from acromion to
   joint centre;
 - head: ANSUR II (interpupillary and bitragion breadths, tragion to nose) and Drillis & Contini's segment heights.
 """
@@ -25,21 +25,21 @@ from mvpose.skeleton import Skeleton
 
 STATURE = 1.70  # metres
 STATURE_DEVIATION = 0.055
-"""Deviation of the stature of adults, as a share of it: all bones of a person together."""
+"""Standard deviation of the stature of adults, as a fraction of it; common to all bones of a person."""
 PROPORTION_DEVIATION = 0.04
-"""Deviation of a bone among adults of one stature, as a share of its length."""
+"""Standard deviation of a bone length among adults of equal stature, as a fraction of the length."""
 
-_OUTLIER = 9.0  # squared deviations at which a bone's say is halved
-_ROUNDS = 3
+_OUTLIER = 9.0  # squared standardised residual at which the Cauchy weight of a bone is 1/2
+_ROUNDS = 3  # of iteratively reweighted least squares
 
-# Mean length in metres and the deviation, in metres, of what detectors call the joint from the joint centre.
+# Mean length, and standard deviation of the detectors' definition of the joints from the joint centres, in metres.
 # fmt: off
 _BONES: dict[frozenset[str], tuple[float, float]] = {
     frozenset({"shoulder", "elbow"}): (0.160 * STATURE, 0.02),
     frozenset({"elbow", "wrist"}): (0.153 * STATURE, 0.02),
     frozenset({"hip", "knee"}): (0.228 * STATURE, 0.03),
     frozenset({"knee", "ankle"}): (0.249 * STATURE, 0.02),
-    frozenset({"shoulder", "hip"}): (0.296 * STATURE, 0.04),   # the trunk, and half the difference of the two spans
+    frozenset({"shoulder", "hip"}): (0.296 * STATURE, 0.04),   # trunk, and half the difference of shoulder and hip span
     frozenset({"shoulder"}): (0.33, 0.03),
     frozenset({"nose", "shoulder"}): (0.26, 0.05),             # the head turns: the widest deviation of all
     frozenset({"nose", "eye"}): (0.057, 0.01),
@@ -51,12 +51,12 @@ _BONES: dict[frozenset[str], tuple[float, float]] = {
 
 
 class Bones(NamedTuple):
-    """The bone from every joint to its parent.
+    """Published length of the bone from every joint to its parent.
 
     Attributes:
-        length: mean over adults, (J,), metres; 0 where nothing is published, and at the root.
-        definition: deviation, in metres, of what detectors call the joints from the joint centres, (J,); infinite
-            where nothing is published, and at the root.
+        length: mean over adults, (J,), metres; 0 where no length is published, and at the root.
+        definition: standard deviation of the length due to the detectors' definition of the joints, (J,), metres;
+            infinite where no length is published, and at the root.
     """
 
     length: Floats
@@ -64,8 +64,8 @@ class Bones(NamedTuple):
 
 
 @cache
-def bones(skeleton: Skeleton) -> Bones:
-    """The published bones of a skeleton."""
+def published_bones(skeleton: Skeleton) -> Bones:
+    """Return the published bone lengths of a skeleton."""
     length, definition = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
     for parent, child in skeleton.edges:
         ends = frozenset((skeleton.parts[parent], skeleton.parts[child]))
@@ -75,36 +75,37 @@ def bones(skeleton: Skeleton) -> Bones:
 
 
 def bone_lengths(skeleton: Skeleton) -> tuple[Floats, Floats]:
-    """Mean and standard deviation of the bone from every joint to its parent, over adults.
+    """Return mean and standard deviation, over adults, of the length of the bone from every joint to its parent.
 
     Returns:
-        Means (J,) and deviations (J,), metres. A bone without a published length, and the root, has an infinite
-        deviation: it constrains nothing.
+        Means (J,) and standard deviations (J,), metres. A bone without a published length, and the root, has an
+        infinite deviation: it is not constrained.
     """
-    length, definition = bones(skeleton)
+    length, definition = published_bones(skeleton)
     return length, np.hypot(np.hypot(STATURE_DEVIATION, PROPORTION_DEVIATION) * length, definition)
 
 
 @njit(cache=True)
 def personal_prior(states, count, weights, sigmas, parents, length, definition, personal):
-    """Mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, of one person.
+    """Return mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, for one person.
 
-    Stature is the one scale that all bones share: its posterior is Gaussian about the population's, from the lengths
-    between the likeliest proposals, of which long bones with many views say most and misfits little (Cauchy weights).
-    What is left for each bone is the deviation of proportions, and of stature as far as it is still in doubt.
+    Stature is a scale that all bones of a person share. Its posterior is Gaussian, with the population as prior and
+    the distances between the likeliest proposals as measurements. Long bones seen by many views weigh most, outliers
+    weigh little (Cauchy weights). The deviation of each bone is then that of proportions combined with the posterior
+    deviation of stature.
 
     Args:
         states: proposals (J, S, 3), metres, the likeliest first.
-        count: how many are valid, (J,).
+        count: number of valid proposals per joint, (J,).
         weights: scores in every view, (J, n, K).
-        sigmas: deviation of each joint across a ray, (J,), metres.
-        parents: the tree, (J,).
-        length: of the population, (J,), metres.
-        definition: deviation of what is called the joint, (J,), metres; infinite for no prior.
-        personal: whether to scale; if not, this is the population's prior.
+        sigmas: standard deviation of each joint across a ray, (J,), metres.
+        parents: parent of each joint, (J,), -1 for the root.
+        length: mean bone lengths of the population, (J,), metres.
+        definition: standard deviation due to the definition of the joints, (J,), metres; infinite for no prior.
+        personal: whether to scale to the person; if not, the prior of the population is returned.
     """
     joints, n, _ = weights.shape
-    scale, doubt = 1.0, STATURE_DEVIATION
+    scale, deviation = 1.0, STATURE_DEVIATION
     if personal:
         views = np.zeros(joints)
         for j in range(joints):
@@ -112,7 +113,7 @@ def personal_prior(states, count, weights, sigmas, parents, length, definition, 
                 for v in range(n):
                     views[j] += weights[j, v, 0] > 0.0
         for _ in range(_ROUNDS):
-            top, mass = 1.0 / STATURE_DEVIATION**2, 1.0 / STATURE_DEVIATION**2
+            weighted_sum, information = 1.0 / STATURE_DEVIATION**2, 1.0 / STATURE_DEVIATION**2
             for j in range(joints):
                 parent = parents[j]
                 if parent < 0 or length[j] == 0.0 or views[j] < 2 or views[parent] < 2:
@@ -124,11 +125,11 @@ def personal_prior(states, count, weights, sigmas, parents, length, definition, 
                 variance = (PROPORTION_DEVIATION * length[j]) ** 2 + definition[j] ** 2 + measured
                 residual = np.sqrt(d2) - scale * length[j]
                 weight = 1.0 / (1.0 + residual * residual / (_OUTLIER * variance))
-                top += weight * length[j] * np.sqrt(d2) / variance
-                mass += weight * length[j] ** 2 / variance
-            scale, doubt = top / mass, 1.0 / np.sqrt(mass)
-    own, precision = np.empty(joints), np.empty(joints)
+                weighted_sum += weight * length[j] * np.sqrt(d2) / variance
+                information += weight * length[j] ** 2 / variance
+            scale, deviation = weighted_sum / information, 1.0 / np.sqrt(information)
+    scaled, precision = np.empty(joints), np.empty(joints)
     for j in range(joints):
-        own[j] = scale * length[j]
-        precision[j] = 1.0 / ((doubt**2 + PROPORTION_DEVIATION**2) * length[j] ** 2 + definition[j] ** 2)
-    return own, precision
+        scaled[j] = scale * length[j]
+        precision[j] = 1.0 / ((deviation**2 + PROPORTION_DEVIATION**2) * length[j] ** 2 + definition[j] ** 2)
+    return scaled, precision

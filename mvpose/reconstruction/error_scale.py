@@ -1,9 +1,9 @@
-"""How large the keypoint errors of a person really are, from the residuals of the joints.
+"""Empirical Bayes estimate of a person's keypoint error variance, from the residuals of the joints.
 
-The error model gives the scatter of an ordinary detector; the one at hand may be three times better, and a person in
-the distance or in strange clothes may be worse off. One scale for all joints of a person is well measured by a few
-views, so it is estimated first (empirical Bayes) and used; each joint's own then differs from it by what its own
-residuals say.
+The error model gives the variance for a typical detector. The detector in use may be three times more accurate, and
+errors on a distant or unusually dressed person may be larger. A few views suffice to estimate one scale for all joints
+of a person, so this scale is estimated first; the scale of each joint then starts from it and is updated by the
+residuals of that joint.
 """
 
 from __future__ import annotations
@@ -11,42 +11,45 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-# A keypoint's error counts as far as the keypoint is right, which cuts the tail of even a perfect Gaussian: with the
-# floor at a hundredth of the peak, a tenth of the variance is not seen (an integral over the two densities).
-_SEEN = 0.9
-_PERSON = 3.0  # residuals that the error model's own scale is worth, against a person's
-_JOINT = 6.0  # and that the person's scale is worth, against a joint's
-_LEAST, _MOST = 0.1, 4.0  # of a person's scale: no detector is better or worse than the model by more
+# Errors are weighted by the responsibility of the keypoint, which truncates the tail of even a perfect Gaussian: with
+# the floor at a hundredth of the peak, a tenth of the variance is lost (an integral over the two densities).
+_OBSERVED_VARIANCE = 0.9
+_MODEL_FREEDOM = 3.0  # residuals that the prior scale of the error model counts for, against those of a person
+_PERSON_FREEDOM = 6.0  # residuals that the scale of the person counts for, against those of a joint
+_LEAST, _MOST = 0.1, 4.0  # range of a person's scale; detectors do not differ from the model by more
 
 
 @njit(cache=True)
-def _freedom(rights):
-    """Residuals that are free, of views whose responsibilities sum to ``rights``: two each, less a joint's three."""
-    return _SEEN * max(2.0 * rights - 3.0, 0.0)
+def _degrees_of_freedom(responsibility):
+    """Return the degrees of freedom of a joint's residuals: two per responsible view, minus three for the position."""
+    return _OBSERVED_VARIANCE * max(2.0 * responsibility - 3.0, 0.0)
 
 
 @njit(cache=True)
-def person_scale(misfit, rights):
-    """How much larger the squared errors of a person are than the model's.
+def person_scale(misfit, responsibilities):
+    """Return the ratio of a person's squared keypoint errors to those of the error model.
 
-    Inverse-gamma about the model's: many residuals outweigh it, few do not.
+    The prior is inverse-gamma around 1, so many residuals outweigh it and few do not.
 
     Args:
         misfit: sum over views of responsibility times squared error over variance, (J,).
-        rights: sum of responsibilities, (J,).
+        responsibilities: sum over views of the responsibilities, (J,).
     """
-    total, freedom = _PERSON, _PERSON
+    total, freedom = _MODEL_FREEDOM, _MODEL_FREEDOM
     for j in range(len(misfit)):
-        if rights[j] > 1.5:
+        if responsibilities[j] > 1.5:
             total += misfit[j]
-            freedom += _freedom(rights[j])
+            freedom += _degrees_of_freedom(responsibilities[j])
     return min(max(total / freedom, _LEAST), _MOST)
 
 
 @njit(cache=True)
-def joint_scales(misfit, rights):
-    """How much larger the squared errors of each joint are than the model's, (J,); see :func:`person_scale`."""
-    person, scale = person_scale(misfit, rights), np.empty(len(misfit))
+def joint_scales(misfit, responsibilities):
+    """Return the ratio of each joint's squared errors to those of the error model, (J,); see :func:`person_scale`."""
+    person, scale = person_scale(misfit, responsibilities), np.empty(len(misfit))
     for j in range(len(misfit)):
-        scale[j] = (_JOINT * person + misfit[j]) / (_JOINT + _freedom(rights[j])) if rights[j] > 1.5 else person
+        scale[j] = person
+        if responsibilities[j] > 1.5:
+            freedom = _PERSON_FREEDOM + _degrees_of_freedom(responsibilities[j])
+            scale[j] = (_PERSON_FREEDOM * person + misfit[j]) / freedom
     return scale

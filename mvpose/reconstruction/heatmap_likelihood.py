@@ -1,7 +1,7 @@
-"""The likelihood of the paper's section 3.3 as it stands there: heat maps, sampled where a point projects.
+"""Likelihood from heat maps, sampled where a point projects (paper, section 3.3).
 
-The Gaussians of :mod:`mvpose.reconstruction.likelihood` about the modes of the maps propose and refine; which proposal
-is the likeliest, the maps decide.
+Proposals and refinement use Gaussians at the modes of the maps (:mod:`mvpose.reconstruction.likelihood`); the maps
+themselves decide which proposal is the likeliest.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ from mvpose.reconstruction.proposals import insert
 def rescore(states, unary, count, labels, person, weights, maps, floor):
     """Score proposals by heat maps, in place, and sort them again, the likeliest first.
 
-    A view says ``floor + height`` of its map at the projection, sub-pixel; the floor models a joint that it missed.
+    The likelihood of a view is ``floor + height`` of its map at the projection (sub-pixel); the floor models a joint
+    that the detector missed.
 
     Args:
-        states: (J, S, 3), metres.
-        unary: where to write, (J, S).
-        count: how many of the S are valid, (J,).
-        labels: whose each detection is, (m,).
-        person: whose proposals these are.
+        states: proposals, (J, S, 3), metres.
+        unary: output, log-likelihood of each proposal, (J, S).
+        count: number of valid proposals per joint, (J,).
+        labels: person of each detection, (m,).
+        person: label of the person to whom the proposals belong.
         weights: heights of the modes of the person's n detections, (J, n, K).
         maps: values (m, J, h, w), grid (m, 4) and cameras (m, 22) of :class:`mvpose.rays.Modes`.
-        floor: likelihood of a joint anywhere.
+        floor: likelihood of a joint at any place.
     """
     values, grid, cameras = maps
     for j in range(len(count)):
@@ -38,14 +39,14 @@ def rescore(states, unary, count, labels, person, weights, maps, floor):
             for d in range(len(labels)):
                 if labels[d] == person:
                     if weights[j, v, 0] > 0.0:
-                        total += np.log(floor + _look_up(x, y, z, d, j, values, grid[d], cameras[d]))
+                        total += np.log(floor + _height_at(x, y, z, d, j, values, grid[d], cameras[d]))
                     v += 1
             insert(states[j], unary[j], s, total, x, y, z)
 
 
 @njit(cache=True)
-def _look_up(x, y, z, detection, joint, values, grid, camera):
-    """Height of one map where a point of the world projects; 0 behind the camera."""
+def _height_at(x, y, z, detection, joint, values, grid, camera):
+    """Return the height of one map where a world point projects; 0 behind the camera."""
     x, y, z = x - camera[14], y - camera[15], z - camera[16]
     depth = camera[11] * x + camera[12] * y + camera[13] * z
     if depth <= 0.0:

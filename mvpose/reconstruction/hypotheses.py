@@ -1,9 +1,9 @@
-"""Where anybody's joints can be, whosever the keypoints are: the state space of 3DPS without matching.
+"""State space of 3DPS without matching: possible joint positions of all people.
 
-Every pair of keypoints of one joint in two views proposes a state where their rays meet. A keypoint vouches for a
-state if, were the joint there, the keypoint would sooner be right than wrong: if its responsibility
-(:mod:`mvpose.reconstruction.likelihood`) exceeds 1/2. Where the rays of two people meet by chance two views vouch;
-where a joint really is most of them do.
+Every pair of keypoints of one joint in two views proposes a state where their rays meet. A keypoint supports a state
+if it is more likely right than wrong given the joint there, that is, if its responsibility
+(:mod:`mvpose.reconstruction.likelihood`) exceeds 1/2. Where the rays of two people meet by chance, two views support
+the state; at a true joint position most views do.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from mvpose.skeleton import Skeleton
 
 
 class Hypotheses(NamedTuple):
-    """The states of all joints, S in all, what vouches for them and which are a bone apart.
+    """States of all joints (S in total), the keypoints that support them, and links between states a bone apart.
 
     Attributes:
         start: first state of each joint, and S, (J + 1,).
-        points: (S, 3), metres.
-        voucher_start: first voucher of each state, and their number, (S + 1,).
-        voucher: detections whose keypoints vouch, in the order of their views.
-        evidence: log-likelihood of each of these keypoints with the joint there, less that without.
-        link_start: first link of each state, and their number, (S + 1,).
-        link: states of the parent joint that are a bone away.
-        cost: what the prior takes off for that bone's length.
+        points: positions of the states, (S, 3), metres.
+        support_start: first supporting keypoint of each state, and their total number, (S + 1,).
+        support: detections whose keypoints support each state, in the order of their views.
+        evidence: log-likelihood ratio of each supporting keypoint with the joint at the state against without it.
+        link_start: first link of each state, and their total number, (S + 1,).
+        link: states of the parent joint at the distance of a bone.
+        cost: negative log-prior of the bone length of each link.
     """
 
     start: Integers
     points: Floats
-    voucher_start: Integers
-    voucher: Integers
+    support_start: Integers
+    support: Integers
     evidence: Floats
     link_start: Integers
     link: Integers
@@ -48,55 +48,57 @@ class Hypotheses(NamedTuple):
 def hypothesize(
     rays: Rays, skeleton: Skeleton, *, noise: Noise, agreement: float, reach: float, most: int
 ) -> Hypotheses:
-    """States of everybody's joints.
+    """Return the states of the joints of all people.
 
     Args:
         rays: m detections, in the order of their views.
-        skeleton: their J joints.
-        noise: the error model of keypoints.
-        agreement: two rays meet if they pass each other within this many standard deviations, before both cameras.
-        reach: greatest misfit of a bone, in standard deviations of its length and of the states at its ends.
-        most: states that a keypoint can propose, the likeliest ones; those within a standard deviation are one.
+        skeleton: the J joints.
+        noise: error model of keypoints.
+        agreement: greatest distance between two rays that meet, in standard deviations; they must meet in front of
+            both cameras.
+        reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
+        most: greatest number of states that a keypoint proposes, the likeliest ones; states within one standard
+            deviation of each other are merged.
     """
     sigmas, joints = noise.sigmas(skeleton), range(len(skeleton))
-    seen = [np.flatnonzero(rays.weights[:, j] > noise.floor) for j in joints]  # others can vouch for nothing
-    sights = [_sights(rays, j, seen[j], noise) for j in joints]
-    points = [_propose(rays.view[seen[j]], sights[j], sigmas[j], agreement, most) for j in joints]
-    vouchers = [_vouch(sights[j], points[j], sigmas[j]) for j in joints]
+    seen = [np.flatnonzero(rays.weights[:, j] > noise.floor) for j in joints]  # weaker keypoints cannot support a state
+    rows = [_ray_rows(rays, j, seen[j], noise) for j in joints]
+    points = [_propose(rays.view[seen[j]], rows[j], sigmas[j], agreement, most) for j in joints]
+    supports = [_supporting_rays(rows[j], points[j], sigmas[j]) for j in joints]
     start = np.cumsum([0, *map(len, points)])
     length, deviation = bone_lengths(skeleton)
     parents = np.array(skeleton.parents, np.int64)
-    # The likeliest of several pairs is about as good as the mean of four keypoints.
+    # The likeliest of several pairs is about as accurate as the mean of four keypoints.
     spread = np.sqrt(deviation**2 + (sigmas**2 + sigmas[parents] ** 2) / 4)
     return Hypotheses(
         start,
         np.concatenate(points),
-        np.cumsum(np.concatenate([[0], *(count for count, _, _ in vouchers)])),
-        np.concatenate([seen[j][which] for j, (_, which, _) in enumerate(vouchers)]),
-        np.concatenate([evidence for _, _, evidence in vouchers]),
+        np.cumsum(np.concatenate([[0], *(count for count, _, _ in supports)])),
+        np.concatenate([seen[j][which] for j, (_, which, _) in enumerate(supports)]),
+        np.concatenate([evidence for _, _, evidence in supports]),
         *_link(start, np.concatenate(points), parents, length, spread, reach),
     )
 
 
-def _sights(rays: Rays, joint: int, seen: Integers, noise: Noise) -> Floats:
-    """The rays of one joint, a row each: origin, direction, score, score over floor, pixel angle squared, and a bound.
+def _ray_rows(rays: Rays, joint: int, seen: Integers, noise: Noise) -> Floats:
+    """Return the rays of one joint as rows: origin, direction, score, score over floor, squared pixel angle, bound.
 
-    At more than that many variances, squared distance from the ray, the keypoint does not vouch.
+    The bound is the squared distance from the ray, in variances, beyond which the keypoint does not support a state.
     """
     score = rays.weights[seen, joint]
     odds, pixel = score / noise.floor, (noise.pixels * rays.pixel[seen]) ** 2
     return np.column_stack([rays.origins[seen], rays.directions[seen, joint], score, odds, pixel, 2 * np.log(odds)])
 
 
-def _propose(view: Integers, sights: Floats, sigma: float, agreement: float, most: int) -> Floats:
-    """States of one joint, (S, 3): where rays of two views meet, the likeliest ones of each keypoint, all distinct."""
-    points, ends, likelihood = _meetings(view, sights, sigma, agreement)
+def _propose(view: Integers, rows: Floats, sigma: float, agreement: float, most: int) -> Floats:
+    """Return the states of one joint, (S, 3): the likeliest distinct points where rays of two views meet."""
+    points, ends, likelihood = _meetings(view, rows, sigma, agreement)
     return points[_distinct(points, ends, np.argsort(-likelihood, kind="stable"), len(view), sigma, most)]
 
 
 @njit(cache=True)
-def _meetings(view, sights, sigma, agreement):
-    """Where pairs of rays of different views meet, (N, 3), which rays these are, (N, 2), and log-likelihoods, (N,)."""
+def _meetings(view, rows, sigma, agreement):
+    """Return points where rays of two views meet, (N, 3), the two rays, (N, 2), and log-likelihoods, (N,)."""
     n = len(view)
     points, likelihood = np.empty((n * (n - 1) // 2, 3)), np.empty(n * (n - 1) // 2)
     ends = np.empty((len(points), 2), np.int64)
@@ -104,11 +106,11 @@ def _meetings(view, sights, sigma, agreement):
     for a in range(n):
         for b in range(a + 1, n):
             if view[a] == view[b] or not pair_point(
-                sights[a, :3], sights[a, 3:6], sights[a, 6], sights[b, :3], sights[b, 3:6], sights[b, 6], points[pairs]
+                rows[a, :3], rows[a, 3:6], rows[a, 6], rows[b, :3], rows[b, 3:6], rows[b, 6], points[pairs]
             ):
                 continue
-            # Across both rays the errors add up to what parts them.
-            near, far = _across(points, pairs, sights, a, sigma), _across(points, pairs, sights, b, sigma)
+            # The errors across both rays add up to the distance between the rays.
+            near, far = _distance_to_ray(points, pairs, rows, a, sigma), _distance_to_ray(points, pairs, rows, b, sigma)
             gap = np.sqrt(near[0]) + np.sqrt(far[0])
             if gap * gap > agreement * agreement * (near[1] + far[1]):
                 continue
@@ -118,7 +120,7 @@ def _meetings(view, sights, sigma, agreement):
                 if k > 0 and view[k] != view[k - 1]:
                     total += np.log1p(best)
                     best = 0.0
-                best = max(best, _odds(points, pairs, sights, k, sigma))
+                best = max(best, _odds(points, pairs, rows, k, sigma))
             likelihood[pairs] = total + np.log1p(best)
             pairs += 1
     return points[:pairs], ends[:pairs], likelihood[:pairs]
@@ -126,7 +128,7 @@ def _meetings(view, sights, sigma, agreement):
 
 @njit(cache=True)
 def _distinct(points, ends, order, rays, sigma, most):
-    """Indices of points to keep, in this order: none within sigma of one before, and so many of each ray."""
+    """Return indices of the points to keep: none within sigma of an earlier one, and at most ``most`` per ray."""
     kept, count, states = np.empty(len(points), np.int64), np.zeros(rays, np.int64), 0
     for k in order:
         a, b = ends[k, 0], ends[k, 1]
@@ -146,33 +148,33 @@ def _distinct(points, ends, order, rays, sigma, most):
 
 
 @njit(cache=True)
-def _across(points, s, sights, k, sigma):
-    """Squared distance of a point from a ray and its variance, m^2, and how far along the ray the point is, metres."""
-    x, y, z = points[s, 0] - sights[k, 0], points[s, 1] - sights[k, 1], points[s, 2] - sights[k, 2]
-    along = x * sights[k, 3] + y * sights[k, 4] + z * sights[k, 5]
-    variance = (sigma * sigma + sights[k, 8] * along * along) / (sights[k, 6] * sights[k, 6])
+def _distance_to_ray(points, s, rows, k, sigma):
+    """Return the squared distance of a point from a ray and its variance, m^2, and its depth along the ray, metres."""
+    x, y, z = points[s, 0] - rows[k, 0], points[s, 1] - rows[k, 1], points[s, 2] - rows[k, 2]
+    along = x * rows[k, 3] + y * rows[k, 4] + z * rows[k, 5]
+    variance = (sigma * sigma + rows[k, 8] * along * along) / (rows[k, 6] * rows[k, 6])
     return max(x * x + y * y + z * z - along * along, 0.0), variance, along
 
 
 @njit(cache=True)
-def _odds(points, s, sights, k, sigma):
-    """How many times likelier a keypoint is with the joint at the point than without; 0 where it does not vouch."""
-    e2, variance, along = _across(points, s, sights, k, sigma)
-    return sights[k, 7] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < sights[k, 9] * variance else 0.0
+def _odds(points, s, rows, k, sigma):
+    """Return the likelihood ratio of a keypoint with the joint at the point against without; 0 without support."""
+    e2, variance, along = _distance_to_ray(points, s, rows, k, sigma)
+    return rows[k, 7] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < rows[k, 9] * variance else 0.0
 
 
 @njit(cache=True)
-def _vouch(sights, points, sigma):
-    """How many rays vouch for each state of one joint, which ones, and the evidence that each adds."""
+def _supporting_rays(rows, points, sigma):
+    """Return the number of rays that support each state of one joint, the rays, and the evidence of each."""
     count = np.zeros(len(points), np.int64)
     for s in range(len(points)):
-        for k in range(len(sights)):
-            count[s] += _odds(points, s, sights, k, sigma) > 0.0
+        for k in range(len(rows)):
+            count[s] += _odds(points, s, rows, k, sigma) > 0.0
     which, evidence = np.empty(count.sum(), np.int64), np.empty(count.sum())
     filled = 0
     for s in range(len(points)):
-        for k in range(len(sights)):
-            odds = _odds(points, s, sights, k, sigma)
+        for k in range(len(rows)):
+            odds = _odds(points, s, rows, k, sigma)
             if odds > 0.0:
                 which[filled], evidence[filled] = k, np.log1p(odds)
                 filled += 1
@@ -181,12 +183,12 @@ def _vouch(sights, points, sigma):
 
 @njit(cache=True)
 def _link(start, points, parents, length, deviation, reach):
-    """The links and costs of :class:`Hypotheses`. A bone of unknown length (infinite deviation) links nothing."""
-    begin = np.zeros(len(points) + 1, np.int64)
+    """Return links and costs of :class:`Hypotheses`; a bone of unknown length (infinite deviation) has no links."""
+    link_start = np.zeros(len(points) + 1, np.int64)
     link, cost = np.empty(0, np.int64), np.empty(0)
     for filling in (False, True):
         if filling:
-            link, cost = np.empty(begin[-1], np.int64), np.empty(begin[-1])
+            link, cost = np.empty(link_start[-1], np.int64), np.empty(link_start[-1])
         count = 0
         for joint in range(len(parents)):
             parent = parents[joint]
@@ -206,5 +208,5 @@ def _link(start, points, parents, length, deviation, reach):
                             link[count] = other
                             cost[count] = 0.5 * ((np.sqrt(d2) - length[joint]) / deviation[joint]) ** 2
                         count += 1
-                begin[s + 1] = count
-    return begin, link, cost
+                link_start[s + 1] = count
+    return link_start, link, cost

@@ -1,14 +1,16 @@
-"""How well a point in space explains what the views saw: the likelihood term of the paper's section 3.3.
+"""Likelihood of a joint position given the keypoints of all views (paper, section 3.3).
 
-Each view that detected a joint says ``p(I_v | X) = floor + score * exp(-score^2 e^2 / (2 sigma^2))``, where e is the
-distance in metres from X to the viewing ray: a keypoint of half the score scatters twice as far, as the rows of a
-score-weighted DLT have it. The floor models a keypoint that is simply wrong; without it one bad view would veto the
-truth. sigma is the scatter of a sure detector across the body, in metres and so the same for every rig, with the angle
-of a pixel added: far away, pixels are what limits it. Where a view offers several keypoints for
-one joint (the modes of a heat map), the best of them counts (a max-mixture: Olson & Agarwal, IJRR 2013).
+The likelihood of a view that detected the joint is ``p(I_v | X) = floor + score * exp(-score^2 e^2 / (2 sigma^2))``,
+where e is the distance in metres from X to the viewing ray. A keypoint of half the score has twice the standard
+deviation, as in a score-weighted DLT. The floor models a keypoint that is wrong; without it one wrong view would rule
+out the true position. sigma is the standard deviation of a confident detection on the body, in metres, so it is the
+same for every rig; the size of a pixel at the joint is added in quadrature, because it limits accuracy at a distance.
+Where a view has several keypoints for one joint (the modes of a heat map), the best of them counts (a max-mixture:
+Olson & Agarwal, IJRR 2013).
 
 The kernels work on one joint of one person in n views with K modes each: origins (n, 3), directions (n, K, 3),
-weights (n, K), 0 where a view has no such mode, and the angle of a pixel (n,).
+weights (n, K), 0 where a view has no such mode, and the angle of a pixel (n,). The responsibility of a keypoint is
+the posterior probability that it is right, given the joint at the point.
 """
 
 from __future__ import annotations
@@ -28,18 +30,20 @@ _FASTMATH = {"contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 @dataclass(frozen=True)
 class Noise:
-    """The error model of a keypoint.
+    """Error model of a keypoint.
 
     Attributes:
-        area: what OKS calls the square root of the person's area, in metres: an adult fills 53 % of a box of
-            1.7 m x 0.55 m (Ronchi & Perona 2017 give the share).
-        definition: deviation of what detectors mean by a joint from view to view, metres.
-        pixels: deviation in pixels that no detector goes below.
-        floor: likelihood of a keypoint anywhere, as a share of the peak of a right one. One keypoint in ten is
-            grossly wrong (PoseFix's rates) and lies anywhere in a square metre; the others within 0.05 m.
+        area: square root of the person's area as OKS uses it, in metres: an adult fills 53 % of a box of
+            1.7 m x 0.55 m (fraction from Ronchi & Perona 2017).
+        definition: standard deviation between views of the point that a detector takes for the joint, metres.
+        pixels: least standard deviation of any detector, pixels.
+        floor: likelihood of a wrong keypoint at any place, as a fraction of the peak likelihood of a right one. One
+            keypoint in ten is grossly wrong (rates of PoseFix) and lies anywhere in a square metre; the others lie
+            within 0.05 m.
 
     Raises:
-        ValueError: a floor of 0, a deviation below 0, nothing that scatters.
+        ValueError: ``floor`` not above 0, a negative ``area``, ``definition`` or ``pixels``, or ``area`` and
+            ``definition`` both 0.
     """
 
     area: float = 0.70
@@ -50,10 +54,12 @@ class Noise:
     def __post_init__(self) -> None:
         check_numbers(self, "the noise model", positive=("floor",), not_negative=("area", "definition", "pixels"))
         if not self.area + self.definition:
-            raise ValueError("the noise model needs an area or a definition above 0: no detector is exact")
+            raise ValueError(
+                "the noise model needs an area or a definition above 0, got 0 for both: no detector is exact"
+            )
 
     def sigmas(self, skeleton: Skeleton) -> Floats:
-        """Standard deviation of every joint of score 1 across the ray, (J,), metres."""
+        """Return the standard deviation across the ray of every joint at score 1, (J,), metres."""
         return _sigmas(self.area, self.definition, skeleton)
 
 
@@ -66,7 +72,7 @@ def _sigmas(area: float, definition: float, skeleton: Skeleton) -> Floats:
 
 @njit(cache=True, fastmath=_FASTMATH)
 def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):
-    """Sum over the views that detected the joint; a view that has the point behind it gives the floor."""
+    """Sum the log-likelihood over the views that detected the joint; a point behind a camera has the floor there."""
     total, product = 0.0, 1.0
     for v in range(weights.shape[0]):
         x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
@@ -81,7 +87,7 @@ def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):
                     e2 = x * x + y * y + z * z - along * along
                     best = max(best, weights[v, k] * np.exp(-0.5 * e2 * precision))
         if seen:
-            product *= floor + best  # one logarithm for many views
+            product *= floor + best  # one logarithm for several views, which is faster
             if product < 1e-200:
                 total += np.log(product)
                 product = 1.0
@@ -89,14 +95,15 @@ def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):
 
 
 NO_RAYS = (0.0,) * 9
-"""What :func:`add_ray` starts from."""
+"""Empty sums for :func:`add_ray`."""
 
 
 @njit(cache=True, fastmath=_FASTMATH)
 def add_ray(sums, weight, direction, origin):
     """Add ``weight * (I - d dᵀ)`` and its product with the origin to normal equations held in nine numbers.
 
-    They stay in registers, where matrices would go through memory: the upper triangle by rows, then the right side.
+    The numbers are the upper triangle by rows, then the right-hand side. They stay in registers; matrices would go
+    through memory.
     """
     a00, a01, a02, a11, a12, a22, b0, b1, b2 = sums
     dx, dy, dz = direction[0], direction[1], direction[2]
@@ -130,17 +137,17 @@ def add_sums(sums, A, b):
 
 @njit(cache=True, fastmath=_FASTMATH)
 def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):
-    """Add what the views say of a joint near the point to its normal equations A (3, 3) and b (3,).
+    """Add the rays of all views to the normal equations A (3, 3) and b (3,) of a joint near the point.
 
-    Every keypoint weighs by its responsibility (the posterior that it is right, given the joint at the point) over
-    its variance. ``temper`` widens the variances of the responsibilities alone: above 1, far keypoints still pull.
+    Every keypoint is weighted by its responsibility over its variance. ``temper`` scales the variances in the
+    responsibilities only: above 1, distant keypoints keep some weight.
 
     Returns:
         Support, the sum of score times responsibility; the sum of responsibilities; and the misfit, the sum of
         responsibility times squared error over variance.
     """
     sums = NO_RAYS
-    support, rights, misfit, cold = 0.0, 0.0, 0.0, -0.5 / temper
+    support, responsibilities, misfit, cold = 0.0, 0.0, 0.0, -0.5 / temper
     for v in range(weights.shape[0]):
         x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
         best, mode, precision, error = 0.0, -1, 1.0, 0.0
@@ -156,20 +163,20 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
                         best, mode, precision, error = value, k, sharpness, e2
         if mode < 0:
             continue
-        right = best / (best + floor)
-        weight = right * precision
-        support += weights[v, mode] * right
-        rights += right
+        responsibility = best / (best + floor)
+        weight = responsibility * precision
+        support += weights[v, mode] * responsibility
+        responsibilities += responsibility
         misfit += weight * error
         sums = add_ray(sums, weight, directions[v, mode], origins[v])
     add_sums(sums, A, b)
-    return support, rights, misfit
+    return support, responsibilities, misfit
 
 
 @njit(cache=True, fastmath=_FASTMATH)
-def look(point, origins, directions, weights, pixel, sigma, floor):
-    """What :func:`accumulate` returns, of the strongest modes alone, and the greatest squared error, m^2."""
-    support, rights, misfit, worst = 0.0, 0.0, 0.0, 0.0
+def evaluate_strongest_modes(point, origins, directions, weights, pixel, sigma, floor):
+    """Return the sums of :func:`accumulate` for the strongest modes only, and the greatest squared error, m^2."""
+    support, responsibilities, misfit, worst = 0.0, 0.0, 0.0, 0.0
     for v in range(weights.shape[0]):
         weight = weights[v, 0]
         x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
@@ -181,32 +188,32 @@ def look(point, origins, directions, weights, pixel, sigma, floor):
                 breadth = pixel[v] * along
                 sharpness = weight * weight / (sigma * sigma + breadth * breadth)
                 value = weight * np.exp(-0.5 * e2 * sharpness)
-                right = value / (value + floor)
-                support += weight * right
-                rights += right
-                misfit += right * e2 * sharpness
-    return support, rights, misfit, worst
+                responsibility = value / (value + floor)
+                support += weight * responsibility
+                responsibilities += responsibility
+                misfit += responsibility * e2 * sharpness
+    return support, responsibilities, misfit, worst
 
 
-LEASH = 1.0
-"""Information, 1/m^2, that ties a joint to where it is: it matters only where no view agrees."""
+ANCHOR = 1.0
+"""Information, 1/m^2, that keeps a joint at its current position; it matters only where no view agrees."""
 
 
 @njit(cache=True)
-def tie(point, A, b):
-    """Begin normal equations with no more than that the joint is about here."""
+def anchor(point, A, b):
+    """Start normal equations with weak information that the joint is at the point."""
     for r in range(3):
         for c in range(3):
             A[r, c] = 0.0
-        A[r, r] = LEASH
-        b[r] = LEASH * point[r]
+        A[r, r] = ANCHOR
+        b[r] = ANCHOR * point[r]
 
 
 @njit(cache=True)
 def solve(A, b, inverse, point):
-    """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; False where A is singular in practice.
+    """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; return False if A is numerically singular.
 
-    Written out: a call into LAPACK costs more than the work, and much more to compile.
+    Written out because a call of LAPACK costs more time than the arithmetic, and much more to compile.
     """
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
     c01 = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]

@@ -1,8 +1,8 @@
 """3D pictorial structures on the proposals of one matched person (paper, section 3.3).
 
 The posterior of a pose is the product of every joint's likelihood in all views and of a Gaussian on every bone
-length; its logarithm is a sum over a tree, so max-product (here max-sum) finds the best combination of proposals
-exactly, in time linear in the bones and quadratic in the proposals of a joint.
+length. Its logarithm is a sum over a tree, so max-product (here max-sum) finds the best combination of proposals
+exactly, in time linear in the number of bones and quadratic in the number of proposals per joint.
 """
 
 from __future__ import annotations
@@ -14,31 +14,35 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.rays import Rays
-from mvpose.reconstruction.bone_length_prior import bones, personal_prior
+from mvpose.reconstruction.bone_length_prior import personal_prior, published_bones
 from mvpose.reconstruction.heatmap_likelihood import rescore
 from mvpose.reconstruction.likelihood import Noise
-from mvpose.reconstruction.limb_direction_prior import down_the_trunk, hang, parts
+from mvpose.reconstruction.limb_direction_prior import direction_concentrations, trunk_direction, trunk_segments
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
-from mvpose.reconstruction.refinement import climb, fit_scale, judge, tree
+from mvpose.reconstruction.refinement import climb, fit_scale, tree, write_uncertainty
 from mvpose.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
 class PictorialStructure:
-    """Reconstruction by 3DPS: proposals, max-product, then a local refinement of the winner.
+    """Reconstruction by 3DPS: proposals, max-product, then local refinement of the best pose.
 
-    The likelihood is that of the detections' heat maps where they carry any, else a Gaussian about each keypoint.
+    The likelihood comes from the heat maps of the detections where they carry any, else from a Gaussian around each
+    keypoint.
 
-    A joint that one view alone sees is placed on its ray by the prior, with the covariance that this deserves; one
-    that no view sees is missing.
+    A joint that only one view sees is placed on its ray by the prior, with the resulting covariance; a joint that no
+    view sees is missing.
 
     Attributes:
-        noise: the error model of keypoints.
-        personal: scale the bone-length prior to the person, whose stature the well-seen bones tell.
-        most_pairs: pairs of views that propose for a joint, those that agree and meet at wide angles; 12 views and
-            more have too many.
-        most_states: proposals kept for a joint, the likeliest ones.
+        noise: error model of keypoints.
+        personal: whether to scale the bone-length prior to the person's stature, estimated from the well-seen bones.
+        most_pairs: greatest number of pairs of views that propose positions for a joint; pairs that agree and meet at
+            wide angles come first. The limit matters from 12 views on.
+        most_states: number of proposals kept for a joint, the likeliest ones.
+
+    Raises:
+        ValueError: ``most_pairs`` or ``most_states`` below 1.
     """
 
     noise: Noise = Noise()
@@ -52,8 +56,8 @@ class PictorialStructure:
                 raise ValueError(f"{name} of the pictorial structure must be at least 1, got {getattr(self, name)}")
 
     def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
-        """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
-        length, definition = bones(skeleton)
+        """Return the joints of all people; labels (m,) count from 0, -1 for a detection of no person."""
+        length, definition = published_bones(skeleton)
         modes = rays.modes
         maps = None if modes is None else (modes.values, modes.grid, modes.cameras)
         poses = Poses.empty(labels, len(skeleton))
@@ -70,8 +74,8 @@ class PictorialStructure:
             *tree(skeleton),
             length,
             definition,
-            hang(skeleton),
-            parts(skeleton),
+            direction_concentrations(skeleton),
+            trunk_segments(skeleton),
             self.personal,
             self.most_pairs,
             self.most_states,
@@ -82,57 +86,59 @@ class PictorialStructure:
 @njit(cache=True)
 def _structures(
     poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
-    parents, order, neighbours, bones, length, definition, hang, parts, personal, most_pairs, most_states,
+    parents, order, neighbours, bones, length, definition, concentrations, segments, personal, most_pairs, most_states,
 ):  # fmt: skip
-    down = np.empty(3)
+    trunk = np.empty(3)
     for person in range(len(poses.joints)):
         joints, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
         clear(joints, scores, covariance)
-        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
-        states, unary, count, scatter = propose_all(
-            mine, towards, weight, angle, sigmas, floor, most_pairs, most_states
-        )
+        centers, rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
+        states, unary, count, scale = propose_all(
+            centers, rays, scores_2d, angles, sigmas, floor, most_pairs, most_states
+        )  # fmt: skip
         if maps is not None:
-            rescore(states, unary, count, labels, person, weight, maps, floor)
-        own_length, precision = personal_prior(states, count, weight, sigmas, parents, length, definition, personal)
-        down_the_trunk(states, count, parts, down)
+            rescore(states, unary, count, labels, person, scores_2d, maps, floor)
+        lengths, precision = personal_prior(states, count, scores_2d, sigmas, parents, length, definition, personal)
+        trunk_direction(states, count, segments, trunk)
         propose_single_views(
-            states, unary, count, mine, towards, weight, floor, neighbours, bones, own_length, precision, hang, down
-        )
-        chosen = max_product(states, unary, count, parents, order, own_length, precision)
-        own = np.empty(len(sigmas))
+            states, unary, count, centers, rays, scores_2d, floor, neighbours, bones, lengths, precision,
+            concentrations, trunk,
+        )  # fmt: skip
+        chosen = max_product(states, unary, count, parents, order, lengths, precision)
+        deviations = np.empty(len(sigmas))
         for j in range(len(sigmas)):
-            own[j] = scatter * sigmas[j]
+            deviations[j] = scale * sigmas[j]
             if count[j] > 0:
                 for r in range(3):
                     joints[j, r] = states[j, chosen[j], r]
         climb(
-            joints, mine, towards, weight, angle, own, floor,
-            parents, order, neighbours, bones, own_length, precision,
+            joints, centers, rays, scores_2d, angles, deviations, floor,
+            parents, order, neighbours, bones, lengths, precision,
         )  # fmt: skip
-        # Where the keypoints agree to a pixel, the prior has no say about millimetres (empirical Bayes).
-        eased = precision * fit_scale(joints, mine, towards, weight, angle, own, floor)
+        # The prior is weakened where the keypoints agree to a pixel, so that it does not move joints by millimetres
+        # (empirical Bayes).
+        weakened = precision * fit_scale(joints, centers, rays, scores_2d, angles, deviations, floor)
         climb(
-            joints, mine, towards, weight, angle, own, floor,
-            parents, order, neighbours, bones, own_length, eased,
+            joints, centers, rays, scores_2d, angles, deviations, floor,
+            parents, order, neighbours, bones, lengths, weakened,
         )  # fmt: skip
-        judge(
-            scores, covariance, joints, mine, towards, weight, angle, own, floor,
-            parents, order, neighbours, bones, own_length, precision, hang, down,
+        write_uncertainty(
+            scores, covariance, joints, centers, rays, scores_2d, angles, deviations, floor,
+            parents, order, neighbours, bones, lengths, precision, concentrations, trunk,
         )  # fmt: skip
 
 
 @njit(cache=True)
 def max_product(states, unary, count, parents, order, length, precision):
-    """The combination of states with the greatest sum of unaries and log-Gaussian bone lengths.
+    """Find the combination of states with the greatest sum of unaries and log-Gaussian pairwise terms of bone length.
 
     Args:
         states: candidate positions, (J, S, 3), metres.
-        unary: their log-likelihoods, (J, S).
-        count: how many of the S are valid for each joint, (J,). A joint without any is passed over: its neighbours
-            are not constrained by it.
-        parents: the tree, (J,), -1 for the root.
-        order: its joints, leaves first, (J,).
+        unary: log-likelihoods of the states, (J, S).
+        count: number of valid states for each joint, (J,). A joint without any is skipped: it does not constrain its
+            neighbours.
+        parents: parent of each joint, (J,), -1 for the root.
+        order: joints in an order with leaves first, (J,).
         length: mean bone length to the parent, (J,), metres.
         precision: inverse variance of the length, (J,), 1/m^2; 0 for no constraint.
 

@@ -1,4 +1,4 @@
-"""What every reconstruction answers with, and how the rays of one person are laid out for the kernels."""
+"""Result type of every reconstruction, and the layout of one person's rays for the kernels."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 
-NOBODY = 1e-9
-"""Score up to which no view vouches for a joint: it is missing, whatever a prior says of it."""
+MISSING_SCORE = 1e-9
+"""Score at or below which no view supports a joint: it is reported as missing, even if a prior places it."""
 
 
 class Poses(NamedTuple):
-    """The joints of n people.
+    """Joints of n people.
 
     Attributes:
-        joints: (n, J, 3), metres; NaN where a joint could not be placed.
-        scores: (n, J): mean over the person's views of score times the posterior that the keypoint is right; 0
-            where a joint could not be placed.
-        covariance: (n, J, 3, 3), square metres; NaN where a joint could not be placed.
+        joints: positions, (n, J, 3), metres; NaN where a joint could not be placed.
+        scores: mean over the person's views of the keypoint score times the posterior probability that the keypoint
+            is right, (n, J); 0 where a joint could not be placed.
+        covariance: covariance of each position, (n, J, 3, 3), square metres; NaN where a joint could not be placed.
     """
 
     joints: Floats
@@ -30,7 +30,7 @@ class Poses(NamedTuple):
 
     @classmethod
     def empty(cls, labels: NDArray[np.int64], joints: int) -> Poses:
-        """Room for the people that labels (m,) name, all of it still to be written."""
+        """Return uninitialised arrays for the people in labels (m,)."""
         people = int(labels.max()) + 1 if len(labels) else 0
         return cls(np.empty((people, joints, 3)), np.empty((people, joints)), np.empty((people, joints, 3, 3)))
 
@@ -48,27 +48,28 @@ def clear(joints, scores, covariance):
 
 @njit(cache=True)
 def gather(labels, person, origins, directions, weights, pixel):
-    """The n detections of one person, joint by joint.
+    """Select the n detections of one person and order their rays by joint.
 
     Returns:
-        Origins (n, 3), directions (J, n, K, 3), weights (J, n, K), angle of a pixel (n,); of (m, J, K, ...) given.
+        Origins (n, 3), directions (J, n, K, 3), weights (J, n, K) and angle of a pixel (n,), from arrays whose first
+        axes are (m, J, K).
     """
     m, joints, modes = weights.shape
     n = 0
     for d in range(m):
         n += labels[d] == person
-    mine, angle = np.empty((n, 3)), np.empty(n)
-    towards, weight = np.empty((joints, n, modes, 3)), np.empty((joints, n, modes))
+    centers, angles = np.empty((n, 3)), np.empty(n)
+    rays, scores_2d = np.empty((joints, n, modes, 3)), np.empty((joints, n, modes))
     v = 0
     for d in range(m):
         if labels[d] == person:
-            angle[v] = pixel[d]
+            angles[v] = pixel[d]
             for r in range(3):
-                mine[v, r] = origins[d, r]
+                centers[v, r] = origins[d, r]
             for j in range(joints):
                 for k in range(modes):
-                    weight[j, v, k] = weights[d, j, k]
+                    scores_2d[j, v, k] = weights[d, j, k]
                     for r in range(3):
-                        towards[j, v, k, r] = directions[d, j, k, r]
+                        rays[j, v, k, r] = directions[d, j, k, r]
             v += 1
-    return mine, towards, weight, angle
+    return centers, rays, scores_2d, angles

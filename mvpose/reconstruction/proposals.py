@@ -1,8 +1,8 @@
-"""The state space of the pictorial structure: points that pairs of views propose for every joint (paper, 3.3).
+"""State space of the pictorial structure: positions that pairs of views propose for every joint (paper, section 3.3).
 
-As long as a joint is right in two views, its position is among the proposals; the point that all views agree on adds
-accuracy where more are right. A joint that one view alone sees is proposed where its ray is a bone's length from a
-neighbour in the tree.
+If a joint is right in two views, its position is among the proposals; the point on which all views agree is added
+because it is more accurate where more views are right. A joint that only one view sees is proposed where its ray is a
+bone length away from a neighbour in the tree.
 """
 
 from __future__ import annotations
@@ -12,39 +12,39 @@ from numba import njit
 
 from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.likelihood import log_likelihood
-from mvpose.reconstruction.limb_direction_prior import how_it_hangs
+from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
-_SINGLE_VIEW_STATES = 16  # two depths from every neighbour
-_SAME = 0.25  # of the joint's variance: squared distance under which refinement leads two proposals to one point
+_SINGLE_VIEW_STATES = 16  # room for two depths per neighbour
+_SAME = 0.25  # squared distance, in variances of the joint, below which refinement moves two proposals to one point
 
 
 @njit(cache=True)
 def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, most_states):
-    """Propose for every joint of one person in n views.
+    """Propose positions for every joint of one person in n views.
 
     Returns:
-        States (J, S, 3), metres, their log-likelihoods (J, S), the likeliest first; how many of the S are valid,
-        (J,), with room for what :func:`propose_single_views` adds; and how much larger the errors of this person
-        are than the model's.
+        States (J, S, 3), metres, and their log-likelihoods (J, S), the likeliest first, with room for the states that
+        :func:`propose_single_views` adds; the number of valid states per joint, (J,); and the ratio of this person's
+        errors to those of the error model.
     """
     joints = len(weights)
     room = max(most_states, _SINGLE_VIEW_STATES)
     states, unary = np.empty((joints, room, 3)), np.empty((joints, room))
-    count, rights, misfit = np.zeros(joints, np.int64), np.zeros(joints), np.zeros(joints)
+    count, responsibilities, misfit = np.zeros(joints, np.int64), np.zeros(joints), np.zeros(joints)
     points, quality, scratch = np.empty((most_pairs + 1, 3)), np.empty(most_pairs + 1), np.empty((8, 3))
     for j in range(joints):
-        found = _pairs(origins, directions[j], weights[j], sigmas[j], points, quality)
-        if found == 0:
+        filled = _pairs(origins, directions[j], weights[j], sigmas[j], points, quality)
+        if filled == 0:
             continue
         view = origins, directions[j], weights[j], pixel, sigmas[j], floor
-        support, rights[j], misfit[j] = consensus(points[found], view, scratch)
+        support, responsibilities[j], misfit[j] = consensus(points[filled], view, scratch)
         if support > 0.0:
-            quality[found] = np.inf
-            found += 1
+            quality[filled] = np.inf
+            filled += 1
         while count[j] < most_states:
             best = 0
-            for s in range(1, found):
+            for s in range(1, filled):
                 if quality[s] > quality[best]:
                     best = s
             if quality[best] < 0.0:
@@ -53,17 +53,17 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
             value = log_likelihood(point, origins, directions[j], weights[j], pixel, sigmas[j], floor)
             insert(states[j], unary[j], count[j], value, point[0], point[1], point[2])
             count[j] += 1
-            # What is this near adds nothing.
-            for s in range(found):
+            # A proposal this close to a better one adds nothing.
+            for s in range(filled):
                 x, y, z = points[s, 0] - point[0], points[s, 1] - point[1], points[s, 2] - point[2]
                 if x * x + y * y + z * z <= _SAME * sigmas[j] * sigmas[j]:
                     quality[s] = -1.0
-    return states, unary, count, np.sqrt(person_scale(misfit, rights))
+    return states, unary, count, np.sqrt(person_scale(misfit, responsibilities))
 
 
 @njit(cache=True)
 def insert(states, unary, count, value, x, y, z):
-    """Put a point among the ``count`` states (S, 3) of a joint, the likeliest first."""
+    """Insert a point into the ``count`` states (S, 3) of a joint, which are ordered with the likeliest first."""
     place = count
     while place > 0 and unary[place - 1] < value:
         unary[place] = unary[place - 1]
@@ -76,9 +76,9 @@ def insert(states, unary, count, value, x, y, z):
 
 @njit(cache=True)
 def _pairs(origins, directions, weights, sigma, points, quality):
-    """Write the points of the best pairs of views, all but the last place; how many there are."""
+    """Write the points of the best pairs of views, up to the last slot, which stays free; return their number."""
     n, modes = weights.shape
-    most, found, worst = len(points) - 1, 0, 0
+    most, filled, worst = len(points) - 1, 0, 0
     crowded = n * (n - 1) // 2 * modes * modes > most
     point = np.empty(3)
     for first in range(n):
@@ -93,9 +93,9 @@ def _pairs(origins, directions, weights, sigma, points, quality):
                         continue
                     if crowded:  # prefer pairs that agree
                         value *= _agreement(point, origins, directions, first, mode, second, other, sigma)
-                    slot = found
-                    if found < most:
-                        found += 1
+                    slot = filled
+                    if filled < most:
+                        filled += 1
                     elif value > quality[worst]:
                         slot = worst
                     else:
@@ -103,17 +103,17 @@ def _pairs(origins, directions, weights, sigma, points, quality):
                     quality[slot] = value
                     for r in range(3):
                         points[slot, r] = point[r]
-                    if found == most:
+                    if filled == most:
                         worst = 0
                         for s in range(1, most):
                             if quality[s] < quality[worst]:
                                 worst = s
-    return found
+    return filled
 
 
 @njit(cache=True)
 def _agreement(point, origins, directions, first, mode, second, other, sigma):
-    """How likely the two rays' distances from their common point are, at most 1."""
+    """Return the relative likelihood, at most 1, of the distances of two rays from their common point."""
     e2, a, b = 0.0, 0.0, 0.0
     for r in range(3):
         a += (point[r] - origins[first, r]) * directions[first, mode, r]
@@ -126,14 +126,25 @@ def _agreement(point, origins, directions, first, mode, second, other, sigma):
 
 @njit(cache=True)
 def propose_single_views(
-    states, unary, count, origins, directions, weights, floor, neighbours, bones, length, precision, hang, down
+    states,
+    unary,
+    count,
+    origins,
+    directions,
+    weights,
+    floor,
+    neighbours,
+    bones,
+    length,
+    precision,
+    concentrations,
+    trunk,
 ):
-    """Propose, in place, for joints that a single view sees: where its ray is a bone's length from a neighbour.
+    """Add, in place, proposals for joints that a single view sees: where the ray is a bone length from a neighbour.
 
-    Such a joint has no pair of views, but its direction is known and the prior knows the depth, up to which of two
-    points it is: the one where the limb hangs down the trunk (:mod:`mvpose.reconstruction.limb_direction_prior`) as limbs do.
-    The nearer comes first, so it wins a tie: a body hides its own far side. Placed joints serve their own neighbours
-    in the next round.
+    Such a joint has no pair of views, but its ray is known, and the bone length leaves two depths on it. The prior on
+    limb directions (:mod:`mvpose.reconstruction.limb_direction_prior`) ranks the two. The nearer one is inserted first
+    and wins a tie, because a body hides its far side. Joints placed in one round serve their neighbours in the next.
     """
     joints, n, _ = weights.shape
     only = np.empty(joints, np.int64)
@@ -148,7 +159,7 @@ def propose_single_views(
     for j in range(joints):
         placed[j] = count[j]
     while True:
-        changed = False
+        any_placed = False
         for j in range(joints):
             if only[j] < 0 or placed[j] > 0:
                 continue
@@ -168,11 +179,13 @@ def propose_single_views(
                         for r in range(3):
                             point[r] = origins[v, r] + depth * directions[j, v, 0, r]
                         value = np.log(weights[j, v, 0] + floor)
-                        value += how_it_hangs(point, states[other, 0], bone == j, hang[bone], down)
+                        value += direction_log_likelihood(
+                            point, states[other, 0], bone == j, concentrations[bone], trunk
+                        )
                         insert(states[j], unary[j], placed[j], value, point[0], point[1], point[2])
                         placed[j] += 1
-            changed = changed or placed[j] > 0
+            any_placed = any_placed or placed[j] > 0
         for j in range(joints):
             count[j] = placed[j]
-        if not changed:
+        if not any_placed:
             return

@@ -1,8 +1,9 @@
-"""From a good pose of one person to the nearby best one, and how well every joint of it is known.
+"""Local refinement of one person's pose, and the covariance of every joint.
 
-Expectation maximisation: which keypoints are right given the joints, then the joints given those, each a 3 x 3 solve
-with the bones to its neighbours linearised. No step lowers the posterior. The covariances are the marginals of the
-Gaussian there, by belief propagation along the tree, with the errors' scale estimated from the person's residuals.
+Expectation maximisation alternates between the responsibilities of the keypoints given the joints, and the joints
+given the responsibilities; each joint is a 3 x 3 solve with the bones to its neighbours linearised. No step lowers the
+posterior. The covariances are the marginals of the Gaussian at the maximum, by belief propagation along the tree, with
+the error scale estimated from the person's residuals.
 """
 
 from __future__ import annotations
@@ -16,20 +17,20 @@ from numba import njit
 from mvpose.arrays import Floats, Integers
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import joint_scales, person_scale
-from mvpose.reconstruction.likelihood import LEASH, Noise, accumulate, log_likelihood, solve, tie
-from mvpose.reconstruction.limb_direction_prior import how_it_hangs
-from mvpose.reconstruction.poses import NOBODY, gather
+from mvpose.reconstruction.likelihood import ANCHOR, Noise, accumulate, anchor, log_likelihood, solve
+from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
+from mvpose.reconstruction.poses import MISSING_SCORE, gather
 from mvpose.skeleton import Skeleton
 
 
 class Tree(NamedTuple):
-    """A skeleton for the kernels.
+    """Kinematic tree of a skeleton as arrays for the kernels.
 
     Attributes:
-        parents: (J,), -1 for the root.
-        order: the joints, leaves first, (J,).
-        neighbours: joints at the other ends of every joint's bones, (J, D), -1 where there are fewer.
-        bones: the child of each of these bones, which names it, (J, D).
+        parents: parent of each joint, (J,), -1 for the root.
+        order: joints in an order with leaves first, (J,).
+        neighbours: joints at the other ends of each joint's bones, (J, D), -1 where there are fewer.
+        bones: child joint of each of these bones, which identifies the bone, (J, D).
     """
 
     parents: Integers
@@ -40,22 +41,22 @@ class Tree(NamedTuple):
 
 @cache
 def tree(skeleton: Skeleton) -> Tree:
-    """Lay a skeleton out for the kernels."""
+    """Return the kinematic tree of a skeleton."""
     ends: list[list[tuple[int, int]]] = [[] for _ in skeleton.joints]
     for parent, child in skeleton.edges:
         ends[child].insert(0, (parent, child))  # the parent first
         ends[parent].append((child, child))
     shape = len(ends), max(map(len, ends))
     neighbours, bones = np.full(shape, -1), np.full(shape, -1)
-    for joint, mine in enumerate(ends):
-        for slot, (other, child) in enumerate(mine):
+    for joint, joint_ends in enumerate(ends):
+        for slot, (other, child) in enumerate(joint_ends):
             neighbours[joint, slot], bones[joint, slot] = other, child
     parents = np.array(skeleton.parents, np.int64)
     return Tree(parents, leaves_first(parents), neighbours, bones)
 
 
 def leaves_first(parents: Integers) -> Integers:
-    """An order of the joints, (J,), in which every child comes before its parent."""
+    """Return an order of the joints, (J,), in which every child comes before its parent."""
     depth = np.zeros(len(parents), np.int64)
     for joint in range(len(parents)):
         ancestor = parents[joint]
@@ -68,20 +69,20 @@ def leaves_first(parents: Integers) -> Integers:
 def refine(
     joints: Floats, rays: Rays, skeleton: Skeleton, *, noise: Noise, length: Floats, deviation: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Climb from a pose of one person to the nearby maximum of likelihood times bone-length prior.
+    """Move a pose of one person to the nearby maximum of likelihood times bone-length prior.
 
     Args:
-        joints: where to start, (J, 3), metres; NaN for a joint to leave out.
-        rays: the person's, (n, J).
-        skeleton: its tree.
-        noise: the error model.
+        joints: initial pose, (J, 3), metres; NaN for a joint to leave out.
+        rays: rays of the person's n detections.
+        skeleton: the J joints.
+        noise: error model of keypoints.
         length: mean length of the bone to the parent, (J,), metres.
-        deviation: its deviation, (J,), metres; infinite for no constraint.
+        deviation: standard deviation of that length, (J,), metres; infinite for no constraint.
 
     Returns:
         Joints (J, 3), scores (J,) and covariances (J, 3, 3), as :class:`mvpose.reconstruction.poses.Poses`.
     """
-    mine = gather(
+    views = gather(
         np.zeros(len(rays), np.int64),
         0,
         rays.origins,
@@ -92,12 +93,12 @@ def refine(
     refined, scores = np.array(joints, float), np.zeros(len(joints))
     covariance = np.full((len(joints), 3, 3), np.nan)
     skeletal = (*tree(skeleton), length, 1.0 / deviation**2)
-    climb(refined, *mine, noise.sigmas(skeleton), noise.floor, *skeletal)
-    judge(
+    climb(refined, *views, noise.sigmas(skeleton), noise.floor, *skeletal)
+    write_uncertainty(
         scores,
         covariance,
         refined,
-        *mine,
+        *views,
         noise.sigmas(skeleton),
         noise.floor,
         *skeletal,
@@ -109,15 +110,15 @@ def refine(
 
 _SWEEPS = 8
 _HALVINGS = 4
-_STILL = 1e-6  # m^2
-_LONG = 4e-4  # m^2: a step of 2 cm turns no bone by much, so that it cannot overshoot
+_CONVERGED = 1e-6  # m^2
+_LONG = 4e-4  # m^2; a step below 2 cm turns no bone by much, so it cannot overshoot
 
 
 @njit(cache=True)
 def climb(
     joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones, length, precision
 ):
-    """Move the joints (J, 3) to a maximum of the posterior, in place; NaN is left alone."""
+    """Move the joints (J, 3) to a maximum of the posterior, in place; joints that are NaN are skipped."""
     A, b, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     target, trial = np.empty(3), np.empty(3)
     for _ in range(_SWEEPS):
@@ -125,7 +126,7 @@ def climb(
         for j in order:
             if np.isnan(joints[j, 0]):
                 continue
-            tie(joints[j], A, b)
+            anchor(joints[j], A, b)
             accumulate(joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b)
             _add_bones(A, b, j, joints, neighbours, bones, length, precision)
             if not solve(A, b, inverse, target):
@@ -134,8 +135,8 @@ def climb(
             for r in range(3):
                 moved += (target[r] - joints[j, r]) ** 2
             if moved > _LONG:
-                # The bones are linearised, so a long step can overshoot: it is taken only if it climbs.
-                here = _local_posterior(
+                # The bones are linearised, so a long step can overshoot: it is taken only if the posterior rises.
+                current = _local_posterior(
                     joints[j], j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones,
                     length, precision,
                 )  # fmt: skip
@@ -143,11 +144,11 @@ def climb(
                 for _ in range(_HALVINGS):
                     for r in range(3):
                         trial[r] = joints[j, r] + step * (target[r] - joints[j, r])
-                    there = _local_posterior(
+                    proposed = _local_posterior(
                         trial, j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones,
                         length, precision,
                     )  # fmt: skip
-                    climbs = there >= here
+                    climbs = proposed >= current
                     if climbs:
                         break
                     step *= 0.5
@@ -158,40 +159,40 @@ def climb(
             for r in range(3):
                 joints[j, r] = target[r]
             furthest = max(furthest, moved)
-        if furthest < _STILL:
+        if furthest < _CONVERGED:
             break
 
 
 @njit(cache=True)
 def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
-    """How much larger the person's squared errors are than the model's, at a pose (J, 3).
+    """Return the ratio of the person's squared errors to those of the error model, at a pose (J, 3).
 
-    Likelihoods with errors so scaled, times the prior, have their maximum where the model's likelihoods have it with a
-    prior of so scaled precision. See :func:`mvpose.reconstruction.error_scale.person_scale`.
+    Scaling the variances of the likelihood by this ratio has the same maximum as scaling the precision of the prior
+    by it. See :func:`mvpose.reconstruction.error_scale.person_scale`.
     """
     count = len(joints)
-    misfit, rights = np.zeros(count), np.zeros(count)
+    misfit, responsibilities = np.zeros(count), np.zeros(count)
     A, b = np.empty((3, 3)), np.empty(3)
     for j in range(count):
         if not np.isnan(joints[j, 0]):
             A[:] = 0.0
             b[:] = 0.0
-            _, rights[j], misfit[j] = accumulate(
+            _, responsibilities[j], misfit[j] = accumulate(
                 joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b
             )
-    return person_scale(misfit, rights)
+    return person_scale(misfit, responsibilities)
 
 
 @njit(cache=True)
 def _add_bones(A, b, j, joints, neighbours, bones, length, precision):
-    """Add the bones that end in joint j to its normal equations, linearised in the direction they have now."""
+    """Add the bones that end in joint j to its normal equations, linearised along their current directions."""
     for slot in range(neighbours.shape[1]):
         other, bone = neighbours[j, slot], bones[j, slot]
         if other < 0 or precision[bone] == 0.0 or np.isnan(joints[other, 0]):
             continue
         x, y, z = joints[j, 0] - joints[other, 0], joints[j, 1] - joints[other, 1], joints[j, 2] - joints[other, 2]
-        now = max(np.sqrt(x * x + y * y + z * z), 1e-9)
-        x, y, z = x / now, y / now, z / now
+        current = max(np.sqrt(x * x + y * y + z * z), 1e-9)
+        x, y, z = x / current, y / current, z / current
         along = x * joints[other, 0] + y * joints[other, 1] + z * joints[other, 2] + length[bone]
         weight = precision[bone]
         A[0, 0] += weight * x * x
@@ -212,7 +213,7 @@ def _add_bones(A, b, j, joints, neighbours, bones, length, precision):
 def _local_posterior(
     point, j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones, length, precision
 ):
-    """The terms of the log-posterior that change when joint j moves to ``point``."""
+    """Return the terms of the log-posterior that change when joint j moves to ``point``."""
     value = log_likelihood(point, origins, directions[j], weights[j], pixel, sigmas[j], floor)
     for slot in range(neighbours.shape[1]):
         other, bone = neighbours[j, slot], bones[j, slot]
@@ -227,43 +228,46 @@ def _distance(a, b):
 
 
 @njit(cache=True)
-def judge(
+def write_uncertainty(
     scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones,
-    length, precision, hang, down,
+    length, precision, concentrations, trunk,
 ):  # fmt: skip
-    """Write scores (J,) and covariances (J, 3, 3) of a pose at its maximum.
+    """Write scores (J,) and covariances (J, 3, 3) of a pose at the maximum of its posterior.
 
-    A joint that is NaN is left alone, and one that no view vouches for becomes NaN.
+    A joint that is NaN is skipped, and one that no view supports becomes NaN.
     """
     n, count = len(pixel), len(joints)
-    misfit, rights = np.zeros(count), np.zeros(count)
+    misfit, responsibilities = np.zeros(count), np.zeros(count)
     information, b = np.zeros((count, 3, 3)), np.empty(3)
     for j in range(count):
         if not np.isnan(joints[j, 0]):
-            support, rights[j], misfit[j] = accumulate(
+            support, responsibilities[j], misfit[j] = accumulate(
                 joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, information[j], b
             )
-            if support / n > NOBODY:
+            if support / n > MISSING_SCORE:
                 scores[j] = support / n
-            else:  # no view vouches for it: invented by the prior
+            else:  # no view supports it: placed by the prior alone
                 for r in range(3):
                     joints[j, r] = np.nan
-    scale = joint_scales(misfit, rights)
+    scale = joint_scales(misfit, responsibilities)
     for j in range(count):
         for r in range(3):
             for c in range(3):
                 information[j, r, c] /= scale[j]
-            information[j, r, r] += LEASH
+            information[j, r, r] += ANCHOR
     _marginalize(joints, information, covariance, parents, order, precision)
-    _add_ambiguity(covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down)
+    _add_ambiguity(
+        covariance, joints, origins, directions, weights, parents, order, neighbours, precision, concentrations, trunk
+    )
 
 
 @njit(cache=True)
 def _marginalize(joints, information, covariance, parents, order, precision):
-    """Gaussian belief propagation: each joint's own information (J, 3, 3) to everybody's covariance.
+    """Gaussian belief propagation from the information of each joint (J, 3, 3) to the marginal covariances.
 
-    A bone measures one length, so its message has rank one: along it, the variance of the bone plus that of what is
-    beyond it. Upwards from the leaves, then down, each time without what the receiver itself has said.
+    A bone measures one length, so its message has rank one: along the bone, with the variance of the bone plus that of
+    the joint at its other end. Messages go up from the leaves, then down; each leaves out the message that the
+    receiver sent.
     """
     count = len(joints)
     along, upward = np.zeros((count, 3)), np.zeros(count)  # of the bone to the parent
@@ -292,7 +296,7 @@ def _marginalize(joints, information, covariance, parents, order, precision):
 
 @njit(cache=True)
 def _message(information, along, precision, inverse, b, unused):
-    """Information along a bone about the joint at its one end, from all that is beyond its other."""
+    """Return the information along a bone about the joint at one end, from everything beyond the other end."""
     if not solve(information, b, inverse, unused):
         return 0.0
     variance = 1.0 / precision
@@ -310,16 +314,18 @@ def _add_outer(matrix, vector, weight):
 
 
 @njit(cache=True)
-def _add_ambiguity(covariance, joints, origins, directions, weights, parents, order, neighbours, precision, hang, down):
-    """Count in that a joint which one view alone sees may as well be at the other depth where its bone fits.
+def _add_ambiguity(
+    covariance, joints, origins, directions, weights, parents, order, neighbours, precision, concentrations, trunk
+):
+    """Add the depth ambiguity of joints that only one view sees, whose bone also fits at a second depth.
 
-    The second moment about the chosen depth grows by the squared distance of the two times how likely the other is
-    (:mod:`mvpose.reconstruction.limb_direction_prior`). Joints that hang on such a joint inherit its doubt; one that holds a better
-    seen joint at its other end has none.
+    The second moment around the chosen depth grows by the squared distance between the two depths times the
+    probability of the other one (:mod:`mvpose.reconstruction.limb_direction_prior`). Single-view children of such a
+    joint inherit its ambiguity. A joint whose child is seen by several views has none.
     """
     count = len(joints)
     mirrored = np.empty(3)
-    view, doubt = np.full(count, -1), np.zeros(count)  # the only view of a joint
+    view, ambiguity = np.full(count, -1), np.zeros(count)  # the only view that sees a joint, and the added variance
     for j in range(count):
         views = 0
         for v in range(weights.shape[1]):
@@ -337,17 +343,17 @@ def _add_ambiguity(covariance, joints, origins, directions, weights, parents, or
             held = held or (other >= 0 and other != parent and view[other] < 0 and not np.isnan(joints[other, 0]))
         if held:
             continue
-        here, anchor = 0.0, 0.0
+        depth, parent_depth = 0.0, 0.0
         for r in range(3):
-            here += (joints[j, r] - origins[only, r]) * directions[j, only, 0, r]
-            anchor += (joints[parent, r] - origins[only, r]) * directions[j, only, 0, r]
-        doubt[j] = doubt[parent]
-        if 2.0 * anchor - here > 0.0:  # the other depth, in front of the camera
+            depth += (joints[j, r] - origins[only, r]) * directions[j, only, 0, r]
+            parent_depth += (joints[parent, r] - origins[only, r]) * directions[j, only, 0, r]
+        ambiguity[j] = ambiguity[parent]
+        if 2.0 * parent_depth - depth > 0.0:  # the other depth, in front of the camera
             for r in range(3):
-                mirrored[r] = joints[j, r] + 2.0 * (anchor - here) * directions[j, only, 0, r]
+                mirrored[r] = joints[j, r] + 2.0 * (parent_depth - depth) * directions[j, only, 0, r]
             odds = np.exp(
-                how_it_hangs(joints[j], joints[parent], True, hang[j], down)
-                - how_it_hangs(mirrored, joints[parent], True, hang[j], down)
+                direction_log_likelihood(joints[j], joints[parent], True, concentrations[j], trunk)
+                - direction_log_likelihood(mirrored, joints[parent], True, concentrations[j], trunk)
             )
-            doubt[j] += 4.0 * (anchor - here) ** 2 / (1.0 + odds)
-        _add_outer(covariance[j], directions[j, only, 0], doubt[j])
+            ambiguity[j] += 4.0 * (parent_depth - depth) ** 2 / (1.0 + odds)
+        _add_outer(covariance[j], directions[j, only, 0], ambiguity[j])

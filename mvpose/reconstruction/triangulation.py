@@ -1,9 +1,9 @@
-"""From matched rays to points, every joint by itself: the paper's reconstruction without a pictorial structure.
+"""Triangulation of every joint independently: the paper's reconstruction without a pictorial structure.
 
-A triangulated point minimises the weighted squared distance to its viewing rays: linear triangulation (the DLT) in
-metres. One wrong view spoils it, so the default goes on: residuals are down-weighted by the error model of
-:mod:`mvpose.reconstruction.likelihood`, from a wide one to the real one (graduated non-convexity: Yang et al., IEEE
-RA-L 2020), and where no majority of the views agrees every pair of views gets its say.
+A triangulated point minimises the weighted squared distance to its viewing rays: linear triangulation (DLT) in metres.
+One wrong view spoils this point, so the default method is robust: residuals are down-weighted by the error model of
+:mod:`mvpose.reconstruction.likelihood`, starting from inflated variances (graduated non-convexity: Yang et al., IEEE
+RA-L 2020), and where no majority of the views agrees, every pair of views is tried.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from mvpose.reconstruction.likelihood import (
     accumulate,
     add_ray,
     add_sums,
+    anchor,
+    evaluate_strongest_modes,
     log_likelihood,
-    look,
     solve,
-    tie,
 )
-from mvpose.reconstruction.poses import NOBODY, Poses, clear, gather
+from mvpose.reconstruction.poses import MISSING_SCORE, Poses, clear, gather
 from mvpose.skeleton import Skeleton
 
 Method = Literal["robust", "dlt", "best-pair"]
@@ -39,16 +39,16 @@ _METHODS: tuple[Method, ...] = ("robust", "dlt", "best-pair")
 class Triangulation:
     """Reconstruction without a pictorial structure (the paper's "No 3DPS").
 
-    Joints seen by fewer than two views are missing, not invented.
+    Joints seen by fewer than two views are missing.
 
     Attributes:
-        method: ``"robust"`` finds the views that are wrong and leaves them out; ``"dlt"`` averages all views, weighted
-            by score; ``"best-pair"`` takes the pair of views with the least reprojection error over all views, as
-            the code released with the paper does.
-        noise: the error model of keypoints.
+        method: ``"robust"`` finds wrong views and leaves them out; ``"dlt"`` averages all views, weighted by score;
+            ``"best-pair"`` takes the pair of views with the least reprojection error over all views, as the code
+            released with the paper does.
+        noise: error model of keypoints.
 
     Raises:
-        ValueError: a method that is none of these.
+        ValueError: an unknown method.
     """
 
     method: Method = "robust"
@@ -59,7 +59,7 @@ class Triangulation:
             raise ValueError(f"method of triangulation must be one of {', '.join(_METHODS)}, got {self.method!r}")
 
     def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
-        """The joints of everyone: labels (m,) from 0, -1 for a detection of nobody."""
+        """Return the joints of all people; labels (m,) count from 0, -1 for a detection of no person."""
         poses = Poses.empty(labels, len(skeleton))
         _triangulate(
             poses,
@@ -78,31 +78,31 @@ class Triangulation:
 @njit(cache=True)
 def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, floor, method):
     joints = len(sigmas)
-    misfit, rights = np.empty(joints), np.empty(joints)
+    misfit, responsibilities = np.empty(joints), np.empty(joints)
     scratch = np.empty((8, 3))
     for person in range(len(poses.joints)):
-        mine, towards, weight, angle = gather(labels, person, origins, directions, weights, pixel)
+        centers, person_rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
         point, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
         clear(point, scores, covariance)
-        own, steps = 1.0, 0
+        error_scale, steps = 1.0, 0
         for j in range(joints):
-            rights[j] = misfit[j] = 0.0
-            view = mine, towards[j], weight[j], angle, sigmas[j], floor
+            responsibilities[j] = misfit[j] = 0.0
+            view = centers, person_rays[j], scores_2d[j], angles, sigmas[j], floor
             if method == 0:
-                _, rights[j], misfit[j] = consensus(point[j], view, scratch)
+                _, responsibilities[j], misfit[j] = consensus(point[j], view, scratch)
             elif method == 1:
                 _all_views(point[j], view, scratch)
             else:
                 _best_pair(point[j], view)
-        if method == 0:  # what is wrong by this person's measure, not the model's
-            own, steps = np.sqrt(person_scale(misfit, rights)), _MOST_STEPS
+        if method == 0:  # which keypoints are wrong is decided by the error scale of this person, not of the model
+            error_scale, steps = np.sqrt(person_scale(misfit, responsibilities)), _MOST_STEPS
         for j in range(joints):
             support = 0.0
             if not np.isnan(point[j, 0]):
-                view = mine, towards[j], weight[j], angle, own * sigmas[j], floor
-                support, rights[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
-            _note(point[j], support / len(angle), scratch, j, scores, covariance)
-        scale = joint_scales(misfit, rights)
+                view = centers, person_rays[j], scores_2d[j], angles, error_scale * sigmas[j], floor
+                support, responsibilities[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
+            _store(point[j], support / len(angles), scratch, j, scores, covariance)
+        scale = joint_scales(misfit, responsibilities)
         for j in range(joints):
             for r in range(3):
                 for c in range(3):
@@ -110,40 +110,40 @@ def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, flo
 
 
 @njit(cache=True)
-def _note(point, score, scratch, j, scores, covariance):
-    """Enter a joint of one person; where no view vouches for it, there is none."""
-    scores[j] = score if score > NOBODY else 0.0
+def _store(point, score, scratch, j, scores, covariance):
+    """Store the score and covariance of a joint; mark it as missing if no view supports it."""
+    scores[j] = score if score > MISSING_SCORE else 0.0
     for r in range(3):
-        if score <= NOBODY:
+        if score <= MISSING_SCORE:
             point[r] = np.nan
         for c in range(3):
-            covariance[j, r, c] = scratch[r, c] if score > NOBODY else np.nan
+            covariance[j, r, c] = scratch[r, c] if score > MISSING_SCORE else np.nan
 
 
 _MOST_STEPS = 12
-_HOT = 4.0  # variances: with no view further off than two deviations, all agree
-_COOLING = 4.0  # of the temper, a step
-_STILL = 2.5e-5  # m^2: a step of less than 5 mm is far below the scatter of any detector, and the step is still taken
-_MAJORITY = 0.5  # of the score
-_NEARLY_ALL = 0.8
-_BEYOND_CHANCE = 3.5  # views
+_HOT = 4.0  # variances; all views agree if no squared error exceeds two standard deviations
+_COOLING = 4.0  # factor by which the temper falls per step
+_CONVERGED = 2.5e-5  # m^2; the last step, shorter than 5 mm, is still taken and is far below any detector's accuracy
+_MAJORITY = 0.5  # of the total score
+_NEARLY_ALL = 0.8  # of the total score
+_BEYOND_CHANCE = 3.5  # views; three rays may pass one point by chance
 
 
 @njit(cache=True)
 def consensus(point, view, scratch):
-    """Write the most likely point of one joint, and say who vouches for it, as :func:`settle` does.
+    """Write the most likely point of one joint and return its support as :func:`settle` does.
 
-    Nobody does, and the support is 0, where fewer than two views see it.
+    The support is 0 where fewer than two views see the joint.
 
-    Where nearly all views agree, or four and more that are the majority (rays that pass one point by chance are
-    rarely more than three), cooling has led to the point. Otherwise all pairs of views are tried and the likeliest
-    point is refined.
+    Where nearly all views agree, or a majority of four views or more (rarely do more than three rays pass one point
+    by chance), the point found by cooling is taken. Otherwise all pairs of views are tried and the likeliest point is
+    refined.
 
     Args:
-        point: where to write, (3,).
+        point: output, (3,).
         view: origins, directions, weights and angles of a pixel as in :mod:`mvpose.reconstruction.likelihood`, the
-            deviation of the joint and the floor.
-        scratch: (8, 3).
+            standard deviation of the joint, and the floor.
+        scratch: working memory, (8, 3).
     """
     origins, directions, weights, pixel, sigma, floor = view
     if not _all_views(point, view, scratch):
@@ -151,12 +151,14 @@ def consensus(point, view, scratch):
     total = 0.0
     for v in range(len(weights)):
         total += weights[v, 0]
-    support, rights, misfit, worst = look(point, origins, directions, weights, pixel, sigma, floor)
+    support, responsibilities, misfit, worst = evaluate_strongest_modes(
+        point, origins, directions, weights, pixel, sigma, floor
+    )
     if worst > _HOT * sigma * sigma:
         temper = min(worst / (_HOT * sigma * sigma), 1e4)
-        support, rights, misfit = settle(point, view, scratch, temper, _MOST_STEPS)
-    if support > (_MAJORITY if rights > _BEYOND_CHANCE else _NEARLY_ALL) * total:
-        return support, rights, misfit
+        support, responsibilities, misfit = settle(point, view, scratch, temper, _MOST_STEPS)
+    if support > (_MAJORITY if responsibilities > _BEYOND_CHANCE else _NEARLY_ALL) * total:
+        return support, responsibilities, misfit
     best = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
     trial = np.empty(3)
     for first in range(len(weights)):
@@ -177,39 +179,39 @@ def consensus(point, view, scratch):
 def settle(point, view, scratch, temper, steps):
     """Move a point to the nearby maximum of its likelihood by expectation maximisation.
 
-    Hot, with a temper above 1, the error model starts wider, so that the maximum need not be near.
+    A ``temper`` above 1 starts with inflated variances, so that a more distant maximum is found.
 
     Returns:
-        Support, responsibilities and misfit as :func:`mvpose.reconstruction.likelihood.accumulate`, at the last step;
-        the first three rows of the scratch are the covariance there.
+        Support, responsibilities and misfit as :func:`mvpose.reconstruction.likelihood.accumulate`, at the last step.
+        The first three rows of ``scratch`` hold the covariance there.
     """
     origins, directions, weights, pixel, sigma, floor = view
     inverse, A, b, target = scratch[:3], scratch[3:6], scratch[6], scratch[7]
     for step in range(max(steps, 1)):
-        tie(point, A, b)
-        vouched = accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b)
+        anchor(point, A, b)
+        sums = accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b)
         solve(A, b, inverse, target)
-        if step == steps:  # only to look
+        if step == steps:  # zero steps requested: evaluate only
             break
         moved = 0.0
         for r in range(3):
             moved += (target[r] - point[r]) ** 2
             point[r] = target[r]
-        if temper == 1.0 and moved < _STILL:
+        if temper == 1.0 and moved < _CONVERGED:
             break
         temper = max(temper / _COOLING, 1.0)
-    return vouched
+    return sums
 
 
 @njit(cache=True)
 def _all_views(point, view, scratch):
-    """Write the point nearest to all rays, weighted by score; False where fewer than two views see the joint."""
+    """Write the point nearest to all rays, weighted by score; return False if fewer than two views see the joint."""
     origins, directions, weights = view[:3]
     sums, views = NO_RAYS, 0
     for v in range(len(weights)):
         if weights[v, 0] > 0.0:
             views += 1
-            # Squared: in the DLT the rows are weighted by score, and a row is a residual.
+            # Squared because the DLT weights its rows by score, and a row is a residual.
             sums = add_ray(sums, weights[v, 0] ** 2, directions[v, 0], origins[v])
     if views < 2:
         return False
@@ -224,7 +226,7 @@ def _all_views(point, view, scratch):
 
 @njit(cache=True)
 def _best_pair(point, view):
-    """Write the point of the pair of views with the least mean reprojection error over all views; False if none."""
+    """Write the point of the pair of views with the least mean reprojection error; return False if there is none."""
     origins, directions, weights, pixel = view[:4]
     best, trial = np.inf, np.empty(3)
     for first in range(len(weights)):
@@ -248,17 +250,17 @@ def _best_pair(point, view):
     return best < np.inf
 
 
-_LEAST_SINE2 = 1e-10  # of the angle between two rays, squared; below, they are parallel
+_LEAST_SINE2 = 1e-10  # squared sine of the angle between two rays; below it they count as parallel
 
 
 @njit(cache=True)
 def pair_point(origin, direction, weight, other_origin, other_direction, other_weight, point):
-    """Write the point nearest to two rays, weighted by score; how well they pin it down, 0 where they have no point.
+    """Write the point nearest to two rays, weighted by score, and return a measure of how well they determine it.
 
-    Rays that are parallel, or that come nearest to each other behind a camera, have none.
+    Rays that are parallel, or whose nearest points lie behind a camera, determine no point.
 
     Returns:
-        Product of the scores and of the squared sine between the rays.
+        Product of the scores and of the squared sine of the angle between the rays; 0 where there is no point.
     """
     if weight <= 0.0 or other_weight <= 0.0:
         return 0.0
@@ -275,6 +277,6 @@ def pair_point(origin, direction, weight, other_origin, other_direction, other_w
     s, t = s / sine2, t / sine2
     share = weight * weight / (weight * weight + other_weight * other_weight)
     for r in range(3):
-        here, there = origin[r] + s * direction[r], other_origin[r] + t * other_direction[r]
-        point[r] = there + share * (here - there)
+        near, other_near = origin[r] + s * direction[r], other_origin[r] + t * other_direction[r]
+        point[r] = other_near + share * (near - other_near)
     return weight * other_weight * sine2

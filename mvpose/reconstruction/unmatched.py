@@ -1,17 +1,18 @@
 """3D pictorial structures straight from all detections, without matching (the paper's "No matching", section 4.2).
 
-The way of the methods before the paper (Belagiannis et al., PAMI 2016; Joo et al., PAMI 2017): which keypoints of
-different views belong together is not decided beforehand but by the pictorial structure, for everybody at once.
+This is the approach of earlier methods (Belagiannis et al., PAMI 2016; Joo et al., PAMI 2017): the pictorial structure
+itself decides which keypoints of different views belong together, for all people at once.
 
-1. The states of a joint are where any two views' rays meet (:mod:`mvpose.reconstruction.hypotheses`). The unary of a
-   state is the sum over the views of ``log(1 + score * exp(-e^2 / (2 sigma^2)) / floor)``, of the best keypoint that
-   vouches for it: its log-likelihood less that of a joint that is not there.
+1. The states of a joint are the points where the rays of any two views meet (:mod:`mvpose.reconstruction.hypotheses`).
+   The unary of a state is the sum over views of ``log(1 + score * exp(-e^2 / (2 sigma^2)) / floor)`` of the best
+   keypoint that supports it: its log-likelihood ratio against a joint that is not there.
 2. Max-product over the tree, with the log-Gaussian prior on bone lengths, finds the best pose; it may lack joints.
-3. The keypoints that vouch for a pose, one in a view for a joint, are explained and serve no other pose. Back to 2
-   with what is left, until no pose has enough joints.
+3. The keypoints that support a pose, one per view and joint, are explained and serve no other pose. Step 2 is repeated
+   with the remaining keypoints until no pose has enough joints.
 
-Besides its price this has a weakness that no tuning mends: which keypoints of a view are one body's comes in only
-when the pose stands, so it takes the limb of whoever is near where the bones fit. That is why the paper matches first.
+Besides its cost, the approach has a weakness that tuning cannot remove: the keypoints of one detection are not known
+to belong to one body until the pose is found, so a pose may take a limb of a nearby person where the bones fit. That
+is why the paper matches first.
 """
 
 from __future__ import annotations
@@ -32,25 +33,25 @@ from mvpose.reconstruction.poses import Poses
 from mvpose.reconstruction.refinement import refine
 from mvpose.skeleton import Skeleton
 
-_SHARED = 3  # joints of a detection that a person must explain to have it
+_SHARED = 3  # least number of joints of a detection that a person must explain to be its label
 
 
 @dataclass(frozen=True)
 class UnmatchedPictorialStructure:
-    """Everybody's joints from all detections at once, without matching.
+    """Reconstruction by 3DPS from all detections at once, without matching.
 
     Attributes:
-        noise: the error model of keypoints.
-        agreement: two rays propose a state if they pass each other within this many standard deviations.
-        reach: greatest misfit of a bone, in standard deviations of its length and of the states at its ends.
-        least_joints: joints of a person on which two views or more agree. More than the five of a face: they lie
-            within a hand's breadth, so where the rays of two faces meet by chance all five do.
-        apart: two people's joints are further apart than this on average, metres: a chest is 0.25 m deep
-            (ANSUR II). What lies nearer is one person seen twice, left-right inverted or not.
-        most_states: states that a keypoint can propose, the likeliest ones.
+        noise: error model of keypoints.
+        agreement: greatest distance between two rays that propose a state, in standard deviations.
+        reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
+        least_joints: least number of joints of a person on which two or more views agree. It exceeds the five joints
+            of a face: they lie within a few centimetres, so all five agree where the rays of two faces meet by chance.
+        apart: least mean distance between corresponding joints of two people, metres; a chest is 0.25 m deep
+            (ANSUR II). A nearer pose is the same person found again, with left and right exchanged or not.
+        most_states: greatest number of states that a keypoint proposes, the likeliest ones.
 
     Raises:
-        ValueError: a setting that is not above 0.
+        ValueError: a parameter that is not above 0 (``apart``: below 0).
     """
 
     noise: Noise = Noise()
@@ -69,29 +70,29 @@ class UnmatchedPictorialStructure:
         )
 
     def __call__(self, rays: Rays, skeleton: Skeleton) -> tuple[Poses, Integers]:
-        """Find everybody.
+        """Find all people.
 
         Args:
-            rays: all detections of all views, m of them.
-            skeleton: their J joints.
+            rays: the m detections of all views.
+            skeleton: the J joints.
 
         Returns:
-            The poses, without the joints on which no two views agree; and the person of each detection, (m,): the one
-            who explains most of its joints, three at least, -1 for none. A person has two detections or more, at most
-            one of a view.
+            The poses, without joints on which no two views agree; and the person of each detection, (m,): the one who
+            explains most of its joints, at least three, or -1. A person has two or more detections, at most one per
+            view.
         """
         order = np.argsort(rays.view, kind="stable")
         by_view = rays.select(order)
         found = self._find(by_view, skeleton)
         labels = np.empty(len(rays), np.int64)
         labels[order] = _label(found, by_view.view)
-        # Numbered by their first detection; a pose that is left with a single one is nobody.
+        # People are numbered by their first detection; a pose with a single detection is dropped.
         people = [pose for pose in dict.fromkeys(labels.tolist()) if pose >= 0 and (labels == pose).sum() > 1]
-        number = np.full(len(found.poses) + 1, -1)  # the last one stays: that of -1
+        number = np.full(len(found.poses) + 1, -1)  # the last entry stays -1, for the label -1
         number[people] = np.arange(len(people))
         return Poses(*_polish(by_view, skeleton, found, people, self.noise)), number[labels]
 
-    def _find(self, rays: Rays, skeleton: Skeleton) -> _Found:
+    def _find(self, rays: Rays, skeleton: Skeleton) -> _FoundPoses:
         space = hypothesize(
             rays, skeleton, noise=self.noise, agreement=self.agreement, reach=self.reach, most=self.most_states
         )
@@ -100,8 +101,8 @@ class UnmatchedPictorialStructure:
         for joint in outwards:
             outwards += np.flatnonzero(parents == joint).tolist()
         order = np.array(outwards)
-        known = np.isfinite(bone_lengths(skeleton)[1])  # a bone of unknown length binds nothing
-        found = _Found([], [], np.full(rays.weights.shape, -1), np.zeros(rays.weights.shape))
+        known = np.isfinite(bone_lengths(skeleton)[1])  # a bone of unknown length is no constraint
+        found = _FoundPoses([], [], np.full(rays.weights.shape, -1), np.zeros(rays.weights.shape))
         unary = np.ones(len(space.points))
         _weigh(unary, rays.view, found.owner, space)
         while True:
@@ -119,17 +120,17 @@ class UnmatchedPictorialStructure:
             _weigh(unary, rays.view, found.owner, space)
 
 
-class _Found(NamedTuple):
-    """Poses in the order in which they were found."""
+class _FoundPoses(NamedTuple):
+    """Poses in the order in which they were found, and the keypoints that they explain."""
 
     poses: list[Floats]  # (J, 3), NaN where absent
-    person: list[int]  # the first pose that was the same person, (often) itself
-    owner: Integers  # the pose that explains each keypoint, -1 for none, (m, J)
-    evidence: Floats  # for what it says, (m, J)
+    person: list[int]  # index of the first pose of the same person, often the pose itself
+    owner: Integers  # pose that explains each keypoint, -1 for none, (m, J)
+    evidence: Floats  # evidence of each keypoint for its owner, (m, J)
 
 
-def _same_person(joints: Floats, found: _Found, skeleton: Skeleton, apart: float) -> int:
-    """The pose of which this one is a repetition, as it is or with left and right exchanged; else its own index."""
+def _same_person(joints: Floats, found: _FoundPoses, skeleton: Skeleton, apart: float) -> int:
+    """Return the earlier pose that this one repeats, possibly with left and right exchanged, or else a new index."""
     for index, other in enumerate(found.poses):
         for same in (other, other[list(skeleton.mirror)]):
             distance = np.linalg.norm(joints - same, axis=1)
@@ -138,8 +139,8 @@ def _same_person(joints: Floats, found: _Found, skeleton: Skeleton, apart: float
     return len(found.poses)
 
 
-def _label(found: _Found, view: Integers) -> Integers:
-    """Detections to people by the joints that they explain, the clearest first, (m,)."""
+def _label(found: _FoundPoses, view: Integers) -> Integers:
+    """Assign detections to people by the number of explained joints, the clearest first, (m,)."""
     votes, evidence = np.zeros((2, len(view), len(found.poses)))
     detection, joint = np.nonzero(found.owner >= 0)
     person = np.array(found.person, np.int64)[found.owner[detection, joint]]
@@ -156,9 +157,9 @@ def _label(found: _Found, view: Integers) -> Integers:
 
 
 def _polish(
-    rays: Rays, skeleton: Skeleton, found: _Found, people: list[int], noise: Noise
+    rays: Rays, skeleton: Skeleton, found: _FoundPoses, people: list[int], noise: Noise
 ) -> tuple[Floats, Floats, Floats]:
-    """Refine poses over the keypoints that they explain, as if those of a view were one detection."""
+    """Refine poses on the keypoints that they explain, with the keypoints of a view taken as one detection."""
     shape = (len(people), len(skeleton))
     joints, scores, covariance = np.zeros((*shape, 3)), np.zeros(shape), np.zeros((*shape, 3, 3))
     length, deviation = bone_lengths(skeleton)
@@ -168,10 +169,10 @@ def _polish(
         directions, weights = np.zeros((len(views), shape[1], 3)), np.zeros((len(views), shape[1]))
         directions[row, joint] = rays.directions[detection, joint]
         weights[row, joint] = rays.weights[detection, joint]
-        mine = detection[first]
+        representative = detection[first]
         joints[k], scores[k], covariance[k] = refine(
             found.poses[pose],
-            Rays(views, rays.origins[mine], directions, weights, rays.pixel[mine]),
+            Rays(views, rays.origins[representative], directions, weights, rays.pixel[representative]),
             skeleton,
             noise=noise,
             length=length,
@@ -182,17 +183,17 @@ def _polish(
 
 @njit(cache=True)
 def _weigh(unary, view, owner, space):
-    """Renew unaries from the keypoints that are not explained yet: 0, for good, where fewer than two views vouch."""
+    """Update unaries from the keypoints not yet explained; 0, permanently, where fewer than two views give support."""
     for joint in range(len(space.start) - 1):
         for state in range(space.start[joint], space.start[joint + 1]):
             if unary[state] == 0.0:
                 continue
             total, best, views, last = 0.0, 0.0, 0, -1
-            for k in range(space.voucher_start[state], space.voucher_start[state + 1]):
-                if owner[space.voucher[k], joint] >= 0:
+            for k in range(space.support_start[state], space.support_start[state + 1]):
+                if owner[space.support[k], joint] >= 0:
                     continue
-                if view[space.voucher[k]] != last:
-                    last = view[space.voucher[k]]
+                if view[space.support[k]] != last:
+                    last = view[space.support[k]]
                     total += best
                     best = 0.0
                     views += 1
@@ -202,15 +203,15 @@ def _weigh(unary, view, owner, space):
 
 @njit(cache=True)
 def _best_pose(order, parents, unary, space):
-    """The connected part of the tree, and states of its joints, with the greatest sum of unaries less costs of bones.
+    """Find the connected part of the tree, and its states, with the greatest sum of unaries minus bone costs.
 
     Returns:
-        State of every joint, (J,), -1 where the pose lacks it; and how many joints a pose can have, at most.
+        State of every joint, (J,), -1 where the pose lacks it; and an upper bound on the number of joints of a pose.
     """
     joints, most = len(parents), 0
     for joint in range(joints):
         most = max(most, space.start[joint + 1] - space.start[joint])
-    value, size = unary.copy(), np.ones(len(unary), np.int64)  # of the best pose that has the state on top
+    value, size = unary.copy(), np.ones(len(unary), np.int64)  # of the best pose with the state at its root
     choice = np.full((joints, most), -1)  # best state of a joint for each state of its parent
     message, larger = np.zeros(most), np.zeros(most, np.int64)
     chosen, root, top, best, bound = np.full(joints, -1), 0, -1, 0.0, 0
@@ -225,15 +226,15 @@ def _best_pose(order, parents, unary, space):
             if value[state] > best:
                 best, root, top = value[state], joint, state
             for k in range(space.link_start[state], space.link_start[state + 1]):
-                there = space.link[k] - space.start[parent]
-                larger[there] = max(larger[there], size[state])
-                if value[state] - space.cost[k] > message[there]:
-                    message[there] = value[state] - space.cost[k]
-                    choice[joint, there] = state
+                slot = space.link[k] - space.start[parent]
+                larger[slot] = max(larger[slot], size[state])
+                if value[state] - space.cost[k] > message[slot]:
+                    message[slot] = value[state] - space.cost[k]
+                    choice[joint, slot] = state
         if parent >= 0:
-            for there in range(space.start[parent + 1] - space.start[parent]):
-                value[space.start[parent] + there] += message[there]
-                size[space.start[parent] + there] += larger[there]
+            for slot in range(space.start[parent + 1] - space.start[parent]):
+                value[space.start[parent] + slot] += message[slot]
+                size[space.start[parent] + slot] += larger[slot]
     if top >= 0:
         chosen[root] = top
         for joint in order:
@@ -244,22 +245,22 @@ def _best_pose(order, parents, unary, space):
 
 @njit(cache=True)
 def _attach(core, order, parents, unary, view, owner, known, space):
-    """The pose with joints that an absent one cuts it off from: those on which two of its own detections agree.
+    """Add joints that a missing joint disconnects from the pose, where two detections of the person agree on them.
 
-    Its own is, in each view, the detection that vouches for most of its joints, if for three or more.
+    The detection of the person in a view is the one that supports most joints of the pose, at least three.
     """
     pose = core.copy()
     votes = np.zeros(len(view))
     for joint in range(len(parents)):
         if pose[joint] >= 0:
-            for k in range(space.voucher_start[pose[joint]], space.voucher_start[pose[joint] + 1]):
-                if owner[space.voucher[k], joint] < 0:
-                    votes[space.voucher[k]] += 1.0 + 1e-6 * space.evidence[k]  # the evidence decides between equals
-    own = votes >= _SHARED
+            for k in range(space.support_start[pose[joint]], space.support_start[pose[joint] + 1]):
+                if owner[space.support[k], joint] < 0:
+                    votes[space.support[k]] += 1.0 + 1e-6 * space.evidence[k]  # the evidence breaks ties
+    of_person = votes >= _SHARED
     for d in range(len(view)):
         for other in range(len(view)):
             if view[other] == view[d] and votes[other] > votes[d]:
-                own[d] = False
+                of_person[d] = False
     for joint in order:
         if pose[joint] >= 0:
             continue
@@ -268,13 +269,13 @@ def _attach(core, order, parents, unary, view, owner, known, space):
             if unary[state] == 0.0:
                 continue
             total, views = 0.0, 0
-            for k in range(space.voucher_start[state], space.voucher_start[state + 1]):
-                if own[space.voucher[k]] and owner[space.voucher[k], joint] < 0:
+            for k in range(space.support_start[state], space.support_start[state + 1]):
+                if of_person[space.support[k]] and owner[space.support[k], joint] < 0:
                     total += space.evidence[k]
                     views += 1
             if views < 2 or total <= best:
                 continue
-            fits = True  # to the neighbours that there are
+            fits = True  # with the neighbours that are present
             for other in range(len(parents)):
                 if pose[other] >= 0 and parents[joint] == other:
                     fits = fits and (not known[joint] or _linked(state, pose[other], space))
@@ -296,16 +297,16 @@ def _linked(child, parent, space):
 
 @njit(cache=True)
 def _explain(pose, index, view, owner, strength, space):
-    """Give the keypoints that vouch for a pose to it: of each joint, in every view, the best that is free."""
+    """Assign to a pose the best free keypoint of every view that supports each of its joints."""
     for joint in range(len(pose)):
         if pose[joint] < 0:
             continue
-        best, last = -1, space.voucher_start[pose[joint] + 1]
-        for k in range(space.voucher_start[pose[joint]], last):
-            if owner[space.voucher[k], joint] < 0 and (best < 0 or space.evidence[k] > space.evidence[best]):
+        best, last = -1, space.support_start[pose[joint] + 1]
+        for k in range(space.support_start[pose[joint]], last):
+            if owner[space.support[k], joint] < 0 and (best < 0 or space.evidence[k] > space.evidence[best]):
                 best = k
-            if best >= 0 and (k + 1 == last or view[space.voucher[k + 1]] != view[space.voucher[k]]):
-                owner[space.voucher[best], joint] = index
-                strength[space.voucher[best], joint] = space.evidence[best]
+            if best >= 0 and (k + 1 == last or view[space.support[k + 1]] != view[space.support[k]]):
+                owner[space.support[best], joint] = index
+                strength[space.support[best], joint] = space.evidence[best]
                 best = -1
-    # A keypoint is taken only after all of its view were compared, so no pose takes two of a view for a joint.
+    # A keypoint is taken only after all keypoints of its view were compared, so no pose takes two per view and joint.

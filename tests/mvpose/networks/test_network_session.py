@@ -105,6 +105,12 @@ def test_importing_the_networks_brings_in_neither_onnxruntime_nor_opencv():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
 
 
+def test_without_onnxruntime_it_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(ModuleNotFoundError, match=r"net\.onnx: onnxruntime is not installed.*'mvpose\[networks\]'"):
+        Session(tmp_path / "net.onnx")
+
+
 # What is refused.
 
 

@@ -10,7 +10,11 @@ from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
-from mvpose.reconstruction.limb_direction_prior import hang, how_it_hangs, parts
+from mvpose.reconstruction.limb_direction_prior import (
+    direction_concentrations,
+    direction_log_likelihood,
+    trunk_segments,
+)
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
 from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb, leaves_first, refine, tree
@@ -138,9 +142,13 @@ def test_the_neck_tells_where_hips_of_one_view_are():
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19], ids=lambda skeleton: skeleton.name)
 def test_limbs_hang_in_every_skeleton(skeleton):
     limbs = {joint for joint in skeleton.joints if joint.split("_")[-1] in ("elbow", "wrist", "knee", "ankle")}
-    hanging = {joint for joint, concentration in zip(skeleton.joints, hang(skeleton), strict=True) if concentration}
+    hanging = {
+        joint
+        for joint, concentration in zip(skeleton.joints, direction_concentrations(skeleton), strict=True)
+        if concentration
+    }
     assert limbs <= hanging <= limbs | {"left_hip", "right_hip"}
-    told = dict(zip(skeleton.joints, parts(skeleton), strict=True))
+    told = dict(zip(skeleton.joints, trunk_segments(skeleton), strict=True))
     assert (told["left_shoulder"], told["right_hip"], told["left_wrist"]) == (1, 2, 0)
     assert 3 in told.values()
 
@@ -151,13 +159,13 @@ def test_how_a_bone_hangs_is_von_mises_fisher():
     directions = rng.standard_normal((200_000, 3))
     down = np.array([0.6, 0.0, -0.8])
     for concentration in (0.5, 3.0):
-        value = [how_it_hangs(each, np.zeros(3), True, concentration, down) for each in directions]
+        value = [direction_log_likelihood(each, np.zeros(3), True, concentration, down) for each in directions]
         constant = 2 * concentration / (1 - np.exp(-2 * concentration))  # over the uniform density, at most 0
         assert np.mean(constant * np.exp(value)) == pytest.approx(1.0, abs=0.01)
-    assert how_it_hangs(np.zeros(3), directions[0], False, 3.0, down) == how_it_hangs(
+    assert direction_log_likelihood(np.zeros(3), directions[0], False, 3.0, down) == direction_log_likelihood(
         directions[0], np.zeros(3), True, 3.0, down
     )
-    assert how_it_hangs(directions[0], np.zeros(3), True, 3.0, np.zeros(3)) == 0.0
+    assert direction_log_likelihood(directions[0], np.zeros(3), True, 3.0, np.zeros(3)) == 0.0
 
 
 def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():

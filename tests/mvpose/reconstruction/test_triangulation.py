@@ -9,8 +9,8 @@ from people import STANDING, detect, look_at, ring
 from mvpose import COCO17, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
-from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.error_scale import joint_scales
+from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
 
