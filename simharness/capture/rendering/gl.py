@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,15 @@ class GlRenderer:
     """Renders with OpenGL. The last scene stays uploaded: all views of a frame share it.
 
     Raises:
-        Unavailable: no EGL context can be made here; the message has the reason.
+        Unavailable: pyrender is not installed or no EGL context can be made here; the message has the reason.
     """
 
     def __init__(self) -> None:
+        if find_spec("pyrender") is None:
+            raise Unavailable(
+                "pyrender is not installed; pip install 'simharness[gl]' (in a checkout: pip install -e '.[gl]') "
+                "or use the renderer 'raster'"
+            )
         # PyOpenGL binds to one platform at its first import; pyglet, which pyrender imports, asks for a display.
         os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
         os.environ.setdefault("PYGLET_HEADLESS", "1")
