@@ -1,4 +1,4 @@
-"""Pictures of a scene: what is put before a renderer, and what comes out of a camera with a shutter and a sensor."""
+"""Colour pictures of a scene: meshes for the renderer, then the shutter and the sensor of a camera."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.mirrors import with_mirrors
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.sensor import blur, develop
-from simharness.capture.shutter import moments, strips
+from simharness.capture.shutter import band_cameras, band_times
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.motion.trajectory import posed
+from simharness.world.motion.trajectory import transform_points
 
 if TYPE_CHECKING:
     from simharness.scenario.sections.scenario import Sensor
@@ -30,21 +30,23 @@ if TYPE_CHECKING:
 
 Rgb = NDArray[np.uint8]
 
-_BLUR_STEPS = 5  # moments that make up the blur of one picture
+_BLUR_STEPS = 5  # times averaged for the motion blur of one picture
 
 
 def meshes_at(scene: Scene, state: State) -> list[Mesh]:
-    """Everything to be seen in one state: people first, so that a mesh index below P is a person; then things."""
+    """Return the meshes of a scene in one state: the P people, then the solids, so mesh indices < P are people."""
     people = [
         figure.moved(body.skin(bones))
         for body, bones, figure in zip(scene.bodies, state.bones, scene.figures, strict=True)
     ]
     placements = iter(state.placements)
-    things = [
-        solid.mesh if solid.trajectory is None else solid.mesh.moved(posed(solid.mesh.vertices, next(placements)))
+    objects = [
+        solid.mesh
+        if solid.trajectory is None
+        else solid.mesh.moved(transform_points(solid.mesh.vertices, next(placements)))
         for solid in scene.solids
     ]
-    return [*people, *things]
+    return [*people, *objects]
 
 
 def antialiased(
@@ -56,15 +58,15 @@ def antialiased(
     lighting: Lighting | None = None,
     mirrors: Mapping[int, Mirror] = MappingProxyType({}),
 ) -> Rgb:
-    """Picture for people to look at: ``finer`` x ``finer`` samples a pixel, so that outlines are smooth.
+    """Render an antialiased colour picture, with ``finer`` x ``finer`` samples per pixel.
 
     Args:
-        renderer: draws it.
-        camera: takes it.
-        meshes: what is there.
-        finer: samples a pixel each way.
-        lighting: the light; by default that of ``Lighting()``.
-        mirrors: the glass of those meshes that are mirrors, by their index.
+        renderer: renderer of the picture.
+        camera: camera of the picture.
+        meshes: meshes of the scene.
+        finer: samples per pixel in each direction.
+        lighting: lighting of the scene; ``Lighting()`` by default.
+        mirrors: glass of the meshes that are mirrors, by mesh index.
 
     Returns:
         (h, w, 3) uint8.
@@ -77,7 +79,7 @@ def antialiased(
 
 
 def scaled(camera: Camera, scale: float) -> Camera:
-    """The same camera with pixels of another size: 2 gives it 2 x 2 for each of its own."""
+    """Return the camera with another resolution: a scale of 2 gives 2 x 2 pixels for each original one."""
     if scale == 1.0:
         return camera
     size = reduced_size(camera.size, scale)
@@ -89,12 +91,12 @@ def scaled(camera: Camera, scale: float) -> Camera:
 
 
 def reduced_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
-    """Width and height of a picture of ``size`` at another scale, whole pixels."""
+    """Return width and height of a picture of ``size`` at another scale, in whole pixels."""
     return max(1, round(scale * size[0])), max(1, round(scale * size[1]))
 
 
-def one_below_the_other(bands: Many[Image]) -> Image:
-    """One image of images of bands of rows, from the top."""
+def stack_bands(bands: Many[Image]) -> Image:
+    """Join the images of bands of rows, given from the top, to one image."""
     if len(bands) == 1:
         return bands[0]
     parts = [band.parts for band in bands if band.parts is not None]
@@ -107,13 +109,13 @@ def one_below_the_other(bands: Many[Image]) -> Image:
 
 
 class PictureSource:
-    """Makes the pictures that the cameras deliver, with their shutters and sensors.
+    """Source of the pictures that the cameras deliver, shutter and sensor included.
 
     Args:
-        playback: the scene.
-        renderer: draws it.
-        sensor: what the pictures are like.
-        seed: of the scenario.
+        playback: scene to picture.
+        renderer: renderer of the pictures.
+        sensor: parameters of the sensor.
+        seed: seed of the scenario.
     """
 
     def __init__(self, playback: Playback, renderer: Renderer, *, sensor: Sensor, seed: int) -> None:
@@ -125,14 +127,14 @@ class PictureSource:
     def picture(
         self, exposures: ExposureSchedule, frame: int, view: int, *, finer: int = 1, width: int | None = None
     ) -> Rgb:
-        """The colour picture that ``view`` delivers in ``frame``, (h, w, 3); black where none arrives.
+        """Return the colour picture that ``view`` delivers in ``frame``, (h, w, 3); black if none arrives.
 
         Args:
-            exposures: when and with which lens it is taken.
-            frame: of the sequence.
-            view: of the rig.
-            finer: samples a pixel each way; 2 makes smooth outlines.
-            width: of the picture, pixels, where it is to be smaller than the camera's.
+            exposures: time and camera of every picture.
+            frame: index of the frame.
+            view: index of the view.
+            finer: samples per pixel in each direction; 2 gives smooth outlines.
+            width: width of the picture in pixels, if it should be smaller than that of the camera.
         """
         size = exposures.believed_rig[view].size
         scale = 1.0 if width is None else min(1.0, width / size[0])
@@ -140,35 +142,35 @@ class PictureSource:
             return np.zeros((*reduced_size(size, scale)[::-1], 3), np.uint8)
         camera = scaled(exposures.camera(frame, view), scale)
         exposed = []
-        for middle in self._open(exposures.time[frame, view]):
-            times = moments(middle, exposures.readout)
-            bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
-            exposed.append(np.concatenate([self._drawn(state, strip, finer) for state, strip in bands]))
+        for middle in self._exposure_times(exposures.time[frame, view]):
+            times = band_times(middle, exposures.readout)
+            bands = zip(self._playback.over(times), band_cameras(camera, len(times)), strict=True)
+            exposed.append(np.concatenate([self._render(state, strip, finer) for state, strip in bands]))
         taken = int(exposures.source[frame, view])
         return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken)
 
     def image(self, exposures: ExposureSchedule, frame: int, view: int) -> Image:
-        """Depth, ids and body parts of the middle of the exposure.
+        """Return depth, ids and body parts at the middle of the exposure.
 
         Raises:
-            ValueError: a picture that never arrives.
+            ValueError: the picture never arrives.
         """
         if not exposures.delivered[frame, view]:
             raise ValueError(f"view {view} delivers no picture in frame {frame}")
         camera, scene = exposures.camera(frame, view), self._playback.scene
-        times = moments(exposures.time[frame, view], exposures.readout)
-        bands = zip(self._playback.over(times), strips(camera, len(times)), strict=True)
-        return one_below_the_other(
+        times = band_times(exposures.time[frame, view], exposures.readout)
+        bands = zip(self._playback.over(times), band_cameras(camera, len(times)), strict=True)
+        return stack_bands(
             [self._renderer.render(strip, meshes_at(scene, state), color=False, parts=True) for state, strip in bands]
         )
 
-    def _open(self, middle: float) -> NDArray[np.float64]:
-        """Moments that one exposure is the mean of, seconds."""
+    def _exposure_times(self, middle: float) -> NDArray[np.float64]:
+        """Return the times over which one exposure is averaged, seconds."""
         shutter = self._sensor.shutter
         steps = _BLUR_STEPS if shutter else 1
         return middle + shutter * ((np.arange(steps) + 0.5) / steps - 0.5)
 
-    def _drawn(self, state: State, camera: Camera, finer: int) -> Rgb:
+    def _render(self, state: State, camera: Camera, finer: int) -> Rgb:
         scene = self._playback.scene
         return antialiased(
             self._renderer,

@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from simharness.scenario.sections.scenario import People, Scenario
 from simharness.types.random_streams import stream
-from simharness.world.motion.contact import Crowd, Presence
+from simharness.world.motion.contact import ContactModel, SampledBody
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.paths import Loop, Recorded, Spot, Track, turned
+from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.registry import Activity, activities, solo
-from simharness.world.motion.track_planning import Going, Replaying, Staying, Wish, plan_tracks
+from simharness.world.motion.track_planning import LoopRequest, RecordedRequest, SpotRequest, TrackRequest, plan_tracks
 from simharness.world.motion.trajectory import Trajectory
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick
@@ -39,7 +39,7 @@ class Choreography:
 
 
 @dataclass(frozen=True)
-class Party:
+class Group:
     """Those who do one activity together: one person, or two.
 
     Attributes:
@@ -76,7 +76,7 @@ def choreograph(
     missing = [name for name in people.activities if name not in known]
     if missing:
         raise ValueError(f"people.activities: {missing[0]!r} is not known here; there are {', '.join(sorted(known))}")
-    parties = hand_out([known[name] for name in people.activities], people.count, spare=known["stand"])
+    parties = assign_activities([known[name] for name in people.activities], people.count, spare=known["stand"])
     stage = _Stage(scenario.seed, parties, cast, time, people.spacing)
     plan_tracks(
         scenario.seed,
@@ -95,7 +95,7 @@ def choreograph(
     )
 
 
-def hand_out(activities: Sequence[Activity], count: int, *, spare: Activity) -> tuple[Party, ...]:
+def assign_activities(activities: Sequence[Activity], count: int, *, spare: Activity) -> tuple[Group, ...]:
     """Give the activities out in turn, each to as many people as it takes.
 
     Args:
@@ -103,13 +103,13 @@ def hand_out(activities: Sequence[Activity], count: int, *, spare: Activity) -> 
         count: how many people there are.
         spare: what the last one does who finds no partner.
     """
-    parties: list[Party] = []
+    parties: list[Group] = []
     first = 0
     while first < count:
         activity = activities[len(parties) % len(activities)]
         if first + activity.performers > count:
             activity = spare
-        parties.append(Party(tuple(range(first, first + activity.performers)), activity))
+        parties.append(Group(tuple(range(first, first + activity.performers)), activity))
         first += activity.performers
     return tuple(parties)
 
@@ -118,7 +118,7 @@ def roles(people: People) -> tuple[str, ...]:
     """What each person of a scenario does, by name."""
     known = dict(activities())
     known["mocap"] = replace(known["stand"], name="mocap")
-    parties = hand_out([known[name] for name in people.activities], people.count, spare=known["stand"])
+    parties = assign_activities([known[name] for name in people.activities], people.count, spare=known["stand"])
     return tuple(party.activity.name for party in parties for _ in party.people)
 
 
@@ -142,15 +142,15 @@ class _Stage:
     """
 
     def __init__(
-        self, seed: int, parties: Sequence[Party], cast: Sequence[Kinematics], time: Floats, spacing: float
+        self, seed: int, parties: Sequence[Group], cast: Sequence[Kinematics], time: Floats, spacing: float
     ) -> None:
         self._parties, self._cast, self._time, self._spacing = parties, cast, time, spacing
-        self._crowd = Crowd(cast)
+        self._crowd = ContactModel(cast)
         self._checks = time[::_CHECKS]
         self._performing: list[partial[Performance]] = []
         self._at_origin: dict[int, Performance] = {}
-        self._acts: dict[int, tuple[Performance, list[Presence]]] = {}  # of the parties that have a track
-        self.wishes: list[Wish] = []
+        self._acts: dict[int, tuple[Performance, list[SampledBody]]] = {}  # of the parties that have a track
+        self.wishes: list[TrackRequest] = []
         for index, party in enumerate(parties):
             manner = stream(seed, "people", party.people[0], "gait")
             froude, pace = manner.uniform(*party.activity.froude), manner.uniform(*_PACE)
@@ -169,16 +169,16 @@ class _Stage:
         if isinstance(track, Loop):
             performance = self._performing[index](track)
         else:
-            spot = track.spot if isinstance(track, Recorded) else track
-            performance = moved(self._origin(index), spot)
+            spot = track.spot if isinstance(track, RecordedPath) else track
+            performance = move_to(self._origin(index), spot)
         movers = zip(self._parties[index].people, performance.motions, strict=True)
-        present = [self._crowd.presence(person, motion, self._checks) for person, motion in movers]
+        present = [self._crowd.sample(person, motion, self._checks) for person, motion in movers]
         if self._collides(performance, present):
             return False
         self._acts[index] = (performance, present)
         return True
 
-    def _perform(self, seed: int, party: Party, pace: float, track: Track) -> Performance:
+    def _perform(self, seed: int, party: Group, pace: float, track: Track) -> Performance:
         rng = stream(seed, "people", party.people[0], "motion")  # begun anew for each track: the manner stays
         movers = [self._cast[person] for person in party.people]
         return party.activity.perform(movers, track, self._time, rng=rng, pace=pace)
@@ -189,19 +189,19 @@ class _Stage:
             self._at_origin[index] = self._performing[index](_ORIGIN)
         return self._at_origin[index]
 
-    def _wish(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> Wish:
+    def _wish(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> TrackRequest:
         if activity.name == "mocap":
-            return Replaying(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
+            return RecordedRequest(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
         if activity.track is not Loop:
-            return Staying(activity.name, activity.clearance, activity.performers > 1)
+            return SpotRequest(activity.name, activity.clearance, activity.performers > 1)
         unit = np.sqrt(_GRAVITY * mover.leg_length)
         slowest, fastest = (unit * limit for limit in activity.froude)
         running = activity.froude[1] > _RUNNING
         if running:
             slowest = min(slowest, unit * _RUNNING)
-        return Going(activity.name, unit * froude, slowest, fastest, running)
+        return LoopRequest(activity.name, unit * froude, slowest, fastest, running)
 
-    def _collides(self, performance: Performance, present: Sequence[Presence]) -> bool:
+    def _collides(self, performance: Performance, present: Sequence[SampledBody]) -> bool:
         """Whether a performance comes too near to those before it."""
         others = [presence for _, others in self._acts.values() for presence in others]
         for one in present:
@@ -210,30 +210,32 @@ class _Stage:
                 if apart.min() < self._spacing or self._crowd.penetration(one, other).max() > _DEEPEST:
                     return True
         before = [prop for earlier, _ in self._acts.values() for prop in earlier.props]
-        return any(in_the_way(prop, one.motion) for prop in before for one in present) or any(
-            in_the_way(prop, other.motion) for prop in performance.props for other in others
+        return any(obstructs(prop, one.motion) for prop in before for one in present) or any(
+            obstructs(prop, other.motion) for prop in performance.props for other in others
         )
 
 
-def moved(performance: Performance, spot: Spot) -> Performance:
+def move_to(performance: Performance, spot: Spot) -> Performance:
     """A performance at the origin, facing along x, carried to a spot."""
-    motions = tuple(Motion(motion.time, _carried(motion.root, spot), motion.angles) for motion in performance.motions)
+    motions = tuple(
+        Motion(motion.time, _moved_poses(motion.root, spot), motion.angles) for motion in performance.motions
+    )
     props = tuple(
-        Prop(prop.kind, prop.size, Trajectory(prop.trajectory.time, _carried(prop.trajectory.pose, spot)))
+        Prop(prop.kind, prop.size, Trajectory(prop.trajectory.time, _moved_poses(prop.trajectory.pose, spot)))
         for prop in performance.props
     )
     return Performance(motions, props)
 
 
-def _carried(pose: Floats, spot: Spot) -> Floats:
+def _moved_poses(pose: Floats, spot: Spot) -> Floats:
     """Poses (N, 7) turned by a spot's bearing about the origin, and shifted to its place."""
     turn = Rotation.from_euler("Z", spot.bearing)
-    place = np.column_stack([pose[:, :2] @ turned(spot.bearing).T + spot.place, pose[:, 2]])
+    place = np.column_stack([pose[:, :2] @ rotation_2d(spot.bearing).T + spot.place, pose[:, 2]])
     facing = (turn * Rotation.from_quat(pose[:, 3:], scalar_first=True)).as_quat(scalar_first=True)
     return np.concatenate([place, facing], axis=1)
 
 
-def in_the_way(prop: Prop, motion: Motion) -> bool:
+def obstructs(prop: Prop, motion: Motion) -> bool:
     """Whether someone's pelvis comes too near to the ground plan of a thing."""
     pose = prop.trajectory.at(motion.time)
     turn = Rotation.from_quat(pose[:, 3:], scalar_first=True).inv()

@@ -18,7 +18,7 @@ _FLESH = 0.15  # metres: how far a body reaches to the side beyond the heads of 
 
 
 @dataclass(frozen=True)
-class Presence:
+class SampledBody:
     """Someone at N times.
 
     Attributes:
@@ -32,13 +32,13 @@ class Presence:
     low: Floats
     high: Floats
 
-    def near(self, other: Presence) -> NDArray[np.intp]:
+    def near(self, other: SampledBody) -> NDArray[np.intp]:
         """The indices of the times at which two might touch."""
         meet = (self.low < other.high) & (other.low < self.high)
         return np.flatnonzero(meet.all(axis=1))
 
 
-class Crowd:
+class ContactModel:
     """Bodies that may touch, two at a time in a MuJoCo model with nothing else.
 
     Args:
@@ -49,14 +49,14 @@ class Crowd:
         self._cast = tuple(cast)
         self._pairs: dict[tuple[int, int], _Pair] = {}
 
-    def presence(self, person: int, motion: Motion, time: ArrayLike) -> Presence:
+    def sample(self, person: int, motion: Motion, time: ArrayLike) -> SampledBody:
         """Where the body of a person is at times (N,), seconds."""
         mover, sampled = self._cast[person], motion.at(time)
         bones = mover.transforms(sampled)[:, :, :2]
         heads = np.matmul(bones[..., :3], mover.body.heads[:, :, None])[..., 0] + bones[..., 3]
-        return Presence(person, sampled, heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH)
+        return SampledBody(person, sampled, heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH)
 
-    def penetration(self, one: Presence, other: Presence) -> Floats:
+    def penetration(self, one: SampledBody, other: SampledBody) -> Floats:
         """How deep two people are in one another, (N,) metres, 0 where they are apart.
 
         It is the depth of the deepest of MuJoCo's contacts between the shapes of the two: how far these would have to
@@ -75,9 +75,9 @@ class Crowd:
 
 
 def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: ArrayLike) -> Floats:
-    """How deep any two people are in one another at times (N,), (N, P, P) metres; see :meth:`Crowd.penetration`."""
-    crowd = Crowd(cast)
-    people = [crowd.presence(person, motion, time) for person, motion in enumerate(motions)]
+    """How deep any two people are in one another at times (N,), (N, P, P) metres; see :meth:`ContactModel.penetration`."""
+    crowd = ContactModel(cast)
+    people = [crowd.sample(person, motion, time) for person, motion in enumerate(motions)]
     depth = np.zeros((np.size(time), len(people), len(people)))
     for one, other in combinations(people, 2):
         depth[:, one.person, other.person] = depth[:, other.person, one.person] = crowd.penetration(one, other)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from simharness.world.humans.anatomy import DOFS
-from simharness.world.motion.trajectory import check_poses, check_times, through, through_poses
+from simharness.world.motion.trajectory import check_poses, check_times, interpolate, interpolate_poses
 
 
 @dataclass(frozen=True)
@@ -52,4 +52,4 @@ class Motion:
 
     def read(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Root (..., 7) and angles (..., D) at any times (...)."""
-        return through_poses(self.time, self.root, time), through(self.time, self.angles, time)
+        return interpolate_poses(self.time, self.root, time), interpolate(self.time, self.angles, time)

@@ -77,7 +77,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedPath:
     """A recorded way, begun at a spot.
 
     Attributes:
@@ -100,14 +100,14 @@ class Recorded:
         """Where the pelvis is, (..., 2) metres."""
         time = np.asarray(time, float)
         way = np.stack([np.interp(time, self.time, self.offset[:, k]) for k in range(2)], axis=-1)
-        return self.spot.place + way @ turned(self.spot.bearing).T
+        return self.spot.place + way @ rotation_2d(self.spot.bearing).T
 
 
-Track = Spot | Loop | Recorded
+Track = Spot | Loop | RecordedPath
 
 
 @dataclass(frozen=True)
-class Bends:
+class LoopLimits:
     """How fast someone goes round a loop, and how tightly it may turn.
 
     Attributes:
@@ -121,7 +121,7 @@ class Bends:
     tightest: float
 
 
-def bends(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> Bends:
+def loop_limits(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> LoopLimits:
     """What a square of half side ``half``, metres, lets of the speeds that someone would go at, metres a second.
 
     A walker turns at 1.3 rad/s at most and else goes more slowly, however slowly; a runner is held on the bend by
@@ -130,13 +130,13 @@ def bends(speed: float, *, slowest: float, fastest: float, half: float, running:
     if running:
         tightest = min(max(_TIGHTEST, speed**2 / _HARDEST_TURN), 0.85 * half)
         limit = float(np.sqrt(_HARDEST_TURN * tightest))
-        return Bends(min(speed, limit), slowest, min(fastest, limit), tightest)
+        return LoopLimits(min(speed, limit), slowest, min(fastest, limit), tightest)
     tightest = min(_TIGHTEST, 0.7 * half)
     limit = _FASTEST_TURN * tightest
-    return Bends(min(speed, limit), min(slowest, 0.85 * limit), min(fastest, limit), tightest)
+    return LoopLimits(min(speed, limit), min(slowest, 0.85 * limit), min(fastest, limit), tightest)
 
 
-def turned(bearing: float) -> Floats:
+def rotation_2d(bearing: float) -> Floats:
     """The rotation of the floor, (2, 2), that turns x into ``bearing``, radians."""
     c, s = np.cos(bearing), np.sin(bearing)
     return np.array([[c, -s], [s, c]])
@@ -166,15 +166,15 @@ def draw_spot(rng: np.random.Generator, *, half: float, apart: bool = False) -> 
     return Spot(place=place, bearing=float(anywhere if apart else inward + off))
 
 
-def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset: Floats) -> Recorded | None:
+def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset: Floats) -> RecordedPath | None:
     """A recorded way turned and shifted by chance; None where the turned way does not fit into the square."""
     bearing = float(rng.uniform(-np.pi, np.pi))
     share = rng.uniform(size=2)
-    way = offset @ turned(bearing).T
+    way = offset @ rotation_2d(bearing).T
     low, high = -half - way.min(axis=0), half - way.max(axis=0)
     if (low > high).any():
         return None
-    return Recorded(Spot(low + share * (high - low), bearing), time, offset)
+    return RecordedPath(Spot(low + share * (high - low), bearing), time, offset)
 
 
 def draw_loop(
@@ -207,7 +207,7 @@ def _ellipse(rng: np.random.Generator, half: float, tightest: float, widest: flo
     around = rng.choice([-1.0, 1.0]) * np.linspace(0.0, 2 * np.pi, 8 * _KNOTS, endpoint=False)
     radial = 1.0 + wobble * np.cos(3 * around + phase)
     ellipse = np.stack([wide * radial * np.cos(around), slim * radial * np.sin(around)], axis=-1)
-    return center + ellipse @ turned(tilt).T
+    return center + ellipse @ rotation_2d(tilt).T
 
 
 def _sharpest(points: Floats) -> float:

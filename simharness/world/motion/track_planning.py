@@ -11,13 +11,13 @@ from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 from simharness.world.motion.paths import (
     SWAY,
-    Bends,
     Loop,
+    LoopLimits,
     Track,
-    bends,
     draw_loop,
     draw_recorded,
     draw_spot,
+    loop_limits,
 )
 
 _NARROWEST = 0.45  # metres: half side of the least square to walk round in
@@ -34,7 +34,7 @@ _SCREEN = 16  # every so manyth coarse check comes first: most draws fail there
 
 
 @dataclass(frozen=True)
-class Going:
+class LoopRequest:
     """A wish to go round a loop.
 
     Attributes:
@@ -51,7 +51,7 @@ class Going:
 
 
 @dataclass(frozen=True)
-class Staying:
+class SpotRequest:
     """A wish to stay on a spot.
 
     Attributes:
@@ -66,7 +66,7 @@ class Staying:
 
 
 @dataclass(frozen=True)
-class Replaying:
+class RecordedRequest:
     """A wish to go a recorded way: ``offset`` (N, 2), metres from its beginning, at ``time`` (N,), seconds."""
 
     what: str
@@ -74,14 +74,14 @@ class Replaying:
     offset: Floats
 
 
-Wish = Going | Staying | Replaying
+TrackRequest = LoopRequest | SpotRequest | RecordedRequest
 Admit = Callable[[int, Track, Sequence[int]], bool]
 """Says whether a wish, by its index, may have a track that is far enough from those of the wishes that have one."""
 
 
 def plan_tracks(
     seed: int,
-    wishes: Sequence[Wish],
+    wishes: Sequence[TrackRequest],
     *,
     area: float,
     spacing: float,
@@ -146,7 +146,7 @@ def plan_tracks(
 
 
 def _place(
-    rng: np.random.Generator, index: int, wish: Wish, board: _Board, *, plan: int, half: float, admit: Admit
+    rng: np.random.Generator, index: int, wish: TrackRequest, board: _Board, *, plan: int, half: float, admit: Admit
 ) -> int:
     """Put a track on the board, if one is found that keeps its distance and is admitted; how many were refused."""
     own_way = _TRIES * max(0.0, _OWN_WAY[0] + plan * _OWN_WAY[1])
@@ -156,7 +156,7 @@ def _place(
         for attempt in range(_TRIES)
     )
     found: Iterable[Track] = (track for tracks in drawn for track in tracks if board.apart(track, wish))
-    if plan and isinstance(wish, Staying):
+    if plan and isinstance(wish, SpotRequest):
         found = sorted(found, key=lambda track: board.elbow_room(track, wish, half))
     refusals = 0
     for track in found:
@@ -183,12 +183,12 @@ class _Board:
     def loops(self) -> list[Loop]:
         return [track for track in self.tracks.values() if isinstance(track, Loop)]
 
-    def add(self, index: int, track: Track, wish: Wish) -> None:
+    def add(self, index: int, track: Track, wish: TrackRequest) -> None:
         self.tracks[index] = track
         self._needs.append(_clearance(wish))
         self._taken = np.concatenate([self._taken, track.position(self._time)[None]])
 
-    def apart(self, track: Track, wish: Wish) -> bool:
+    def apart(self, track: Track, wish: TrackRequest) -> bool:
         """Whether a track keeps its distance from the middle, and from all the others at the same times."""
         if self._around and not self._clear_of_middle(track, wish):
             return False
@@ -212,14 +212,14 @@ class _Board:
                 return False
         return True
 
-    def _clear_of_middle(self, track: Track, wish: Wish) -> bool:
+    def _clear_of_middle(self, track: Track, wish: TrackRequest) -> bool:
         least = self._around + SWAY + _clearance(wish)
         if (np.hypot(*track.position(self._time).T) < least).any():
             return False
         fine = np.arange(self._time[0], self._time[-1], _FINE)
         return track.fastest == 0 or bool((np.hypot(*track.position(fine).T) >= least).all())
 
-    def elbow_room(self, spot: Track, wish: Wish, half: float) -> float:
+    def elbow_room(self, spot: Track, wish: TrackRequest, half: float) -> float:
         """How much further than it must be a spot is from the next track or from edges of the square, metres.
 
         Added up over both axes, so that it is least in corners.
@@ -234,30 +234,30 @@ def _distance(one: Floats, other: Floats) -> Floats:
     return np.hypot(other[..., 0] - one[..., 0], other[..., 1] - one[..., 1])
 
 
-def _clearance(wish: Wish) -> float:
-    return wish.clearance if isinstance(wish, Staying) else 0.0
+def _clearance(wish: TrackRequest) -> float:
+    return wish.clearance if isinstance(wish, SpotRequest) else 0.0
 
 
-def _urgency(wish: Wish, *, movers_first: bool) -> tuple[bool, float]:
+def _urgency(wish: TrackRequest, *, movers_first: bool) -> tuple[bool, float]:
     """Those who go about come before or after the others, and of these those first who need most room."""
-    return isinstance(wish, Staying) == movers_first, -_clearance(wish)
+    return isinstance(wish, SpotRequest) == movers_first, -_clearance(wish)
 
 
-def _heads(wish: Wish) -> int:
-    return 2 if isinstance(wish, Staying) and wish.together else 1
+def _heads(wish: TrackRequest) -> int:
+    return 2 if isinstance(wish, SpotRequest) and wish.together else 1
 
 
-def _bends(wish: Going, half: float) -> Bends:
-    return bends(wish.speed, slowest=wish.slowest, fastest=wish.fastest, half=half, running=wish.running)
+def _bends(wish: LoopRequest, half: float) -> LoopLimits:
+    return loop_limits(wish.speed, slowest=wish.slowest, fastest=wish.fastest, half=half, running=wish.running)
 
 
 def _draw(
-    rng: np.random.Generator, wish: Wish, board: _Board, *, half: float, wide: float, in_file: float
+    rng: np.random.Generator, wish: TrackRequest, board: _Board, *, half: float, wide: float, in_file: float
 ) -> Sequence[Track]:
     """Tracks to try, none or some; those of one loop begin at different places of it."""
-    if isinstance(wish, Staying):
+    if isinstance(wish, SpotRequest):
         return [draw_spot(rng, half=half - wish.clearance, apart=wish.together)]
-    if isinstance(wish, Replaying):
+    if isinstance(wish, RecordedRequest):
         recorded = draw_recorded(rng, half=half, time=wish.time, offset=wish.offset)
         return [] if recorded is None else [recorded]
     limits = _bends(wish, half)
@@ -280,13 +280,13 @@ def _draw(
     return [replace(loop, start=float(start) * loop.length) for start in starts]
 
 
-def _square(wish: Wish, half: float, limit: float, plan: int) -> float:
+def _square(wish: TrackRequest, half: float, limit: float, plan: int) -> float:
     """Return half the side of the square that a wish is to stay in, metres.
 
     It is ``half``, except for a recorded path that fits into it at no bearing: its square goes in equal steps, plan by
     plan, from the one that it fits at any bearing to ``limit``.
     """
-    if not isinstance(wish, Replaying):
+    if not isinstance(wish, RecordedRequest):
         return half
     extents = _extents(wish)
     if extents.min() <= 2 * half:
@@ -295,23 +295,23 @@ def _square(wish: Wish, half: float, limit: float, plan: int) -> float:
     return least + (limit - least) * plan / (_PLANS - 1)
 
 
-def _extents(wish: Replaying) -> Floats:
+def _extents(wish: RecordedRequest) -> Floats:
     """Return the sides of the squares around a recorded path, one for each of several bearings, metres."""
     return np.array([np.ptp(wish.offset @ axes, axis=0).max() for axes in _AXES])
 
 
-def _check_room(wish: Wish, half: float, limit: float) -> None:
+def _check_room(wish: TrackRequest, half: float, limit: float) -> None:
     """Raise ValueError if the area is too small for one of the wishes alone."""
     area = half + SWAY
     least = None
-    if isinstance(wish, Staying) and half <= wish.clearance:
+    if isinstance(wish, SpotRequest) and half <= wish.clearance:
         least = max(wish.clearance, SWAY) + SWAY
-    elif isinstance(wish, Going) and half < _NARROWEST:
+    elif isinstance(wish, LoopRequest) and half < _NARROWEST:
         least = _NARROWEST + SWAY
-    elif isinstance(wish, Going) and _bends(wish, half).speed < _bends(wish, half).slowest:
+    elif isinstance(wish, LoopRequest) and _bends(wish, half).speed < _bends(wish, half).slowest:
         grown = np.arange(half, half + 100.0, 0.05)
         least = next((float(h) for h in grown if _bends(wish, h).speed >= _bends(wish, h).slowest), grown[-1]) + SWAY
-    elif isinstance(wish, Replaying):
+    elif isinstance(wish, RecordedRequest):
         _check_recorded(wish, half, limit)
     if least is not None:
         raise ValueError(
@@ -320,7 +320,7 @@ def _check_room(wish: Wish, half: float, limit: float) -> None:
         )
 
 
-def _check_recorded(wish: Replaying, half: float, limit: float) -> None:
+def _check_recorded(wish: RecordedRequest, half: float, limit: float) -> None:
     """Raise ValueError if a recorded path fits into the largest square at no bearing."""
     extents = _extents(wish)
     if extents.min() <= 2 * limit:

@@ -54,10 +54,10 @@ class Trajectory:
 
     def at(self, time: ArrayLike) -> Floats:
         """Poses (..., 7) at times (...); before the first and after the last the thing stands still."""
-        return through_poses(self.time, self.pose, time)
+        return interpolate_poses(self.time, self.pose, time)
 
 
-def through(time: Floats, values: Floats, when: ArrayLike) -> Floats:
+def interpolate(time: Floats, values: Floats, when: ArrayLike) -> Floats:
     """The smooth curve through ``values`` (N, D) of ``time`` (N,) at times (...), (..., D).
 
     Cubic Hermite with central differences (Catmull and Rom, 1974): continuous velocity, and local, so that a curve
@@ -77,17 +77,17 @@ def through(time: Floats, values: Floats, when: ArrayLike) -> Floats:
     return (1 + 2 * s) * turn**2 * start + s * turn**2 * leaving + s**2 * (3 - 2 * s) * end + s**2 * turn * arriving
 
 
-def through_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
-    """As :func:`through` for poses (N, 7): quaternions w x y z are interpolated on the shorter way and kept unit."""
+def interpolate_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
+    """As :func:`interpolate` for poses (N, 7): quaternions w x y z are interpolated on the shorter way and kept unit."""
     flips = np.where((pose[1:, 3:] * pose[:-1, 3:]).sum(axis=1) < 0, -1.0, 1.0)
     signs = np.concatenate([np.ones(min(len(pose), 1)), np.cumprod(flips)])
     steady = np.concatenate([pose[:, :3], pose[:, 3:] * signs[:, None]], axis=1)
-    result = through(time, steady, when)
+    result = interpolate(time, steady, when)
     result[..., 3:] /= np.linalg.norm(result[..., 3:], axis=-1, keepdims=True)
     return result
 
 
-def posed(points: NDArray[np.floating], pose: Floats) -> Floats:
+def transform_points(points: NDArray[np.floating], pose: Floats) -> Floats:
     """Points (n, 3) of a thing's own frame in the world, where its pose (7,) puts them."""
     turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
     return np.asarray(points @ turn.T + pose[:3])

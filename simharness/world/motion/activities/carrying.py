@@ -11,11 +11,25 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.foot_placement import Print, carry_pelvis, hip_over, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import Foot, arm_angles, girdle, plant, pose_angles, reach_with
+from simharness.world.motion.poses.foot_placement import (
+    Footprint,
+    foot_path,
+    hip_position,
+    pelvis_from_hips,
+    spot_to_world,
+    stance,
+)
+from simharness.world.motion.poses.inverse_kinematics import (
+    Foot,
+    arm_angles,
+    pose_angles,
+    reach_with,
+    shoulder_girdle,
+    solve_legs,
+)
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
-from simharness.world.motion.poses.timing import glide, rounds
+from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import cycle_time, minimum_jerk
 from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
@@ -38,11 +52,11 @@ def carry(
     sense, big, tall, far = rng.uniform(size=4)
     stature = kinematics.body.stature
     depth, width = 0.14 * stature, (0.19 + 0.05 * big) * stature
-    u, marks = rounds(time, 2 * (1.2, 1.3, 1.5, 1.3, 1.1), rng=rng, pace=pace)
+    u, marks = cycle_time(time, 2 * (1.2, 1.3, 1.5, 1.3, 1.1), rng=rng, pace=pace)
     way = (1.0 if sense < 0.5 else -1.0) * (0.11 + 0.05 * far) * stature
 
     own = {side: stance(kinematics, side, apart=1.35, out=np.radians(18.0)).moved(0.05, -way / 2) for side in SIDES}
-    steps: dict[str, list[tuple[float, float, Print]]] = {side: [] for side in SIDES}
+    steps: dict[str, list[tuple[float, float, Footprint]]] = {side: [] for side in SIDES}
     low_keys, up_keys, hold_keys, aside_keys = ([(0.0, start)] for start in (0.0, 0.0, 0.0, -way / 2))
     aloft = np.zeros(len(time), bool)
     for first, there in ((0, way / 2), (5, -way / 2)):
@@ -56,12 +70,12 @@ def carry(
         order = ("left", "right") if there > 0 else ("right", "left")
         for side, starts in zip(order, (lifted + 0.05, lifted + half), strict=True):
             steps[side].append((starts, starts + 0.9 * half, own[side].moved(0.0, there + way / 2)))
-    low, up, hold, aside = (glide(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
-    feet = {side: tread(kinematics, track, u, own[side], steps[side], lift=0.04) for side in SIDES}
-    motion = _bend(kinematics, track, time, own["left"], low, up, aside, feet, at_ease(time, rng))
+    low, up, hold, aside = (minimum_jerk(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
+    feet = {side: foot_path(kinematics, track, u, own[side], steps[side], lift=0.04) for side in SIDES}
+    motion = _bend(kinematics, track, time, own["left"], low, up, aside, feet, relaxed_posture(time, rng))
 
     once = np.zeros(1)
-    standing = {side: tread(kinematics, track, once, own[side]) for side in SIDES}
+    standing = {side: foot_path(kinematics, track, once, own[side]) for side in SIDES}
     lowest = _bend(kinematics, track, once, own["left"], once + 1, once, once - way / 2, standing, {})
     (shoulders,) = _in_spot(track, _shoulders(kinematics, lowest))
     arm = kinematics.arms["left"]
@@ -82,10 +96,10 @@ def carry(
     close = arm_angles(kinematics, shoulder_flexion=20.0, shoulder_abduction=8.0, elbow_flexion=75.0)
     grasp = stretched + up[:, None] * (close - stretched)
     for side, outward in zip(SIDES, (1.0, -1.0), strict=True):
-        place = in_world(track, box + grip + [0.0, outward * width / 2, 0.0])
+        place = spot_to_world(track, box + grip + [0.0, outward * width / 2, 0.0])
         motion = reach_with(kinematics, motion, side, place, weight=hold, guess=grasp)
     turn = np.tile([np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)], (len(time), 1))
-    pose = np.concatenate([in_world(track, box), turn], axis=1)
+    pose = np.concatenate([spot_to_world(track, box), turn], axis=1)
     return Performance((motion,), (Prop("box", (float(depth), float(width), float(height)), Trajectory(time, pose)),))
 
 
@@ -93,7 +107,7 @@ def _bend(
     kinematics: Kinematics,
     spot: Spot,
     time: Floats,
-    foot: Print,
+    foot: Footprint,
     low: Floats,
     up: Floats,
     aside: Floats,
@@ -104,19 +118,19 @@ def _bend(
     blend(curves, low, lumbar_flexion=42.0, thorax_flexion=28.0, neck_flexion=-12.0, thorax_rotation=0.0)
     blend(curves, up, lumbar_flexion=-3.0, thorax_rotation=0.0)
     blend(curves, low, **limbs(shoulder_flexion=75.0, shoulder_abduction=8.0, elbow_flexion=15.0))
-    hip = hip_over(
+    hip = hip_position(
         kinematics, shank=np.radians(5.0 + 14.0 * low + 11.0 * up), thigh=np.radians(7.0 + 88.0 * low + 15.0 * up)
     )
     hip[:, 0] += foot.place[0]
-    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=np.radians(1.0 + 20.0 * low - 4.0 * up), aside=aside)
-    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=np.radians(1.0 + 20.0 * low - 4.0 * up), aside=aside)
+    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
 def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:
     """The middle between the shoulders in the world, (T, 3) metres."""
     ends = []
     for side in SIDES:
-        turn, place = girdle(kinematics, motion, side)
+        turn, place = shoulder_girdle(kinematics, motion, side)
         ends.append(turn @ kinematics.arms[side].anchors[0] + place)
     return (ends[0] + ends[1]) / 2
 
@@ -124,4 +138,4 @@ def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:
 def _in_spot(spot: Spot, place: Floats) -> Floats:
     """Points (T, 3) of the world in the spot's frame."""
     back = Spot(np.zeros(2), -spot.bearing)
-    return in_world(back, place - [*spot.place, 0.0])
+    return spot_to_world(back, place - [*spot.place, 0.0])

@@ -8,11 +8,11 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import PEELING, carry_pelvis, hip_over, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles
+from simharness.world.motion.poses.foot_placement import PEELING, foot_path, hip_position, pelvis_from_hips, stance
+from simharness.world.motion.poses.inverse_kinematics import pose_angles, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, limbs
-from simharness.world.motion.poses.timing import glide, rounds, wander
+from simharness.world.motion.poses.posture import Curves, blend, limb, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
 _ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()  # pitch of the foot behind a kneeling leg, and at most
@@ -24,9 +24,9 @@ _OTHER = {"left": "right", "right": "left"}
 def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Bend the knees until the thighs are nearly level, heels down, arms forward for balance, and come up again."""
     deep, wide, arms, head = rng.uniform(size=4)
-    u, marks = rounds(time, (1.2, 0.5, 1.2, 0.7), rng=rng, pace=pace)
-    low = glide(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
-    curves = at_ease(time, rng)
+    u, marks = cycle_time(time, (1.2, 0.5, 1.2, 0.7), rng=rng, pace=pace)
+    low = minimum_jerk(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
+    curves = relaxed_posture(time, rng)
     blend(
         curves,
         low,
@@ -36,13 +36,15 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         neck_flexion=-8.0 - 10 * head,
     )
     lean = np.radians(2.0 + 26.0 * low)
-    hip = hip_over(kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + (55.0 + 23.0 * deep) * low))
+    hip = hip_position(
+        kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + (55.0 + 23.0 * deep) * low)
+    )
     own = {side: stance(kinematics, side, apart=1.05 + 0.3 * wide, out=np.radians(10 + 8 * wide)) for side in SIDES}
     hip[:, 0] += own["left"].place[0] + 0.1  # the spot is in the middle of where the pelvis goes
     own = {side: foot.moved(0.1) for side, foot in own.items()}
-    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean, aside=0.004 * wander(time, rng, 0.2))
-    feet = {side: tread(kinematics, spot, time, own[side]) for side in SIDES}
-    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=0.004 * smooth_noise(time, rng, 0.2))
+    feet = {side: foot_path(kinematics, spot, time, own[side]) for side in SIDES}
+    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
 @solo_activity("kneel", clearance=0.5)
@@ -51,32 +53,32 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     handed, bow, look = rng.uniform(size=3)
     back = "right" if handed < 0.6 else "left"
     front = _OTHER[back]
-    u, marks = rounds(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
+    u, marks = cycle_time(time, (0.8, 0.9, 0.9, 0.9, 0.8, 0.5), rng=rng, pace=pace)
     stepped, down, stayed, up, home, _ = marks[1:]
 
     def through(standing: float, lunging: float, kneeling: float) -> Floats:
         keys = ((0.0, standing), (stepped, lunging), (down, kneeling), (stayed, kneeling), (up, lunging))
-        return glide(u, *keys, (home, standing))
+        return minimum_jerk(u, *keys, (home, standing))
 
     shank, thigh, on_toes = _kneeling(kinematics)
     pitch = np.radians(through(0.0, -38.0, np.degrees(on_toes)))
-    hip = hip_over(
+    hip = hip_position(
         kinematics,
         shank=np.radians(through(3.0, 52.0, np.degrees(shank))),
         thigh=np.radians(through(5.0, -30.0, np.degrees(thigh))),
         pitch=pitch,
     )
-    knelt = hip_over(kinematics, shank=shank, thigh=thigh, pitch=on_toes)
+    knelt = hip_position(kinematics, shank=shank, thigh=thigh, pitch=on_toes)
     half = knelt[0] / 2  # the spot is in the middle of where the pelvis goes
     behind, before = (stance(kinematics, side).moved(-half) for side in (back, front))
     there = before.moved(_before(kinematics, knelt))
     hip[:, 0] += behind.place[0]
     aside = 0.35 * behind.place[1] * through(0.0, 1.0, 0.3)
     lean = np.radians(through(1.0, 8.0, 3.0 + 4.0 * bow))
-    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean, aside=aside)
+    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
     feet = {
-        back: tread(kinematics, spot, time, behind, pitch=pitch),
-        front: tread(
+        back: foot_path(kinematics, spot, time, behind, pitch=pitch),
+        front: foot_path(
             kinematics,
             spot,
             u,
@@ -85,11 +87,11 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
             lift=0.09,
         ),
     }
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     low = through(0.0, 0.15, 1.0)
     _rest_on_knee(curves, low, front)
     blend(curves, low, lumbar_flexion=8.0 + 10 * bow, thorax_flexion=5.0 + 8 * bow, neck_flexion=10.0 * look)
-    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
 @solo_activity("crouch", clearance=0.4)
@@ -99,36 +101,36 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     back = "right" if handed < 0.6 else "left"
     front = _OTHER[back]
     rate = 0.3 * pace
-    fidget = wander(time, rng, rate)
+    fidget = smooth_noise(time, rng, rate)
     pitch, shank = np.radians(-42.0), np.radians(58.0)
     thigh = np.radians(52.0 + 14.0 * deep)
-    middle = hip_over(kinematics, shank=shank, thigh=thigh, pitch=pitch)
-    hip = hip_over(kinematics, shank=shank - 0.06 * fidget, thigh=thigh + np.radians(12.0) * fidget, pitch=pitch)
+    middle = hip_position(kinematics, shank=shank, thigh=thigh, pitch=pitch)
+    hip = hip_position(kinematics, shank=shank - 0.06 * fidget, thigh=thigh + np.radians(12.0) * fidget, pitch=pitch)
     behind = stance(kinematics, back).moved(-middle[0])
     before = stance(kinematics, front).moved(_before(kinematics, middle, shank=np.radians(12.0)) - middle[0])
     hip[:, 0] += behind.place[0]
-    lean = np.radians(16.0 + 8.0 * wander(time, rng, rate))
-    aside = 0.035 * wander(time, rng, rate)
-    pelvis, height = carry_pelvis(
-        kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * wander(time, rng, rate)
+    lean = np.radians(16.0 + 8.0 * smooth_noise(time, rng, rate))
+    aside = 0.035 * smooth_noise(time, rng, rate)
+    pelvis, height = pelvis_from_hips(
+        kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * smooth_noise(time, rng, rate)
     )
     feet = {
-        back: tread(kinematics, spot, time, behind, pitch=pitch),
-        front: tread(kinematics, spot, time, before),
+        back: foot_path(kinematics, spot, time, behind, pitch=pitch),
+        front: foot_path(kinematics, spot, time, before),
     }
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     on = np.ones(len(time))
     _rest_on_knee(curves, on, front)
     blend(
         curves,
         on,
-        lumbar_flexion=14.0 + 10.0 * wander(time, rng, rate),
+        lumbar_flexion=14.0 + 10.0 * smooth_noise(time, rng, rate),
         thorax_flexion=10.0,
-        thorax_rotation=22.0 * wander(time, rng, rate),
-        neck_flexion=-14.0 + 8.0 * wander(time, rng, rate),
-        neck_rotation=35.0 * wander(time, rng, rate),
+        thorax_rotation=22.0 * smooth_noise(time, rng, rate),
+        neck_flexion=-14.0 + 8.0 * smooth_noise(time, rng, rate),
+        neck_rotation=35.0 * smooth_noise(time, rng, rate),
     )
-    return plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
 def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:

@@ -8,11 +8,11 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import Print, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.foot_placement import Footprint, foot_path, spot_to_world, stance
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import at_ease, blend, limb
-from simharness.world.motion.poses.timing import glide, wander
+from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
+from simharness.world.motion.poses.timing import minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
 _BAR = 4  # beats: step, touch, step back, touch
@@ -41,30 +41,30 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     away = {side: foot.moved(0.0, way) for side, foot in own.items()}
     on = [(k + 0.25) / beat for k in range(_BAR)]
     lasts = 0.65 / beat
-    steps: dict[str, list[tuple[float, float, Print]]] = {
+    steps: dict[str, list[tuple[float, float, Footprint]]] = {
         lead: [(on[0], on[0] + lasts, away[lead]), (on[3], on[3] + lasts, own[lead])],
         other: [(on[1], on[1] + lasts, away[other]), (on[2], on[2] + lasts, own[other])],
     }
 
     def stances(count: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         u = np.mod(count, _BAR) / beat  # seconds since the bar began
-        aside = glide(u, (0.0, -way / 2), (1.5 / beat, way / 2), (2.0 / beat, way / 2), (3.5 / beat, -way / 2))
+        aside = minimum_jerk(u, (0.0, -way / 2), (1.5 / beat, way / 2), (2.0 / beat, way / 2), (3.5 / beat, -way / 2))
         sway, dip = np.sin(np.pi * count), 0.5 - 0.5 * np.cos(2 * np.pi * count)
         pelvis = Pelvis(
-            ground=in_world(spot, np.stack([0.01 * sway, aside], axis=-1)),
+            ground=spot_to_world(spot, np.stack([0.01 * sway, aside], axis=-1)),
             bob=-(0.012 + 0.02 * bouncy) * kinematics.leg_length / 0.8 * dip,
             bearing=spot.bearing + np.radians((4.0 + 8.0 * twisty) * np.sin(0.5 * np.pi * count)),
             lean=np.radians(3.0 + 2.0 * dip),
             list=np.radians((1.5 + 2.0 * twisty) * sway),
         )
         high = 0.05 + 0.03 * bouncy
-        return pelvis, {side: tread(kinematics, spot, u, own[side], steps[side], lift=high) for side in SIDES}
+        return pelvis, {side: foot_path(kinematics, spot, u, own[side], steps[side], lift=high) for side in SIDES}
 
     swing, sway = np.sin(0.5 * np.pi * count), np.sin(np.pi * count)  # once a bar, every two beats
     dip = 0.5 - 0.5 * np.cos(2 * np.pi * count)  # every beat
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     always = np.ones(len(time))
-    raised = 0.5 + 0.5 * np.tanh(5.0 * wander(time, rng, 0.12) - 0.5)  # arms come up now and then
+    raised = 0.5 + 0.5 * np.tanh(5.0 * smooth_noise(time, rng, 0.12) - 0.5)  # arms come up now and then
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         pump = np.sin(np.pi * count + (0.0 if sign > 0 else np.pi) + 0.6)
         blend(
@@ -101,7 +101,7 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         neck_flexion=2.0 + 8.0 * dip * bouncy,
     )
     pelvis, feet = stances(count)
-    return stand_on(
+    return solve_standing(
         kinematics,
         time,
         pelvis,

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
-from simharness.world.motion.poses.foot_roll import Rolling
+from simharness.world.motion.poses.foot_roll import FootRoll
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import smoothstep
 
@@ -44,7 +44,7 @@ _CLEARANCE = 0.02  # metres between the swinging foot and the floor
 _SAMPLES = 240
 
 
-def normative(phase: ArrayLike) -> Floats:
+def normative_angles(phase: ArrayLike) -> Floats:
     """Flexion of hip and knee and dorsiflexion of the ankle, (..., 3) radians, at shares (...) of the stride."""
     phase = np.mod(phase, 1.0)
     return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
@@ -84,7 +84,7 @@ class Gait:
     lift: Floats
     progress: Floats
     foot_off: float
-    rolling: Rolling
+    rolling: FootRoll
 
     @property
     def speed(self) -> float:
@@ -113,7 +113,7 @@ class Gait:
 
     def leg(self, phase: Floats) -> Floats:
         """Flexion of hip and knee and dorsiflexion of the ankle on a straight way, (..., 3) radians."""
-        return self.vigour * normative(phase)
+        return self.vigour * normative_angles(phase)
 
 
 def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
@@ -141,7 +141,7 @@ def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gai
     phase, swing = played.phase, played.phase >= FOOT_OFF
     ahead = played.print_x + stride * phase - played.lead
     progress = np.zeros(len(phase))
-    progress[swing] = pinned(phase[swing], ahead[swing] / stride, 0.0, 1.0)
+    progress[swing] = pin_ends(phase[swing], ahead[swing] / stride, 0.0, 1.0)
     hasted = np.minimum(FOOT_OFF + _HASTE * (phase - FOOT_OFF), 1.0)
     progress[swing] = PchipInterpolator(phase[swing], progress[swing])(hasted[swing])
     along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
@@ -174,9 +174,9 @@ class _Played:
     lead: float
 
 
-def _play(kinematics: Kinematics, rolling: Rolling, vigour: float) -> _Played:
+def _play(kinematics: Kinematics, rolling: FootRoll, vigour: float) -> _Played:
     phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    curves = vigour * normative(phase)
+    curves = vigour * normative_angles(phase)
     order = kinematics.leg_order
     angles = np.zeros((len(phase), len(order)))
     angles[:, [order.index(name) for name in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]] = curves
@@ -185,7 +185,7 @@ def _play(kinematics: Kinematics, rolling: Rolling, vigour: float) -> _Played:
     hip, knee, ankle = curves.T
     pitch = hip - knee + ankle
     pitch = np.where(pitch < 0, pitch / (1 - pitch / _STIFF_TOES), pitch)
-    pitch = np.where(phase < FOOT_OFF, flattened(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
+    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
     print_x = place[:, 0] - rolling.at(pitch)[0]
     # While the foot is planted, from its strike to that of the other, the pelvis covers half a stride over it; the
     # curves do not do so at quite constant speed, which the pelvis will have.
@@ -195,7 +195,7 @@ def _play(kinematics: Kinematics, rolling: Rolling, vigour: float) -> _Played:
     return _Played(phase, pitch, print_x, stride, lead)
 
 
-def flattened(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats:
+def flatten_stance(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats:
     """The pitch of a stance foot that comes down smoothly, lies quite flat, and then rises as the curves say.
 
     Args:
@@ -210,7 +210,7 @@ def flattened(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats
     return np.where(phase < down, landing(np.minimum(phase, down)), rise * pitch)
 
 
-def pinned(x: Floats, y: Floats, first: float, last: float) -> Floats:
+def pin_ends(x: Floats, y: Floats, first: float, last: float) -> Floats:
     """The curve ``y`` of ``x`` bent by a cubic so that it goes from first to last without velocity at either end."""
     slope = np.gradient(y, x)
     fault = CubicSpline(x[[0, -1]], [y[0] - first, y[-1] - last], bc_type=((1, slope[0]), (1, slope[-1])))

@@ -10,11 +10,11 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
+from simharness.world.motion.poses.inverse_kinematics import Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, at_ease, blend, limb, some_side
-from simharness.world.motion.poses.timing import strokes, wander
+from simharness.world.motion.poses.posture import Curves, blend, draw_side, limb, relaxed_posture
+from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
 _STRAIGHTEST = np.radians(8.0)  # knees at ease
@@ -53,8 +53,8 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
         time: seconds, (T,).
         rng: draws which arm, the rhythm, and the manner.
     """
-    curves = at_ease(time, rng)
-    curves |= {"forward": 0.006 * wander(time, rng, 0.2), "aside": _SHIFT * wander(time, rng, 0.12)}
+    curves = relaxed_posture(time, rng)
+    curves |= {"forward": 0.006 * smooth_noise(time, rng, 0.2), "aside": _SHIFT * smooth_noise(time, rng, 0.12)}
     GESTURES[name](curves, time, rng)
 
     forward, aside = curves.pop("forward"), curves.pop("aside")
@@ -62,12 +62,12 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
         spot, forward, aside, turned=0.3 * curves["thorax_rotation"], lean=0.15 * curves["lumbar_flexion"]
     )
     curves["lumbar_bending"] = np.degrees(pelvis.list)
-    feet = {side: tread(kinematics, spot, time, stance(kinematics, side)) for side in SIDES}
+    feet = {side: foot_path(kinematics, spot, time, stance(kinematics, side)) for side in SIDES}
     # The height must hold for all that the pelvis ever does, not only for what it does in these seconds.
     ends = np.array([[ahead, left] for ahead in (-_FURTHEST, _FURTHEST) for left in (-_FURTHEST, _FURTHEST)])
     corners = _shifted(spot, *ends.T, turned=np.zeros(4), lean=np.zeros(4))
-    planted = {side: tread(kinematics, spot, np.zeros(4), stance(kinematics, side)) for side in SIDES}
-    return stand_on(
+    planted = {side: foot_path(kinematics, spot, np.zeros(4), stance(kinematics, side)) for side in SIDES}
+    return solve_standing(
         kinematics,
         time,
         pelvis,
@@ -81,7 +81,7 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
 def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean: Floats) -> Pelvis:
     """The pelvis of a person who stands, forward and aside of the spot by metres (T,), turned and leaning (degrees)."""
     return Pelvis(
-        ground=in_world(spot, np.stack([forward, aside], axis=-1)),
+        ground=spot_to_world(spot, np.stack([forward, aside], axis=-1)),
         bob=np.zeros(len(forward)),
         bearing=spot.bearing + np.radians(turned),
         lean=np.radians(lean),
@@ -92,14 +92,14 @@ def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean
 @_gesture("stand")
 def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """Nothing but shifting weight and looking around a little more."""
-    curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * wander(time, rng, 0.12)
+    curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * smooth_noise(time, rng, 0.12)
 
 
 @_gesture("wave")
 def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """The hand goes up beside the head, palm forward, and waves from the elbow."""
-    side, _ = some_side(rng)
-    on = strokes(time, rng, hold=2.4, rest=0.5)
+    side, _ = draw_side(rng)
+    on = gesture_envelope(time, rng, hold=2.4, rest=0.5)
     beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
     arm = limb(
         side,
@@ -117,15 +117,15 @@ def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 @_gesture("point")
 def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """A straight arm points at something that the eyes follow too."""
-    side, sign = some_side(rng)
-    on = strokes(time, rng, hold=2.0, rest=0.6)
-    away = rng.uniform(-10, 45) + 10.0 * wander(time, rng, 0.3)  # to the arm's side
+    side, sign = draw_side(rng)
+    on = gesture_envelope(time, rng, hold=2.0, rest=0.6)
+    away = rng.uniform(-10, 45) + 10.0 * smooth_noise(time, rng, 0.3)  # to the arm's side
     blend(
         curves,
         on,
         **limb(
             side,
-            shoulder_flexion=rng.uniform(72, 100) + 4.0 * wander(time, rng, 0.3),
+            shoulder_flexion=rng.uniform(72, 100) + 4.0 * smooth_noise(time, rng, 0.3),
             shoulder_abduction=away,
             shoulder_rotation=0.0,
             elbow_flexion=6.0,
@@ -143,18 +143,18 @@ def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
     """Both hands in front of the belly, beating along with what is said; the head nods."""
     for side in SIDES:
-        on = strokes(time, rng, hold=3.0, rest=0.5)
+        on = gesture_envelope(time, rng, hold=3.0, rest=0.5)
         blend(
             curves,
             on,
             **limb(
                 side,
-                shoulder_flexion=20.0 + 9.0 * wander(time, rng, 0.5),
-                shoulder_abduction=13.0 + 5.0 * wander(time, rng, 0.4),
-                shoulder_rotation=16.0 + 14.0 * wander(time, rng, 0.6),
-                elbow_flexion=82.0 + 18.0 * wander(time, rng, 0.7),
-                forearm_pronation=-10.0 + 30.0 * wander(time, rng, 0.5),
-                wrist_flexion=12.0 * wander(time, rng, 0.8),
+                shoulder_flexion=20.0 + 9.0 * smooth_noise(time, rng, 0.5),
+                shoulder_abduction=13.0 + 5.0 * smooth_noise(time, rng, 0.4),
+                shoulder_rotation=16.0 + 14.0 * smooth_noise(time, rng, 0.6),
+                elbow_flexion=82.0 + 18.0 * smooth_noise(time, rng, 0.7),
+                forearm_pronation=-10.0 + 30.0 * smooth_noise(time, rng, 0.5),
+                wrist_flexion=12.0 * smooth_noise(time, rng, 0.8),
             ),
         )
-    curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * wander(time, rng, 0.8)
+    curves["neck_flexion"] = curves["neck_flexion"] + 4.0 * smooth_noise(time, rng, 0.8)

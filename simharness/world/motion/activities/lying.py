@@ -10,11 +10,18 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import Print, carry_pelvis, hip_over, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import arm_angles, plant, pose_angles, reach_with
+from simharness.world.motion.poses.foot_placement import (
+    Footprint,
+    foot_path,
+    hip_position,
+    pelvis_from_hips,
+    spot_to_world,
+    stance,
+)
+from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, at_ease, blend, limbs
-from simharness.world.motion.poses.timing import ease, glide, rounds, wander
+from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
 _SITTING = 0.68  # of the leg's length: from ankles to hips of one who sits on the floor, knees up
@@ -58,13 +65,13 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     """Go down to the floor, lie on the back for a while, and get up the same way."""
     open_, wide = rng.uniform(size=2)
     lasting = (1.1, 1.1, 1.2, 1.1, 1.6, 1.0, 1.2, 1.1, 1.1, 0.5)
-    u, marks = rounds(time, lasting, rng=rng, pace=pace)
+    u, marks = cycle_time(time, lasting, rng=rng, pace=pace)
     squatted, sat, lain, stretched, stirred, bent, curled, raised, stood, _ = marks[1:]
 
     def through(*values: float) -> Floats:
         """Values when standing, squatting, sitting, lying, and on the way back."""
         down = zip((0.0, squatted, sat, lain), values, strict=True)
-        return glide(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
+        return minimum_jerk(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
 
     low, down, roll = through(0.0, 1.0, 1.0, 1.0), through(0.0, 0.0, 1.0, 1.0), through(0.0, 0.0, 0.0, 1.0)
     length = kinematics.leg_length
@@ -75,27 +82,29 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     feet = {}
     for side, late in zip(SIDES, (0.0, 0.3), strict=True):
         ahead = float(lying + _STRETCHED * length - kinematics.rolling.at(np.asarray(_TOES_UP))[0])
-        far = Print((ahead, own[side].place[1] * (0.9 + 0.5 * open_)), own[side].bearing, pitch=_TOES_UP)
+        far = Footprint((ahead, own[side].place[1] * (0.9 + 0.5 * open_)), own[side].bearing, pitch=_TOES_UP)
         out = (lain + late * (stretched - lain), stretched - (0.3 - late) * (stretched - lain))
         home = (stirred + late * (bent - stirred), bent - (0.3 - late) * (bent - stirred))
-        bent_knee = 1.0 - glide(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
+        bent_knee = 1.0 - minimum_jerk(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
         steps = [(*out, far), (*home, own[side])]
-        feet[side] = tread(kinematics, spot, u, own[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0)
+        feet[side] = foot_path(
+            kinematics, spot, u, own[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0
+        )
 
     trunk = _trunk(roll)
-    squatting = hip_over(kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + 73.0 * low))
+    squatting = hip_position(kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + 73.0 * low))
     floor = np.stack([-(_SITTING + _BACK * roll) * length, _hip_height(kinematics, roll)], axis=-1)
     hip = squatting + down[:, None] * (floor - squatting)
     hip[:, 0] += ankle
     upright = 2.0 + 20.0 * low
     lean = np.radians(upright + down * (trunk.pop("lean") - upright))
-    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean)
+    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean)
 
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     blend(curves, low, lumbar_flexion=18.0, thorax_flexion=12.0, neck_flexion=-8.0, thorax_rotation=0.0)
     blend(curves, low * (1 - down), **limbs(shoulder_flexion=70.0, elbow_flexion=15.0))
-    blend(curves, down, **trunk, neck_rotation=14.0 * roll * wander(time, rng, 0.12))
-    motion = plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    blend(curves, down, **trunk, neck_rotation=14.0 * roll * smooth_noise(time, rng, 0.12))
+    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
     # The hands support the body behind the hips, and lie beside them in the end.
     seat = ankle - _SITTING * length
@@ -120,7 +129,7 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
             kinematics,
             motion,
             side,
-            in_world(spot, place),
+            spot_to_world(spot, place),
             turn=turn,
             weight=ease(down / 0.7),
             guess=guess,
@@ -148,12 +157,12 @@ def _hip_height(kinematics: Kinematics, roll: Floats) -> Floats:
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     lying = np.isin(most, [body.index(name) for name in _LYING])
     own = {side: stance(kinematics, side, out=_OUT) for side in SIDES}
-    feet = {side: tread(kinematics, spot, share, own[side], pitch=_HEELS) for side in SIDES}
+    feet = {side: foot_path(kinematics, spot, share, own[side], pitch=_HEELS) for side in SIDES}
     height = np.full(_SAMPLES, 0.1)
     for _ in range(2):
         hip = np.stack([own["left"].place[0] - (_SITTING + _BACK * share) * length, height], axis=-1)
-        pelvis, up = carry_pelvis(kinematics, spot, hip, lean=lean)
-        motion = plant(kinematics, share, pelvis, up, feet, pose_angles(_SAMPLES, **trunk))
+        pelvis, up = pelvis_from_hips(kinematics, spot, hip, lean=lean)
+        motion = solve_legs(kinematics, share, pelvis, up, feet, pose_angles(_SAMPLES, **trunk))
         lowest = [body.skin(pose)[lying, 2].min() for pose in kinematics.transforms(motion)]
         height = height + _SPARE - np.array(lowest, float)
     return PchipInterpolator(share, height)(roll)

@@ -8,26 +8,32 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import carry_pelvis, hip_over, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import arm_angles, plant, pose_angles, reach_with
+from simharness.world.motion.poses.foot_placement import (
+    foot_path,
+    hip_position,
+    pelvis_from_hips,
+    spot_to_world,
+    stance,
+)
+from simharness.world.motion.poses.inverse_kinematics import arm_angles, pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import at_ease, blend, limb, some_side
-from simharness.world.motion.poses.timing import glide, rounds, wander
+from simharness.world.motion.poses.posture import blend, draw_side, limb, relaxed_posture
+from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
 
 @solo_activity("reach", clearance=0.2)
 def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
     """Reach for something on a high shelf, on one's toes, then for something low in front, with bent knees."""
-    side, sign = some_side(rng)
+    side, sign = draw_side(rng)
     tall, deep, across = rng.uniform(size=3)
-    u, marks = rounds(time, (1.1, 0.5, 1.0, 0.3, 1.1, 0.5, 1.1, 0.4), rng=rng, pace=pace)
-    high = glide(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
-    low = glide(u, (marks[4], 0.0), (marks[5], 1.0), (marks[6], 1.0), (marks[7], 0.0))
+    u, marks = cycle_time(time, (1.1, 0.5, 1.0, 0.3, 1.1, 0.5, 1.1, 0.4), rng=rng, pace=pace)
+    high = minimum_jerk(u, (0.0, 0.0), (marks[1], 1.0), (marks[2], 1.0), (marks[3], 0.0))
+    low = minimum_jerk(u, (marks[4], 0.0), (marks[5], 1.0), (marks[6], 1.0), (marks[7], 0.0))
 
     tiptoe = np.radians(-18.0 * tall) * high
     lean = np.radians(2.0 + 24.0 * low)
-    hip = hip_over(
+    hip = hip_position(
         kinematics,
         shank=np.radians(6.0 + (7.0 + 8.0 * deep) * low),
         thigh=np.radians(7.0 + (24.0 + 30.0 * deep) * low),
@@ -35,10 +41,10 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     )
     own = {foot: stance(kinematics, foot, apart=1.15).moved(0.06) for foot in SIDES}
     hip[:, 0] += own["left"].place[0]
-    aside = 0.012 * sign * np.maximum(high, low) + 0.005 * wander(time, rng, 0.2)
-    pelvis, height = carry_pelvis(kinematics, spot, hip, lean=lean, aside=aside)
-    feet = {foot: tread(kinematics, spot, time, own[foot], pitch=tiptoe) for foot in SIDES}
-    curves = at_ease(time, rng)
+    aside = 0.012 * sign * np.maximum(high, low) + 0.005 * smooth_noise(time, rng, 0.2)
+    pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
+    feet = {foot: foot_path(kinematics, spot, time, own[foot], pitch=tiptoe) for foot in SIDES}
+    curves = relaxed_posture(time, rng)
     blend(
         curves,
         high,
@@ -58,7 +64,7 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         thorax_rotation=-sign * 14.0,
         neck_flexion=2.0,
     )
-    motion = plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
     arm = kinematics.arms[side]
     shoulder, length = arm.anchors[0], float(np.linalg.norm(arm.end - arm.anchors[0]))
@@ -66,7 +72,7 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     shelf = np.array([0.38 * length, shoulder[1] + sign * 0.1 * (across - 0.5), top])
     bottom = np.array([0.62 * length + 0.2, 0.5 * shoulder[1], (0.55 - 0.35 * deep) * kinematics.leg_length])
     for on, target, flexion in ((high, shelf, 125.0), (low, bottom, 75.0)):
-        place = np.tile(in_world(spot, target), (len(time), 1))
+        place = np.tile(spot_to_world(spot, target), (len(time), 1))
         guess = arm_angles(kinematics, shoulder_flexion=flexion, shoulder_abduction=8.0, elbow_flexion=20.0)
         motion = reach_with(kinematics, motion, side, place, weight=on, guess=guess)
     return motion

@@ -14,11 +14,11 @@ from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.activities.gait import Gait, Knots, flattened, periodic, pinned
+from simharness.world.motion.activities.gait import Gait, Knots, flatten_stance, periodic, pin_ends
 from simharness.world.motion.activities.walking import footsteps, laps
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
 from simharness.world.motion.registry import solo_activity
@@ -103,7 +103,7 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
         **{f"{side}_clavicle_elevation": 3.0 for side in SIDES},
     )
     lap, strides = laps(loop, stride)
-    return stand_on(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+    return solve_standing(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
 
 
 def _bank(loop: Loop, time: Floats) -> Floats:
@@ -111,7 +111,7 @@ def _bank(loop: Loop, time: Floats) -> Floats:
     return np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.3, 0.3)
 
 
-def normative(phase: ArrayLike) -> Floats:
+def normative_angles(phase: ArrayLike) -> Floats:
     """Flexion of hip and knee and dorsiflexion of the ankle, (..., 3) radians, at shares (...) of the stride."""
     phase = np.mod(phase, 1.0)
     return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
@@ -142,7 +142,7 @@ def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> G
     lead = float(np.mean(print_x[stance] + stride * phase[stance])) - _EARLY * stride
     progress = np.zeros(len(phase))
     ahead = (print_x + stride * phase - lead) / stride
-    progress[swing] = pinned(phase[swing], ahead[swing], 0.0, 1.0)
+    progress[swing] = pin_ends(phase[swing], ahead[swing], 0.0, 1.0)
     # A wave of two periods a stride of which the top is the flight: it would fall freely there at an acceleration of g,
     # but the flight is short, and what the wave lacks around it flattens it.
     bob = _FLATTENED * _GRAVITY / (4 * np.pi * frequency) ** 2
@@ -171,12 +171,12 @@ def _swept(kinematics: Kinematics, vigour: float) -> float:
 def _play(kinematics: Kinematics, vigour: float) -> tuple[Floats, Floats, Floats]:
     """The curves on a body: phase (n,), the foot's pitch (n,), and its print (n,) before the pelvis."""
     phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    hip, knee, ankle = (vigour * normative(phase)).T
+    hip, knee, ankle = (vigour * normative_angles(phase)).T
     order = kinematics.leg_order
     angles = np.zeros((len(phase), len(order)))
     for name, curve in (("hip_flexion", hip), ("knee_flexion", knee), ("ankle_dorsiflexion", ankle)):
         angles[:, order.index(name)] = curve
     _, place = kinematics.legs["left"].forward(angles)
     pitch = hip - knee + ankle
-    pitch = np.where(phase < FOOT_OFF, flattened(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
+    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
     return phase, pitch, place[:, 0] - kinematics.rolling.at(pitch)[0]

@@ -11,11 +11,17 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.foot_placement import carry_pelvis, hip_over, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles, reach_with
+from simharness.world.motion.poses.foot_placement import (
+    foot_path,
+    hip_position,
+    pelvis_from_hips,
+    spot_to_world,
+    stance,
+)
+from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import at_ease, blend, limbs
-from simharness.world.motion.poses.timing import ease, glide, rounds
+from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk
 from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
@@ -59,11 +65,11 @@ def sit(
     (kinematics,) = performers
     assert isinstance(track, Spot)
     low, wide, slouch, along = rng.uniform(size=4)
-    u, marks = rounds(time, (1.4, 2.2, 1.4, 0.8), rng=rng, pace=pace)
+    u, marks = cycle_time(time, (1.4, 2.2, 1.4, 0.8), rng=rng, pace=pace)
     seat = fit_seat(kinematics, below_knee=0.05 + 0.04 * low)
     down, rising, stood = marks[1:4]
-    seated = glide(u, (0.05 * down, 0.0), (0.85 * down, 1.0), (rising + 0.25 * down, 1.0), (stood, 0.0))
-    bow = glide(
+    seated = minimum_jerk(u, (0.05 * down, 0.0), (0.85 * down, 1.0), (rising + 0.25 * down, 1.0), (stood, 0.0))
+    bow = minimum_jerk(
         u, (0.0, 0.0), (0.6 * down, 1.0), (1.2 * down, 0.0), (rising - 0.4, 0.0), (rising + 0.4, 1.0), (stood, 0.0)
     )
     lean = np.radians(1.0 - (5.0 + 4.0 * slouch) * seated + 30.0 * bow)
@@ -73,19 +79,19 @@ def sit(
     own = {side: stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
     ankle = own["left"].place[0]
     hip[:, 0] += ankle
-    pelvis, height = carry_pelvis(kinematics, track, hip, lean=lean)
-    curves = at_ease(time, rng)
+    pelvis, height = pelvis_from_hips(kinematics, track, hip, lean=lean)
+    curves = relaxed_posture(time, rng)
     blend(curves, seated, lumbar_flexion=6.0 + 6 * slouch, thorax_flexion=4.0 + 6 * slouch, neck_flexion=2.0)
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
     blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
-    feet = {side: tread(kinematics, track, time, own[side]) for side in SIDES}
-    motion = plant(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
+    feet = {side: foot_path(kinematics, track, time, own[side]) for side in SIDES}
+    motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]
     for side in SIDES:
-        place = in_world(track, [lap, own[side].place[1], seat.height + _THIGH * kinematics.body.stature])
+        place = spot_to_world(track, [lap, own[side].place[1], seat.height + _THIGH * kinematics.body.stature])
         rested = ease((seated - 0.6) / 0.4)
         motion = reach_with(kinematics, motion, side, np.tile(place, (len(time), 1)), weight=rested)
-    middle = in_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
+    middle = spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
     pose = [[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]]
     chair = Prop("chair", (seat.front - seat.back, _WIDTH, seat.height), Trajectory(time[:1], np.array(pose)))
     return Performance((motion,), (chair,))
@@ -98,7 +104,7 @@ def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -
     sitting = np.arctan2(knee[0] - end[:, 0], end[:, 1] - knee[1])
     shank = np.radians(4.0) * (1 - d) + _SHANK * d + np.radians(12.0) * 4 * d * (1 - d)
     thigh = np.radians(5.0) * (1 - d) + sitting * d
-    return hip_over(kinematics, shank=shank, thigh=thigh)
+    return hip_position(kinematics, shank=shank, thigh=thigh)
 
 
 def _knee(kinematics: Kinematics) -> Floats:
@@ -122,13 +128,13 @@ def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
     lap = np.isin(most, [body.index(name) for name in _LAP])
     own = {side: stance(kinematics, side) for side in SIDES}
     own = {side: foot.moved(-foot.place[0]) for side, foot in own.items()}
-    feet = {side: tread(kinematics, spot, np.zeros(count), own[side]) for side in SIDES}
+    feet = {side: foot_path(kinematics, spot, np.zeros(count), own[side]) for side in SIDES}
     up = np.full(count, height + 0.1)
     for _ in range(3):
         across = np.sqrt(np.maximum(upper**2 - (up - knee[1]) ** 2, 0.0))
         hip = np.stack([knee[0] - across, up], axis=-1)
-        pelvis, high = carry_pelvis(kinematics, spot, hip, lean=_LEANS)
-        motion = plant(kinematics, np.arange(float(count)), pelvis, high, feet, pose_angles(count))
+        pelvis, high = pelvis_from_hips(kinematics, spot, hip, lean=_LEANS)
+        motion = solve_legs(kinematics, np.arange(float(count)), pelvis, high, feet, pose_angles(count))
         skins = np.array([body.skin(pose)[lap] for pose in kinematics.transforms(motion)], float)
         over = np.where(skins[..., 0] < front, skins[..., 2], np.inf)
         up = up + height - over.min(axis=1)

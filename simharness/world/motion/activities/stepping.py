@@ -11,15 +11,21 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.foot_placement import Print, in_world, pelvis_at_ease, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, plant, pose_angles, stand_on
+from simharness.world.motion.poses.foot_placement import (
+    Footprint,
+    foot_path,
+    relaxed_pelvis_height,
+    spot_to_world,
+    stance,
+)
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import at_ease, blend, limb
-from simharness.world.motion.poses.timing import bump, glide, rounds
+from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
+from simharness.world.motion.poses.timing import bump, cycle_time, minimum_jerk
 from simharness.world.motion.registry import activity, solo_activity
 from simharness.world.motion.trajectory import Trajectory
 
-Steps = Mapping[str, list[tuple[float, float, Print]]]  # by side: when a foot takes off, when it lands, where
+Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: when a foot takes off, when it lands, where
 
 _STRAIGHTEST = np.radians(10.0)
 _STEP_TIME = 0.5  # seconds
@@ -37,7 +43,7 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     turns = (first, second, -first - second)
     counts = [2 * int(np.ceil(abs(by) / _LARGEST_TURN)) for by in turns]
     lasting = [part for count in counts for part in (0.5, _STEP_TIME * count)]
-    u, marks = rounds(time, lasting, rng=rng, pace=pace)
+    u, marks = cycle_time(time, lasting, rng=rng, pace=pace)
 
     own = {side: stance(kinematics, side, apart=1.05) for side in SIDES}
     steps: Steps = {side: [] for side in SIDES}
@@ -55,27 +61,27 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
         faced += by
 
     def facing(u: Floats) -> Floats:
-        return sum((glide(u, (begun, 0.0), (ended, by)) for begun, ended, by in shares), start=np.zeros(len(u)))
+        return sum((minimum_jerk(u, (begun, 0.0), (ended, by)) for begun, ended, by in shares), start=np.zeros(len(u)))
 
     def stances(u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         bearing = facing(u)
         aside = _over_standing_foot(u, steps, by=0.022)
         left = np.stack([-np.sin(bearing), np.cos(bearing)], axis=-1)
         pelvis = Pelvis(
-            ground=in_world(spot, aside[:, None] * left),
+            ground=spot_to_world(spot, aside[:, None] * left),
             bob=np.zeros(len(u)),
             bearing=spot.bearing + bearing,
             lean=np.full(len(u), np.radians(1.0)),
             list=0.8 * aside,
         )
-        return pelvis, {side: tread(kinematics, spot, u, own[side], steps[side], lift=0.035) for side in SIDES}
+        return pelvis, {side: foot_path(kinematics, spot, u, own[side], steps[side], lift=0.035) for side in SIDES}
 
     pelvis, feet = stances(u)
     early = np.degrees(facing(u + 0.25) - facing(u))  # the eyes go first
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     curves["neck_rotation"] = curves["neck_rotation"] + np.clip(0.9 * early, -45.0, 45.0)
     curves["thorax_rotation"] = curves["thorax_rotation"] + np.clip(0.25 * early, -15.0, 15.0)
-    return stand_on(
+    return solve_standing(
         kinematics,
         time,
         pelvis,
@@ -98,7 +104,7 @@ def step(
     trail = _OTHER[lead]
     length = kinematics.leg_length
     height, way = (0.13 + 0.09 * tall) * length, 0.57 * length
-    u, marks = rounds(time, (0.7, 0.75, 0.7, 0.7, 0.75, 0.6), rng=rng, pace=pace)
+    u, marks = cycle_time(time, (0.7, 0.75, 0.7, 0.7, 0.75, 0.6), rng=rng, pace=pace)
     led, up, stood, lowered, down, _ = marks[1:]
 
     own = {side: stance(kinematics, side).moved(-way / 2) for side in SIDES}
@@ -108,10 +114,12 @@ def step(
         trail: [(led + 0.3 * (up - led), up, above[trail]), (stood, lowered, own[trail])],
     }
     # On the floor both knees give a little; forward over the foot on the block first, then up.
-    stands = pelvis_at_ease(kinematics) - 0.008
-    ahead = glide(u, (0.1, 0.0), (led, 0.38 * way), (up - 0.1, way), (stood, way), (lowered, 0.45 * way), (down, 0.0))
+    stands = relaxed_pelvis_height(kinematics) - 0.008
+    ahead = minimum_jerk(
+        u, (0.1, 0.0), (led, 0.38 * way), (up - 0.1, way), (stood, way), (lowered, 0.45 * way), (down, 0.0)
+    )
     low, bent = stands - 0.02, stands - 0.06
-    rise = glide(
+    rise = minimum_jerk(
         u,
         (0.1, stands),
         (led, low),
@@ -123,7 +131,7 @@ def step(
     aside = _over_standing_foot(u, steps, by=0.03)
     lean = np.radians(2.0) + np.radians(9.0) * (bump(u, 0.2, up) + 0.6 * bump(u, stood, down))
     pelvis = Pelvis(
-        ground=in_world(track, np.stack([ahead - way / 2, aside], axis=-1)),
+        ground=spot_to_world(track, np.stack([ahead - way / 2, aside], axis=-1)),
         bob=np.zeros(len(time)),
         bearing=np.full(len(time), track.bearing),
         lean=lean,
@@ -131,17 +139,19 @@ def step(
     )
     # The foot that stays behind on the floor comes up onto its toes, and lands on them when it is the first down.
     rolled = {lead: 0.0 * u, trail: -np.radians(38.0) * (bump(u, 0.6 * led, up) + bump(u, stood + 0.2, lowered + 0.5))}
-    feet = {side: tread(kinematics, track, u, own[side], steps[side], pitch=rolled[side], lift=0.07) for side in SIDES}
-    curves = at_ease(time, rng)
+    feet = {
+        side: foot_path(kinematics, track, u, own[side], steps[side], pitch=rolled[side], lift=0.07) for side in SIDES
+    }
+    curves = relaxed_posture(time, rng)
     moving = bump(u, 0.1, led + 0.2) - bump(u, led, up + 0.2)
     for side, sign in ((lead, -1.0), (trail, 1.0)):
         curves[f"{side}_shoulder_flexion"] = curves[f"{side}_shoulder_flexion"] + sign * (10 + 14 * swing) * moving
     blend(curves, bump(u, 0.1, up) + bump(u, stood, down), neck_flexion=14.0, **limb(lead, elbow_flexion=28.0))
-    motion = plant(kinematics, time, pelvis, rise, feet, pose_angles(len(time), **curves))
+    motion = solve_legs(kinematics, time, pelvis, rise, feet, pose_angles(len(time), **curves))
     foot = kinematics.soles["left"]
     front, back = above["left"].place[0] + foot[:, 0].max(), above["left"].place[0] + foot[:, 0].min()
     depth = float(front - back) + 0.08
-    middle = in_world(track, [(front + back) / 2, 0.0])
+    middle = spot_to_world(track, [(front + back) / 2, 0.0])
     pose = np.array([[*middle, 0.0, np.cos(track.bearing / 2), 0.0, 0.0, np.sin(track.bearing / 2)]])
     return Performance((motion,), (Prop("step", (depth, 0.6, float(height)), Trajectory(time[:1], pose)),))
 
@@ -158,7 +168,7 @@ def _over_standing_foot(u: Floats, steps: Steps, *, by: float) -> Floats:
     )
 
 
-def _turned(foot: Print, by: float) -> Print:
+def _turned(foot: Footprint, by: float) -> Footprint:
     c, s = np.cos(by), np.sin(by)
     x, y = foot.place
-    return Print((float(c * x - s * y), float(s * x + c * y)), foot.bearing + by)
+    return Footprint((float(c * x - s * y), float(s * x + c * y)), foot.bearing + by)

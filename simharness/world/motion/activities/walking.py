@@ -9,7 +9,7 @@ from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gait import Gait, make_gait
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, stand_on
+from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.registry import solo_activity
 
@@ -89,7 +89,7 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
         **{f"{side}_wrist_flexion": 6.0 for side in forward},
     )
     lap, strides = laps(loop, gait)
-    return stand_on(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
+    return solve_standing(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
 
 
 def laps(loop: Loop, gait: Gait) -> tuple[Floats, Floats]:

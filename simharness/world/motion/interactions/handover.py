@@ -10,15 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.motion.activities.gestures import gesture
-from simharness.world.motion.interactions.handshake import held_out
-from simharness.world.motion.interactions.partners import Meeting, arm_length, attentive, bent, meet
+from simharness.world.motion.interactions.handshake import handshake_orientation
+from simharness.world.motion.interactions.partners import Meeting, arm_length, lean_forward, look_ahead, plan_meeting
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop, PropKind
-from simharness.world.motion.poses.foot_placement import in_world
+from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import ease, rounds
+from simharness.world.motion.poses.timing import cycle_time, ease
 from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
@@ -82,18 +82,18 @@ def hand_over(
     box, bulk = rng.uniform() < _BOX_CHANCE, rng.uniform(size=3)
     thing = _box(bulk) if box else _bottle(bulk)
     parts = (0.6, 0.9, 0.35, 0.9, 0.6, 1.4, 0.9, 0.4)
-    u, marks = rounds(time, parts, rng=rng, pace=pace)
+    u, marks = cycle_time(time, parts, rng=rng, pace=pace)
     course = _Course(*marks[1:])
-    meeting = meet(performers, spot, raised=0.42, stretched=0.92)
+    meeting = plan_meeting(performers, spot, raised=0.42, stretched=0.92)
     given = course.given(u)
     way = _way(performers, meeting, thing, given)
     turn = np.tile(Rotation.from_euler("Z", spot.bearing).as_quat(scalar_first=True), (len(time), 1))
     motions = []
     for person, mover in enumerate(performers):
         own = meeting.spots[person]
-        motion = attentive(gesture("stand", mover, own, time, rng=rng))
+        motion = look_ahead(gesture("stand", mover, own, time, rng=rng))
         reaching = 1.0 - np.abs(given)
-        motion = bent(motion, ease(reaching) * (3.0 + meeting.lean[person]))
+        motion = lean_forward(motion, ease(reaching) * (3.0 + meeting.lean[person]))
         motions.append(_hold(mover, motion, own, thing, person, way, course.holding(person, u)))
     prop = Prop(thing.kind, thing.size, Trajectory(time, np.concatenate([way, turn], axis=1)))
     return Performance(tuple(motions), (prop,))
@@ -119,7 +119,7 @@ def _way(performers: Sequence[Kinematics], meeting: Meeting, thing: _Thing, give
         right = 0.0 if thing.kind == "box" else _WAITS[1]
         # Before the belly, forearms about level.
         height = mover.standing_height + 0.28 * mover.arms["right"].anchors[0][2] - tall / 2
-        waits.append(np.append(in_world(own, [ahead, -right]), height))
+        waits.append(np.append(spot_to_world(own, [ahead, -right]), height))
     first, second = (np.maximum(sense * given, 0.0)[:, None] for sense in (-1.0, 1.0))
     return middle + first * (waits[0] - middle) + second * (waits[1] - middle)
 
@@ -133,7 +133,7 @@ def _hold(
     for side in sides:
         palm_faces = 1.0 if side == "right" else -1.0  # to the left of the own body
         inward = palm_faces * _INWARD if thing.kind == "bottle" else 0.0
-        turn = held_out(own.bearing + inward)
+        turn = handshake_orientation(own.bearing + inward)
         out = thing.size[1] / 2 * palm_faces
         place = grip - out * turn[:, 1] - thing.behind * np.array([np.cos(own.bearing), np.sin(own.bearing), 0.0])
         turns = np.tile(turn, (len(way), 1, 1))

@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.motion.activities.gestures import gesture
-from simharness.world.motion.interactions.partners import attentive, bent, meet
+from simharness.world.motion.interactions.partners import lean_forward, look_ahead, plan_meeting
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.inverse_kinematics import reach_with
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.timing import ease, rounds
+from simharness.world.motion.poses.timing import cycle_time, ease
 from simharness.world.motion.registry import activity
 
 _SHAKEN = (0.015, 0.03)  # metres up and down
@@ -29,24 +29,24 @@ def shake_hands(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
     """Both hold out the right hand, take the other's, shake it a few times and let go; again and again."""
-    meeting = meet(performers, spot)
+    meeting = plan_meeting(performers, spot)
     amplitude, rate, phase = rng.uniform(*_SHAKEN), rng.uniform(*_SHAKE_RATE), rng.uniform(0, 2 * np.pi)
-    u, (_, taken, let_go, down, _) = rounds(time, (0.9, 2.2, 1.0, 1.0), rng=rng, pace=pace)
+    u, (_, taken, let_go, down, _) = cycle_time(time, (0.9, 2.2, 1.0, 1.0), rng=rng, pace=pace)
     on = ease(u / taken) * (1 - ease((u - let_go) / (down - let_go)))
     shaken = amplitude * ease((u - taken) / 0.3) * ease((let_go - u) / 0.3) * np.sin(2 * np.pi * rate * u + phase)
     place = meeting.point + np.column_stack([np.zeros((len(time), 2)), shaken])
     motions = []
     for person, mover in enumerate(performers):
         own = meeting.spots[person]
-        motion = attentive(gesture("stand", mover, own, time, rng=rng))
-        motion = bent(motion, on * (3.0 + meeting.lean[person]))
-        turn = held_out(own.bearing + _INWARD)
+        motion = look_ahead(gesture("stand", mover, own, time, rng=rng))
+        motion = lean_forward(motion, on * (3.0 + meeting.lean[person]))
+        turn = handshake_orientation(own.bearing + _INWARD)
         motions.append(
             reach_with(mover, motion, "right", place, turn=np.tile(turn, (len(time), 1, 1)), weight=on, guess=_HELD_OUT)
         )
     return Performance(tuple(motions))
 
 
-def held_out(bearing: float) -> Floats:
+def handshake_orientation(bearing: float) -> Floats:
     """Orientation (3, 3) of a hand whose fingers point to ``bearing`` and whose thumb points up."""
     return (Rotation.from_euler("Z", bearing) * Rotation.from_euler("Y", -np.pi / 2)).as_matrix()

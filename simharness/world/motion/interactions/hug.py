@@ -10,16 +10,23 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.motion.contact import Crowd
-from simharness.world.motion.interactions.partners import bent, face_to_face, nudged, towards
+from simharness.world.motion.contact import ContactModel
+from simharness.world.motion.interactions.partners import blend_angles, face_to_face, lean_forward, offset_angles
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance
-from simharness.world.motion.poses.foot_placement import in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, girdle, pose_angles, reach_with, stand_on
+from simharness.world.motion.poses.foot_placement import foot_path, spot_to_world, stance
+from simharness.world.motion.poses.inverse_kinematics import (
+    Foot,
+    Pelvis,
+    pose_angles,
+    reach_with,
+    shoulder_girdle,
+    solve_standing,
+)
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import Curves, at_ease, limbs
-from simharness.world.motion.poses.timing import bump, ease, rounds
+from simharness.world.motion.poses.posture import Curves, limbs, relaxed_posture
+from simharness.world.motion.poses.timing import bump, cycle_time, ease
 from simharness.world.motion.registry import activity
 
 Role = Literal["over", "under"]
@@ -30,7 +37,7 @@ _ASIDE = 0.045  # metres that each stands to the left of the line between them, 
 _SHIFT = 0.02  # metres: the weight goes over the standing foot
 _STRAIGHTEST = np.radians(8.0)
 _DEEPEST = 0.012  # metres that clothes and flesh give way where chests touch
-_APART = np.arange(0.7, 0.2, -0.01)  # metres between pelvises that are tried
+_DISTANCES = np.arange(0.7, 0.2, -0.01)  # metres between pelvises that are tried
 _ON_SKIN = 0.028  # metres from the skin of a back to the skin of the palm that lies on it
 _TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "LeftShoulder", "RightShoulder")
 _LEVEL = 0.03  # metres up and down that make one level of a trunk
@@ -116,14 +123,16 @@ def hug(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
     """Step up to each other, hug, step back; the taller one's arms go over the other's, which go round the waist."""
-    u, marks = rounds(time, (1.5, 2.1, 0.8, 1.5, 0.6), rng=rng, pace=pace)
+    u, marks = cycle_time(time, (1.5, 2.1, 0.8, 1.5, 0.6), rng=rng, pace=pace)
     course = _Course(*marks[1:])
     taller = int(performers[1].body.stature > performers[0].body.stature)
     roles: tuple[Role, Role] = ("under", "over") if taller else ("over", "under")
-    distance, wraps = _fit(performers, roles, course)
+    distance, wraps = _fit_pair(performers, roles, course)
     came = [
-        _come(mover, home, course, time, u, _attentive(time, rng), lean=lean)
-        for mover, home, lean in zip(performers, _homes(performers, spot, distance), _leans(performers), strict=True)
+        _approach(mover, home, course, time, u, _attentive(time, rng), lean=lean)
+        for mover, home, lean in zip(
+            performers, _start_spots(performers, spot, distance), _leans(performers), strict=True
+        )
     ]
     return Performance(
         tuple(
@@ -133,26 +142,26 @@ def hug(
     )
 
 
-def _fit(
+def _fit_pair(
     performers: Sequence[Kinematics], roles: tuple[Role, Role], course: _Course
 ) -> tuple[float, tuple[float | None, float | None]]:
     """How near their pelvises come, metres, when their bodies just touch, and how far round each then reaches.
 
-    The second is as of :func:`_laid`: as far as the arms can without going through the other; None: not at all.
+    The second is as of :func:`_palm_on_trunk`: as far as the arms can without going through the other; None: not at all.
     """
-    crowd, instants = Crowd(performers), course.instants(30)
-    homes, leans = _homes(performers, Spot(np.zeros(2), 0.0), _APART[0]), _leans(performers)
+    crowd, instants = ContactModel(performers), course.instants(30)
+    homes, leans = _start_spots(performers, Spot(np.zeros(2), 0.0), _DISTANCES[0]), _leans(performers)
     came = [
-        _come(mover, home, course, instants, instants, {}, lean=lean)
+        _approach(mover, home, course, instants, instants, {}, lean=lean)
         for mover, home, lean in zip(performers, homes, leans, strict=True)
     ]
-    bare = [towards(motion, 1.0, **_ARMS_BACK) for motion in came]
-    present = crowd.presence(0, bare[0], instants)
-    for distance in _APART:
-        nearer = _shifted(bare[1], distance - _APART[0])
-        if crowd.penetration(present, crowd.presence(1, nearer, instants)).max() > _DEEPEST:
+    bare = [blend_angles(motion, 1.0, **_ARMS_BACK) for motion in came]
+    present = crowd.sample(0, bare[0], instants)
+    for distance in _DISTANCES:
+        nearer = _shifted(bare[1], distance - _DISTANCES[0])
+        if crowd.penetration(present, crowd.sample(1, nearer, instants)).max() > _DEEPEST:
             break
-    came[1], bare[1] = _shifted(came[1], distance - _APART[0]), nearer
+    came[1], bare[1] = _shifted(came[1], distance - _DISTANCES[0]), nearer
 
     def around(person: int, wrap: float | None) -> Motion:
         other = 1 - person
@@ -161,9 +170,9 @@ def _fit(
 
     wraps, shown = [], bare
     for person in (0, 1):
-        other = crowd.presence(1 - person, shown[1 - person], instants)
+        other = crowd.sample(1 - person, shown[1 - person], instants)
         tried = [around(person, wrap) for wrap in _WRAPS]
-        depths = [crowd.penetration(crowd.presence(person, own, instants), other).max() for own in tried]
+        depths = [crowd.penetration(crowd.sample(person, own, instants), other).max() for own in tried]
         free = np.flatnonzero(np.array(depths) < _PRESSED)
         best = int(free[0] if len(free) else np.argmin(depths[:-1]))
         if depths[best] > _MOST_PRESSED:
@@ -178,7 +187,7 @@ def _shifted(motion: Motion, ahead: float) -> Motion:
     return Motion(motion.time, root, motion.angles)
 
 
-def _homes(performers: Sequence[Kinematics], middle: Spot, distance: float) -> tuple[Spot, Spot]:
+def _start_spots(performers: Sequence[Kinematics], middle: Spot, distance: float) -> tuple[Spot, Spot]:
     """Where both stand before they step up to ``distance`` metres."""
     first, second = (_STEP * mover.leg_length for mover in performers)
     apart = distance + first + second
@@ -194,20 +203,20 @@ def _leans(performers: Sequence[Kinematics]) -> list[float]:
 
 def _attentive(time: Floats, rng: np.random.Generator) -> Curves:
     """Somebody at ease who looks at the other."""
-    curves = at_ease(time, rng)
+    curves = relaxed_posture(time, rng)
     return curves | {name: 0.3 * curves[name] for name in ("neck_rotation", "thorax_rotation")}
 
 
-def _come(
+def _approach(
     mover: Kinematics, home: Spot, course: _Course, time: Floats, u: Floats, curves: Curves, *, lean: float
 ) -> Motion:
     """Step up to the other, and back, with hanging arms."""
     pelvis, feet = _steps(mover, home, course, u)
     angles = pose_angles(len(u), **curves)
     whole = _steps(mover, home, course, np.linspace(0.0, course.end, 80))
-    motion = stand_on(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
+    motion = solve_standing(mover, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=whole)
     near = course.near(u)
-    return towards(bent(motion, lean * near), near, neck_bending=9.0)
+    return blend_angles(lean_forward(motion, lean * near), near, neck_bending=9.0)
 
 
 def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
@@ -220,11 +229,11 @@ def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[P
     feet, aside = {}, np.zeros(len(u))
     for side, (there, back) in times.items():
         own = stance(mover, side)
-        feet[side] = tread(mover, home, u, own, [(*there, own.moved(step)), (*back, own)], lift=_LIFT)
+        feet[side] = foot_path(mover, home, u, own, [(*there, own.moved(step)), (*back, own)], lift=_LIFT)
         over = _SHIFT if side == "right" else -_SHIFT
         aside += over * (bump(u, *there) + bump(u, *back))
     pelvis = Pelvis(
-        ground=in_world(home, np.stack([step * course.near(u), aside], axis=-1)),
+        ground=spot_to_world(home, np.stack([step * course.near(u), aside], axis=-1)),
         bob=np.zeros(len(u)),
         bearing=np.full(len(u), home.bearing),
         lean=np.zeros(len(u)),
@@ -246,7 +255,7 @@ def _embrace(
     """Close both arms around the other, the palms on the other's back."""
     hold = _HOLDS[role]
     opened = course.open(u)
-    motion = towards(
+    motion = blend_angles(
         motion,
         opened,
         **_OPEN[role],
@@ -254,7 +263,7 @@ def _embrace(
     )
     if role == "over":  # outside of the other's arms, which come up at the same time
         out = _DETOUR * 4 * opened * (1 - opened)
-        motion = nudged(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
+        motion = offset_angles(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
     if wrap is None:
         return motion
     guess = np.radians([hold.raised, hold.out, hold.turned, hold.bent, 15.0, 0.0])
@@ -264,8 +273,8 @@ def _embrace(
     height = min(shoulder + hold.height, own)
     inward = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
     for side, sign in (("right", 1.0), ("left", -1.0)):
-        turn, place = girdle(other, others, "left" if sign > 0 else "right")
-        palm = turn @ _laid(other, height, sign * hold.across, wrap) + place
+        turn, place = shoulder_girdle(other, others, "left" if sign > 0 else "right")
+        palm = turn @ _palm_on_trunk(other, height, sign * hold.across, wrap) + place
         motion = reach_with(
             mover,
             motion,
@@ -280,7 +289,7 @@ def _embrace(
     return motion
 
 
-def _laid(mover: Kinematics, height: float, left: float, wrap: float) -> Floats:
+def _palm_on_trunk(mover: Kinematics, height: float, left: float, wrap: float) -> Floats:
     """Where a palm lies on somebody's trunk, just off the skin, in that one's neutral frame, (3,) metres.
 
     Args:

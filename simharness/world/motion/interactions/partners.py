@@ -12,8 +12,8 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import in_world
-from simharness.world.motion.poses.inverse_kinematics import girdle
+from simharness.world.motion.poses.foot_placement import spot_to_world
+from simharness.world.motion.poses.inverse_kinematics import shoulder_girdle
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _SAG = 0.02  # metres that standing at ease is lower than standing upright
@@ -52,11 +52,11 @@ def face_to_face(middle: Spot, distance: float, *, share: float = 0.5, aside: fl
         share: of the distance that the first has to the middle.
         aside: how far each is to the left of the line between them, metres.
     """
-    first, second = in_world(middle, [[-share * distance, aside], [(1 - share) * distance, -aside]])
+    first, second = spot_to_world(middle, [[-share * distance, aside], [(1 - share) * distance, -aside]])
     return Spot(first, middle.bearing), Spot(second, middle.bearing + np.pi)
 
 
-def meet(
+def plan_meeting(
     performers: Sequence[Kinematics], middle: Spot, *, raised: float = 0.5, stretched: float = _STRETCHED
 ) -> Meeting:
     """Where two stand so that the right hand of each, or both hands, come to one place between them.
@@ -83,7 +83,7 @@ def meet(
         ahead.append(max(_NEAREST, float(shoulders[k, 0] + np.sqrt(max(across, 0.0)))))
     distance = ahead[0] + ahead[1]
     spots = face_to_face(middle, distance)
-    place = in_world(middle, [ahead[0] - distance / 2, 0.0, height])
+    place = spot_to_world(middle, [ahead[0] - distance / 2, 0.0, height])
     return Meeting(spots, place, (leans[0], leans[1]))
 
 
@@ -97,11 +97,11 @@ def _shoulder(mover: Kinematics, lean: float) -> Floats:
     """The right shoulder of someone who stands at the origin and bends the trunk by ``lean`` degrees, (3,) metres."""
     root = np.array([[0.0, 0.0, mover.standing_height - _SAG, 1.0, 0.0, 0.0, 0.0]])
     upright = Motion(np.zeros(1), root, np.zeros((1, len(DOFS))))
-    turn, place = girdle(mover, bent(upright, lean), "right")
+    turn, place = shoulder_girdle(mover, lean_forward(upright, lean), "right")
     return turn[0] @ mover.arms["right"].anchors[0] + place[0]
 
 
-def bent(motion: Motion, lean: ArrayLike) -> Motion:
+def lean_forward(motion: Motion, lean: ArrayLike) -> Motion:
     """The same motion with the trunk bent forward by ``lean`` degrees more, (T,) or constant.
 
     The eyes stay half level, and the arms hang down as before.
@@ -109,10 +109,10 @@ def bent(motion: Motion, lean: ArrayLike) -> Motion:
     lean = np.asarray(lean, float)
     trunk = {name: share * lean for name, share in _LEAN.items()}
     arms = {f"{side}_shoulder_flexion": lean for side in SIDES}
-    return nudged(motion, **trunk, **arms, neck_flexion=-0.5 * lean)
+    return offset_angles(motion, **trunk, **arms, neck_flexion=-0.5 * lean)
 
 
-def nudged(motion: Motion, **degrees: ArrayLike) -> Motion:
+def offset_angles(motion: Motion, **degrees: ArrayLike) -> Motion:
     """The same motion with these angles changed by so many degrees, (T,) or constant, within their ranges."""
     angles = motion.angles.copy()
     for name, change in degrees.items():
@@ -121,7 +121,7 @@ def nudged(motion: Motion, **degrees: ArrayLike) -> Motion:
     return Motion(motion.time, motion.root, angles)
 
 
-def towards(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
+def blend_angles(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
     """The same motion gone so far, (T,) from 0 to 1, towards these angles, degrees."""
     angles = motion.angles.copy()
     for name, target in degrees.items():
@@ -130,7 +130,7 @@ def towards(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
     return Motion(motion.time, motion.root, angles)
 
 
-def attentive(motion: Motion, share: float = 0.35) -> Motion:
+def look_ahead(motion: Motion, share: float = 0.35) -> Motion:
     """The same motion of someone who keeps looking ahead: the head turns only by a share of what it did."""
     angles = motion.angles.copy()
     angles[:, [DOFS.index("neck_rotation"), DOFS.index("thorax_rotation")]] *= share

@@ -12,15 +12,21 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.activities.sitting import Seat, fit_seat
-from simharness.world.motion.interactions.partners import arm_length, attentive, bent, face_to_face, nudged
+from simharness.world.motion.interactions.partners import (
+    arm_length,
+    face_to_face,
+    lean_forward,
+    look_ahead,
+    offset_angles,
+)
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop
-from simharness.world.motion.poses.foot_placement import carry_pelvis, in_world, stance, tread
-from simharness.world.motion.poses.inverse_kinematics import plant, pose_angles, reach_with
+from simharness.world.motion.poses.foot_placement import foot_path, pelvis_from_hips, spot_to_world, stance
+from simharness.world.motion.poses.inverse_kinematics import pose_angles, reach_with, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.poses.posture import at_ease, blend
-from simharness.world.motion.poses.timing import strokes, wander
+from simharness.world.motion.poses.posture import blend, relaxed_posture
+from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
 from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
@@ -84,7 +90,7 @@ def table(
             motion, ankles = _seated(mover, seats[person], own, time, rng)
             props.append(_chair(seats[person], own, ankles, time))
         else:
-            motion = attentive(gesture("stand", mover, own, time, rng=rng))
+            motion = look_ahead(gesture("stand", mover, own, time, rng=rng))
         motions.append(_DOINGS[(first, other)[person]](mover, motion, place, time, rng))
     return Performance(tuple(motions), tuple(props))
 
@@ -118,20 +124,20 @@ def _ankles(seat: Seat) -> float:
 
 def _seated(mover: Kinematics, seat: Seat, own: Spot, time: Floats, rng: np.random.Generator) -> tuple[Motion, float]:
     """Someone who sits with the pelvis over a spot, and how far the ankles are ahead of it, metres."""
-    lean = np.radians(-3.0 + 2.0 * wander(time, rng, 0.1))
+    lean = np.radians(-3.0 + 2.0 * smooth_noise(time, rng, 0.1))
     hip = seat.hip_at(lean)
     ankles = _ankles(seat)
     hip[:, 0] += ankles
-    pelvis, height = carry_pelvis(mover, own, hip, lean=lean)
-    curves = at_ease(time, rng)
+    pelvis, height = pelvis_from_hips(mover, own, hip, lean=lean)
+    curves = relaxed_posture(time, rng)
     for name in ("neck_rotation", "thorax_rotation"):
         curves[name] = 0.35 * curves[name]
     blend(curves, np.ones(len(time)), lumbar_flexion=5.0, thorax_flexion=4.0)
     feet = {}
     for side in SIDES:
         print_ = stance(mover, side, apart=1.15)
-        feet[side] = tread(mover, own, time, print_.moved(ankles - print_.place[0]))
-    return plant(mover, time, pelvis, height, feet, pose_angles(len(time), **curves)), ankles
+        feet[side] = foot_path(mover, own, time, print_.moved(ankles - print_.place[0]))
+    return solve_legs(mover, time, pelvis, height, feet, pose_angles(len(time), **curves)), ankles
 
 
 def _chair(seat: Seat, own: Spot, ankles: float, time: Floats) -> Prop:
@@ -142,7 +148,7 @@ def _chair(seat: Seat, own: Spot, ankles: float, time: Floats) -> Prop:
 def _standing(spot: Spot, ahead: float, time: Floats) -> Trajectory:
     """Something that stands still ahead of a spot, facing as it does."""
     half = spot.bearing / 2
-    pose = np.array([[*in_world(spot, [ahead, 0.0]), 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
+    pose = np.array([[*spot_to_world(spot, [ahead, 0.0]), 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
     return Trajectory(time[:1], pose)
 
 
@@ -158,7 +164,7 @@ def _lay(mover: Kinematics, motion: Motion, place: _Place, side: str, at: Floats
         roll: of the hand, from flat to its little finger's edge, radians.
     """
     sign = -1.0 if side == "right" else 1.0
-    ground = in_world(place.spot, at + [place.edge, 0.0, place.top + _ON_TABLE])
+    ground = spot_to_world(place.spot, at + [place.edge, 0.0, place.top + _ON_TABLE])
     tilt = Rotation.from_euler("ZX", [place.spot.bearing - sign * _INWARD, -sign * roll]).as_matrix()
     turns = np.tile(tilt @ _FLAT[side], (len(at), 1, 1))
     return reach_with(mover, motion, side, ground, turn=turns, guess=_RESTING, turn_weight=0.02)
@@ -172,11 +178,11 @@ def _rest(mover: Kinematics, side: str, frames: int) -> Floats:
 
 def _talk(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """The hands leave the table now and then and beat along with what is said."""
-    motion = nudged(motion, neck_flexion=3.0 * wander(time, rng, 0.8))
+    motion = offset_angles(motion, neck_flexion=3.0 * smooth_noise(time, rng, 0.8))
     for side in SIDES:
-        on = strokes(time, rng, hold=2.0, rest=1.0)
-        beat = np.stack([0.05 * wander(time, rng, 0.6), 0.05 * wander(time, rng, 0.5), 0.0 * time], axis=-1)
-        up = on * (0.13 + 0.05 * wander(time, rng, 0.7))
+        on = gesture_envelope(time, rng, hold=2.0, rest=1.0)
+        beat = np.stack([0.05 * smooth_noise(time, rng, 0.6), 0.05 * smooth_noise(time, rng, 0.5), 0.0 * time], axis=-1)
+        up = on * (0.13 + 0.05 * smooth_noise(time, rng, 0.7))
         at = _rest(mover, side, len(time)) + on[:, None] * beat
         at[:, 2] += up
         motion = _lay(mover, motion, place, side, at)
@@ -186,22 +192,26 @@ def _talk(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: n
 def _write(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """The right hand writes, the left one holds the paper, the eyes are on it."""
     lean = 8.0 + 4.0 * rng.uniform()
-    motion = nudged(bent(motion, lean), neck_flexion=16.0 + lean)
+    motion = offset_angles(lean_forward(motion, lean), neck_flexion=16.0 + lean)
     motion = _lay(mover, motion, place, "left", _rest(mover, "left", len(time)))
     rate, phase = rng.uniform(1.6, 2.4), rng.uniform(0, 2 * np.pi)
     stroke = 2 * np.pi * rate * time + phase
     at = _rest(mover, "right", len(time)) + [0.03, 0.07, 0.0]
     at[:, 0] += 0.005 * np.sin(stroke)
-    at[:, 1] += 0.05 * wander(time, rng, 0.15) + 0.004 * np.cos(stroke)
+    at[:, 1] += 0.05 * smooth_noise(time, rng, 0.15) + 0.004 * np.cos(stroke)
     return _lay(mover, motion, place, "right", at, roll=np.radians(35.0))
 
 
 def _reach(mover: Kinematics, motion: Motion, place: _Place, time: Floats, rng: np.random.Generator) -> Motion:
     """Now and then a hand goes out to the middle of the table, and returns."""
-    on, aside, far = strokes(time, rng, hold=0.8, rest=1.2, raised=1.0), rng.uniform(-0.12, 0.12), rng.uniform(0.7, 1.0)
+    on, aside, far = (
+        gesture_envelope(time, rng, hold=0.8, rest=1.2, raised=1.0),
+        rng.uniform(-0.12, 0.12),
+        rng.uniform(0.7, 1.0),
+    )
     side = "right" if rng.uniform() < 0.75 else "left"
     other = "left" if side == "right" else "right"
-    motion = bent(motion, 4.0 + 14.0 * on)
+    motion = lean_forward(motion, 4.0 + 14.0 * on)
     motion = _lay(mover, motion, place, other, _rest(mover, other, len(time)))
     at = _rest(mover, side, len(time))
     target = np.array([far * (place.middle - place.edge), aside, 0.05])

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
-from simharness.world.motion.mocap.line_reader import Line, Reader, shown
+from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
 from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
 
 RATE = 120.0  # Hz: an AMC file does not say; CMU's are recorded so
@@ -67,7 +67,7 @@ def read_asf(path: Path) -> Acclaim:
         reader.take("")
         section = line.words[0].lower()
         if not section.startswith(":"):
-            raise line.fault(f"expected a section such as :bonedata, got {shown(line.words[0])}")
+            raise line.error(f"expected a section such as :bonedata, got {quoted(line.words[0])}")
         if section == ":units":
             degrees = _units(reader)
         elif section == ":root":
@@ -80,11 +80,11 @@ def read_asf(path: Path) -> Acclaim:
             _body(reader)
     for missing, there in ((":root", root), (":bonedata", bones), (":hierarchy", parents)):
         if not there:
-            raise reader.fault(f"has no section {missing}; is it an ASF file?")
+            raise reader.error(f"has no section {missing}; is it an ASF file?")
     assert root is not None
     orphan = next((bone for name, bone in bones.items() if name not in parents), None)
     if orphan is not None:
-        raise orphan.line.fault(f"bone {shown(orphan.line.words[-1])} has no parent in :hierarchy")
+        raise orphan.line.error(f"bone {quoted(orphan.line.words[-1])} has no parent in :hierarchy")
     return Acclaim(
         skeleton=_skeleton(bones, parents),
         frames={_ROOT: root.frame} | {name: bone.frame for name, bone in bones.items()},
@@ -113,14 +113,14 @@ def read_amc(path: Path, acclaim: Acclaim) -> Recording:
         number = head.words[0] if not frames else str(first + frames)  # an excerpt begins anywhere
         if head.words != (number,) or not number.isdecimal():
             expected = f"the number of frame {number}" if frames else "the number of the first frame"
-            raise head.fault(f"expected {expected} alone, got {shown(' '.join(head.words))}")
+            raise head.error(f"expected {expected} alone, got {quoted(' '.join(head.words))}")
         first = first if frames else int(number[:9])
         frames += 1
         absent = set(moving) - _frame(reader, moving, values)
         if absent:
-            raise head.fault(f"frame {number} has no values for {', '.join(sorted(absent))}")
+            raise head.error(f"frame {number} has no values for {', '.join(sorted(absent))}")
     if not frames:
-        raise reader.fault("has no frames; is it an AMC file?")
+        raise reader.error("has no frames; is it an AMC file?")
     return _recording(path.name, acclaim, values, frames, degrees=degrees)
 
 
@@ -130,9 +130,9 @@ def _frame(reader: Reader, moving: dict[str, tuple[str, ...]], values: dict[str,
     while (line := reader.peek()) is not None and not line.words[0].isdigit():
         name = line.words[0]
         if name not in moving:
-            raise line.fault(f"the skeleton has no bone {shown(name)} that moves; it has {', '.join(moving)}")
+            raise line.error(f"the skeleton has no bone {quoted(name)} that moves; it has {', '.join(moving)}")
         if name in seen:
-            raise line.fault(f"{name} appears twice in one frame")
+            raise line.error(f"{name} appears twice in one frame")
         dofs = moving[name]
         values[name].append(line.numbers(line.words[1:], len(dofs), f"{name} ({' '.join(dofs)})"))
         seen.add(name)
@@ -175,7 +175,7 @@ def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
         offsets += [tip] * len(children)
     lost = [bone for name, bone in bones.items() if name not in names]
     if lost:
-        raise lost[0].line.fault(f"bone {shown(lost[0].line.words[1])} hangs on itself in :hierarchy, not on the root")
+        raise lost[0].line.error(f"bone {quoted(lost[0].line.words[1])} hangs on itself in :hierarchy, not on the root")
     return Skeleton(tuple(names), np.array(above), np.array(offsets))
 
 
@@ -194,7 +194,7 @@ def _units(reader: Reader) -> bool:
         if line.words[0].lower() == "angle":
             unit = line.words[1].lower() if len(line.words) > 1 else ""
             if unit not in ("deg", "rad"):
-                raise line.fault(f"expected angle deg or rad, got {shown(unit)}")
+                raise line.error(f"expected angle deg or rad, got {quoted(unit)}")
             degrees = unit == "deg"
     return degrees
 
@@ -207,7 +207,7 @@ def _root(reader: Reader, head: Line, degrees: bool) -> _Bone:
         if key.lower() == "order":
             order = tuple(word.lower() for word in line.words[1:])
             if set(order) - {*_SHIFTS, *_TURNS} or len(set(order)) != len(order):
-                raise line.fault(f"expected an order of TX TY TZ RX RY RZ, got {shown(' '.join(line.words[1:]))}")
+                raise line.error(f"expected an order of TX TY TZ RX RY RZ, got {quoted(' '.join(line.words[1:]))}")
         elif key.lower() == "axis":
             axis = _axis(line, line.words[1:])
         elif key.lower() == "position":
@@ -215,7 +215,7 @@ def _root(reader: Reader, head: Line, degrees: bool) -> _Bone:
         elif key.lower() == "orientation":
             values = line.numbers(line.words[1:], 3, "the root's orientation")
         else:
-            raise line.fault(f"expected order, axis, position or orientation, got {shown(key)}")
+            raise line.error(f"expected order, axis, position or orientation, got {quoted(key)}")
     return _Bone(head, place, Rotation.from_euler(axis, values, degrees=degrees), order)
 
 
@@ -224,13 +224,13 @@ def _bones(reader: Reader, degrees: bool) -> dict[str, _Bone]:
     while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
         begin = reader.take("")
         if begin.words[0].lower() != "begin":
-            raise begin.fault(f"expected begin, got {shown(begin.words[0])}")
+            raise begin.error(f"expected begin, got {quoted(begin.words[0])}")
         name, bone = _bone(reader, begin, degrees)
         if name in bones or name == _ROOT:
-            raise bone.line.fault(f"there are two bones {shown(name)}")
+            raise bone.line.error(f"there are two bones {quoted(name)}")
         bones[name] = bone
         if len(bones) > _MOST_BONES:
-            raise begin.fault(f"more than {_MOST_BONES} bones")
+            raise begin.error(f"more than {_MOST_BONES} bones")
     return bones
 
 
@@ -246,30 +246,30 @@ def _bone(reader: Reader, begin: Line, degrees: bool) -> tuple[str, _Bone]:
         if key == "end":
             break
         if key.startswith(":") or key == "begin":
-            raise line.fault(f"the bone that begins in line {begin.number} has no end")
+            raise line.error(f"the bone that begins in line {begin.number} has no end")
         if key == "name":
             if len(rest) != 1:
-                raise line.fault(f"expected one name, got {len(rest)}")
+                raise line.error(f"expected one name, got {len(rest)}")
             named = line
         elif key == "direction":
             direction = np.array(line.numbers(rest, 3, "direction"))
             if np.linalg.norm(direction) < 1e-6:
-                raise line.fault("expected a direction, got a vector of no length")
+                raise line.error("expected a direction, got a vector of no length")
             direction /= np.linalg.norm(direction)
         elif key == "length":
             (length,) = line.numbers(rest, 1, "length")
             if length < 0:
-                raise line.fault(f"expected a length of 0 or more, got {length:g}")
+                raise line.error(f"expected a length of 0 or more, got {length:g}")
         elif key == "axis":
             values = line.numbers(rest[:3], 3, "axis")
             frame = Rotation.from_euler(_axis(line, rest[3:]), values, degrees=degrees)
         elif key == "dof":
             dofs = tuple(word.lower() for word in rest)
             if set(dofs) - set(_TURNS) or len(set(dofs)) != len(dofs):
-                raise line.fault(f"expected dof to be some of rx ry rz, got {shown(' '.join(rest))}")
+                raise line.error(f"expected dof to be some of rx ry rz, got {quoted(' '.join(rest))}")
     for what, value in (("name", named), ("direction", direction), ("length", length)):
         if value is None:
-            raise begin.fault(f"the bone that begins here has no {what}")
+            raise begin.error(f"the bone that begins here has no {what}")
     assert named is not None
     assert direction is not None
     return named.words[1], _Bone(named, direction * length, frame, dofs)
@@ -278,7 +278,7 @@ def _bone(reader: Reader, begin: Line, degrees: bool) -> tuple[str, _Bone]:
 def _axis(line: Line, words: tuple[str, ...]) -> str:
     order = words[0].lower() if len(words) == 1 else ""
     if sorted(order) != ["x", "y", "z"]:
-        raise line.fault(f"expected the order of the axes, such as XYZ, got {shown(' '.join(words))}")
+        raise line.error(f"expected the order of the axes, such as XYZ, got {quoted(' '.join(words))}")
     return order
 
 
@@ -291,9 +291,9 @@ def _hierarchy(reader: Reader, bones: dict[str, _Bone]) -> dict[str, str]:
         parent, *children = line.words
         for name in line.words:
             if name != _ROOT and name not in bones:
-                raise line.fault(f":bonedata has no bone {shown(name)}")
+                raise line.error(f":bonedata has no bone {quoted(name)}")
         for child in children:
             if child in parents or child == _ROOT:
-                raise line.fault(f"{child} has a parent already")
+                raise line.error(f"{child} has a parent already")
             parents[child] = parent
     return parents

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from simharness.world.motion.mocap.line_reader import Line, Reader, shown
+from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
 from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
 
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
@@ -49,7 +49,7 @@ def read_bvh(path: Path) -> Recording:
     if len(rows) != frames:
         where = rows[-1] if rows else None
         message = f"the file says Frames: {frames} and has {len(rows)}"
-        raise where.fault(message) if where else reader.fault(message)
+        raise where.error(message) if where else reader.error(message)
     table = np.array([line.numbers(line.words, width, f"{len(joints)} joints' channels") for line in rows])
 
     turns = np.zeros((frames, len(joints), 4))
@@ -72,7 +72,7 @@ def _hierarchy(reader: Reader) -> list[_Joint]:
     """The joints, parents before children, read up to the line MOTION."""
     first = reader.take("HIERARCHY")
     if first.words[0].upper() != "HIERARCHY":
-        raise first.fault(f"expected HIERARCHY, got {shown(first.words[0])}; is it a BVH file?")
+        raise first.error(f"expected HIERARCHY, got {quoted(first.words[0])}; is it a BVH file?")
     joints: list[_Joint] = []
     opened: list[int] = []
     width = 0
@@ -81,14 +81,14 @@ def _hierarchy(reader: Reader) -> list[_Joint]:
         key = line.words[0].upper()
         if not opened and joints:
             if key != "MOTION":
-                raise line.fault(f"expected MOTION after the one ROOT, got {shown(' '.join(line.words))}")
+                raise line.error(f"expected MOTION after the one ROOT, got {quoted(' '.join(line.words))}")
             break
         if key in ("ROOT", "JOINT", "END"):
             joints.append(_joint(line, key, joints, opened))
             _brace(reader, line)
             opened.append(len(joints) - 1)
         elif not opened:
-            raise line.fault(f"expected ROOT, got {shown(line.words[0])}")
+            raise line.error(f"expected ROOT, got {quoted(line.words[0])}")
         elif key == "OFFSET":
             joints[opened[-1]].offset = line.numbers(line.words[1:], 3, f"OFFSET of {joints[opened[-1]].name}")
         elif key == "CHANNELS":
@@ -98,28 +98,28 @@ def _hierarchy(reader: Reader) -> list[_Joint]:
         elif key == "}":
             joint = joints[opened.pop()]
             if joint.offset is None:
-                raise line.fault(f"{joint.name}, which begins in line {joint.line.number}, has no OFFSET")
+                raise line.error(f"{joint.name}, which begins in line {joint.line.number}, has no OFFSET")
         else:
-            raise line.fault(f"expected OFFSET, CHANNELS, JOINT, End Site or }}, got {shown(line.words[0])}")
+            raise line.error(f"expected OFFSET, CHANNELS, JOINT, End Site or }}, got {quoted(line.words[0])}")
     return joints
 
 
 def _joint(line: Line, key: str, joints: list[_Joint], opened: list[int]) -> _Joint:
     parent = opened[-1] if opened else -1
     if (key == "ROOT") != (parent < 0):
-        raise line.fault(f"a {key} {'inside of another joint' if parent >= 0 else 'before the ROOT'}")
+        raise line.error(f"a {key} {'inside of another joint' if parent >= 0 else 'before the ROOT'}")
     if len(joints) >= _MOST_JOINTS:
-        raise line.fault(f"more than {_MOST_JOINTS} joints")
+        raise line.error(f"more than {_MOST_JOINTS} joints")
     words = line.words[1:]
     if words[-1:] == ("{",):
         words = words[:-1]
     if not words:
-        raise line.fault(f"expected a name after {line.words[0]}")
+        raise line.error(f"expected a name after {line.words[0]}")
     if parent >= 0 and joints[parent].name.endswith(END):
-        raise line.fault(f"{joints[parent].name!r} is an End Site and carries no joint")
+        raise line.error(f"{joints[parent].name!r} is an End Site and carries no joint")
     name = joints[parent].name + END if key == "END" else " ".join(words)
     if any(joint.name == name for joint in joints):
-        raise line.fault(f"there are two joints {shown(name)}")
+        raise line.error(f"there are two joints {quoted(name)}")
     return _Joint(name, line, parent)
 
 
@@ -127,20 +127,20 @@ def _brace(reader: Reader, line: Line) -> None:
     if line.words[-1] != "{":
         brace = reader.take("{")
         if brace.words != ("{",):
-            raise brace.fault(f"expected {{ alone, got {shown(' '.join(brace.words))}")
+            raise brace.error(f"expected {{ alone, got {quoted(' '.join(brace.words))}")
 
 
 def _channels(line: Line, joint: _Joint) -> list[str]:
     if joint.channels:
-        raise line.fault(f"{joint.name} has CHANNELS already")
+        raise line.error(f"{joint.name} has CHANNELS already")
     names = [word.lower() for word in line.words[2:]]
     if len(line.words) < 2 or line.words[1] != str(len(names)):
-        said = shown(line.words[1]) if len(line.words) > 1 else "no number"
-        raise line.fault(f"CHANNELS of {joint.name} says {said} and lists {len(names)}")
+        said = quoted(line.words[1]) if len(line.words) > 1 else "no number"
+        raise line.error(f"CHANNELS of {joint.name} says {said} and lists {len(names)}")
     if joint.name.endswith(END) or set(names) - set(_CHANNELS) or len(set(names)) != len(names):
-        raise line.fault(
+        raise line.error(
             f"expected CHANNELS of {joint.name} to be some of Xposition Yposition Zposition Xrotation Yrotation "
-            f"Zrotation, each once, got {shown(' '.join(line.words[2:]))}"
+            f"Zrotation, each once, got {quoted(' '.join(line.words[2:]))}"
         )
     return names
 
@@ -149,14 +149,14 @@ def _heading(reader: Reader) -> tuple[int, float]:
     """How many frames, and frames a second."""
     line = reader.take("Frames:")
     if line.words[0].lower() != "frames:":
-        raise line.fault(f"expected Frames: and a count, got {shown(' '.join(line.words))}")
+        raise line.error(f"expected Frames: and a count, got {quoted(' '.join(line.words))}")
     if len(line.words) != 2 or not line.words[1].isdecimal() or int(line.words[1][:18]) < 1:
-        raise line.fault(f"expected a count of 1 or more after Frames:, got {shown(' '.join(line.words[1:]))}")
+        raise line.error(f"expected a count of 1 or more after Frames:, got {quoted(' '.join(line.words[1:]))}")
     frames = int(line.words[1][:18])
     line = reader.take("Frame Time:")
     if tuple(word.lower() for word in line.words[:2]) != ("frame", "time:"):
-        raise line.fault(f"expected Frame Time: and seconds, got {shown(' '.join(line.words))}")
+        raise line.error(f"expected Frame Time: and seconds, got {quoted(' '.join(line.words))}")
     (step,) = line.numbers(line.words[2:], 1, "Frame Time")
     if not 1e-4 <= step <= 10:
-        raise line.fault(f"expected a Frame Time of 0.0001 to 10 s, got {step:g}")
+        raise line.error(f"expected a Frame Time of 0.0001 to 10 s, got {step:g}")
     return frames, 1.0 / step

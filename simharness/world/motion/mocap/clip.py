@@ -19,11 +19,11 @@ from mvpose.arrays import Floats
 from simharness.scenario.sections.people import Mocap
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
-from simharness.world.motion.mocap.retarget import Recorded, pelvis_path, retarget, understand
+from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion
 from simharness.world.motion.mocap.skeleton import Recording
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.trajectory import RATE, through_poses
+from simharness.world.motion.trajectory import RATE, interpolate_poses
 
 TURN = 0.3  # seconds that turning round at an end of the clip takes
 
@@ -56,8 +56,8 @@ class Clip:
         _ = self._recorded  # a skeleton that is not understood shows here
 
     @cached_property
-    def _recorded(self) -> Recorded:
-        return understand(self.recording, rate=RATE)
+    def _recorded(self) -> SourceMotion:
+        return source_motion(self.recording, rate=RATE)
 
     @property
     def time(self) -> Floats:
@@ -105,7 +105,7 @@ class Clip:
 
     def _begin(self, root: Floats) -> tuple[Floats, float]:
         """The point of the floor (x, y, 0) over which a pelvis (N, 7) is at the start, and where it then faces."""
-        pose = through_poses(self.time, root, self.start)
+        pose = interpolate_poses(self.time, root, self.start)
         forward = Rotation.from_quat(pose[3:], scalar_first=True).apply([1.0, 0.0, 0.0])
         return np.array([pose[0], pose[1], 0.0]), float(np.arctan2(forward[1], forward[0]))
 

@@ -54,7 +54,7 @@ class Sole:
 
 
 @dataclass(frozen=True)
-class Steps:
+class FootPath:
     """The way of one foot on our floor, which is at 0.
 
     Attributes:
@@ -95,7 +95,7 @@ def make_sole(points: Floats) -> Sole:
     return Sole(corners)
 
 
-def stands(ankle: Floats, turn: Floats, soles: tuple[Sole, Sole], *, rate: float) -> Bools:
+def detect_stances(ankle: Floats, turn: Floats, soles: tuple[Sole, Sole], *, rate: float) -> Bools:
     """When each foot stands, (2, T).
 
     A foot stands while its heel or its toes are still, if it is down with the lowest one around that time or if the
@@ -142,7 +142,7 @@ def runs(on: Bools) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def plant(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate: float) -> Steps:
+def plant_foot(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate: float) -> FootPath:
     """Hold one recorded foot where it stands.
 
     Args:
@@ -163,7 +163,7 @@ def plant(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate: flo
         held[start:stop] = _settled(recorded[start:stop])
     turn = Rotation.from_euler("ZYX", (recorded + _faded(held - recorded, stances, rate)) * [1, -1, 1]).as_matrix()
     anchors = [_anchor(ankle[start:stop, :2], turn[start:stop], sole) for start, stop in stances]
-    return Steps(
+    return FootPath(
         turn=turn,
         clearance=_lifted(clearance - ground, stances),
         ground=ground,

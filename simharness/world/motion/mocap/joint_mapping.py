@@ -34,7 +34,7 @@ _UPRIGHT = 0.75  # cosine between the vertical and each segment of a person who 
 
 
 @dataclass(frozen=True)
-class Roles:
+class JointMap:
     """The joints of a skeleton that matter to us, as indices; -1 where a skeleton has none.
 
     Attributes:
@@ -50,7 +50,7 @@ class Roles:
     axes: Floats
 
 
-def find_roles(recording: Recording) -> Roles:
+def map_joints(recording: Recording) -> JointMap:
     """Find a person in the skeleton of a recording.
 
     Raises:
@@ -86,7 +86,7 @@ def find_roles(recording: Recording) -> Roles:
     tops = [limbs[side]["collar"] if limbs[side]["collar"] >= 0 else limbs[side]["arm"] for side in SIDES]
     chest = lowest_common_ancestor(skeleton, *(_above(skeleton, top) for top in tops))
     heads = [joint for joint, (side, word) in enumerate(named) if side is None and word == "head"]
-    return Roles(pelvis, chest, heads[0] if heads else -1, limbs, _axes(recording, limbs))
+    return JointMap(pelvis, chest, heads[0] if heads else -1, limbs, _axes(recording, limbs))
 
 
 def _above(skeleton: Skeleton, joint: int) -> int:

@@ -23,7 +23,7 @@ class Line:
     number: int
     words: tuple[str, ...]
 
-    def fault(self, message: str) -> ValueError:
+    def error(self, message: str) -> ValueError:
         """An error about this line."""
         return ValueError(f"{self.file}, line {self.number}: {message}")
 
@@ -39,15 +39,15 @@ class Line:
             ValueError: another count, or a word that is not a number of moderate size.
         """
         if count is not None and len(words) != count:
-            raise self.fault(f"expected {count} value{'s' * (count != 1)} for {what}, got {len(words)}")
+            raise self.error(f"expected {count} value{'s' * (count != 1)} for {what}, got {len(words)}")
         result = []
         for word in words:
             try:
                 value = float(word)
             except ValueError:
-                raise self.fault(f"expected numbers for {what}, got {shown(word)}") from None
+                raise self.error(f"expected numbers for {what}, got {quoted(word)}") from None
             if not isfinite(value) or abs(value) > _LARGEST:
-                raise self.fault(f"expected numbers within +-{_LARGEST:g} for {what}, got {shown(word)}")
+                raise self.error(f"expected numbers within +-{_LARGEST:g} for {what}, got {quoted(word)}")
             result.append(value)
         return result
 
@@ -85,7 +85,7 @@ class Reader:
         """The next line; at the end of the file a ValueError says what was expected."""
         line = self.peek()
         if line is None:
-            raise self._end.fault(f"the file ends where {expected} was expected")
+            raise self._end.error(f"the file ends where {expected} was expected")
         self._next += 1
         return line
 
@@ -95,11 +95,11 @@ class Reader:
         self._next = len(self._lines)
         return lines
 
-    def fault(self, message: str) -> ValueError:
+    def error(self, message: str) -> ValueError:
         """An error about the file as a whole."""
         return ValueError(f"{self.file}: {message}")
 
 
-def shown(word: str) -> str:
+def quoted(word: str) -> str:
     """A word of a file for a message, quoted and not too long."""
     return repr(word if len(word) <= 40 else word[:37] + "...")

@@ -16,12 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import DOFS, SIDES
-from simharness.world.motion.mocap.foot_contact import Steps, make_sole, plant, stands
-from simharness.world.motion.mocap.joint_mapping import Roles, find_roles
+from simharness.world.motion.mocap.foot_contact import FootPath, detect_stances, make_sole, plant_foot
+from simharness.world.motion.mocap.joint_mapping import JointMap, map_joints
 from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, thigh_and_shank
 from simharness.world.motion.mocap.skeleton import Recording
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.inverse_kinematics import riding_height
+from simharness.world.motion.poses.inverse_kinematics import pelvis_height
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _CUTOFF = 8.0  # Hz: human motion is slower, the tremble of markers is not (Winter 1991: 6 for walking)
@@ -39,7 +39,7 @@ _SHOULDER_RISE = 0.35  # of the collar bone, radians, where the arm is overhead;
 
 
 @dataclass(frozen=True)
-class Recorded:
+class SourceMotion:
     """A recording in our axes (x forward, y left, z up in the zero pose), resampled: what a body needs of it.
 
     Attributes:
@@ -59,13 +59,13 @@ class Recorded:
     leg: float
 
 
-def understand(recording: Recording, *, rate: float) -> Recorded:
+def source_motion(recording: Recording, *, rate: float) -> SourceMotion:
     """Find the person in a recording and read it at ``rate`` frames a second, or its own where that is lower.
 
     Raises:
-        ValueError: a skeleton that is not understood, see ``find_roles``.
+        ValueError: a skeleton that is not understood, see ``map_joints``.
     """
-    roles = find_roles(recording)
+    roles = map_joints(recording)
     recording = _resampled(recording, rate)
     places, turns = recording.pose()
     axes = roles.axes
@@ -91,7 +91,7 @@ def understand(recording: Recording, *, rate: float) -> Recorded:
             segments[side, segment] = places[:, end] - places[:, limb[segment]]
     lengths = [np.linalg.norm(segments[side, part], axis=1)[0] for side in SIDES for part in ("thigh", "shank")]
     found["pelvis"] = _tilted(found["pelvis"], segments, recording.rate)
-    return Recorded(
+    return SourceMotion(
         time=np.arange(len(recording)) / recording.rate,
         turns=found,
         segments=segments,
@@ -109,8 +109,8 @@ def _tilted(pelvis: Floats, segments: dict[tuple[str, str], Floats], rate: float
     flexion = np.stack([_hip_and_knee(pelvis, segments, side)[:, 0] for side in SIDES])
     least, most = _HIP
     frames = round(_SETTLE * rate)
-    back = give_way(flexion.max(axis=0) - most, frames)
-    forth = give_way(least - flexion.min(axis=0), frames)
+    back = smooth_envelope(flexion.max(axis=0) - most, frames)
+    forth = smooth_envelope(least - flexion.min(axis=0), frames)
     return pelvis @ Rotation.from_euler("Y", (forth - back)[:, None]).as_matrix()
 
 
@@ -122,13 +122,13 @@ def _hip_and_knee(pelvis: Floats, segments: dict[tuple[str, str], Floats], side:
     return thigh_and_shank(*unit)
 
 
-def give_way(excess: Floats, frames: int) -> Floats:
+def smooth_envelope(excess: Floats, frames: int) -> Floats:
     """By how much to give way, (N,): never less than the excess (N,), never less than 0, and smooth over frames."""
     most = maximum_filter1d(np.maximum(excess, 0.0), 2 * frames + 1, mode="nearest")
     return gaussian_filter1d(most, frames / 3, mode="nearest", radius=frames) if frames else most
 
 
-def _tip(recording: Recording, roles: Roles, side: str, role: str) -> int:
+def _tip(recording: Recording, roles: JointMap, side: str, role: str) -> int:
     """The joint at the far end of a limb's last segment: its toes or, for want of them, the first that hangs on it."""
     limb = roles.limbs[side]
     if role == "foot" and limb["toes"] >= 0:
@@ -155,13 +155,13 @@ def _calmed(values: Floats, rate: float) -> Floats:
     return np.asarray(gaussian_filter1d(values, deviation * rate, axis=0, mode="nearest"))
 
 
-def pelvis_path(recorded: Recorded, kinematics: Kinematics) -> Floats:
+def pelvis_path(recorded: SourceMotion, kinematics: Kinematics) -> Floats:
     """Where the pelvis of a body goes, (N, 3) metres; heights are those of the recording, scaled."""
     hips = np.mean([kinematics.legs[side].anchors[0] for side in SIDES], axis=0)
     return recorded.hips * _scale(recorded, kinematics) - recorded.turns["pelvis"] @ hips
 
 
-def _scale(recorded: Recorded, kinematics: Kinematics) -> float:
+def _scale(recorded: SourceMotion, kinematics: Kinematics) -> float:
     return _leg_length(kinematics) / recorded.leg
 
 
@@ -171,7 +171,7 @@ def _leg_length(kinematics: Kinematics) -> float:
     return float(np.linalg.norm(knee - chain.anchors[0]) + np.linalg.norm(chain.end - knee))
 
 
-def retarget(recorded: Recorded, kinematics: Kinematics) -> Motion:
+def retarget(recorded: SourceMotion, kinematics: Kinematics) -> Motion:
     """The recording's motion on a body, over the recording's time; where it goes and faces is the recording's."""
     rate = 1.0 / np.diff(recorded.time).mean() if len(recorded.time) > 1 else 1.0
     pelvis = recorded.turns["pelvis"]
@@ -179,15 +179,15 @@ def retarget(recorded: Recorded, kinematics: Kinematics) -> Motion:
     soles = tuple(make_sole(kinematics.soles[side]) for side in SIDES)
     turns = np.stack([recorded.turns[f"{side} foot"] for side in SIDES])
     ankles = np.stack([_ankle(recorded, kinematics, side, position) for side in SIDES])
-    standing = stands(ankles, turns, (soles[0], soles[1]), rate=rate)
-    steps = [plant(ankles[k], turns[k], standing[k], soles[k], rate=rate) for k in range(2)]
+    standing = detect_stances(ankles, turns, (soles[0], soles[1]), rate=rate)
+    steps = [plant_foot(ankles[k], turns[k], standing[k], soles[k], rate=rate) for k in range(2)]
 
     ground = gaussian_filter1d(np.mean([step.ground for step in steps], axis=0), _SETTLE * rate, mode="nearest")
     position[:, 2] -= ground
     frames = round(_SETTLE * rate)
     lowest, highest = (_heights(kinematics, position, pelvis, steps, knee) for knee in (_FOLDED, _STRAIGHTEST))
-    position[:, 2] += give_way(lowest.max(axis=0) - position[:, 2], frames)
-    position[:, 2] -= give_way(position[:, 2] - highest.min(axis=0), frames)
+    position[:, 2] += smooth_envelope(lowest.max(axis=0) - position[:, 2], frames)
+    position[:, 2] -= smooth_envelope(position[:, 2] - highest.min(axis=0), frames)
 
     angles = np.zeros((len(position), len(DOFS)))
     _trunk(recorded, kinematics, angles)
@@ -202,7 +202,7 @@ def retarget(recorded: Recorded, kinematics: Kinematics) -> Motion:
     return Motion(recorded.time, np.concatenate([position, quaternion], axis=1), angles)
 
 
-def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, step: Steps, start: Floats) -> Floats:
+def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, step: FootPath, start: Floats) -> Floats:
     """Angles (N, 6) of a leg whose foot goes its steps.
 
     Where the joints do not let the foot lie as it should, it lies as they let it, over the same print: the heel rises
@@ -229,22 +229,22 @@ def _leg(kinematics: Kinematics, side: str, position: Floats, pelvis: Floats, st
     angles, turn = fitted(step.turn, start)
     risen = np.arcsin(np.clip(step.turn[:, 2, 0], -1, 1)) - np.arcsin(np.clip(turn[:, 2, 0], -1, 1))
     if risen.max() > _FELT:  # let the heel begin to rise before it must, or the knee would jerk
-        toes_down = Rotation.from_euler("Y", give_way(risen, round(_SETTLE * step.rate))[:, None]).as_matrix()
+        toes_down = Rotation.from_euler("Y", smooth_envelope(risen, round(_SETTLE * step.rate))[:, None]).as_matrix()
         angles, _ = fitted(step.turn @ toes_down, angles)
     return angles
 
 
-def _heights(kinematics: Kinematics, position: Floats, pelvis: Floats, steps: list[Steps], knee: float) -> Floats:
+def _heights(kinematics: Kinematics, position: Floats, pelvis: Floats, steps: list[FootPath], knee: float) -> Floats:
     """Heights of the pelvis at which either knee flexes by ``knee`` radians, (2, N) metres."""
     return np.stack(
         [
-            riding_height(kinematics, side, position[:, :2], pelvis, step.ankle(step.turn), knee)
+            pelvis_height(kinematics, side, position[:, :2], pelvis, step.ankle(step.turn), knee)
             for side, step in zip(SIDES, steps, strict=True)
         ]
     )
 
 
-def _ankle(recorded: Recorded, kinematics: Kinematics, side: str, position: Floats) -> Floats:
+def _ankle(recorded: SourceMotion, kinematics: Kinematics, side: str, position: Floats) -> Floats:
     """The recorded ankle, (N, 3): from the body's own hip, the leg scaled so that a straight one stays straight."""
     thigh, shank = recorded.segments[side, "thigh"], recorded.segments[side, "shank"]
     own = float((np.linalg.norm(thigh, axis=1) + np.linalg.norm(shank, axis=1))[0])
@@ -252,7 +252,7 @@ def _ankle(recorded: Recorded, kinematics: Kinematics, side: str, position: Floa
     return hip + (thigh + shank) * (_leg_length(kinematics) / own)
 
 
-def _trunk(recorded: Recorded, kinematics: Kinematics, angles: Floats) -> None:
+def _trunk(recorded: SourceMotion, kinematics: Kinematics, angles: Floats) -> None:
     """Spine, neck and arms, from the pelvis outwards: each joint makes up for what the ones before could not do."""
     ranges = dict(zip(DOFS, kinematics.ranges, strict=True))
 
@@ -278,7 +278,7 @@ def _spine(turn: Floats) -> Floats:
     return Rotation.from_matrix(turn).as_euler("YXZ") * [1, -1, 1]
 
 
-def _arm(recorded: Recorded, trunk: Floats, side: str, angles: Floats, shrug: Floats) -> None:
+def _arm(recorded: SourceMotion, trunk: Floats, side: str, angles: Floats, shrug: Floats) -> None:
     mirror = _MIRROR if side == "right" else np.ones(3)
 
     def direction(vectors: Floats) -> Floats:

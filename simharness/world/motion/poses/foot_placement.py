@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.world.motion.paths import Spot, turned
+from simharness.world.motion.paths import Spot, rotation_2d
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import bump, ease
@@ -22,7 +22,7 @@ PEELING = 0.12  # and the heel so many seconds before
 
 
 @dataclass(frozen=True)
-class Print:
+class Footprint:
     """Where a foot stands, in the frame of its spot: x ahead, y to the left.
 
     Attributes:
@@ -37,13 +37,13 @@ class Print:
     floor: float = 0.0
     pitch: float = 0.0
 
-    def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> Print:
+    def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> Footprint:
         """The same, elsewhere."""
         x, y = self.place
         return replace(self, place=(x + ahead, y + left), floor=self.floor if floor is None else floor)
 
 
-def stance(kinematics: Kinematics, side: str, *, apart: float = 1.0, out: float = TOE_OUT) -> Print:
+def stance(kinematics: Kinematics, side: str, *, apart: float = 1.0, out: float = TOE_OUT) -> Footprint:
     """The print of one foot of a person who stands on the spot.
 
     Args:
@@ -53,20 +53,20 @@ def stance(kinematics: Kinematics, side: str, *, apart: float = 1.0, out: float 
         out: how far the toes point outwards, radians.
     """
     ankle = kinematics.legs[side].end
-    return Print((float(ankle[0]), float(apart * ankle[1])), float(np.sign(ankle[1]) * out))
+    return Footprint((float(ankle[0]), float(apart * ankle[1])), float(np.sign(ankle[1]) * out))
 
 
-def pelvis_at_ease(kinematics: Kinematics) -> float:
+def relaxed_pelvis_height(kinematics: Kinematics) -> float:
     """Height of the pelvis of someone who stands with knees that give a little, metres."""
     return kinematics.standing_height - float(1 - np.cos(_AT_EASE / 2)) * kinematics.leg_length
 
 
-def tread(
+def foot_path(
     kinematics: Kinematics,
     spot: Spot,
     time: Floats,
-    first: Print,
-    steps: Sequence[tuple[float, float, Print]] = (),
+    first: Footprint,
+    steps: Sequence[tuple[float, float, Footprint]] = (),
     *,
     pitch: ArrayLike = 0.0,
     lift: float = _LIFT,
@@ -106,20 +106,20 @@ def tread(
     ahead, height = kinematics.rolling.at(tilt)
     ground = ground + ahead[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
     return Foot(
-        ankle=np.column_stack([in_world(spot, ground), height + floor + aloft]),
+        ankle=np.column_stack([spot_to_world(spot, ground), height + floor + aloft]),
         bearing=spot.bearing + bearing,
         pitch=tilt,
     )
 
 
-def in_world(spot: Spot, place: ArrayLike) -> Floats:
+def spot_to_world(spot: Spot, place: ArrayLike) -> Floats:
     """Points (..., 2) or (..., 3) of a spot's frame in the world."""
     place = np.asarray(place, float)
-    ground = spot.place + place[..., :2] @ turned(spot.bearing).T
+    ground = spot.place + place[..., :2] @ rotation_2d(spot.bearing).T
     return ground if place.shape[-1] == 2 else np.concatenate([ground, place[..., 2:]], axis=-1)
 
 
-def hip_over(kinematics: Kinematics, *, shank: ArrayLike, thigh: ArrayLike, pitch: ArrayLike = 0.0) -> Floats:
+def hip_position(kinematics: Kinematics, *, shank: ArrayLike, thigh: ArrayLike, pitch: ArrayLike = 0.0) -> Floats:
     """Where a leg in its plane carries the hip, (T, 2): ahead of the ankle of the flat foot, and up from its floor.
 
     Args:
@@ -140,7 +140,7 @@ def hip_over(kinematics: Kinematics, *, shank: ArrayLike, thigh: ArrayLike, pitc
     )
 
 
-def carry_pelvis(
+def pelvis_from_hips(
     kinematics: Kinematics,
     spot: Spot,
     hip: Floats,
@@ -154,7 +154,7 @@ def carry_pelvis(
     Args:
         kinematics: the body.
         spot: where.
-        hip: metres, as of :func:`hip_over` and the place of its foot.
+        hip: metres, as of :func:`hip_position` and the place of its foot.
         lean: of the pelvis, forward positive, (T,) radians.
         aside: of the pelvis, to the left, metres.
         bearing: of the pelvis against the spot's, radians.
@@ -164,7 +164,7 @@ def carry_pelvis(
     up = hip[:, 1] - (z * np.cos(lean) - x * np.sin(lean))
     aside = np.broadcast_to(np.asarray(aside, float), len(hip))
     pelvis = Pelvis(
-        ground=in_world(spot, np.stack([ahead, aside], axis=-1)),
+        ground=spot_to_world(spot, np.stack([ahead, aside], axis=-1)),
         bob=np.zeros(len(hip)),
         bearing=np.broadcast_to(spot.bearing + np.asarray(bearing, float), len(hip)),
         lean=np.broadcast_to(np.asarray(lean, float), len(hip)),

@@ -13,7 +13,7 @@ _STEP, _ROUNDING = 0.25, 5.0  # degrees
 
 
 @dataclass(frozen=True)
-class Rolling:
+class FootRoll:
     """What the pitch of a foot does to its ankle.
 
     Attributes:
@@ -38,7 +38,7 @@ class Rolling:
         return np.interp(pitch, self.pitch, self.passing - self.height)
 
 
-def roll(sole: Floats) -> Rolling:
+def roll_sole(sole: Floats) -> FootRoll:
     """Roll a rigid sole over its edges: at each pitch the lowest point touches, and while it touches it stays.
 
     Args:
@@ -54,4 +54,4 @@ def roll(sole: Floats) -> Rolling:
     ahead -= np.interp(0.0, pitch, ahead)
     height = -z.min(axis=1)
     passing = np.maximum(height, gaussian_filter1d(height, _ROUNDING / _STEP))
-    return Rolling(pitch=pitch, ahead=ahead, height=height, passing=passing)
+    return FootRoll(pitch=pitch, ahead=ahead, height=height, passing=passing)

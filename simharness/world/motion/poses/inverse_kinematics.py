@@ -71,7 +71,7 @@ def pose_angles(frames: int, **degrees: ArrayLike) -> Floats:
     return angles
 
 
-def stand_on(
+def solve_standing(
     kinematics: Kinematics,
     time: Floats,
     pelvis: Pelvis,
@@ -90,26 +90,26 @@ def stand_on(
         pelvis: its motion.
         feet: by side.
         angles: of the upper body, (T, D); the legs' columns are overwritten.
-        guess: as in :func:`plant`.
+        guess: as in :func:`solve_legs`.
         straightest: the least flexion that a knee comes to, radians; it sets the height.
         fit: the pelvis and the feet that the height is fitted to, where it shall not depend on which instants are
             asked for: all that they ever do, or the extremes of it; None: ``pelvis`` and ``feet``.
     """
-    height = ride(kinematics, *(fit or (pelvis, feet)), straightest=straightest)
-    return plant(kinematics, time, pelvis, height, feet, angles, guess=guess)
+    height = highest_pelvis(kinematics, *(fit or (pelvis, feet)), straightest=straightest)
+    return solve_legs(kinematics, time, pelvis, height, feet, angles, guess=guess)
 
 
-def ride(kinematics: Kinematics, pelvis: Pelvis, feet: Mapping[str, Foot], *, straightest: float) -> float:
+def highest_pelvis(kinematics: Kinematics, pelvis: Pelvis, feet: Mapping[str, Foot], *, straightest: float) -> float:
     """The greatest height of the pelvis, over which it bobs, at which no knee flexes less than ``straightest``.
 
     One constant for the whole motion: a height fitted frame by frame would jolt with every step.
     """
     turn = pelvis.turn.as_matrix()
-    highest = [riding_height(kinematics, side, pelvis.ground, turn, feet[side].ankle, straightest) for side in SIDES]
+    highest = [pelvis_height(kinematics, side, pelvis.ground, turn, feet[side].ankle, straightest) for side in SIDES]
     return float(np.min(highest - pelvis.bob, initial=np.inf))
 
 
-def plant(
+def solve_legs(
     kinematics: Kinematics,
     time: Floats,
     pelvis: Pelvis,
@@ -164,7 +164,7 @@ def _bent(kinematics: Kinematics, side: str, ankle: Floats, pitch: Floats) -> Fl
     return np.stack([hip, knee, pitch - hip + knee], axis=-1)
 
 
-def riding_height(
+def pelvis_height(
     kinematics: Kinematics, side: str, ground: Floats, turn: Floats, ankle: Floats, knee: float
 ) -> Floats:
     """The height of the pelvis at which a knee flexes by ``knee`` radians, (T,) metres.
@@ -186,7 +186,7 @@ def riding_height(
     return ankle[:, 2] - hip[:, 2] + np.sqrt(np.maximum(length**2 - across**2, 0.0))
 
 
-def girdle(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
+def shoulder_girdle(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
     """Where the pelvis, the trunk and the clavicle have carried the frame of an arm, (T, 3, 3) and (T, 3) metres."""
     pelvis = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
     columns = [DOFS.index(name) for name in kinematics.trunk_order(side)]
@@ -194,9 +194,9 @@ def girdle(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, F
     return pelvis @ turn, (pelvis @ place[..., None])[..., 0] + motion.root[:, :3]
 
 
-def palm(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
+def palm_pose(kinematics: Kinematics, motion: Motion, side: str) -> tuple[Floats, Floats]:
     """Orientation (T, 3, 3) and place (T, 3), metres, of the middle of a palm; see ``Kinematics.arms``."""
-    base, origin = girdle(kinematics, motion, side)
+    base, origin = shoulder_girdle(kinematics, motion, side)
     turn, place = kinematics.arms[side].forward(motion.angles[:, arm_columns(kinematics, side)])
     return base @ turn, (base @ place[..., None])[..., 0] + origin
 
@@ -247,7 +247,7 @@ def reach_with(
     columns, on = arm_columns(kinematics, side), weight > 0
     own = motion.angles[:, columns]
     start = own if guess is None else np.broadcast_to(np.asarray(guess, float), own.shape)
-    base, origin = girdle(kinematics, motion, side)
+    base, origin = shoulder_girdle(kinematics, motion, side)
     inward = base[on].swapaxes(1, 2)
     arm = kinematics.arms[side]
     solved = arm.solve(

@@ -13,7 +13,7 @@ from simharness.world.humans.anatomy import DOFS, RANGES, SIDES
 from simharness.world.humans.body import Body
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.motion.motion import Motion
-from simharness.world.motion.poses.foot_roll import Rolling, roll
+from simharness.world.motion.poses.foot_roll import FootRoll, roll_sole
 from simharness.world.motion.poses.kinematic_chain import Chain
 
 _TRUNK = ("lumbar_flexion", "lumbar_bending", "lumbar_rotation", "thorax_flexion", "thorax_bending", "thorax_rotation")
@@ -107,9 +107,9 @@ class Kinematics:
         return -float(self.neutral_skin[:, 2].min())
 
     @cached_property
-    def rolling(self) -> Rolling:
+    def rolling(self) -> FootRoll:
         """How a foot rolls over the floor; the right one's sole is the mirror image of the left one's."""
-        return roll(self.soles["left"])
+        return roll_sole(self.soles["left"])
 
     @cached_property
     def leg_parts(self) -> tuple[float, float]:

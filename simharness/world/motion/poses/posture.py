@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.poses.timing import wander
+from simharness.world.motion.poses.timing import smooth_noise
 
 Curves = dict[str, Floats]
 
@@ -15,18 +15,18 @@ _HANGING = {"shoulder_abduction": 9.0, "shoulder_rotation": 8.0, "elbow_flexion"
 _HANGING |= {"wrist_flexion": 5.0, "shoulder_flexion": 2.0}
 
 
-def at_ease(time: Floats, rng: np.random.Generator) -> Curves:
+def relaxed_posture(time: Floats, rng: np.random.Generator) -> Curves:
     """Arms hang, the head looks around a little, and nothing is ever quite still."""
     curves = {
-        "neck_rotation": 12.0 * wander(time, rng, 0.15),
-        "neck_flexion": 3.0 + 4.0 * wander(time, rng, 0.25),
-        "neck_bending": 2.0 * wander(time, rng, 0.2),
-        "lumbar_flexion": 1.0 + 1.0 * wander(time, rng, 0.15),
-        "thorax_rotation": 3.0 * wander(time, rng, 0.12),
+        "neck_rotation": 12.0 * smooth_noise(time, rng, 0.15),
+        "neck_flexion": 3.0 + 4.0 * smooth_noise(time, rng, 0.25),
+        "neck_bending": 2.0 * smooth_noise(time, rng, 0.2),
+        "lumbar_flexion": 1.0 + 1.0 * smooth_noise(time, rng, 0.15),
+        "thorax_rotation": 3.0 * smooth_noise(time, rng, 0.12),
     }
     for side in SIDES:
         for name, rest in _HANGING.items():
-            curves[f"{side}_{name}"] = rest + 1.5 * wander(time, rng, 0.2)
+            curves[f"{side}_{name}"] = rest + 1.5 * smooth_noise(time, rng, 0.2)
     return curves
 
 
@@ -46,7 +46,7 @@ def limbs(**targets: ArrayLike) -> dict[str, ArrayLike]:
     return {name: value for side in SIDES for name, value in limb(side, **targets).items()}
 
 
-def some_side(rng: np.random.Generator) -> tuple[str, float]:
+def draw_side(rng: np.random.Generator) -> tuple[str, float]:
     """The arm that acts, mostly the right one, and its sign: 1 left, -1 right."""
     side = "right" if rng.uniform() < 0.75 else "left"
     return side, 1.0 if side == "left" else -1.0

@@ -23,7 +23,7 @@ def smoothstep(x: ArrayLike) -> Floats:
     return x * x * (3 - 2 * x)
 
 
-def glide(time: Floats, *keys: tuple[float, float]) -> Floats:
+def minimum_jerk(time: Floats, *keys: tuple[float, float]) -> Floats:
     """From value to value, at rest at each, (T,): minimum-jerk ways between keys (time, value), held beyond them."""
     result = np.full(len(time), float(keys[0][1]))
     for (start, before), (end, after) in pairwise(keys):
@@ -38,7 +38,7 @@ def bump(time: Floats, start: float, end: float) -> Floats:
     return 64 * x**3 * (1 - x) ** 3
 
 
-def rounds(
+def cycle_time(
     time: Floats, lasting: Sequence[float], *, rng: np.random.Generator, pace: float = 1.0
 ) -> tuple[Floats, Floats]:
     """Divide time into equal rounds of several parts each.
@@ -58,14 +58,16 @@ def rounds(
     return np.mod(time + rng.uniform(0.0, marks[-1]), marks[-1]), marks
 
 
-def wander(time: Floats, rng: np.random.Generator, rate: float) -> Floats:
+def smooth_noise(time: Floats, rng: np.random.Generator, rate: float) -> Floats:
     """A smooth aimless curve about 0 within -1..1, (T,): three slow waves about ``rate`` hertz."""
     rates = rate * rng.uniform([0.6, 1.0, 1.7], [0.9, 1.5, 2.4])
     phases = rng.uniform(0.0, 2 * np.pi, 3)
     return np.sin(2 * np.pi * time[:, None] * rates + phases) @ np.array([0.5, 0.3, 0.2])
 
 
-def strokes(time: Floats, rng: np.random.Generator, *, hold: float, rest: float, raised: float = 0.8) -> Floats:
+def gesture_envelope(
+    time: Floats, rng: np.random.Generator, *, hold: float, rest: float, raised: float = 0.8
+) -> Floats:
     """How far a repeated gesture is on, (T,) from 0 (resting) to 1 (held), smoothly up and down.
 
     Args:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.world.motion.trajectory import Trajectory, posed
+from simharness.world.motion.trajectory import Trajectory, transform_points
 from simharness.world.scene.objects.geoms import Box, Geom, carried
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class ObjectModel:
 
     def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> Solid:
         """The thing on its way."""
-        corners = np.concatenate([posed(self.extent.corners, pose) for pose in trajectory.pose])
+        corners = np.concatenate([transform_points(self.extent.corners, pose) for pose in trajectory.pose])
         return Solid(kind, name, self.mesh, self.geoms, Box.around(corners), trajectory=trajectory)
 
 
@@ -96,7 +96,7 @@ class Solid:
         pose = self.trajectory.at(time)
         if np.abs(pose[4:6]).max() < 1e-6:  # upright
             return self._extent.moved(pose[:2], _yaw(pose)).raised(pose[2])
-        return Box.around(posed(self._extent.corners, pose))
+        return Box.around(transform_points(self._extent.corners, pose))
 
     @cached_property
     def _extent(self) -> Box:

@@ -8,7 +8,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.inverse_kinematics import palm
+from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import motion_clock
@@ -90,7 +90,7 @@ def test_the_box_stays_in_both_hands_while_it_is_off_the_floor(kinematics, seed)
     assert 0.2 < lifted.mean() < 0.8
     assert pose[:, 2].max() > 0.35 * kinematics.body.stature
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        _, place = palm(kinematics, motion, side)
+        _, place = palm_pose(kinematics, motion, side)
         local = in_prop(box, place, TIME)[lifted]
         assert np.ptp(local, axis=0).max() < 0.006  # a hand does not slip
         assert np.abs(sign * local[:, 1] - box.size[1] / 2).max() < 0.005  # and is on the side of the box

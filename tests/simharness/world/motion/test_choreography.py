@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
-from simharness.world.motion.choreography import choreograph, hand_out, in_the_way, moved
+from simharness.world.motion.choreography import assign_activities, choreograph, move_to, obstructs
 from simharness.world.motion.contact import penetration
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop
@@ -26,7 +26,7 @@ def cast(count):
 def test_activities_are_handed_out_in_turn_and_pairs_take_two():
     one, two = (Activity(name, n, Spot, 0.0, solo(lambda: None)) for name, n in (("one", 1), ("two", 2)))
     spare = Activity("stand", 1, Spot, 0.0, solo(lambda: None))
-    parties = hand_out([one, two], 7, spare=spare)
+    parties = assign_activities([one, two], 7, spare=spare)
     assert [(party.people, party.activity.name) for party in parties] == [
         ((0,), "one"),
         ((1, 2), "two"),
@@ -34,8 +34,8 @@ def test_activities_are_handed_out_in_turn_and_pairs_take_two():
         ((4, 5), "two"),
         ((6,), "one"),
     ]
-    assert hand_out([two], 3, spare=spare)[-1].activity.name == "stand"  # nobody is left to greet
-    assert hand_out([one], 0, spare=spare) == ()
+    assert assign_activities([two], 3, spare=spare)[-1].activity.name == "stand"  # nobody is left to greet
+    assert assign_activities([one], 0, spare=spare) == ()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -71,7 +71,7 @@ def test_pairs_meet_and_keep_away_from_the_others():
     assert {prop.kind for prop in made.props} <= {"table", "chair"}
     for prop in made.props:
         for person in (0, 1, 2):
-            assert not in_the_way(prop, made.motions[person])
+            assert not obstructs(prop, made.motions[person])
 
 
 def test_one_more_person_changes_none_of_the_others():
@@ -103,7 +103,7 @@ def test_what_is_done_on_a_spot_is_carried_there(name):
         activity.perform(people, where, clock, rng=stream(1, name), pace=1.1)
         for where in (spot, Spot(np.zeros(2), 0.0))
     )
-    carried = moved(carried, spot)
+    carried = move_to(carried, spot)
     for one, other in zip(there.motions, carried.motions, strict=True):
         np.testing.assert_allclose(one.root[:, :3], other.root[:, :3], atol=1e-6)
         np.testing.assert_allclose(one.angles, other.angles, atol=2e-4)
@@ -114,7 +114,7 @@ def test_what_is_done_on_a_spot_is_carried_there(name):
 def test_carried_poses_turn_about_the_vertical():
     pose = np.array([[1.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]])
     prop = Prop("box", (0.2, 0.3, 0.2), Trajectory(np.zeros(1), pose))
-    (carried,) = moved(Performance((), (prop,)), Spot(np.array([2.0, 3.0]), np.pi / 2)).props
+    (carried,) = move_to(Performance((), (prop,)), Spot(np.array([2.0, 3.0]), np.pi / 2)).props
     np.testing.assert_allclose(carried.trajectory.pose[0, :3], [2.0, 4.0, 0.5], atol=1e-12)
     turn = Rotation.from_quat(carried.trajectory.pose[0, 3:], scalar_first=True)
     np.testing.assert_allclose(turn.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
@@ -126,4 +126,4 @@ def test_a_thing_is_in_the_way_of_whoever_comes_near_its_ground_plan(ahead, bloc
     (motion,) = made.motions
     place = [*(motion.root[0, :2] + [0.0, ahead]), 0.0, np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
     prop = Prop("table", (0.4, 1.0, 0.7), Trajectory(np.zeros(1), np.array([place])))  # turned: 0.2 m towards it
-    assert in_the_way(prop, motion) == blocked
+    assert obstructs(prop, motion) == blocked

@@ -7,7 +7,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.mujoco_model import person_spec
 from simharness.world.motion.activities.gestures import gesture
-from simharness.world.motion.contact import Crowd, penetration
+from simharness.world.motion.contact import ContactModel, penetration
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.poses.kinematics import Addresses
@@ -77,8 +77,8 @@ def test_nobody_is_overlooked_by_looking_near_only():
             zip(("point", "wave"), cast, ([0.0, 0.0], [0.45, 0.1]), (0.0, 2.0), strict=True)
         )
     ]
-    crowd = Crowd(cast)
-    one, other = (crowd.presence(k, motion, TIME) for k, motion in enumerate(motions))
+    crowd = ContactModel(cast)
+    one, other = (crowd.sample(k, motion, TIME) for k, motion in enumerate(motions))
     everywhere = crowd._pair(0, 1).depths(one.motion, other.motion, np.arange(len(TIME)))
     assert everywhere.max() > 0
     np.testing.assert_array_equal(crowd.penetration(one, other), everywhere)
@@ -87,7 +87,7 @@ def test_nobody_is_overlooked_by_looking_near_only():
 def test_the_box_of_a_body_holds_all_its_skin():
     mover = performer(2)
     motion = gesture("point", mover, Spot(np.ones(2), 1.0), TIME, rng=stream(0, "box"))
-    here = Crowd([mover]).presence(0, motion, TIME)
+    here = ContactModel([mover]).sample(0, motion, TIME)
     for k in (0, 9, 18, 27):
         skin = mover.body.skin(mover.transforms(here.motion)[k])[:, :2]
         assert (skin >= here.low[k]).all()

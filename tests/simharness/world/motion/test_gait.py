@@ -4,8 +4,8 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
-from simharness.world.motion.activities.gait import FOOT_OFF, make_gait, normative
-from simharness.world.motion.poses.foot_roll import roll
+from simharness.world.motion.activities.gait import FOOT_OFF, make_gait, normative_angles
+from simharness.world.motion.poses.foot_roll import roll_sole
 from simharness.world.motion.poses.kinematics import Kinematics
 
 
@@ -17,7 +17,7 @@ def kinematics(request):
 def test_normative_curves_have_the_published_landmarks():
     """Perry and Burnfield 2010, chapters 3 to 6: ranges of motion and when they are reached."""
     phase = np.linspace(0, 1, 1001)
-    hip, knee, ankle = np.degrees(normative(phase)).T
+    hip, knee, ankle = np.degrees(normative_angles(phase)).T
     assert 38 <= np.ptp(hip) <= 46
     assert 0.48 <= phase[hip.argmin()] <= 0.57
     assert 55 <= knee.max() <= 68
@@ -28,14 +28,14 @@ def test_normative_curves_have_the_published_landmarks():
     assert 8 <= ankle.max() <= 15
     assert -22 <= ankle.min() <= -12
     assert 0.58 <= phase[ankle.argmin()] <= 0.67
-    np.testing.assert_allclose(normative(0.0), normative(1.0))
+    np.testing.assert_allclose(normative_angles(0.0), normative_angles(1.0))
 
 
 def test_a_round_sole_rolls_like_a_wheel():
     radius, center = 0.1, np.array([0.02, 0.0, -0.05])
     around = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
     rim = center + radius * np.stack([np.sin(around), 0 * around, np.cos(around)], axis=-1)
-    rolling = roll(rim)
+    rolling = roll_sole(rim)
     pitch = np.radians([-60.0, -20.0, 0.0, 15.0, 40.0])
     ahead, height = rolling.at(pitch)
     # The wheel's centre moves by -radius x pitch at constant height; the ankle is fixed to the wheel.

@@ -10,7 +10,7 @@ from simharness.types.random_streams import stream
 from simharness.world.motion.contact import penetration
 from simharness.world.motion.paths import SWAY, Spot
 from simharness.world.motion.performance import Performance
-from simharness.world.motion.poses.inverse_kinematics import palm
+from simharness.world.motion.poses.inverse_kinematics import palm_pose
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import RATE
@@ -108,7 +108,7 @@ def test_things_do_not_jump(played):
 
 
 def palms(mover, motion, side):
-    return palm(mover, motion, side)[1]
+    return palm_pose(mover, motion, side)[1]
 
 
 def runs(on):

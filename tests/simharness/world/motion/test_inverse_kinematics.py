@@ -8,14 +8,21 @@ from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.activities.gestures import gesture
 from simharness.world.motion.paths import Spot
-from simharness.world.motion.poses.foot_placement import Print, carry_pelvis, hip_over, in_world, stance, tread
+from simharness.world.motion.poses.foot_placement import (
+    Footprint,
+    foot_path,
+    hip_position,
+    pelvis_from_hips,
+    spot_to_world,
+    stance,
+)
 from simharness.world.motion.poses.inverse_kinematics import (
     arm_angles,
     arm_columns,
-    palm,
-    plant,
+    palm_pose,
     pose_angles,
     reach_with,
+    solve_legs,
 )
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
@@ -36,7 +43,7 @@ def standing(kinematics):
 
 def test_the_palm_lies_on_the_skin_in_any_pose(kinematics, standing):
     for name in ("left", "right"):
-        _, place = palm(kinematics, standing, name)
+        _, place = palm_pose(kinematics, standing, name)
         for pose, point in zip(kinematics.transforms(standing)[::20], place[::20], strict=True):
             assert np.linalg.norm(kinematics.body.skin(pose) - point, axis=1).min() < 0.012
 
@@ -47,11 +54,11 @@ def test_a_hand_goes_where_it_is_sent(kinematics, standing, side):
     chest = kinematics.standing_height + kinematics.arms[side].anchors[0, 2]
     length = np.linalg.norm(kinematics.arms[side].end - kinematics.arms[side].anchors[0])
     way = np.stack([0.6 * length + 0.1 * np.sin(TIME), sign * 0.1 + 0 * TIME, chest - 0.3 * length + 0 * TIME], axis=-1)
-    place = in_world(SPOT, way)
+    place = spot_to_world(SPOT, way)
     guess = arm_angles(kinematics, shoulder_flexion=50.0, elbow_flexion=50.0)
     weight = np.clip(TIME - 0.5, 0, 1)
     moved = reach_with(kinematics, standing, side, place, weight=weight, guess=guess)
-    _, got = palm(kinematics, moved, side)
+    _, got = palm_pose(kinematics, moved, side)
     assert np.linalg.norm(got - place, axis=1)[weight == 1].max() < 0.003
     np.testing.assert_array_equal(moved.angles[weight == 0], standing.angles[weight == 0])
     others = np.delete(np.arange(len(DOFS)), arm_columns(kinematics, side))
@@ -64,9 +71,9 @@ def test_a_hand_turns_as_it_is_told(kinematics, standing):
     angles = standing.angles.copy()
     angles[:, arm_columns(kinematics, "right")] = guess + np.radians([5.0, 3, -4, 6, 10, 8])
     wanted = type(standing)(standing.time, standing.root, angles)
-    turn, place = palm(kinematics, wanted, "right")
+    turn, place = palm_pose(kinematics, wanted, "right")
     moved = reach_with(kinematics, standing, "right", place, turn=turn, guess=guess)
-    got_turn, got = palm(kinematics, moved, "right")
+    got_turn, got = palm_pose(kinematics, moved, "right")
     assert np.linalg.norm(got - place, axis=1).max() < 0.002
     assert Rotation.from_matrix(got_turn.swapaxes(1, 2) @ turn).magnitude().max() < np.radians(6)
 
@@ -76,7 +83,7 @@ def test_what_is_out_of_reach_is_pointed_at_smoothly(kinematics, standing):
     ahead = 0.2 + 2.0 * ease(TIME / 2.0)  # metres: from well within reach to far out of it
     far = np.stack([ahead, 0.2 + 0 * TIME, shoulder + 0 * TIME], axis=-1)
     guess = arm_angles(kinematics, shoulder_flexion=80.0, elbow_flexion=40.0)
-    moved = reach_with(kinematics, standing, "left", in_world(SPOT, far), guess=guess)
+    moved = reach_with(kinematics, standing, "left", spot_to_world(SPOT, far), guess=guess)
     velocity = np.diff(moved.angles, axis=0) * 30
     assert (
         np.abs(velocity).max() < 14.0
@@ -92,14 +99,14 @@ def test_arm_angles_refuse_what_an_arm_has_not(kinematics):
 
 
 def test_a_bent_leg_carries_the_hip_where_kinematics_says(kinematics):
-    """``hip_over`` in closed form against the whole body, solved and posed."""
+    """``hip_position`` in closed form against the whole body, solved and posed."""
     shank, thigh = np.radians([3.0, 12.0, 20.0]), np.radians([5.0, 40.0, 75.0])
-    own = {side: Print((0.0, float(kinematics.legs[side].anchors[0, 1]))) for side in ("left", "right")}
-    hip = hip_over(kinematics, shank=shank, thigh=thigh)
+    own = {side: Footprint((0.0, float(kinematics.legs[side].anchors[0, 1]))) for side in ("left", "right")}
+    hip = hip_position(kinematics, shank=shank, thigh=thigh)
     lean = np.radians([2.0, 20.0, 30.0])
-    pelvis, height = carry_pelvis(kinematics, SPOT, hip, lean=lean)
-    feet = {side: tread(kinematics, SPOT, np.zeros(3), own[side]) for side in own}
-    motion = plant(kinematics, np.arange(3.0), pelvis, height, feet, pose_angles(3))
+    pelvis, height = pelvis_from_hips(kinematics, SPOT, hip, lean=lean)
+    feet = {side: foot_path(kinematics, SPOT, np.zeros(3), own[side]) for side in own}
+    motion = solve_legs(kinematics, np.arange(3.0), pelvis, height, feet, pose_angles(3))
     for side in own:
         column = {name: np.degrees(motion.angles[:, DOFS.index(f"{side}_{name}")]) for name in kinematics.leg_order}
         np.testing.assert_allclose(column["knee_flexion"], np.degrees(shank + thigh), atol=0.5)
@@ -111,10 +118,10 @@ def test_a_foot_treads_from_print_to_print(kinematics):
     first = stance(kinematics, "left")
     up = first.moved(0.3, 0.1, floor=0.2)
     time = np.linspace(0.0, 3.0, 301)
-    foot = tread(kinematics, SPOT, time, first, [(1.0, 1.6, up), (2.0, 2.6, first)], lift=0.05)
+    foot = foot_path(kinematics, SPOT, time, first, [(1.0, 1.6, up), (2.0, 2.6, first)], lift=0.05)
     flat = kinematics.rolling.at(np.zeros(1))[1][0]
-    np.testing.assert_allclose(foot.ankle[0], in_world(SPOT, [*first.place, flat]), atol=1e-6)
-    np.testing.assert_allclose(foot.ankle[180], in_world(SPOT, [*up.place, flat + 0.2]), atol=1e-6)
+    np.testing.assert_allclose(foot.ankle[0], spot_to_world(SPOT, [*first.place, flat]), atol=1e-6)
+    np.testing.assert_allclose(foot.ankle[180], spot_to_world(SPOT, [*up.place, flat + 0.2]), atol=1e-6)
     np.testing.assert_allclose(foot.ankle[-1], foot.ankle[0], atol=1e-6)
     assert foot.ankle[:, 2].max() > flat + 0.22
     # A planted foot may roll, but its sole stays where it is: what rolls is not dragged.

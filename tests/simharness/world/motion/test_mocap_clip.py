@@ -10,7 +10,7 @@ from simharness.world.humans.anatomy import DOFS
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.mocap import Clip, load_clip
-from simharness.world.motion.mocap.joint_mapping import find_roles
+from simharness.world.motion.mocap.joint_mapping import map_joints
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 
@@ -95,7 +95,7 @@ def test_knees_bend_like_the_recorded_ones(played):
     recording = played.clip.recording
     if recording.file.startswith("03"):
         pytest.skip("uneven ground")
-    limbs = find_roles(recording).limbs
+    limbs = map_joints(recording).limbs
     where, _ = recording.pose()
     recorded = np.arange(len(recording)) / recording.rate
     for side in ("left", "right"):

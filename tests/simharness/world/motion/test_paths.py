@@ -6,14 +6,14 @@ from hypothesis import strategies as st
 from simharness.types.random_streams import stream
 from simharness.world.motion.paths import (
     Loop,
-    Recorded,
+    RecordedPath,
     Spot,
-    bends,
     draw_loop,
     draw_recorded,
     draw_spot,
+    loop_limits,
     make_loop,
-    turned,
+    rotation_2d,
 )
 
 TIME = np.linspace(0.0, 6.0, 301)
@@ -36,7 +36,7 @@ def test_circle_has_its_length_speed_and_curvature():
 
 def draw_some_loop(seed: int, *, half: float = 2.0) -> Loop:
     rng = stream(seed, "loop")
-    limits = bends(1.0, slowest=0.8, fastest=1.2, half=half, running=False)
+    limits = loop_limits(1.0, slowest=0.8, fastest=1.2, half=half, running=False)
     loops = (draw_loop(rng, half=half, speed=limits.speed, tightest=limits.tightest) for _ in range(1000))
     return next(loop for loop in loops if loop is not None)
 
@@ -62,7 +62,7 @@ def test_loops_stay_in_turn_gently_and_close(seed, half):
 
 @given(half=st.floats(0.5, 6.0), speed=st.floats(0.5, 4.0), running=st.booleans())
 def test_nobody_is_thrown_off_a_bend(half, speed, running):
-    limits = bends(speed, slowest=0.5, fastest=5.0, half=half, running=running)
+    limits = loop_limits(speed, slowest=0.5, fastest=5.0, half=half, running=running)
     assert limits.tightest < half  # a circle of that radius fits
     assert limits.speed <= min(speed, limits.fastest) + 1e-9
     assert limits.fastest**2 / limits.tightest <= (3.5 if running else 1.3**2 * limits.tightest) + 1e-9
@@ -87,7 +87,7 @@ def test_recorded_way_is_turned_shifted_and_kept_inside(seed):
             break
     places = way.position(TIME)
     assert np.abs(places).max() <= 2.0 + 1e-9
-    np.testing.assert_allclose((places - places[0]) @ turned(way.spot.bearing), offset - offset[0], atol=1e-9)
+    np.testing.assert_allclose((places - places[0]) @ rotation_2d(way.spot.bearing), offset - offset[0], atol=1e-9)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(TIME)
     assert way.fastest == pytest.approx(steps.max())
 
@@ -98,7 +98,11 @@ def test_recorded_way_that_fits_at_no_bearing_is_not_drawn():
 
 
 def test_fastest_bounds_every_track():
-    tracks = [Spot(np.ones(2), 0.3), circle(1.0, speed=0.8), Recorded(Spot(np.zeros(2), 1.0), TIME, np.c_[TIME, TIME])]
+    tracks = [
+        Spot(np.ones(2), 0.3),
+        circle(1.0, speed=0.8),
+        RecordedPath(Spot(np.zeros(2), 1.0), TIME, np.c_[TIME, TIME]),
+    ]
     for track, fastest in zip(tracks, (0.0, 0.8, np.sqrt(2)), strict=True):
         moved = np.linalg.norm(np.diff(track.position(TIME), axis=0), axis=1) / np.diff(TIME)
         assert track.fastest == pytest.approx(fastest)

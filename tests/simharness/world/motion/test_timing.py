@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simharness.types.random_streams import stream
-from simharness.world.motion.poses.timing import bump, ease, glide, rounds, strokes, wander
+from simharness.world.motion.poses.timing import bump, cycle_time, ease, gesture_envelope, minimum_jerk, smooth_noise
 
 TIME = np.arange(0.0, 8.0, 1 / 40)
 
@@ -29,8 +29,8 @@ def test_ease_is_the_quintic_of_least_jerk():
 def test_glide_passes_its_keys_and_stays_between_them(times, values):
     keys = list(zip(sorted(times), values, strict=False))
     t = np.linspace(-1.0, 11.0, 500)
-    curve = glide(t, *keys)
-    at_keys = glide(np.array([time for time, _ in keys]), *keys)
+    curve = minimum_jerk(t, *keys)
+    at_keys = minimum_jerk(np.array([time for time, _ in keys]), *keys)
     np.testing.assert_allclose(at_keys, [value for _, value in keys], atol=1e-9)
     held = np.array([value for _, value in keys])
     assert curve.min() >= held.min() - 1e-9
@@ -47,27 +47,27 @@ def test_bump_goes_up_once_and_comes_down():
 
 
 def test_rounds_repeat():
-    u, marks = rounds(TIME, (1.0, 0.5, 2.0), rng=stream(0, "r"), pace=1.2)
+    u, marks = cycle_time(TIME, (1.0, 0.5, 2.0), rng=stream(0, "r"), pace=1.2)
     assert len(marks) == 4
     assert marks[0] == 0.0
     parts = np.diff(marks) * 1.2 / [1.0, 0.5, 2.0]
     assert (np.abs(parts - 1) <= 1 / 6).all()
     assert u.min() >= 0
     assert u.max() < marks[-1]
-    later, _ = rounds(TIME + marks[-1], (1.0, 0.5, 2.0), rng=stream(0, "r"), pace=1.2)
+    later, _ = cycle_time(TIME + marks[-1], (1.0, 0.5, 2.0), rng=stream(0, "r"), pace=1.2)
     np.testing.assert_allclose(np.exp(2j * np.pi * later / marks[-1]), np.exp(2j * np.pi * u / marks[-1]), atol=1e-9)
 
 
 def test_strokes_and_wander_keep_their_bounds():
     for k in range(50):
-        on = strokes(TIME, stream(k, "on"), hold=2.0, rest=0.8)
+        on = gesture_envelope(TIME, stream(k, "on"), hold=2.0, rest=0.8)
         assert on.min() >= 0
         assert on.max() <= 1
         assert on.max() > 0.99  # in 8 s it is done at least once
         assert np.abs(np.diff(on)).max() < 0.12
-        assert np.abs(wander(TIME, stream(k, "w"), 0.3)).max() <= 1.0
+        assert np.abs(smooth_noise(TIME, stream(k, "w"), 0.3)).max() <= 1.0
 
 
 def test_in_four_seconds_everyone_makes_the_gesture():
     early = TIME[TIME < 4]
-    assert all(strokes(early, stream(k, "on"), hold=2.4, rest=0.8).max() > 0.9 for k in range(200))
+    assert all(gesture_envelope(early, stream(k, "on"), hold=2.4, rest=0.8).max() > 0.9 for k in range(200))

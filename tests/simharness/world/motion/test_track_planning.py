@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from simharness.world.motion.paths import SWAY, Loop, Spot
-from simharness.world.motion.track_planning import Going, Replaying, Staying, plan_tracks
+from simharness.world.motion.track_planning import LoopRequest, RecordedRequest, SpotRequest, plan_tracks
 
-WALK = Going("walk", 1.04, 0.85, 1.15)
-RUN = Going("run", 2.8, 2.0, 3.5, running=True)
-STAND = Staying("stand")
+WALK = LoopRequest("walk", 1.04, 0.85, 1.15)
+RUN = LoopRequest("run", 2.8, 2.0, 3.5, running=True)
+STAND = SpotRequest("stand")
 SPAN = (-1.0, 7.0)
 
 
@@ -32,12 +32,12 @@ def apart(tracks, wishes, *, span, step=1 / 50):
         ([WALK, STAND] * 4 + [WALK], 2.0, 0.8),
         ([WALK, STAND] * 3, 3.0, 1.5),
         ([RUN, WALK, STAND], 2.5, 0.8),
-        ([Staying("table", 0.7, together=True), WALK, Staying("hug", 0.4, together=True), WALK], 2.5, 0.8),
+        ([SpotRequest("table", 0.7, together=True), WALK, SpotRequest("hug", 0.4, together=True), WALK], 2.5, 0.8),
     ],
 )
 def test_everyone_is_apart_and_inside_at_all_times(seed, wishes, area, spacing):
     tracks = plan_tracks(seed, wishes, area=area, spacing=spacing, span=SPAN)
-    assert [isinstance(track, Loop) for track in tracks] == [isinstance(wish, Going) for wish in wishes]
+    assert [isinstance(track, Loop) for track in tracks] == [isinstance(wish, LoopRequest) for wish in wishes]
     least, furthest = apart(tracks, wishes, span=SPAN)
     assert least >= spacing + 2 * SWAY - 0.03  # between the planner's instants
     assert furthest <= area - SWAY + 0.01
@@ -90,7 +90,7 @@ def test_plans_differ_by_seed_and_repeat():
 def test_recorded_ways_keep_apart_too():
     times = np.linspace(*SPAN, 481)
     way = np.column_stack([0.3 * times, 0.1 * np.sin(times)])
-    wishes = [Replaying("mocap", times, way)] * 3 + [WALK]
+    wishes = [RecordedRequest("mocap", times, way)] * 3 + [WALK]
     tracks = plan_tracks(0, wishes, area=2.5, spacing=0.8, span=SPAN)
     least, furthest = apart(tracks, wishes, span=SPAN)
     assert least >= 0.87
@@ -125,7 +125,7 @@ def test_a_crowd_that_does_not_fit_is_told_what_to_change():
 
 @pytest.mark.parametrize(
     ("wish", "area", "least"),
-    [(WALK, 0.3, 0.5), (RUN, 1.0, None), (STAND, 0.04, 0.1), (Staying("lie", 1.0), 1.0, 1.05)],
+    [(WALK, 0.3, 0.5), (RUN, 1.0, None), (STAND, 0.04, 0.1), (SpotRequest("lie", 1.0), 1.0, 1.05)],
 )
 def test_an_area_too_small_for_one_alone(wish, area, least):
     with pytest.raises(ValueError, match=rf'people.area = {area:g} m is too small for "{wish.what}"') as error:
@@ -136,7 +136,9 @@ def test_an_area_too_small_for_one_alone(wish, area, least):
     plan_tracks(0, [wish], area=named + 0.05, spacing=0.5, span=SPAN)  # what the message asks for suffices
 
 
-STRAIGHT = Replaying("mocap", np.linspace(*SPAN, 100), np.column_stack([np.linspace(0.0, 5.0, 100), np.zeros(100)]))
+STRAIGHT = RecordedRequest(
+    "mocap", np.linspace(*SPAN, 100), np.column_stack([np.linspace(0.0, 5.0, 100), np.zeros(100)])
+)
 
 
 @pytest.mark.parametrize("count", [1, 4])

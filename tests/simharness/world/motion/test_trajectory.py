@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from simharness.types.random_streams import stream
-from simharness.world.motion.trajectory import RATE, Trajectory, motion_clock, through
+from simharness.world.motion.trajectory import RATE, Trajectory, interpolate, motion_clock
 
 
 def turning(time, rate=1.0):
@@ -27,10 +27,10 @@ def test_the_clock_ticks_at_its_rate_and_covers_all_that_is_asked_for(duration, 
 def test_a_cubic_is_followed_and_the_samples_are_met():
     time = np.array([0.0, 0.1, 0.3, 0.35, 0.6])
     values = stream(0, "x").normal(size=(5, 3))
-    np.testing.assert_allclose(through(time, values, time), values, atol=1e-12)
+    np.testing.assert_allclose(interpolate(time, values, time), values, atol=1e-12)
     line = np.stack([3 * time - 1, 0 * time], axis=-1)
     when = np.linspace(0.0, 0.6, 50)
-    np.testing.assert_allclose(through(time, line, when)[:, 0], 3 * when - 1, atol=1e-12)
+    np.testing.assert_allclose(interpolate(time, line, when)[:, 0], 3 * when - 1, atol=1e-12)
 
 
 def test_velocity_has_no_jumps_where_samples_meet():
@@ -38,8 +38,8 @@ def test_velocity_has_no_jumps_where_samples_meet():
     values = stream(1, "x").normal(size=(20, 1))
     step = 1e-6
     for knot in time[1:-1]:
-        before = (through(time, values, knot) - through(time, values, knot - step)) / step
-        after = (through(time, values, knot + step) - through(time, values, knot)) / step
+        before = (interpolate(time, values, knot) - interpolate(time, values, knot - step)) / step
+        after = (interpolate(time, values, knot + step) - interpolate(time, values, knot)) / step
         np.testing.assert_allclose(before, after, rtol=1e-2, atol=1e-1)
         assert np.abs(before).max() > 0.01
 

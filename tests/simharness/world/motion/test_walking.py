@@ -14,7 +14,7 @@ from simharness.world.motion.activities.walking import walk
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import SWAY, Loop, make_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.track_planning import Going, plan_tracks
+from simharness.world.motion.track_planning import LoopRequest, plan_tracks
 
 RATE = 80.0  # Hz
 TIME = np.arange(0.0, 3.2, 1 / RATE)
@@ -35,7 +35,7 @@ def walked(request) -> Walk:
     seed = request.param
     kinematics = Kinematics(make_body(draw_shape(stream(seed, "walk"))))
     speed = [0.75, 0.85, 0.95, 1.05, 1.15][seed]
-    (loop,) = plan_tracks(seed, [Going("walk", speed, speed, speed)], area=2.0, spacing=0.8, span=(0.0, 4.0))
+    (loop,) = plan_tracks(seed, [LoopRequest("walk", speed, speed, speed)], area=2.0, spacing=0.8, span=(0.0, 4.0))
     assert isinstance(loop, Loop)
     motion = walk(kinematics, loop, TIME, rng=stream(seed, "manner"), pace=1.1)
     body = kinematics.body
