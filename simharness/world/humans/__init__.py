@@ -1,1 +1,1 @@
-"""People: bodies, their looks, and their MuJoCo models."""
+"""Human bodies: shapes, clothing and hair, skinning, mass distribution and MuJoCo models."""

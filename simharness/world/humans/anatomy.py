@@ -1,8 +1,9 @@
-"""Human anatomy in numbers: degrees of freedom, their ranges, and how mass is spread over the segments.
+"""Degrees of freedom of the human body, their ranges of motion, and mass fractions of the segments.
 
-Zero is the anatomical neutral: standing, legs straight, feet forward, arms hanging, palms to the thighs. The
-anatomical word is the positive direction; bending and spine rotation are positive to the person's left, rotation of
-hip and shoulder inward (medial). A mirrored joint at the same value is in the mirrored pose.
+All angles are zero in the anatomical neutral pose: standing, legs straight, feet forward, arms hanging, palms to the
+thighs. The name gives the positive direction (flexion, abduction ...). Bending and spine rotation are positive to the
+person's left, rotations of hip and shoulder are positive inward (medial). Equal values of a left and a right joint
+give mirrored poses.
 """
 
 from __future__ import annotations
@@ -57,10 +58,10 @@ RANGES: Mapping[str, tuple[float, float]] = MappingProxyType(
 """Least and greatest angle of every degree of freedom, radians."""
 
 DOFS: tuple[str, ...] = tuple(RANGES)
-"""The 35 degrees of freedom in the order of every array of angles."""
+"""Names of the 35 degrees of freedom, in the order of every array of angles."""
 
-# Male and female shares of body mass, de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters",
-# J. Biomechanics 29, 1996, table 4. Limb segments are of one side.
+# (male, female) percent of body mass: de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters",
+# J. Biomechanics 29, 1996, table 4. A limb segment is that of one side.
 _MASS_PERCENT = {
     "head": (6.94, 6.68),
     "upper_trunk": (15.96, 15.45),
@@ -77,10 +78,12 @@ PAIRED_SEGMENTS: frozenset[str] = frozenset({"upper_arm", "forearm", "hand", "th
 
 
 def mass_fractions(gender: float) -> dict[str, float]:
-    """Share of body mass of every segment; limb segments are of one side and count twice towards the sum of 1.
+    """Return the fraction of body mass of every segment.
+
+    A limb segment is that of one side: it counts twice in the sum, which is 1.
 
     Args:
-        gender: 0 male to 1 female; the shares of de Leva (1996) are interpolated.
+        gender: 0 male to 1 female; the values of de Leva (1996) are interpolated linearly.
     """
     shares = {name: (1 - gender) * male + gender * female for name, (male, female) in _MASS_PERCENT.items()}
     total = sum(share * (2 if name in PAIRED_SEGMENTS else 1) for name, share in shares.items())

@@ -1,14 +1,15 @@
-"""Published measures of people: what the drawn population is held against.
+"""Published body measures of adults and children, from which the population is drawn.
 
 Adults: ANSUR II, Gordon et al., "2012 Anthropometric Survey of U.S. Army Personnel: Methods and Summary Statistics",
-NATICK/TR-15/007, 2014, 4082 men and 1986 women. Its lengths lie between landmarks on bones; the body model's between
-centres of joints. Thighs (trochanterion to lateral femoral epicondyle), knee heights (epicondyle) and forearms
-(radiale to stylion) are taken as they stand, for those landmarks are level with the joints within a centimetre. The
-shoulder joint lies 10.4 % of acromion to radiale below the acromion and the elbow joint 4.3 % above the radiale (de
-Leva, "Joint center longitudinal positions computed from a selected subset of Chandler's data", J. Biomechanics 29,
-1996). Mass index: mean weight over mean stature squared, its deviation as that of weight for stature.
+NATICK/TR-15/007, 2014, 4082 men and 1986 women. ANSUR measures lengths between landmarks on bones; the body model
+measures between joint centres. Thighs (trochanterion to lateral femoral epicondyle), knee heights (epicondyle) and
+forearms (radiale to stylion) are used unchanged, because those landmarks are level with the joints within a
+centimetre. The shoulder joint lies 10.4 % of the length from acromion to radiale below the acromion, and the elbow
+joint 4.3 % above the radiale (de Leva, "Joint center longitudinal positions computed from a selected subset of
+Chandler's data", J. Biomechanics 29, 1996). The mean body mass index is mean weight over mean stature squared; its
+deviation is that of weight at a given stature.
 
-Children: the growth reference of the WHO for 5 to 19 years, de Onis et al., Bulletin of the WHO 85, 2007.
+Children: WHO growth reference for 5 to 19 years, de Onis et al., Bulletin of the WHO 85, 2007.
 """
 
 from __future__ import annotations
@@ -19,20 +20,20 @@ from types import MappingProxyType
 
 import numpy as np
 
-_UPPER_ARM = 1 - 0.104 - 0.043  # joint to joint, as a share of acromion to radiale
+_UPPER_ARM = 1 - 0.104 - 0.043  # shoulder joint to elbow joint, as a fraction of acromion to radiale
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and standard deviation of a measure, and its correlation with stature."""
+    """Mean, standard deviation and correlation with stature of a body measure."""
 
     mean: float
     deviation: float
     correlation: float = 0.0
 
 
-# Correlations with stature are rounded from those of ANSUR (Cheverud et al., NATICK/TR-90/031, 1990), between .6
-# and .9; those of differences of two heights are lower.
+# Correlations with stature are rounded from ANSUR (Cheverud et al., NATICK/TR-90/031, 1990), between 0.6 and 0.9;
+# those of differences of two heights are lower.
 ADULTS: Mapping[str, Mapping[str, Spread]] = MappingProxyType(
     {
         "male": {
@@ -53,12 +54,13 @@ ADULTS: Mapping[str, Mapping[str, Spread]] = MappingProxyType(
         },
     }
 )
-"""Measures of adults in metres, bmi in kg/m2; "knee" is the height of the knee joint over the sole, standing."""
+"""Measures of adults by sex, in metres, bmi in kg/m2. "knee" is the height of the knee joint over the sole."""
 
 YEARS = (5.0, 12.0)
-"""Ages of children."""
-_KNOTS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
-# Stature: median in metres and coefficient of variation (its power L is 1). Mass index: L, median, S.
+"""Least and greatest age of children, years."""
+_KNOTS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)  # years
+# LMS parameters at the knots. Stature: median in metres and coefficient of variation S (the power L is 1).
+# Body mass index: L, median in kg/m2, S.
 _STATURE = {
     "male": (
         (1.0973, 1.1595, 1.2173, 1.2727, 1.3257, 1.3778, 1.4311, 1.4908),
@@ -84,12 +86,12 @@ _MASS_INDEX = {
 
 
 def child_stature(sex: str, years: float) -> Spread:
-    """Stature of children of a sex, "male" or "female", at an age of 5 to 12 years."""
+    """Return the distribution of stature of children: ``sex`` "male" or "female", age 5 to 12 years."""
     median, variation = (float(np.interp(years, _KNOTS, row)) for row in _STATURE[sex])
     return Spread(median, median * variation, 1.0)
 
 
 def child_mass_index(sex: str, years: float, score: float) -> float:
-    """Mass index, kg/m2, of a child of a sex and age that is ``score`` standard deviations from the median."""
+    """Return the body mass index, kg/m2, at ``score`` standard deviations from the median of a sex and age."""
     power, median, variation = (float(np.interp(years, _KNOTS, row)) for row in _MASS_INDEX[sex])
     return float(median * (1 + power * variation * score) ** (1 / power))

@@ -1,9 +1,9 @@
-"""Capsules fitted to a body's skin: what people collide with, and what rays meet where no pictures are made.
+"""Capsules fitted to the skin of a body, for collisions and for visibility by ray casting.
 
-The skin that moves with one bone gets a few capsules, laid out roughly at first and then fitted as k-means fits
-centres: every point of the skin goes to the capsule it is nearest to, every capsule takes a Gauss-Newton step to its
-points, and again. There are no absolute sizes, so that a child is fitted as well as a giant, and the clothes and the
-hair count, for they are what is seen and touched.
+The skin that moves with one bone gets a few capsules. They are placed roughly and then fitted in the manner of
+k-means: every skin point is assigned to its nearest capsule, every capsule takes a Gauss-Newton step towards its
+points, and this is repeated. No size is absolute, so that a child is fitted as well as a tall adult. Clothes and hair
+belong to the skin here, because they are what is seen and touched.
 """
 
 from __future__ import annotations
@@ -19,19 +19,21 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats, Integers
 from simharness.world.humans.body import Body
 
-_POINTS = 4000  # of the skin, spread evenly over its area
-_ROUNDS = (4, 8)  # with own points only, then with all points for all, so that no end sticks out of the skin
-_STAY = 0.02  # of the weight of all its points holds a capsule where it began, in directions that they leave free
-_TYPICAL = 3.0  # median distances beyond which a point counts less and less
+_POINTS = 4000  # points on the skin, spread evenly over its area
+_ROUNDS = (4, 8)  # first with the points of a patch only, then with all points, so that no end sticks out of the skin
+_DAMPING = 0.02  # weight of the initial placement against all points: it fixes directions that the points leave free
+_CAUCHY = 3.0  # scale of Cauchy's weights, in median distances
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """All that is within ``radius`` of a segment, in a bone's frame at rest: from the bone's head, axes of the world.
+    """Capsule: all points within ``radius`` of a line segment.
+
+    The frame is that of the bone at rest: its origin is the head of the bone, its axes are those of the world.
 
     Attributes:
-        bone: that carries it.
-        start, end: of the segment, (3,) metres.
+        bone: name of the bone that carries the capsule.
+        start, end: ends of the segment, (3,) metres.
         radius: metres.
     """
 
@@ -42,31 +44,31 @@ class Capsule:
 
     @property
     def volume(self) -> float:
-        """Cubic metres."""
+        """Volume in cubic metres."""
         length = float(np.linalg.norm(self.end - self.start))
         return float(np.pi * self.radius**2 * (length + 4 / 3 * self.radius))
 
 
 @dataclass(frozen=True)
 class _Patch:
-    """Skin that moves as one, and how its capsules lie at first.
+    """Region of skin that moves rigidly, and the initial layout of its capsules.
 
     Attributes:
-        bone: that carries the capsules.
-        bones: whose skin it is; none of them turns against the carrier.
-        count: of capsules.
-        lie: "stacked" one on the other, each along the wider way of its slice; "chained" from one bone's head to the
-            next; "beside" each other, all along the way from bone to bone.
-        way: the two bones, from head to head.
-        part: of a chain's way, from and to.
+        bone: bone that carries the capsules.
+        bones: bones that move this skin; none of them turns relative to ``bone``.
+        count: number of capsules.
+        layout: "stacked": one above the other, each along the wider axis of its slice; "chained": end to end between
+            the heads of two bones; "beside": next to each other, all parallel to the line between the two heads.
+        ends: the two bones whose heads give the line of the layout.
+        span: start and end of a chain, as fractions of that line.
     """
 
     bone: str
     bones: tuple[str, ...]
     count: int
-    lie: Literal["stacked", "chained", "beside"]
-    way: tuple[str, str] = ("", "")
-    part: tuple[float, float] = (0.0, 1.0)
+    layout: Literal["stacked", "chained", "beside"]
+    ends: tuple[str, str] = ("", "")
+    span: tuple[float, float] = (0.0, 1.0)
 
 
 _TRUNK = (
@@ -76,7 +78,7 @@ _TRUNK = (
     _Patch("Neck", ("Neck", "Neck1"), 1, "chained", ("Neck", "Head")),
     _Patch("Head", ("Head",), 5, "stacked"),
 )
-# Without the side. A twist bone begins where its parent does and moves the far half of the limb.
+# Names without "Left" or "Right". A twist bone starts at the head of its parent and moves the far half of the limb.
 _LIMBS = (
     _Patch("Shoulder", ("Shoulder",), 1, "chained", ("Shoulder", "Arm")),
     _Patch("Arm", ("Arm",), 1, "chained", ("Arm", "ForeArm"), (0.0, 0.5)),
@@ -100,19 +102,19 @@ def _patches() -> Iterator[_Patch]:
     for side in ("Left", "Right"):
         for patch in _LIMBS:
             bones = tuple(_sided(bone, side) for bone in patch.bones)
-            way = (_sided(patch.way[0], side), _sided(patch.way[1], side))
-            yield replace(patch, bone=_sided(patch.bone, side), bones=bones, way=way)
+            ends = (_sided(patch.ends[0], side), _sided(patch.ends[1], side))
+            yield replace(patch, bone=_sided(patch.bone, side), bones=bones, ends=ends)
 
 
 def fit_capsules(body: Body) -> tuple[Capsule, ...]:
-    """Fit capsules to the whole skin of a body, dressed or not, as it stands at rest: 46 of them, bone by bone."""
+    """Fit 46 capsules, ordered by bone, to the whole skin of a rest body, dressed or bare."""
     patches = tuple(_patches())
     points, patch_of = _sample(body, patches)
-    first, own = [], []
+    initial, allowed = [], []
     for k, patch in enumerate(patches):
-        first += list(_laid_out(body, patch, points[patch_of == k]))
-        own += [patch_of == k] * patch.count
-    capsules = _fitted(np.array(first), points, np.column_stack(own))
+        initial += list(_initial_capsules(body, patch, points[patch_of == k]))
+        allowed += [patch_of == k] * patch.count
+    capsules = _fit(np.array(initial), points, np.column_stack(allowed))
     carriers = [patch.bone for patch in patches for _ in range(patch.count)]
     heads = [body.heads[body.index(bone)] for bone in carriers]
     return tuple(
@@ -122,7 +124,7 @@ def fit_capsules(body: Body) -> tuple[Capsule, ...]:
 
 
 def _sample(body: Body, patches: tuple[_Patch, ...]) -> tuple[Floats, Integers]:
-    """Points (n, 3) spread evenly over the skin, and the patch whose bones move each most, (n,)."""
+    """Return points (n, 3) spread evenly over the skin, and for each the patch with the largest weight, (n,)."""
     corners = body.vertices[body.faces].astype(float)
     area = np.cumsum(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1))
     chosen = np.searchsorted(area, (np.arange(_POINTS) + 0.5) / _POINTS * area[-1])
@@ -137,14 +139,14 @@ def _sample(body: Body, patches: tuple[_Patch, ...]) -> tuple[Floats, Integers]:
     return corners[chosen].mean(axis=1), share.argmax(axis=1)
 
 
-def _laid_out(body: Body, patch: _Patch, points: Floats) -> Floats:
-    """The capsules of a patch at first, (count, 7): start, end and radius, metres."""
-    if patch.lie == "stacked":
+def _initial_capsules(body: Body, patch: _Patch, points: Floats) -> Floats:
+    """Return the initial capsules of a patch, (count, 7): start, end and radius, metres."""
+    if patch.layout == "stacked":
         return _stacked(points, patch.count)
-    begin, end = (body.heads[body.index(bone)] for bone in patch.way)
-    if patch.lie == "beside":
+    begin, end = (body.heads[body.index(bone)] for bone in patch.ends)
+    if patch.layout == "beside":
         return _beside(points, end - begin, patch.count)
-    share = np.linspace(*patch.part, patch.count + 1)[:, None]
+    share = np.linspace(*patch.span, patch.count + 1)[:, None]
     knots = (1 - share) * begin + share * end
     capsules = np.column_stack([knots[:-1], knots[1:], np.zeros(patch.count)])
     capsules[:, 6] = np.median(_nearest(points, capsules, np.ones((len(points), patch.count), bool))[1])
@@ -152,6 +154,7 @@ def _laid_out(body: Body, patch: _Patch, points: Floats) -> Floats:
 
 
 def _stacked(points: Floats, count: int) -> Floats:
+    """Return capsules (count, 7), one per horizontal slice of the points (n, 3), along its wider axis x or y."""
     edges = np.linspace(points[:, 2].min(), points[:, 2].max(), count + 1)
     capsules = np.empty((count, 7))
     for k in range(count):
@@ -164,49 +167,59 @@ def _stacked(points: Floats, count: int) -> Floats:
     return capsules
 
 
-def _beside(points: Floats, way: Floats, count: int) -> Floats:
-    way = way / np.linalg.norm(way)
+def _beside(points: Floats, axis: Floats, count: int) -> Floats:
+    """Return capsules (count, 7) parallel to an axis (3,), next to each other along the widest way across it."""
+    axis = axis / np.linalg.norm(axis)
     middle = points.mean(axis=0)
-    along = (points - middle) @ way
-    off = points - middle - along[:, None] * way
-    place = off @ np.linalg.svd(off, full_matrices=False)[2][0]
-    strip = np.searchsorted(np.quantile(place, np.arange(1, count) / count), place)
+    along = (points - middle) @ axis
+    off = points - middle - along[:, None] * axis
+    across = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    strip = np.searchsorted(np.quantile(across, np.arange(1, count) / count), across)
     capsules = np.empty((count, 7))
     for k in range(count):
         core = off[strip == k].mean(axis=0)
         radius = float(np.median(np.linalg.norm(off[strip == k] - core, axis=1)))
         low, high = along[strip == k].min() + radius, along[strip == k].max() - radius
-        capsules[k] = *(middle + core + low * way), *(middle + core + high * way), radius
+        capsules[k] = *(middle + core + low * axis), *(middle + core + high * axis), radius
     return capsules
 
 
-def _fitted(first: Floats, points: Floats, own: NDArray[np.bool_]) -> Floats:
-    """Capsules (c, 7), ``first`` at first, fitted to points (n, 3) of which each has some of its ``own``, (n, c)."""
-    capsules = first.copy()
+def _fit(initial: Floats, points: Floats, allowed: NDArray[np.bool_]) -> Floats:
+    """Fit capsules to points (n, 3).
+
+    Args:
+        initial: capsules at the start, (c, 7).
+        points: points on the skin, (n, 3).
+        allowed: whether a point may be assigned to a capsule in the first rounds, (n, c).
+
+    Returns:
+        Capsules (c, 7).
+    """
+    capsules = initial.copy()
     soles, crown = points[:, 2].min(), points[:, 2].max()
-    stiff, force = np.empty((len(first), 7, 7)), np.empty((len(first), 7))
+    hessian, gradient = np.empty((len(initial), 7, 7)), np.empty((len(initial), 7))
     for k in range(sum(_ROUNDS)):
-        nearest, error = _nearest(points, capsules, own if k < _ROUNDS[0] else np.ones_like(own))
-        # Cauchy's weights inside: what lies under hair or a skirt is skin too, but neither seen nor touched.
-        deep = np.minimum(error, 0.0) / (_TYPICAL * np.median(np.abs(error)))
-        _gather(points, capsules, nearest, 1 / (1 + deep**2), stiff, force)
-        stiff += _STAY * np.eye(7)
-        force += _STAY * (capsules - first)
-        capsules -= np.linalg.solve(stiff, force[..., None])[..., 0]
-        capsules[:, 6] = np.maximum(capsules[:, 6], first[:, 6] / 3)  # none may vanish, whatever points it is left with
-        # Soles are flat and capsules round: who stands must stand on the floor, not in it.
+        nearest, error = _nearest(points, capsules, allowed if k < _ROUNDS[0] else np.ones_like(allowed))
+        # Cauchy's weights for points inside: skin under hair or a skirt is neither seen nor touched.
+        deep = np.minimum(error, 0.0) / (_CAUCHY * np.median(np.abs(error)))
+        _normal_equations(points, capsules, nearest, 1 / (1 + deep**2), hessian, gradient)
+        hessian += _DAMPING * np.eye(7)
+        gradient += _DAMPING * (capsules - initial)
+        capsules -= np.linalg.solve(hessian, gradient[..., None])[..., 0]
+        capsules[:, 6] = np.maximum(capsules[:, 6], initial[:, 6] / 3)  # no capsule may vanish, even with few points
+        # Soles are flat and capsules are round: a standing person must stand on the floor, not in it.
         radius = capsules[:, 6:]
         capsules[:, [2, 5]] = np.clip(capsules[:, [2, 5]], soles + radius, crown - radius)
     return capsules
 
 
 @njit(cache=True)
-def _nearest(points, capsules, own):
-    """For each point (n, 3) the nearest of its ``own`` (n, c) capsules (c, 7), and its signed distance to that."""
+def _nearest(points, capsules, allowed):
+    """Return for each point (n, 3) the nearest ``allowed`` (n, c) capsule of (c, 7) and the signed distance to it."""
     nearest, error = np.zeros(len(points), np.int64), np.full(len(points), np.inf)
     for i in range(len(points)):
         for c in range(len(capsules)):
-            if own[i, c]:
+            if allowed[i, c]:
                 _, out = _foot(points[i], capsules[c])
                 distance = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]) - capsules[c, 6]
                 if distance < error[i]:
@@ -215,12 +228,13 @@ def _nearest(points, capsules, own):
 
 
 @njit(cache=True)
-def _gather(points, capsules, nearest, weights, stiff, force):
-    """Normal equations (c, 7, 7) and (c, 7) of a Gauss-Newton step of each capsule to its points, a mean over them.
+def _normal_equations(points, capsules, nearest, weights, hessian, gradient):
+    """Write the normal equations (c, 7, 7), (c, 7) of a Gauss-Newton step of each capsule, means over its points.
 
-    The foot of a point on the axis is where the distance is least, so in its derivative the foot may stand still.
+    The foot of a point on the axis minimises the distance, so the derivative of the distance needs no derivative of
+    the foot (envelope theorem).
     """
-    stiff[:], force[:] = 0.0, 0.0
+    hessian[:], gradient[:] = 0.0, 0.0
     total, slope = np.full(len(capsules), 1e-12), np.empty(7)
     for i in range(len(points)):
         c = nearest[i]
@@ -232,17 +246,17 @@ def _gather(points, capsules, nearest, weights, stiff, force):
         slope[6] = -1.0
         total[c] += weights[i]
         for row in range(7):
-            force[c, row] += weights[i] * slope[row] * (length - capsules[c, 6])
+            gradient[c, row] += weights[i] * slope[row] * (length - capsules[c, 6])
             for column in range(7):
-                stiff[c, row, column] += weights[i] * slope[row] * slope[column]
+                hessian[c, row, column] += weights[i] * slope[row] * slope[column]
     for c in range(len(capsules)):
-        stiff[c] /= total[c]
-        force[c] /= total[c]
+        hessian[c] /= total[c]
+        gradient[c] /= total[c]
 
 
 @njit(cache=True)
 def _foot(point, capsule):
-    """How far along a capsule's axis the foot of a point is, 0 to 1, and the way from there to the point."""
+    """Return the position of a point's foot on a capsule's axis, 0 to 1, and the vector from the foot to the point."""
     ax, ay, az = capsule[3] - capsule[0], capsule[4] - capsule[1], capsule[5] - capsule[2]
     x, y, z = point[0] - capsule[0], point[1] - capsule[1], point[2] - capsule[2]
     share = (x * ax + y * ay + z * az) / max(ax * ax + ay * ay + az * az, 1e-12)

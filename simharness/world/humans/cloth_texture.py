@@ -1,9 +1,10 @@
-"""Stripes, checks and blocks: a picture of the cloth, and where every face of a dressed body lies in it.
+"""Texture of patterned clothes: the image and the texture coordinates of a dressed body.
 
-The picture has two bands, the cloth of the top and that of trousers or skirt, and below them a white strip for all
-that is plain. To the right it goes once around the trunk from its front, and at its ends it repeats. On the way a
-pattern repeats a multiple of six times: so it closes around the trunk, around an arm with a third of it and around a
-leg with half of it. Downwards it goes from the root of the neck along trunk, skirt or limb, in metres.
+The image has two bands, one for the cloth of the top and one for that of trousers or skirt, and below them a white
+strip for plain faces. Its horizontal axis goes once around the trunk, starting at the front, and the image repeats
+there. A pattern repeats a multiple of six times over this width. So it closes around the trunk, around an arm, which
+takes a third of the width, and around a leg, which takes half of it. The vertical axis is metres from the root of the
+neck down along trunk, skirt or limb.
 """
 
 from __future__ import annotations
@@ -16,28 +17,28 @@ from simharness.world.humans.body import Body, Part
 from simharness.world.humans.wardrobe import Color, Look
 
 WIDTH, BAND, WHITE = 256, 160, 16  # pixels
-LENGTH = 1.3  # metres down a band
-_AROUND = 1.05  # metres around a trunk, for patterns as high as wide
-_MARGIN = 0.03  # metres at both ends of a band that no face comes near, as pictures are smoothed
-_ROOT = 0.08  # metres down a band where the root of the neck is; collars reach higher
+LENGTH = 1.3  # height of a band, metres
+_AROUND = 1.05  # circumference of a trunk, metres: makes patterns as high as wide
+_MARGIN = 0.03  # unused margin at both ends of a band, metres, because renderers smooth textures
+_ROOT = 0.08  # position of the root of the neck in a band, metres; collars reach higher
 _OVERSAMPLE = 4
-_BLOCK, _YOKE = 0.24, 0.25  # metres; blocks begin below the shoulders, where sleeves are set in
-_OPENING, _SHADE = 2, 0.35  # half the width of a coat's opening, pixels, and how dark it is
-_ARM, _LEG = 1 / 3, 1 / 2  # of the way around the picture
-_ARM_START = 0.1  # metres from the root of the neck to where a sleeve begins
+_BLOCK, _YOKE = 0.24, 0.25  # metres; blocks start below the shoulders, where sleeves are set in
+_OPENING, _SHADE = 2, 0.35  # half the width of a coat's opening in pixels, and the factor that darkens it
+_ARM, _LEG = 1 / 3, 1 / 2  # fraction of the texture's width around a limb
+_ARM_START = 0.1  # distance from the root of the neck to the start of a sleeve, metres
 
 
 def is_plain(look: Look) -> tuple[bool, bool]:
-    """Whether the cloth of the top, and that of trousers or skirt, is of one colour."""
+    """Return whether the top, and whether the trousers or skirt, have a single colour."""
     return look.top_pattern == "plain" and look.below != "coat", look.bottom_pattern == "plain"
 
 
-def picture(look: Look) -> NDArray[np.uint8] | None:
-    """The cloth of a look, sRGB, (2 ``BAND`` + ``WHITE``, ``WIDTH``, 3); None where all of it is plain."""
+def texture_image(look: Look) -> NDArray[np.uint8] | None:
+    """Return the texture of a look, sRGB, (2 ``BAND`` + ``WHITE``, ``WIDTH``, 3), or None if all clothes are plain."""
     if all(is_plain(look)):
         return None
     top = _cloth(look.top_pattern, look.top, look.accent, look.repeats)
-    if look.below == "coat":  # where it is buttoned
+    if look.below == "coat":  # the line where it is buttoned
         top[:, :_OPENING] *= _SHADE
         top[:, -_OPENING:] *= _SHADE
     bottom = _cloth(look.bottom_pattern, look.trousers, look.accent, look.repeats)
@@ -45,7 +46,7 @@ def picture(look: Look) -> NDArray[np.uint8] | None:
 
 
 def _cloth(pattern: str, color: Color, accent: Color, repeats: int) -> Floats:
-    """One band, (BAND, WIDTH, 3) from 0 to 1, of smooth edges."""
+    """Return one band of the texture with antialiased edges, (BAND, WIDTH, 3), 0 to 1."""
     across = (np.arange(WIDTH * _OVERSAMPLE) + 0.5) / (WIDTH * _OVERSAMPLE)
     down = (np.arange(BAND * _OVERSAMPLE)[:, None] + 0.5) * LENGTH / (BAND * _OVERSAMPLE)
     rows = (down * repeats / _AROUND) % 1 < 0.5
@@ -63,13 +64,13 @@ def _cloth(pattern: str, color: Color, accent: Color, repeats: int) -> Floats:
     return np.asarray((1 - share) * np.array(color) + share * np.array(accent))
 
 
-def places(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Where the corners of every face lie in the picture, (k, 3, 2) from 0 to 1.
+def texture_coordinates(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return the texture coordinates of the corners of every face, (k, 3, 2), 0 to 1.
 
     Args:
-        body: at rest, dressed or not.
-        top: which faces are of the cloth of the first band, (k,).
-        bottom: which are of that of the second, (k,); those of neither lie on the white strip.
+        body: rest body, dressed or bare.
+        top: mask of the faces with the cloth of the first band, (k,).
+        bottom: mask of the faces with the cloth of the second band, (k,). All other faces lie on the white strip.
     """
     corners = body.vertices.astype(float)[body.faces]
     rows = 2 * BAND + WHITE
@@ -85,14 +86,14 @@ def places(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[np.bool_]) -> 
         (Part.LEG, _LEG, neck[2] - body.heads[body.index("LeftUpLeg"), 2], ("UpLeg", "Leg", "Foot")),
     ):
         left = corners[:, :, 1].mean(1) > 0
-        for side, own in (("Left", left), ("Right", ~left)):
-            mine = worn & (body.part == part) & own
+        for side, on_side in (("Left", left), ("Right", ~left)):
+            limb = worn & (body.part == part) & on_side
             joints = np.stack([body.heads[body.index(side + bone)] for bone in bones])
-            angle, along = _limb(corners[mine], joints, mirrored=side == "Right")
-            around[mine], down[mine] = 0.5 + share * angle / (2 * np.pi), start + _ROOT + along
+            angle, along = _limb_coordinates(corners[limb], joints, mirrored=side == "Right")
+            around[limb], down[limb] = 0.5 + share * angle / (2 * np.pi), start + _ROOT + along
     step = around - around[:, :1]
     period = np.select([body.part == Part.ARM, body.part == Part.LEG], [_ARM, _LEG], 1.0)[:, None]
-    around -= period * np.rint(step / period)  # no face goes the long way around
+    around -= period * np.rint(step / period)  # the corners of a face are never a whole turn apart
     down = np.clip(down, _MARGIN, LENGTH - _MARGIN) / LENGTH * BAND / rows
     down[bottom] += BAND / rows
     down[~worn] = (2 * BAND + WHITE / 2) / rows
@@ -100,8 +101,12 @@ def places(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[np.bool_]) -> 
     return np.stack([around, down], axis=2).astype(np.float32)
 
 
-def _limb(points: Floats, joints: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Bearing of points (..., 3) around a limb of three joints (3, 3), radians, and metres from the first along it."""
+def _limb_coordinates(points: Floats, joints: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
+    """Return cylinder coordinates of points (..., 3) on a limb with three joints (3, 3).
+
+    Returns:
+        Bearing around the limb, radians, and distance along it from the first joint, metres, each (...).
+    """
     upper, lower = joints[1] - joints[0], joints[2] - joints[1]
     lengths = np.linalg.norm(upper), np.linalg.norm(lower)
     upper, lower = upper / lengths[0], lower / lengths[1]

@@ -1,4 +1,4 @@
-"""Dressing a body: clothes and hair get their thickness, their shape and their colours."""
+"""Clothing and hair of a body: garment of every face, thickness and shape of the cloth, colours and texture."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from scipy import sparse
 from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
 from simharness.world.humans.body import Body, Part
-from simharness.world.humans.skirts_and_hair import Shell, bun, long_hair, skirt
+from simharness.world.humans.skirts_and_hair import AddedMesh, bun, long_hair, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
 
 
 class Garment(IntEnum):
-    """What covers a face."""
+    """Garment or hair that covers a face."""
 
     NONE = 0
     HAIR = 1
@@ -29,19 +29,19 @@ class Garment(IntEnum):
 
 _SCLERA: Color = (0.9, 0.9, 0.88)
 _SOLE: Color = (0.85, 0.85, 0.83)
-_DRAPE, _DRAPE_ROUNDS = 0.5, (6, 14)  # close, wide
+_DRAPE, _DRAPE_ROUNDS = 0.5, (6, 14)  # step of the smoothing, and its rounds for close-fitting and for wide clothes
 _WAIST = HEMS["tucked"]
-_BREAK = 0.025  # metres by which wide trousers lie on the shoe
+_BREAK = 0.025  # length of wide trousers that lies on the shoe, metres
 
 
 @dataclass(frozen=True)
-class Coat:
-    """The surface of a dressed body of k faces, as :class:`simharness.types.mesh.Mesh` takes it.
+class SurfaceColors:
+    """Colours and texture of a dressed body of k faces, in the form of :class:`simharness.types.mesh.Mesh`.
 
     Attributes:
-        colors: albedo of every face, white where the texture has it all, (k, 3) float32.
-        texture: of the cloth, (h, w, 3) uint8; None where all of it is plain.
-        uv: where the corners of every face lie in the texture, (k, 3, 2) float32; None without one.
+        colors: albedo of every face, white where the texture gives the whole colour, (k, 3) float32.
+        texture: texture of the clothes, (h, w, 3) uint8, or None if all are plain.
+        uv: texture coordinates of the corners of every face, (k, 3, 2) float32, or None without a texture.
     """
 
     colors: NDArray[np.float32]
@@ -49,19 +49,19 @@ class Coat:
     uv: NDArray[np.float32] | None = None
 
 
-def paint(body: Body, look: Look) -> Coat:
-    """The colours and patterns of a body that has been dressed in the look, or of one that shall be."""
-    colors, texture = face_colors(body, look), cloth_texture.picture(look)
+def paint(body: Body, look: Look) -> SurfaceColors:
+    """Return the colours and texture of a look on a body, before or after :func:`dress`."""
+    colors, texture = face_colors(body, look), cloth_texture.texture_image(look)
     if texture is None:
-        return Coat(colors)
+        return SurfaceColors(colors)
     worn, (plain_top, plain_bottom) = garments(body, look), cloth_texture.is_plain(look)
     top, bottom = (worn == Garment.TOP) & (not plain_top), (worn == Garment.TROUSERS) & (not plain_bottom)
     colors[top | bottom] = 1.0
-    return Coat(colors, texture, cloth_texture.places(body, top=top, bottom=bottom))
+    return SurfaceColors(colors, texture, cloth_texture.texture_coordinates(body, top=top, bottom=bottom))
 
 
 def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
-    """Albedo of every face without patterns, (k, 3) float32."""
+    """Return the albedo of every face without patterns, (k, 3) float32."""
     palette = np.array([look.skin, look.hair, look.top, look.trousers, look.shoes, _SOLE], np.float32)
     colors = palette[garments(body, look)]
     colors[body.part == Part.BROW] = mix(look.hair, look.skin, 0.3)
@@ -72,7 +72,7 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
 
 
 def garments(body: Body, look: Look) -> NDArray[np.int64]:
-    """What covers every face of a body, (k,) :class:`Garment`."""
+    """Return the :class:`Garment` of every face of a body, (k,)."""
     part, level = body.part, body.level
     result = np.full(len(part), int(Garment.NONE))
     result[part == Part.SCALP] = Garment.HAIR
@@ -89,10 +89,11 @@ def garments(body: Body, look: Look) -> NDArray[np.int64]:
 
 
 def dress(body: Body, look: Look) -> Body:
-    """Give clothes and hair their thickness and shape; joints do not move.
+    """Return the body with the shape of its clothes and hair; joints do not move.
 
-    The faces of the body stay, in the same order, on vertices moved outwards: where two garments meet each has its
-    own, so hems stand out from what is below. A skirt or coat and long hair come after them, with faces of their own.
+    The faces of the body are kept in order, and their vertices are moved outwards. Where two garments meet, each has
+    separate vertices, so hems stand out from what is below. The faces of long hair, a skirt, dress or coat are added
+    after those of the body.
     """
     garment = garments(body, look)
     rest = body.vertices.astype(float)
@@ -102,58 +103,58 @@ def dress(body: Body, look: Look) -> Body:
     source, worn = pairs // len(Garment), pairs % len(Garment)
 
     arm = body.part == Part.ARM
-    about = np.stack([np.bincount(faces[own].ravel(), minlength=len(pairs)) for own in (~arm, arm)])
+    adjacent = np.stack([np.bincount(faces[rows].ravel(), minlength=len(pairs)) for rows in (~arm, arm)])
     level, along_arm = (
-        np.bincount(faces[own].ravel(), np.repeat(body.level[own], 3), len(pairs)) / np.maximum(count, 1)
-        for own, count in zip((~arm, arm), about, strict=True)
+        np.bincount(faces[rows].ravel(), np.repeat(body.level[rows], 3), len(pairs)) / np.maximum(count, 1)
+        for rows, count in zip((~arm, arm), adjacent, strict=True)
     )
     normals = _vertex_normals(rest, body.faces)[source]
     normals[worn == Garment.SOLE, 2] = 0.0  # a shoe is wider than the foot, but stands on the same floor
     leg = (worn == Garment.TROUSERS) & (level > 1)
-    normals[leg] = _flat(normals[leg])  # over the foot they look up, and would lift the hem
+    normals[leg] = _horizontal(normals[leg])  # normals over the foot point up and would lift the hem
     vertices = _draped(rest[source], faces, garment, look.fit)
     vertices[leg, 2] -= look.fit * _BREAK * np.clip((level[leg] - 1.5) / 0.4, 0, 1)
-    vertices = vertices + _thickness(worn, level, along_arm, about[1] / about.sum(0), look)[:, None] * normals
+    vertices = vertices + _thickness(worn, level, along_arm, adjacent[1] / adjacent.sum(0), look)[:, None] * normals
     dressed = replace(
         body,
         vertices=vertices.astype(np.float32),
         faces=faces,
         weight_bones=body.weight_bones[source],
         weights=body.weights[source],
-        snug=len(vertices),
+        skinned_count=len(vertices),
     )
     if look.hair_style != "short":
-        dressed = _with(dressed, (long_hair if look.hair_style == "long" else bun)(dressed, volume=look.volume))
+        dressed = _add(dressed, (long_hair if look.hair_style == "long" else bun)(dressed, volume=look.volume))
     if look.below != "trousers":
         hips, neck = (body.heads[body.index(bone), 2] for bone in ("LeftUpLeg", "Neck"))
         waist = hips + 0.75 * _WAIST * (neck - hips)
-        shell, hang = skirt(dressed, top=waist, length=look.length, kind=look.below, ease=0.015 * look.fit)
-        dressed = replace(_with(dressed, shell), skirt=replace(hang, first=len(dressed.vertices)))
+        mesh, hang = skirt(dressed, top=waist, length=look.length, kind=look.below, ease=0.015 * look.fit)
+        dressed = replace(_add(dressed, mesh), skirt=replace(hang, first=len(dressed.vertices)))
     return dressed
 
 
-def _with(body: Body, shell: Shell) -> Body:
-    """A body and a shell in one."""
+def _add(body: Body, mesh: AddedMesh) -> Body:
+    """Append a mesh to a body."""
     return replace(
         body,
-        vertices=np.concatenate([body.vertices, shell.vertices.astype(np.float32)]),
-        faces=np.concatenate([body.faces, shell.faces + np.int32(len(body.vertices))]),
-        part=np.append(body.part, np.full(len(shell.faces), shell.part, np.int8)),
-        level=np.append(body.level, shell.level),
-        weight_bones=np.concatenate([body.weight_bones, shell.weight_bones]),
-        weights=np.concatenate([body.weights, shell.weights]),
+        vertices=np.concatenate([body.vertices, mesh.vertices.astype(np.float32)]),
+        faces=np.concatenate([body.faces, mesh.faces + np.int32(len(body.vertices))]),
+        part=np.append(body.part, np.full(len(mesh.faces), mesh.part, np.int8)),
+        level=np.append(body.level, mesh.level),
+        weight_bones=np.concatenate([body.weight_bones, mesh.weight_bones]),
+        weights=np.concatenate([body.weights, mesh.weights]),
     )
 
 
 def _thickness(worn: NDArray[np.int64], level: Floats, along_arm: Floats, sleeve: Floats, look: Look) -> Floats:
-    """Metres by which vertices (v,) stand out.
+    """Return the distances by which clothes and hair stand out from the skin at v vertices, (v,) metres.
 
     Args:
-        worn: their garments.
-        level: mean level of the faces about them that are not on an arm.
-        along_arm: of those that are.
-        sleeve: share of those that are.
-        look: how wide the clothes are.
+        worn: garments of the vertices, (v,).
+        level: mean level of the adjacent faces that are not on an arm, (v,).
+        along_arm: mean level of the adjacent faces on an arm, (v,).
+        sleeve: fraction of the adjacent faces that are on an arm, (v,).
+        look: width of the clothes and volume of the hair.
     """
     collar = np.clip((level - 0.8) / 0.2, 0, 1)
     height = np.clip((level - HEMS[look.hem]) / (1 - HEMS[look.hem]), 0, 1)  # a tucked shirt is held at its hem
@@ -173,7 +174,7 @@ def _thickness(worn: NDArray[np.int64], level: Floats, along_arm: Floats, sleeve
 
 
 def _draped(vertices: Floats, faces: NDArray[np.int32], garment: NDArray[np.int64], fit: float) -> Floats:
-    """Smooth tops and trousers within their hems, as cloth bridges what is hollow below it, the more the wider."""
+    """Smooth tops and trousers between their hems, because cloth bridges hollows of the body; the more, the wider."""
     cloth = faces[(garment == Garment.TOP) | (garment == Garment.TROUSERS)]
     edges = np.sort(cloth[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
@@ -188,8 +189,8 @@ def _draped(vertices: Floats, faces: NDArray[np.int32], garment: NDArray[np.int6
     return vertices
 
 
-def _flat(normals: Floats) -> Floats:
-    """Normals (v, 3) made level."""
+def _horizontal(normals: Floats) -> Floats:
+    """Return normals (v, 3) projected to the horizontal plane, with unit length."""
     level = normals * [1, 1, 0]
     return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-12)
 

@@ -1,9 +1,9 @@
-"""How the mass of a body is spread: mass, centre and inertia of every bone that has any.
+"""Mass distribution of a body: mass, centre of mass and inertia of the bones.
 
 Masses of all segments, and centre and inertia of the long limb segments, follow de Leva, "Adjustments to
 Zatsiorsky-Seluyanov's segment inertia parameters", J. Biomechanics 29, 1996, table 4. Trunk, head, hands and feet are
-measured there between landmarks of the skin that are no joints: of these the centre and inertia are those of the
-fitted capsules at uniform density.
+measured there between skin landmarks that are not joints, so their centre and inertia are taken from the fitted
+capsules at uniform density.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from simharness.world.humans.capsules import Capsule
 
 @dataclass(frozen=True)
 class Inertial:
-    """The inertia of a bone in its frame at rest.
+    """Inertial parameters of a bone in its frame at rest.
 
     Attributes:
-        bone: which.
+        bone: name of the bone.
         mass: kilograms.
-        center: of mass, (3,) metres.
-        tensor: about the centre, (3, 3) kg m2.
+        center: centre of mass, (3,) metres.
+        tensor: inertia tensor about the centre of mass, (3, 3) kg m2.
     """
 
     bone: str
@@ -38,8 +38,13 @@ class Inertial:
 
 @dataclass(frozen=True)
 class _Rod:
-    """A limb segment between two joints: its bones and, male and female, as shares of its length, the centre of mass
-    from the upper end and the radii of gyration about the sagittal, transverse and longitudinal axes.
+    """Limb segment between two joints, with its inertial parameters of men and women as fractions of its length.
+
+    Attributes:
+        bones: bones of the segment, from the upper joint.
+        end: bone whose head is the lower joint.
+        center: distance of the centre of mass from the upper joint.
+        sagittal, transverse, longitudinal: radii of gyration about these axes.
     """
 
     bones: tuple[str, ...]
@@ -70,44 +75,48 @@ _SEGMENT_OF = {
 
 
 def limb_inertials(body: Body) -> tuple[Inertial, ...]:
-    """What de Leva says of the upper arms, forearms, thighs and shanks."""
+    """Return the inertial parameters of upper arms, forearms, thighs and shanks by de Leva (1996)."""
     result = []
     fractions = mass_fractions(body.shape.gender)
     for side in ("Left", "Right"):
         for segment, rod in _RODS.items():
             head = body.heads[body.index(f"{side}{rod.bones[0]}")]
-            way = body.heads[body.index(f"{side}{rod.end}")] - head
+            axis = body.heads[body.index(f"{side}{rod.end}")] - head
             mass = fractions[segment] * body.mass
             across = np.hypot(_between(rod.sagittal, body), _between(rod.transverse, body)) / np.sqrt(2)
             pieces = _halves(rod, across, body) if len(rod.bones) == 2 else [(_between(rod.center, body), across)]
-            long = np.outer(way, way)
+            long = np.outer(axis, axis)
             for bone, (center, gyration) in zip(rod.bones, pieces, strict=True):
-                tensor = gyration**2 * (way @ way * np.eye(3) - long) + _between(rod.longitudinal, body) ** 2 * long
+                tensor = gyration**2 * (axis @ axis * np.eye(3) - long) + _between(rod.longitudinal, body) ** 2 * long
                 share = mass / len(pieces)
-                result.append(Inertial(f"{side}{bone}", share, center * way, share * tensor))
+                result.append(Inertial(f"{side}{bone}", share, center * axis, share * tensor))
     return tuple(result)
 
 
 def _halves(rod: _Rod, across: float, body: Body) -> list[tuple[float, float]]:
-    """Centre and radius of gyration of the two halves of a limb whose far half twists, shares of its length.
+    """Return centre and radius of gyration of the two halves of a limb with a twist bone, as fractions of its length.
 
-    Cut as a uniform rod with the same radius of gyration would be: its halves have half the radius, and their centres
-    are sqrt(3)/2 of it from the rod's. Together they are as the whole.
+    The limb is split as a uniform rod with the same radius of gyration: each half has half that radius, and its centre
+    is sqrt(3)/2 times the radius away from the rod's centre. Together the halves have the inertia of the whole.
     """
     center = _between(rod.center, body)
     return [(center + sign * across * np.sqrt(3) / 2, across / 2) for sign in (-1, 1)]
 
 
 def _between(values: tuple[float, float], body: Body) -> float:
+    """Interpolate between the values of men and women by the gender of a body."""
     return (1 - body.shape.gender) * values[0] + body.shape.gender * values[1]
 
 
 def capsule_masses(body: Body, capsules: Sequence[Capsule]) -> list[float]:
-    """Mass of every capsule, kg: each segment's mass by de Leva, shared by volume. They sum to the body's."""
+    """Return the mass of every capsule, kg: the mass of its segment by de Leva, divided in proportion to volume.
+
+    The masses sum to ``body.mass``.
+    """
     fractions = mass_fractions(body.shape.gender)
     segments = [(_segment(capsule.bone), _side(capsule.bone)) for capsule in capsules]
     volumes = {
-        segment: sum(c.volume for c, its in zip(capsules, segments, strict=True) if its == segment)
+        segment: sum(c.volume for c, each in zip(capsules, segments, strict=True) if each == segment)
         for segment in set(segments)
     }
     return [

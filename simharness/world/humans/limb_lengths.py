@@ -1,6 +1,7 @@
-"""Longer and shorter limbs: a rest body is stretched along its bones, through the weights that move its skin.
+"""Limb lengths: stretch a rest body along its limb bones, using the skinning weights.
 
-anny's limbs follow from its other phenotypes, and its women have short forearms; so their lengths are set apart.
+In anny the limb lengths follow from the other phenotypes, and the forearms of its women are too short. So limb
+lengths are separate parameters here.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from simharness.world.humans.skinning import skin
 
-# Of every limb the bone it begins with, others that move its far half, and the bone that it ends at.
+# For every limb: its first bone, further bones that move its far half, and the bone at its end.
 _CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
     {
         "upper_arm": ("Arm", ("ArmTwist",), "ForeArm"),
@@ -24,19 +25,22 @@ _CHAINS: Mapping[str, tuple[str, tuple[str, ...], str]] = MappingProxyType(
     }
 )
 LIMBS: tuple[str, ...] = tuple(_CHAINS)
-"""The limbs whose lengths can be set, of both sides alike."""
+"""Limbs with a length factor, which holds for both sides."""
 
 
-def stretches(
+def limb_stretches(
     heads: Floats, factors: Mapping[str, float], *, bones: Sequence[str], parents: Sequence[int]
 ) -> tuple[NDArray[np.float32], Floats]:
-    """What makes limbs ``factors`` times as long: every bone's affine map (B, 3, 4), and where bones then begin (B, 3).
+    """Return the affine map of every bone that scales the limb lengths, and the moved bone heads.
 
     Args:
-        heads: where every bone begins, (B, 3) metres.
-        factors: of every limb of ``LIMBS``.
-        bones: their names, parents before children.
-        parents: of every bone, -1 for the pelvis.
+        heads: start points of the bones, (B, 3) metres.
+        factors: length factor of every limb in ``LIMBS``.
+        bones: bone names, parents before children.
+        parents: index of the parent of every bone, -1 for the pelvis.
+
+    Returns:
+        Maps (B, 3, 4) float32 and heads (B, 3).
     """
     linear = np.tile(np.eye(3), (len(bones), 1, 1))
     index = {bone: i for i, bone in enumerate(bones)}
@@ -54,10 +58,10 @@ def stretches(
     return np.concatenate([linear, shift[..., None]], axis=2).astype(np.float32), moved
 
 
-def lengthened(
+def stretch_vertices(
     vertices: Floats, weight_bones: NDArray[np.uint8], weights: NDArray[np.float32], maps: NDArray[np.float32]
 ) -> Floats:
-    """Vertices (n, 3) moved by the maps (B, 3, 4) of the bones (n, w) that carry them, by their weights (n, w)."""
+    """Apply affine bone maps (B, 3, 4) to vertices (n, 3) by linear blend skinning; bones and weights are (n, w)."""
     out = np.empty((len(vertices), 3), np.float32)
     skin(vertices.astype(np.float32), weight_bones, weights, maps, out)
     return out.astype(float)

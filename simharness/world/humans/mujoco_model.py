@@ -1,8 +1,8 @@
-"""A person as a MuJoCo model: one body a bone, hinges named as in the ``anatomy`` module, capsules, masses.
+"""MuJoCo model of a person: one body per bone, hinges of the ``anatomy`` module, capsules and masses.
 
-Every bone's local frame is aligned with the world when the body is in its rest pose, so its skinning transform is
-``[xmat | xpos - xmat @ head]`` whatever the joints do. A fixed quaternion on every body turns the rest pose (an A
-pose) into the anatomical neutral, which is the zero of all joints.
+The local frame of every bone is aligned with the world in the rest pose, so its skinning transform is
+``[xmat | xpos - xmat @ head]`` at all joint angles. A fixed quaternion on every body turns the rest pose (an A pose)
+into the anatomical neutral pose, in which all joint angles are zero.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from simharness.world.humans.body import Body
 from simharness.world.humans.capsules import Capsule, fit_capsules
 from simharness.world.humans.inertia import capsule_masses, limb_inertials
 
-SKIN_GROUP = 1  # of the capsules
+SKIN_GROUP = 1  # MuJoCo geom group of the capsules
 
 _X, _Y, _Z = np.eye(3)
-_CLAVICLE_DROP = np.tan(np.radians(8.0))  # by eye: with the arms raised to 45 degrees the clavicle is up by about that
-# Of every hinge the axis in the neutral pose; of paired joints the left one's, whose mirror image the right one is.
+_CLAVICLE_DROP = np.tan(np.radians(8.0))  # by eye: arms raised to 45 degrees lift the clavicle by about that angle
+# Axis of every hinge in the neutral pose; for paired joints that of the left one, mirrored for the right one.
 _AXES = {
     "flexion_trunk": _Y,
     "bending": -_X,
@@ -63,7 +63,14 @@ _LIMB = {
 
 @dataclass(frozen=True)
 class Hinge:
-    """One degree of freedom: its name, the bone it moves, its axis in the neutral pose, its range in radians."""
+    """One degree of freedom.
+
+    Attributes:
+        name: name in ``DOFS``.
+        bone: bone that it moves.
+        axis: axis in the neutral pose, (3,).
+        range: least and greatest angle, radians.
+    """
 
     name: str
     bone: str
@@ -74,28 +81,28 @@ class Hinge:
 def _hinges() -> tuple[Hinge, ...]:
     result = []
     for name in DOFS:
-        where, word = name.split("_", 1)
-        if where in _TRUNK:
-            axis = _AXES["bending" if word == "bending" else f"{word}_trunk"]
-            bone = _TRUNK[where]
+        region, motion = name.split("_", 1)
+        if region in _TRUNK:
+            axis = _AXES["bending" if motion == "bending" else f"{motion}_trunk"]
+            bone = _TRUNK[region]
         else:
-            axis = _AXES[word]
-            if where == "right":
-                axis = axis * [-1, 1, -1]  # an axis of rotation is mirrored as a pseudovector
-            bone = where.capitalize() + _LIMB[word]
+            axis = _AXES[motion]
+            if region == "right":
+                axis = axis * [-1, 1, -1]  # a rotation axis is a pseudovector under mirroring
+            bone = region.capitalize() + _LIMB[motion]
         result.append(Hinge(name, bone, axis, RANGES[name]))
     return tuple(result)
 
 
 HINGES: tuple[Hinge, ...] = _hinges()
-"""All hinges in the order of ``DOFS``; those of one bone act from the outside in."""
+"""All hinges in the order of ``DOFS``. The hinges of one bone act in this order, the last next to the bone."""
 
 
 def neutral_rotations(body: Body) -> Floats:
-    """World rotations (B, 3, 3) that take every bone from the rest pose to the neutral one, pelvis upright.
+    """Return the world rotations (B, 3, 3) of the bones from the rest pose to the neutral pose, pelvis upright.
 
-    Legs and arms are made straight and vertical, feet point forward, the palms face the thighs, and the clavicles
-    sink with the arms; the trunk, and what hangs on a hand or foot, keep their shape.
+    Legs and arms become straight and vertical, the feet point forward, the palms face the thighs, and the clavicles
+    are lowered with the arms. Trunk, fingers and toes keep their rest shape.
     """
     turn = np.tile(np.eye(3), (len(body.bones), 1, 1))
     for s, side in enumerate(SIDES):
@@ -107,7 +114,7 @@ def neutral_rotations(body: Body) -> Floats:
             "UpLeg": (head["Leg"] - head["UpLeg"], toes),
             "Leg": (head["Foot"] - head["Leg"], toes),
             "Foot": (-_Z, toes),
-            # The rest pose bends the elbow: that bend shows which way it flexes.
+            # The elbow is bent in the rest pose; this bend gives the direction of flexion.
             "Arm": (head["ForeArm"] - head["Arm"], bend),
             "ForeArm": (bend, head["Arm"] - head["ForeArm"]),
             "Hand": (finger - head["Hand"], body.thumbs[s]),
@@ -115,7 +122,7 @@ def neutral_rotations(body: Body) -> Floats:
         }
         for name, (down, forward) in aims.items():
             turn[body.index(side.capitalize() + name)] = _aim(down, forward)
-        # The twist of a forearm is the hand's, about the forearm's own axis.
+        # A forearm twists with the hand, about the axis of the forearm.
         turn[body.index(f"{side.capitalize()}ForeArmTwist")] = _aim(bend, body.thumbs[s])
         turn[body.index(f"{side.capitalize()}ArmTwist")] = turn[body.index(f"{side.capitalize()}Arm")]
     aimed = {hinge.bone for hinge in HINGES if hinge.name.startswith(SIDES)}
@@ -126,7 +133,7 @@ def neutral_rotations(body: Body) -> Floats:
 
 
 def _aim(down: Floats, forward: Floats) -> Floats:
-    """The rotation that turns ``down`` to -z and ``forward``, as far as it is at right angles to it, to +x."""
+    """Return the rotation that turns ``down`` to -z and the component of ``forward`` orthogonal to it to +x."""
     z = -down / np.linalg.norm(down)
     x = forward - (forward @ z) * z
     x = x / np.linalg.norm(x)
@@ -134,44 +141,51 @@ def _aim(down: Floats, forward: Floats) -> Floats:
 
 
 def neutral_transforms(body: Body) -> Floats:
-    """Bone transforms (B, 3, 4) of the neutral pose, the soles on z = 0 and the pelvis over the origin."""
+    """Return the bone transforms (B, 3, 4) of the neutral pose, the soles on z = 0 and the pelvis over the origin."""
     turn = neutral_rotations(body)
-    place = body.heads.copy()
+    position = body.heads.copy()
     for bone, parent in enumerate(body.parents):
         if parent >= 0:
-            place[bone] = place[parent] + turn[parent] @ (body.heads[bone] - body.heads[parent])
-    transforms = bone_transforms(body, place, turn)
+            position[bone] = position[parent] + turn[parent] @ (body.heads[bone] - body.heads[parent])
+    transforms = bone_transforms(body, position, turn)
     transforms[:, 2, 3] -= body.skin(transforms)[:, 2].min()
     return transforms
 
 
 def bone_transforms(body: Body, xpos: ArrayLike, xmat: ArrayLike) -> Floats:
-    """Bone transforms (..., B, 3, 4) from positions (..., B, 3) and rotations (..., B, 3, 3) of the bones' bodies.
+    """Return bone transforms (..., B, 3, 4) from positions and rotations of the MuJoCo bodies.
 
-    Positions and rotations are MuJoCo's ``xpos`` and ``xmat`` of the bodies named as ``body.bones``, in that order.
+    Args:
+        body: body with B bones.
+        xpos: MuJoCo's ``xpos`` of the bodies in the order of ``body.bones``, (..., B, 3).
+        xmat: MuJoCo's ``xmat`` of the same bodies, (..., B, 3, 3).
+
+    Raises:
+        ValueError: a wrong shape.
     """
     xpos, xmat = np.asarray(xpos, float), np.asarray(xmat, float)
     count = len(body.bones)
     if xpos.shape[-2:] != (count, 3) or xmat.shape[-3:] != (count, 3, 3):
         raise ValueError(
-            f"expected xpos (..., {count}, 3) and xmat (..., {count}, 3, 3), got {xpos.shape}, {xmat.shape}"
+            f"expected xpos (..., {count}, 3) and xmat (..., {count}, 3, 3), got {xpos.shape} and {xmat.shape}"
         )
     shift = xpos - np.einsum("...brc,bc->...br", xmat, body.heads)
     return np.concatenate([xmat, shift[..., None]], axis=-1)
 
 
 def person_spec(body: Body, name: str) -> mujoco.MjSpec:
-    """The MuJoCo model of one person, to compile alone or to attach to a scene.
+    """Make the MuJoCo model of one person, to compile alone or to attach to a scene.
 
-    Bodies are named as the bones and stand at their heads, in the order of ``body.bones``; ``Hips`` has the free
-    joint ``root``; the hinges are named as ``DOFS``. In the initial configuration the person stands in the neutral
-    pose on z = 0 over the origin. The capsules of :mod:`simharness.world.humans.capsules` (group 1, named as their
-    bone, or "bone k" where it has several) collide with the world and with other people, not with the person's own.
-    Masses and inertias are those of :mod:`simharness.world.humans.inertia`; they sum to ``body.mass``.
+    The MuJoCo bodies have the names and the order of ``body.bones`` and are located at the bone heads. ``Hips`` has
+    the free joint ``root``; the hinges are named as in ``DOFS``. In the initial configuration the person stands in the
+    neutral pose on z = 0 over the origin. The capsules of :mod:`simharness.world.humans.capsules` are in group 1 and
+    named after their bone, "bone k" if the bone has several. They collide with the world and with other people, but
+    not with each other. Masses and inertias are those of :mod:`simharness.world.humans.inertia`; the masses sum to
+    ``body.mass``.
 
     Args:
-        body: the person's body.
-        name: of the model.
+        body: body of the person.
+        name: name of the model.
     """
     spec = mujoco.MjSpec()
     spec.modelname = name
@@ -180,10 +194,10 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
     height = neutral_transforms(body)[0, 2] @ [*body.heads[0], 1]
     bodies: list[mujoco.MjsBody] = []
     for bone, parent in enumerate(body.parents):
-        above = spec.worldbody if parent < 0 else bodies[parent]
+        parent_body = spec.worldbody if parent < 0 else bodies[parent]
         position = [0, 0, height] if parent < 0 else body.heads[bone] - body.heads[parent]
         local = turn[bone] if parent < 0 else turn[parent].T @ turn[bone]
-        part = above.add_body(name=body.bones[bone], pos=position, quat=_quaternion(local))
+        part = parent_body.add_body(name=body.bones[bone], pos=position, quat=_quaternion(local))
         if parent < 0:
             part.add_freejoint(name="root")
         for hinge in HINGES:
@@ -208,23 +222,24 @@ def person_spec(body: Body, name: str) -> mujoco.MjSpec:
         )
     for inertial in limb_inertials(body):
         part = bodies[body.index(inertial.bone)]
-        part.explicitinertial = True  # instead of what its capsules would give
+        part.explicitinertial = True  # replaces the inertia of the capsules
         part.mass, part.ipos = inertial.mass, inertial.center
         part.fullinertia = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    fleshy = list(dict.fromkeys(capsule.bone for capsule in capsules))
-    for i, first in enumerate(fleshy):
-        for second in fleshy[i + 1 :]:
+    with_capsules = list(dict.fromkeys(capsule.bone for capsule in capsules))
+    for i, first in enumerate(with_capsules):
+        for second in with_capsules[i + 1 :]:
             spec.add_exclude(name=f"{first}-{second}", bodyname1=first, bodyname2=second)
     return spec
 
 
 def _labels(capsules: Sequence[Capsule]) -> list[str]:
-    """A name for each capsule: its bone's, numbered where the bone has several."""
+    """Return a name for each capsule: that of its bone, numbered if the bone has several."""
     bones = [capsule.bone for capsule in capsules]
     return [bone if bones.count(bone) == 1 else f"{bone} {bones[:k].count(bone)}" for k, bone in enumerate(bones)]
 
 
 def _quaternion(rotation: Floats) -> Floats:
+    """Return the quaternion w, x, y, z of a rotation (3, 3)."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
     return quaternion

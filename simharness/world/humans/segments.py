@@ -1,7 +1,7 @@
-"""The segments of the body: the labels of body-part images.
+"""Body segments: the labels of body-part images.
 
-The fourteen of biomechanics (de Leva, J. Biomechanics 29, 1996) with the trunk in one piece: the neck counts to the
-head, the shoulder girdle to the torso, the toes to the foot.
+The segments are the fourteen of de Leva (J. Biomechanics 29, 1996) with the trunk as one segment. The neck belongs to
+the head, the shoulder girdle to the torso, the toes to the foot.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 class Segment(IntEnum):
-    """What part of a body a face belongs to."""
+    """Body segment that a face belongs to."""
 
     HEAD = 0
     TORSO = 1
@@ -51,7 +51,7 @@ _SIDES = {"Left": "LEFT", "Right": "RIGHT", "L": "LEFT", "R": "RIGHT"}
 
 
 def of_bones(bones: Sequence[str]) -> NDArray[np.int8]:
-    """The segment that every bone of the body model moves, (B,); what is on no limb or head is of the torso."""
+    """Return the segment that every bone of the body model moves, (B,); bones of no limb, head or neck: the torso."""
     names = {bone: segment for bone, segment in _TRUNK.items()} | {
         f"{start}{bone}": Segment[f"{side}_{segment}"]
         for start, side in _SIDES.items()
@@ -63,20 +63,20 @@ def of_bones(bones: Sequence[str]) -> NDArray[np.int8]:
 def of_faces(
     faces: ArrayLike, weight_bones: ArrayLike, weights: ArrayLike, *, bones: Sequence[str]
 ) -> NDArray[np.int8]:
-    """The segment of every face of a skin: the one whose bones carry most of its corners' weight.
+    """Return the segment of every face: the one with the largest sum of skinning weights over the face's corners.
 
     Args:
         faces: vertex indices, (k, 3).
-        weight_bones: bones that move every vertex, (n, w).
-        weights: by how much, (n, w).
-        bones: their names.
+        weight_bones: indices of the bones that move every vertex, (n, w).
+        weights: skinning weights, (n, w).
+        bones: bone names.
 
     Returns:
-        (k,) :class:`Segment`.
+        Values of :class:`Segment`, (k,) int8.
     """
-    owner, weights = of_bones(bones)[np.asarray(weight_bones)], np.asarray(weights)
+    segment, weights = of_bones(bones)[np.asarray(weight_bones)], np.asarray(weights)
     share = np.zeros((len(weights), len(Segment)), np.float32)
     rows = np.arange(len(weights))
     for k in range(weights.shape[1]):
-        share[rows, owner[:, k]] += weights[:, k]
+        share[rows, segment[:, k]] += weights[:, k]
     return share[np.asarray(faces)].sum(1).argmax(1).astype(np.int8)

@@ -1,4 +1,4 @@
-"""What makes one person's body differ from another's."""
+"""Shape parameters of a human body."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "shank": (0.6, 1.6),
     }
 )
-"""Least and greatest value of every property of a shape."""
+"""Least and greatest value of every shape parameter."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A body in anny's phenotypes, and by how much its limbs are longer than those.
+    """Body shape: the phenotypes of the ``anny`` body model and length factors of the limbs.
 
     Attributes:
         gender: 0 male to 1 female.
-        age: 0.25 a child of five years, 0.44 one of twelve, 2/3 a young adult, 1 an old one.
+        age: 0.25 is a child of five years, 0.44 a child of twelve, 2/3 a young adult, 1 an old adult.
         muscle: 0 least, 0.5 average, 1 most.
-        weight: 0 least, 0.5 average, 1 most that anny's artists drew; they drew lean people, so it may go on to 2.5.
-        height: 0 to 1; not metres, see :func:`simharness.world.humans.population.fitted`.
+        weight: 0 least, 0.5 average, 1 the heaviest body of anny's artists. Their people are lean, so extrapolation up
+            to 2.5 is allowed.
+        height: 0 to 1, not in metres; :func:`simharness.world.humans.population.fit_shape` finds it for a stature.
         proportions: 0 ideal to 1 uncommon.
-        upper_arm, forearm, thigh, shank: how many times as long as anny has them.
+        upper_arm, forearm, thigh, shank: factors on the limb lengths of anny.
 
     Raises:
-        ValueError: a value out of its range.
+        ValueError: a value is out of its range in ``LIMITS``.
     """
 
     gender: float = 0.5

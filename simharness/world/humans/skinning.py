@@ -1,4 +1,4 @@
-"""The kernels of bodies: blend shapes, linear blend skinning, volume; and skirts, which hang from two thighs."""
+"""Compiled kernels of the body model: blend shapes, linear blend skinning, volume, and the motion of skirts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def skin(
     transforms: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Move ``vertices`` (n, 3) by the ``weights`` (n, w) of the ``transforms`` (B, 3, 4) of ``bones`` (n, w)."""
+    """Write the vertices ``out`` (n, 3) of linear blend skinning; transforms (B, 3, 4), bones and weights (n, w)."""
     for i in range(vertices.shape[0]):
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         new_x, new_y, new_z = np.float32(0.0), np.float32(0.0), np.float32(0.0)
@@ -35,7 +35,10 @@ def skin(
 def mix(
     mean: NDArray[np.float64], deltas: NDArray[np.int16], shares: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """Add to ``mean`` (d,) the ``shares`` (C,) of ``deltas`` (C, d). A threaded BLAS would take ten times as long."""
+    """Write ``mean`` (d,) plus the ``deltas`` (C, d) weighted by ``shares`` (C,) to ``out`` (d,).
+
+    A threaded BLAS would take ten times as long.
+    """
     out[:] = mean
     for c in range(deltas.shape[0]):
         for i in range(out.shape[0]):
@@ -44,7 +47,7 @@ def mix(
 
 @njit(cache=True, fastmath=True)
 def enclosed(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    """Volume inside a closed surface of ``vertices`` (n, 3) and ``faces`` (k, 3)."""
+    """Return the volume inside a closed surface of ``vertices`` (n, 3) and ``faces`` (k, 3)."""
     total = 0.0
     for a, b, c in faces:
         ax, ay, az = vertices[a]
@@ -56,55 +59,58 @@ def enclosed(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
 
 @dataclass(frozen=True)
 class Skirt:
-    """Vertices (s,) of a skirt: each lies where it looks, on the leg that reaches further there; (..., 3) in metres.
+    """Motion of the s vertices of a skirt.
+
+    Every vertex has a direction outwards. It follows the pelvis and the thigh that extends further in that direction,
+    with a smooth transition between the two thighs.
 
     Attributes:
-        first: which vertex of the body is the skirt's first.
-        anchors: where at rest it would lie on the pelvis, the left thigh and the right thigh, (s, 3, 3).
-        centers: the middles of the left and the right thigh at its level, at rest, (s, 2, 3).
-        looks: its direction at rest, of length one, (s, 3).
-        held: share of the pelvis in where it lies, (s,).
-        bones: indices of pelvis, left and right thigh.
+        first: index of the skirt's first vertex in the body.
+        anchors: rest positions of the vertices on the pelvis, the left thigh and the right thigh, (s, 3, 3) metres.
+        centers: centres of the left and the right thigh at the level of the vertices, at rest, (s, 2, 3) metres.
+        directions: outward unit vectors of the vertices at rest, (s, 3).
+        pelvis_share: weight of the pelvis in the position of the vertices, 0 to 1, (s,).
+        bones: indices of the bones of pelvis, left and right thigh.
     """
 
     first: int
     anchors: NDArray[np.float32]
     centers: NDArray[np.float32]
-    looks: NDArray[np.float32]
-    held: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    pelvis_share: NDArray[np.float32]
     bones: tuple[int, int, int]
 
     def hang(self, transforms: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Write its vertices into those of the body, ``out`` (n, 3), moved by bone transforms (B, 3, 4)."""
-        own = out[self.first : self.first + len(self.held)]
+        """Write the skirt's vertices, posed by bone transforms (B, 3, 4), into the body's vertices ``out`` (n, 3)."""
+        rows = out[self.first : self.first + len(self.pelvis_share)]
         pelvis, left, right = (transforms[bone] for bone in self.bones)
-        _hang(self.anchors, self.centers, self.looks, self.held, pelvis, left, right, own)
+        _hang(self.anchors, self.centers, self.directions, self.pelvis_share, pelvis, left, right, rows)
 
 
-_SOFT = np.float32(0.05)  # metres by which one leg must reach further to have a vertex nearly for itself
+_SOFT = np.float32(0.05)  # width of the transition between the thighs, metres of difference in reach
 
 
 @njit(cache=True, fastmath=True)
 def _hang(
     anchors: NDArray[np.float32],
     centers: NDArray[np.float32],
-    looks: NDArray[np.float32],
-    held: NDArray[np.float32],
+    directions: NDArray[np.float32],
+    pelvis_share: NDArray[np.float32],
     pelvis: NDArray[np.float32],
     left: NDArray[np.float32],
     right: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    for i in range(held.shape[0]):
-        further = np.float32(0.0)  # by how much the left thigh reaches further in the vertex's direction
+    for i in range(pelvis_share.shape[0]):
+        lead = np.float32(0.0)  # distance by which the left thigh extends further in the vertex's direction
         for row in range(3):
-            look = np.float32(0.0)
+            direction = np.float32(0.0)
             between = left[row, 3] - right[row, 3]
             for k in range(3):
-                look += pelvis[row, k] * looks[i, k]
+                direction += pelvis[row, k] * directions[i, k]
                 between += left[row, k] * centers[i, 0, k] - right[row, k] * centers[i, 1, k]
-            further += look * between
-        share = np.float32(1.0) / (np.float32(1.0) + np.exp(-further / _SOFT))
+            lead += direction * between
+        share = np.float32(1.0) / (np.float32(1.0) + np.exp(-lead / _SOFT))
         for row in range(3):
             on_pelvis, on_left, on_right = pelvis[row, 3], left[row, 3], right[row, 3]
             for k in range(3):
@@ -112,4 +118,4 @@ def _hang(
                 on_left += left[row, k] * anchors[i, 1, k]
                 on_right += right[row, k] * anchors[i, 2, k]
             on_legs = share * on_left + (np.float32(1.0) - share) * on_right
-            out[i, row] = held[i] * on_pelvis + (np.float32(1.0) - held[i]) * on_legs
+            out[i, row] = pelvis_share[i] * on_pelvis + (np.float32(1.0) - pelvis_share[i]) * on_legs

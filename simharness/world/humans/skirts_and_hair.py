@@ -1,8 +1,8 @@
-"""Cloth and hair that hang free of the body: skirts around the thighs, long hair, buns. Each is a mesh of its own.
+"""Meshes of skirts, long hair and buns, which are added to the mesh of the body.
 
-A skirt is rings of vertices. Above the hips a ring follows the pelvis. Below it is the outline of the two thighs
-together: every vertex looks in a direction, and lies on the thigh that reaches further in it, whatever the pose. So a
-ring is the hull of two round sections, as cloth held by both legs is, and no thigh comes through in a stride.
+A skirt consists of rings of vertices. Above the hips a ring follows the pelvis. Below, it is the common outline of the
+two thighs: every vertex has a direction and lies on the thigh that extends further in that direction, in every pose.
+So a ring is the hull of two round sections, like cloth around both legs, and no thigh comes through during a stride.
 """
 
 from __future__ import annotations
@@ -16,36 +16,38 @@ from mvpose.arrays import Floats
 from simharness.world.humans.body import Body, Part
 from simharness.world.humans.skinning import Skirt
 
+_THIGH = ("UpLeg", "Leg")
 _COLUMNS = 40
 _RING_GAP = 0.035  # metres
-_FITTED = 0.15  # metres from its waistband to where a skirt has all its width
-_EASE = 0.015  # metres between skin or what is worn on it and a skirt
+_FITTED = 0.15  # metres below the waistband at which a skirt reaches its full width
+_EASE = 0.015  # least gap between a skirt and the skin or clothes below it, metres
 _FLARE = {"skirt": 0.05, "dress": 0.06, "coat": 0.045}  # metres by which a hem at the knee is wider than the thigh
-_TOP = {"skirt": 0.003, "dress": 0.0, "coat": 0.0}  # metres that it stands out where it begins
-_HELD = (-0.15, 0.25)  # in thigh lengths below the hip joint, where the pelvis ceases to hold the cloth
+_TOP = {"skirt": 0.003, "dress": 0.0, "coat": 0.0}  # gap at the upper edge, metres
+_HELD = (-0.15, 0.25)  # range in which the weight of the pelvis falls from 1 to 0, thigh lengths below the hip joint
+_BEHIND = (98.0, 262.0)  # bearings from the face around the head's axis, degrees: from behind one ear to the other
 
 
 @dataclass(frozen=True)
-class Shell:
-    """A mesh to be added to a body: see :class:`simharness.world.humans.body.Body` for its fields."""
+class AddedMesh:
+    """Mesh to add to a body; for its fields see :class:`simharness.world.humans.body.Body`."""
 
     vertices: Floats
     faces: NDArray[np.int32]
     part: Part
-    level: Floats  # of the faces
+    level: Floats
     weight_bones: NDArray[np.uint8]
     weights: NDArray[np.float32]
 
 
-def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> tuple[Shell, Skirt]:
-    """A skirt about a body, and how it hangs; ``Skirt.first`` counts from the skirt's own vertices.
+def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> tuple[AddedMesh, Skirt]:
+    """Make the mesh of a skirt and its motion; ``Skirt.first`` is 0, so the caller adds the number of other vertices.
 
     Args:
-        body: at rest, with what is worn below.
-        top: height where it begins, metres.
-        length: where it ends, 0 at the hips to 1 at the knees.
-        kind: one that ``_FLARE`` has.
-        ease: metres by which it is wider, beyond the least.
+        body: rest body with the clothes below the skirt.
+        top: height of the upper edge, metres.
+        length: level of the hem, 0 at the hips to 1 at the knees.
+        kind: "skirt", "dress" or "coat".
+        ease: additional width beyond the least gap, metres.
     """
     hips, knees = (np.stack([body.heads[body.index(side + bone)] for side in ("Left", "Right")]) for bone in _THIGH)
     axis = knees - hips
@@ -53,11 +55,11 @@ def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> t
     first = -(top - hips[:, 2].mean()) / thigh
     depth = np.linspace(first, length, max(4, int((length - first) * thigh / _RING_GAP)))
     bearing = np.linspace(0, 2 * np.pi, _COLUMNS, endpoint=False)
-    looks = np.column_stack([np.cos(bearing), np.sin(bearing), np.zeros(_COLUMNS)])
+    directions = np.column_stack([np.cos(bearing), np.sin(bearing), np.zeros(_COLUMNS)])
 
     trunk, legs = _body_points(body)
     pelvis = np.array([body.heads[0, 0], 0.0])
-    held = 1 - _smooth((depth - _HELD[0]) / (_HELD[1] - _HELD[0]))
+    pelvis_share = 1 - _smoothstep((depth - _HELD[0]) / (_HELD[1] - _HELD[0]))
     anchors = np.zeros((len(depth), _COLUMNS, 3, 3))  # on the pelvis, the left thigh, the right thigh
     centers = np.zeros((len(depth), 2, 3))
     outline = np.zeros(_COLUMNS)
@@ -65,44 +67,42 @@ def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> t
         wide = _EASE + ease + _FLARE[kind] * max(t, 0.0) ** 1.3
         height = hips[:, 2].mean() + t * axis[:, 2].mean()
         around = trunk[np.abs(trunk[:, 2] - height) < 0.025]
-        if len(around) > 20:  # below the crotch there is no trunk, and the last ring goes on
+        if len(around) > 20:  # below the crotch there is no trunk: the outline of the last ring is kept
             outline = _hull(around[:, :2] - pelvis, bearing)
         fitted = min((t - first) * thigh / _FITTED, 1.0)
-        ring = looks[:, :2] * (outline + wide * fitted + _TOP[kind] * (1 - fitted))[:, None]
+        ring = directions[:, :2] * (outline + wide * fitted + _TOP[kind] * (1 - fitted))[:, None]
         anchors[k, :, 0] = np.column_stack([pelvis + ring, np.full(_COLUMNS, height)])
         for side in range(2):
             along = max(t, 0.12)
             centers[k, side] = hips[side] + t * axis[side]
             leg = legs[side] - hips[side]
             near = leg[np.abs(leg @ axis[side] / (axis[side] @ axis[side]) - along) < 0.06] - along * axis[side]
-            reach = (near[:, :2] @ looks[:, :2].T).max(0)
-            anchors[k, :, 1 + side] = centers[k, side] + (reach + wide)[:, None] * looks
+            reach = (near[:, :2] @ directions[:, :2].T).max(0)
+            anchors[k, :, 1 + side] = centers[k, side] + (reach + wide)[:, None] * directions
 
     shape = (len(depth), _COLUMNS)
     hang = Skirt(
         first=0,
         anchors=anchors.reshape(-1, 3, 3).astype(np.float32),
         centers=np.broadcast_to(centers[:, None], (*shape, 2, 3)).reshape(-1, 2, 3).astype(np.float32),
-        looks=np.broadcast_to(looks, (*shape, 3)).reshape(-1, 3).astype(np.float32),
-        held=np.repeat(held, _COLUMNS).astype(np.float32),
+        directions=np.broadcast_to(directions, (*shape, 3)).reshape(-1, 3).astype(np.float32),
+        pelvis_share=np.repeat(pelvis_share, _COLUMNS).astype(np.float32),
         bones=(0, body.index("LeftUpLeg"), body.index("RightUpLeg")),
     )
-    vertices = np.zeros((len(hang.looks), 3), np.float32)
+    vertices = np.zeros((len(hang.directions), 3), np.float32)
     hang.hang(np.tile(np.eye(3, 4, dtype=np.float32), (len(body.bones), 1, 1)), vertices)
     faces = _grid(*shape, closed=True)
-    left = _smooth(0.5 + 4.0 * vertices[:, 1].astype(float))
+    left = _smoothstep(0.5 + 4.0 * vertices[:, 1].astype(float))
     weights = np.zeros((len(vertices), 4), np.float32)
-    weights[:, :3] = np.column_stack([hang.held, (1 - hang.held) * left, (1 - hang.held) * (1 - left)])
+    on_legs = 1 - hang.pelvis_share
+    weights[:, :3] = np.column_stack([hang.pelvis_share, on_legs * left, on_legs * (1 - left)])
     level = np.repeat(depth, _COLUMNS)[faces].mean(1)
     bones = np.tile(np.array([*hang.bones, 0], np.uint8), (len(vertices), 1))
-    return Shell(vertices.astype(float), faces, Part.SKIRT, level, bones, weights), hang
-
-
-_THIGH = ("UpLeg", "Leg")
+    return AddedMesh(vertices.astype(float), faces, Part.SKIRT, level, bones, weights), hang
 
 
 def _body_points(body: Body) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Vertices of the trunk, and of each leg, left and right, with its half of the trunk."""
+    """Return the vertices of the trunk, and those of the left and the right leg with that half of the trunk."""
     trunk, both = (
         body.vertices[np.unique(body.faces[np.isin(body.part, parts)])].astype(float)
         for parts in ([Part.TORSO], [Part.TORSO, Part.LEG])
@@ -111,20 +111,20 @@ def _body_points(body: Body) -> tuple[Floats, tuple[Floats, Floats]]:
 
 
 def _hull(points: Floats, bearing: Floats) -> Floats:
-    """How far the convex hull of points (n, 2) about the origin reaches in directions (c,), metres."""
+    """Return the distance from the origin to the convex hull of points (n, 2) at bearings (c,), metres."""
     support = (points @ np.stack([np.cos(bearing), np.sin(bearing)])).max(0)
     cosine = np.cos(bearing[:, None] - bearing[None, :])
     return np.where(cosine > 0.2, support[None, :] / np.maximum(cosine, 0.2), np.inf).min(1)
 
 
-def _smooth(share: Floats) -> Floats:
-    """From 0 to 1 without a corner."""
+def _smoothstep(share: Floats) -> Floats:
+    """Return the cubic smoothstep of values clipped to 0..1."""
     share = np.clip(share, 0, 1)
     return share * share * (3 - 2 * share)
 
 
 def _grid(rows: int, columns: int, *, closed: bool) -> NDArray[np.int32]:
-    """Faces of a grid of vertices whose columns run counter-clockwise seen from above, and rows downwards."""
+    """Return the faces of a grid of vertices: columns counter-clockwise seen from above, rows downwards."""
     across = np.arange(columns if closed else columns - 1)
     a = (np.arange(rows - 1)[:, None] * columns + across).ravel()
     b = (np.arange(rows - 1)[:, None] * columns + (across + 1) % columns).ravel()
@@ -132,11 +132,8 @@ def _grid(rows: int, columns: int, *, closed: bool) -> NDArray[np.int32]:
     return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])]).astype(np.int32)
 
 
-_BEHIND = (98.0, 262.0)  # degrees about the head's axis, from the face: from behind one ear to behind the other
-
-
-def long_hair(body: Body, *, volume: float) -> Shell:
-    """Hair that hangs from behind the ears to the shoulder blades."""
+def long_hair(body: Body, *, volume: float) -> AddedMesh:
+    """Make the mesh of hair that falls from behind the ears to the shoulder blades."""
     head, neck = body.heads[body.index("Head")], body.heads[body.index("Neck")]
     points, scalp = _head_points(body)
     crown = points[:, 2].max()
@@ -145,29 +142,30 @@ def long_hair(body: Body, *, volume: float) -> Shell:
     height = np.linspace(top, end, 18)
     bearing = np.radians(np.linspace(*_BEHIND, 25))
     center = np.array([0.5 * (scalp[:, 0].min() + scalp[:, 0].max()), 0.0])
-    looks = np.column_stack([np.cos(bearing), np.sin(bearing)])
+    directions = np.column_stack([np.cos(bearing), np.sin(bearing)])
     thick = 0.006 + 0.006 * volume
     rows, fall = [], np.zeros(len(bearing))
     for z in height:
-        if z > nape:  # it lies on the skull, and hangs from where that is widest
+        if z > nape:  # hair lies on the skull and falls from its widest part
             around = scalp[np.abs(scalp[:, 2] - z) < 0.015, :2] - center
             fall = np.maximum(_hull(around, bearing), fall)
             reach = fall + thick * np.sin(np.linspace(0, np.pi, len(bearing))) ** 0.5 - (0.006 if z == top else 0.0)
-        else:  # it falls, and lies on neck and back where they come out further
+        else:  # hair falls, and lies on neck and back where they stand out further
             around = points[np.abs(points[:, 2] - z) < 0.02, :2] - center
-            reach = np.clip(_reach(around, looks) + 0.012, 0.88 * fall, fall + 0.01 + 0.04 * np.abs(looks[:, 0]))
-        rows.append(np.column_stack([center + looks * reach[:, None], np.full(len(bearing), z)]))
+            limit = fall + 0.01 + 0.04 * np.abs(directions[:, 0])
+            reach = np.clip(_reach(around, directions) + 0.012, 0.88 * fall, limit)
+        rows.append(np.column_stack([center + directions * reach[:, None], np.full(len(bearing), z)]))
     vertices = np.concatenate(rows)
     faces = _grid(len(height), len(bearing), closed=False)
-    below = _smooth((head[2] - vertices[:, 2]) / (head[2] - end))
+    below = _smoothstep((head[2] - vertices[:, 2]) / (head[2] - end))
     weights = np.zeros((len(vertices), 4), np.float32)
     weights[:, :3] = np.column_stack([1 - 0.45 * below, 0.2 * below, 0.25 * below])
     bones = np.array([body.index("Head"), body.index("Neck"), body.index("Spine1"), 0], np.uint8)
-    return Shell(vertices, faces, Part.SCALP, np.ones(len(faces)), np.tile(bones, (len(vertices), 1)), weights)
+    return AddedMesh(vertices, faces, Part.SCALP, np.ones(len(faces)), np.tile(bones, (len(vertices), 1)), weights)
 
 
-def bun(body: Body, *, volume: float) -> Shell:
-    """A knot of hair on the back of the head."""
+def bun(body: Body, *, volume: float) -> AddedMesh:
+    """Make the mesh of a bun, a knot of hair on the back of the head."""
     points, scalp = _head_points(body)
     head = body.heads[body.index("Head")]
     radius = 0.028 + 0.008 * volume
@@ -179,19 +177,19 @@ def bun(body: Body, *, volume: float) -> Shell:
     faces = _grid(9, 16, closed=True)
     weights = np.tile(np.array([1, 0, 0, 0], np.float32), (len(vertices), 1))
     bones = np.full((len(vertices), 4), body.index("Head"), np.uint8)
-    return Shell(vertices, faces, Part.SCALP, np.ones(len(faces)), bones, weights)
+    return AddedMesh(vertices, faces, Part.SCALP, np.ones(len(faces)), bones, weights)
 
 
 def _head_points(body: Body) -> tuple[Floats, Floats]:
-    """Vertices of head, neck and trunk, and those of the scalp alone."""
+    """Return the vertices of head, neck and trunk, and those of the scalp."""
     points = body.vertices.astype(float)
     scalp = np.unique(body.faces[body.part == Part.SCALP])
-    rest = np.unique(body.faces[np.isin(body.part, [Part.SCALP, Part.SKIN, Part.TORSO])])
-    return points[rest], points[scalp]
+    upper_body = np.unique(body.faces[np.isin(body.part, [Part.SCALP, Part.SKIN, Part.TORSO])])
+    return points[upper_body], points[scalp]
 
 
-def _reach(points: Floats, looks: Floats) -> Floats:
-    """How far points (n, 2) reach in directions (c, 2), each by those within 15 degrees of it; 0 where none is."""
+def _reach(points: Floats, directions: Floats) -> Floats:
+    """Return the greatest distance of points (n, 2) within 15 degrees of directions (c, 2); 0 if there are none."""
     distance = np.linalg.norm(points, axis=1)
-    near = points @ looks.T > np.cos(np.radians(15)) * distance[:, None]
+    near = points @ directions.T > np.cos(np.radians(15)) * distance[:, None]
     return np.where(near, distance[:, None], 0.0).max(0, initial=0.0)

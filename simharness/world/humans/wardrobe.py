@@ -1,4 +1,4 @@
-"""What people wear: colours, cuts and patterns, drawn so that the people of a scene are easy to tell apart, or not."""
+"""Looks of people: colours, cuts, patterns and hair, drawn so that the people of a scene look distinct or alike."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simharness.world.humans.population import draw_sex
 
 Color = tuple[float, float, float]
 
-# Where sleeves, trouser legs and shirts may end, as levels of a body's faces: the mesh has an edge along each.
+# Levels of a body's faces at which sleeves, trouser legs and shirts may end; the mesh has edges along each of them.
 SLEEVES = {"short": 0.55, "half": 0.9, "long": 1.95}
 LEGS = {"shorts": 0.7, "cropped": 1.55, "long": 1.93}
 HEMS = {"tucked": 0.32, "loose": 0.13}
@@ -21,7 +21,7 @@ PATTERNS = ("plain", "stripes", "checks", "blocks")
 BELOW = ("trousers", "skirt", "dress", "coat")
 HAIR = ("short", "long", "bun")
 REPEATS = (6, 24)
-"""Least and most times that a pattern may repeat around the body: in sixes, so that it closes around limbs too."""
+"""Least and greatest number of repeats of a pattern around the body; a multiple of six closes around limbs too."""
 
 _CHOICES = {
     "sleeves": tuple(SLEEVES),
@@ -37,21 +37,25 @@ _NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0)}
 
 @dataclass(frozen=True)
 class Look:
-    """Colours (sRGB albedo, 0 to 1), cuts and patterns.
+    """Look of one person: colours (sRGB albedo, 0 to 1), cuts, patterns and hair.
 
     Attributes:
-        skin, hair, lips, eyes, top, trousers, shoes: red, green, blue; ``trousers`` also of a skirt.
-        accent: the second colour of patterns.
-        sleeves: one of ``SLEEVES``. legs: one of ``LEGS``. hem: of the shirt, one of ``HEMS``.
-        top_pattern, bottom_pattern: of ``PATTERNS``. repeats: of them around the body, a multiple of six.
-        below: what hangs about the thighs, of ``BELOW``: nothing but trousers, a skirt, a dress (a skirt in one with
-            the top) or a coat (the same over trousers).
-        length: where a skirt ends, 0 at the hip to 1 at the knee.
-        fit: 0 close to 1 wide.
-        hair_style: of ``HAIR``. volume: of the hair, 0 cropped to 2 full.
+        skin, hair, lips, eyes, top, trousers, shoes: red, green, blue; ``trousers`` is also the colour of a skirt.
+        accent: second colour of patterns.
+        sleeves: length of the sleeves, one of ``SLEEVES``.
+        legs: length of the trouser legs, one of ``LEGS``.
+        hem: hem of the shirt, one of ``HEMS``.
+        top_pattern, bottom_pattern: one of ``PATTERNS``.
+        repeats: number of repeats of the patterns around the body, a multiple of six in ``REPEATS``.
+        below: one of ``BELOW``: trousers only, a skirt, a dress (a skirt of the same cloth as the top) or a coat (a
+            dress over trousers).
+        length: level of the hem of a skirt, dress or coat, 0.3 to 1, where 0 is the hip and 1 the knee.
+        fit: width of the clothes, 0 close to 1 wide.
+        hair_style: one of ``HAIR``.
+        volume: volume of the hair, 0 cropped to 2 full.
 
     Raises:
-        ValueError: a choice that there is not, or a number out of its range.
+        ValueError: an unknown choice, or a number out of its range.
     """
 
     skin: Color
@@ -93,7 +97,7 @@ UNIFORM_COLORS = ("top", "trousers", "shoes", "accent")
 UNIFORM_NUMBERS = ("fit", "length")
 UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "below")
 
-# Albedos, by eye. Hair runs from fair to dark as skins do, so that a share of the one goes with a share of the other.
+# Albedos, chosen by eye. Hair and skins both run from fair to dark, so that one draw can correlate the two.
 _SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
 _HAIR = ("c8a468", "8d6a3f", "8c8a88", "6b3a22", "5a3f2a", "3b281d", "2a1d17", "1b1512", "151112")
 _TROUSERS = ("2b3550", "3d5a80", "26282d", "5a5650", "8c7b60", "4a3f38", "6c7480")
@@ -105,7 +109,13 @@ _DRAWS = 32
 
 
 def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | None = None) -> Look:
-    """Draw one look; ``hue`` (0 to 1, around the colour circle) of the top where it shall not be drawn."""
+    """Draw one look.
+
+    Args:
+        rng: random stream.
+        female: whether women's clothes and hair styles may be drawn.
+        hue: hue of the top, 0 to 1 around the colour circle; drawn if None.
+    """
     drawn = rng.random(_DRAWS).tolist()
     hue = drawn[0] if hue is None else hue
     skin = _between(_SKINS, drawn[1])
@@ -139,15 +149,20 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | No
 def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0) -> tuple[Look, ...]:
     """Draw the looks of ``count`` people of one scene.
 
-    At ``look_alike`` 0 they are easy to tell apart, by the hues of their tops above all: those step around the circle
-    by the golden section, which spreads any number of them well, so one more person changes nobody else's look. At 1
-    all wear the same uniform; skin, hair and body are still each one's own. Between, colours and widths are mixed in
-    proportion, and of the cuts and patterns each changes at a value of its own, drawn once for the scene: so any two
-    people come the nearer to each other, the more the dial is turned up. It is about the first ``alike`` people, or
-    about all where that is 0.
+    At ``look_alike`` 0 people are easy to distinguish, mainly by the hues of their tops. The hues step around the
+    colour circle by the golden ratio, which spreads any number of hues well, so an additional person does not change
+    the looks of the others. At 1 all wear the same uniform; skin, hair and body remain individual. In between, colours
+    and widths are mixed in proportion, and every cut or pattern switches to the uniform at a separate value, drawn
+    once for the scene. So the looks of any two people come closer as ``look_alike`` grows.
+
+    Args:
+        seed: seed of the scene.
+        count: number of people.
+        look_alike: similarity of the clothes, 0 to 1.
+        alike: number of people, from the first, that ``look_alike`` applies to; 0 for all.
 
     Raises:
-        ValueError: ``look_alike`` beyond 0 to 1.
+        ValueError: ``look_alike`` is not in 0 to 1.
     """
     if not 0 <= look_alike <= 1:
         raise ValueError(f"look_alike must be from 0 to 1, got {look_alike}")
@@ -157,25 +172,25 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     looks = []
     for i in range(count):
         female = draw_sex(stream(seed, "people", i, "shape")) == "female"
-        own = draw_look(stream(seed, "people", i, "look"), female=female, hue=float(start + i * _GOLDEN))
-        looks.append(_toward(own, uniform, look_alike, changes.tolist()) if i < (alike or count) else own)
+        look = draw_look(stream(seed, "people", i, "look"), female=female, hue=float(start + i * _GOLDEN))
+        looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
 
-def _toward(own: Look, uniform: Look, share: float, changes: list[bool]) -> Look:
-    """A look whose clothes are a ``share`` of a uniform, with those of its choices that have changed (c,)."""
-    clothes: dict[str, Any] = {key: mix(getattr(own, key), getattr(uniform, key), share) for key in UNIFORM_COLORS}
-    clothes |= {key: (1 - share) * getattr(own, key) + share * getattr(uniform, key) for key in UNIFORM_NUMBERS}
+def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Look:
+    """Return a look with clothes mixed with a ``share`` of a uniform, and with the uniform's changed choices (c,)."""
+    clothes: dict[str, Any] = {key: mix(getattr(look, key), getattr(uniform, key), share) for key in UNIFORM_COLORS}
+    clothes |= {key: (1 - share) * getattr(look, key) + share * getattr(uniform, key) for key in UNIFORM_NUMBERS}
     clothes |= {key: getattr(uniform, key) for key, changed in zip(UNIFORM_CHOICES, changes, strict=True) if changed}
-    return replace(own, **clothes)
+    return replace(look, **clothes)
 
 
 def _contrasting(color: Color, share: float) -> Color:
-    """An accent that is told apart from a colour by its lightness."""
+    """Pick an accent colour whose lightness differs clearly from that of a colour; ``share`` 0 to 1 selects it."""
     accents = [_color(code) for code in _ACCENTS]
-    light = [abs(sum(accent) - sum(color)) / 3 for accent in accents]
-    good = [accent for accent, far in zip(accents, light, strict=True) if far >= sorted(light)[-3]]
-    return good[min(int(share * len(good)), len(good) - 1)]
+    contrast = [abs(sum(accent) - sum(color)) / 3 for accent in accents]
+    candidates = [accent for accent, value in zip(accents, contrast, strict=True) if value >= sorted(contrast)[-3]]
+    return candidates[min(int(share * len(candidates)), len(candidates) - 1)]
 
 
 def _pick(choices: tuple[str, ...], share: float) -> str:
@@ -183,17 +198,19 @@ def _pick(choices: tuple[str, ...], share: float) -> str:
 
 
 def _color(code: str) -> Color:
+    """Return the colour of a hexadecimal code."""
     red, green, blue = (int(code[i : i + 2], 16) / 255 for i in (0, 2, 4))
     return red, green, blue
 
 
 def _between(codes: tuple[str, ...], share: float) -> Color:
+    """Interpolate in a scale of hexadecimal colours, ``share`` 0 at the first to 1 at the last."""
     place = share * (len(codes) - 1)
     low = min(int(place), len(codes) - 2)
     return mix(_color(codes[low]), _color(codes[low + 1]), place - low)
 
 
 def mix(first: Color, second: Color, share: float) -> Color:
-    """The colour a ``share`` of the way from the first to the second."""
+    """Interpolate between two colours: ``share`` 0 gives the first, 1 the second."""
     red, green, blue = ((1 - share) * a + share * b for a, b in zip(first, second, strict=True))
     return red, green, blue

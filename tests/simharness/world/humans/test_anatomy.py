@@ -4,7 +4,7 @@ import pytest
 from simharness.world.humans.anatomy import DOFS, PAIRED_SEGMENTS, RANGES, mass_fractions
 
 
-def test_there_are_nine_trunk_and_thirteen_limb_degrees_of_freedom_a_side():
+def test_there_are_9_degrees_of_freedom_of_the_trunk_and_13_of_the_limbs_of_each_side():
     assert len(DOFS) == len(set(DOFS)) == 35
     left = [name.removeprefix("left_") for name in DOFS if name.startswith("left_")]
     right = [name.removeprefix("right_") for name in DOFS if name.startswith("right_")]
@@ -12,14 +12,14 @@ def test_there_are_nine_trunk_and_thirteen_limb_degrees_of_freedom_a_side():
     assert len(left) == 13
 
 
-def test_ranges_hold_the_neutral_pose_and_are_mirrored():
+def test_ranges_include_the_neutral_pose_and_are_equal_on_both_sides():
     for name, (low, high) in RANGES.items():
         assert low < 0 < high, name
         assert high - low < 2 * np.pi, name
         assert RANGES[name.replace("left", "right")] == (low, high)
 
 
-def test_spine_bends_and_turns_alike_to_both_sides():
+def test_spine_ranges_are_symmetric():
     for name, (low, high) in RANGES.items():
         if name.endswith("bending") or name in ("lumbar_rotation", "thorax_rotation", "neck_rotation"):
             assert low == -high

@@ -14,7 +14,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def transforms(body):
-    """Rigid transforms of the bones that have nothing to do with each other."""
+    """Independent random rigid transforms of the bones."""
     rng = np.random.default_rng(0)
     count = len(body.bones)
     turns = Rotation.random(count, random_state=1).as_matrix()
@@ -39,11 +39,11 @@ def test_rest_body_faces_x_with_its_left_to_y(body):
     assert body.heads[body.index("LeftToeBase"), 0] > body.heads[body.index("LeftFoot"), 0] + 0.08
 
 
-def test_identity_leaves_the_skin_where_it_is(body):
+def test_identity_transforms_give_the_rest_vertices(body):
     np.testing.assert_allclose(body.skin(identity(body)), body.vertices, atol=1e-6)
 
 
-def test_skinning_is_the_weighted_sum_of_the_bones_transforms(body, transforms):
+def test_skinning_is_the_weighted_sum_of_bone_transforms(body, transforms):
     points = np.column_stack([body.vertices, np.ones(len(body.vertices))]).astype(float)
     moved = np.einsum("brc,nc->bnr", transforms, points)
     rows = np.arange(len(points))
@@ -64,7 +64,7 @@ def test_joints_are_the_regressed_vertices_of_the_skinned_bare_body(body, transf
     np.testing.assert_allclose(body.joints(transforms), expected, atol=1e-6)
 
 
-def test_joints_take_any_number_of_poses(body, transforms):
+def test_joints_accept_any_number_of_poses(body, transforms):
     many = np.stack([identity(body), transforms, transforms]).reshape(3, 1, -1, 3, 4)
     joints = body.joints(many)
     assert joints.shape == (3, 1, 17, 3)
@@ -83,7 +83,7 @@ def test_joints_take_any_number_of_poses(body, transforms):
     ],
 )
 @pytest.mark.parametrize("gender", [0.0, 1.0])
-def test_keypoints_sit_at_the_bones_joints(joint, bone, distance, gender):
+def test_keypoints_lie_at_the_bone_heads(joint, bone, distance, gender):
     body = make_body(Shape(gender=gender))
     joints = body.joints(identity(body))
     for side in ("left", "right"):
@@ -101,14 +101,14 @@ def test_weights_sum_to_one_and_keypoints_are_affine(body):
     np.testing.assert_allclose(body.keypoints[..., 3].sum(1), 1, atol=1e-6)
 
 
-def test_faces_look_outwards(body):
-    """The flux of position through a closed surface is three times its volume; inside out it would be negative."""
+def test_faces_point_outwards(body):
+    """The volume inside the clothed surface is positive and near that of the body; inside out it would be negative."""
     cloth = np.isin(body.part, [Part.TORSO, Part.ARM, Part.LEG, Part.SHOE, Part.SOLE])
     inside = 1000 * volume(body.vertices - body.vertices.mean(0), body.faces[cloth])
-    assert 0.8 * body.mass < inside < 1.05 * body.mass  # litres; head and hands are not clothed
+    assert 0.8 * body.mass < inside < 1.05 * body.mass  # litres; head and hands are left out
 
 
-def test_mass_index_is_a_persons(body):
+def test_mass_index_is_in_the_human_range(body):
     assert 17 < body.mass / body.stature**2 < 32
 
 
@@ -121,9 +121,9 @@ def test_volume_of_a_tetrahedron():
 def test_every_part_is_shown_on_both_sides(body):
     middle = body.vertices[body.faces].mean(1)
     for part in set(Part) - {Part.SKIRT}:
-        mine = middle[body.part == part]
-        assert (mine[:, 1] > 0).sum() == pytest.approx((mine[:, 1] < 0).sum(), rel=0.1), part
-        assert len(mine) > 10, part
+        centers = middle[body.part == part]
+        assert (centers[:, 1] > 0).sum() == pytest.approx((centers[:, 1] < 0).sum(), rel=0.1), part
+        assert len(centers) > 10, part
 
 
 def test_parts_are_where_they_belong(body):
@@ -138,13 +138,13 @@ def test_parts_are_where_they_belong(body):
     assert height[Part.LIPS].max() < height[Part.IRIS].min() < height[Part.BROW].max()
 
 
-def test_joint_depths_are_those_of_limbs(body):
+def test_joint_depths_are_plausible_limb_radii(body):
     radius = dict(zip(COCO17.joints, body.joint_radii, strict=True))
     assert 0.01 <= radius["nose"] < 0.03
     assert 0.02 < radius["left_wrist"] < radius["left_elbow"] < radius["left_knee"] < radius["left_hip"] < 0.25
 
 
-def test_a_missing_model_says_how_to_make_one(tmp_path):
+def test_the_error_for_a_missing_model_names_the_command_to_make_it(tmp_path):
     with pytest.raises(ValueError, match=r"nothing\.npz: .*tools\.body\.bake"):
         BodyModel.load(tmp_path / "nothing.npz")
 

@@ -1,4 +1,4 @@
-"""Capsules and the skin they stand for: nowhere far apart, seen from either."""
+"""Distance between the skin of a body and its capsules, in both directions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHAPES = {
 
 
 @cache
-def somebody(name):
+def body_of(name):
     if name in SHAPES:
         return make_body(SHAPES[name])
     i = int(name.removeprefix("dressed "))
@@ -37,7 +37,7 @@ def somebody(name):
 
 @cache
 def fitted(name):
-    return fit_capsules(somebody(name))
+    return fit_capsules(body_of(name))
 
 
 NAMES = (*SHAPES, "dressed 0", "dressed 1", "dressed 2")
@@ -49,21 +49,21 @@ def name(request):
 
 
 def placed(body, capsules):
-    """Starts (c, 3), ends (c, 3) and radii (c,) in the world of the body at rest."""
+    """Return starts (c, 3), ends (c, 3) and radii (c,) of capsules in the world, the body at rest."""
     heads = np.array([body.heads[body.index(capsule.bone)] for capsule in capsules])
     starts, ends = (np.array([getattr(capsule, key) for capsule in capsules]) for key in ("start", "end"))
     return heads + starts, heads + ends, np.array([capsule.radius for capsule in capsules])
 
 
 def signed_distances(points, starts, ends, radii):
-    """Of points (n, 3) to the surface of each capsule, (n, c)."""
+    """Return the signed distances of points (n, 3) to the surface of each capsule, (n, c)."""
     axes = ends - starts
     share = np.clip(((points[:, None] - starts) * axes).sum(-1) / np.maximum((axes**2).sum(-1), 1e-12), 0, 1)
     return np.linalg.norm(points[:, None] - starts - share[..., None] * axes, axis=-1) - radii
 
 
 def on_skin(body, count=20_000):
-    """Points spread over the skin at random, (count, 3)."""
+    """Draw points uniformly on the skin, (count, 3)."""
     rng = stream(1, "test", "skin")
     corners = body.vertices[body.faces].astype(float)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -71,8 +71,8 @@ def on_skin(body, count=20_000):
     return (rng.dirichlet(np.ones(3), count)[:, :, None] * corners[face]).sum(1)
 
 
-def in_sight(body, points):
-    """Which points (n, 3) of the skin are seen from somewhere around: not those under a skirt or hair."""
+def is_visible(body, points):
+    """Return the mask of skin points (n, 3) seen by some camera around the body: not those under a skirt or hair."""
     mesh = Mesh(vertices=body.vertices, faces=body.faces, colors=np.full((len(body.faces), 3), 0.5, np.float32))
     renderer, seen = RasterRenderer(), np.zeros(len(points), bool)
     aim = np.array([0.0, 0.0, body.stature / 2])
@@ -94,7 +94,7 @@ def look_at(place, aim):
 
 
 def on_capsules(starts, ends, radii):
-    """Points spread over the part of the capsules' surfaces that shows, as densely on each, (n, 3)."""
+    """Draw points of equal density on the outer surface of the union of capsules, (n, 3)."""
     rng = stream(1, "test", "capsules")
     points = []
     for start, end, radius in zip(starts, ends, radii, strict=True):
@@ -114,22 +114,22 @@ def on_capsules(starts, ends, radii):
 
 @cache
 def from_the_skin(name):
-    """Distances to the capsules of points all over the skin that is seen, metres."""
-    body = somebody(name)
+    """Return the distances of visible skin points to the capsules, metres."""
+    body = body_of(name)
     points = on_skin(body)
-    return np.abs(signed_distances(points[in_sight(body, points)], *placed(body, fitted(name))).min(axis=1))
+    return np.abs(signed_distances(points[is_visible(body, points)], *placed(body, fitted(name))).min(axis=1))
 
 
 @cache
 def from_the_capsules(name):
-    """Distances to the skin of points all over the capsules' surfaces that show, metres."""
-    body = somebody(name)
+    """Return the distances of points on the outer surface of the capsules to the skin, metres."""
+    body = body_of(name)
     return cKDTree(on_skin(body, 60_000)).query(on_capsules(*placed(body, fitted(name))))[0]
 
 
 @pytest.mark.parametrize("distances", [from_the_skin, from_the_capsules])
 def test_skin_and_capsules_differ_little(name, distances):
-    """1 cm on average and 2.5 cm of 95 % were asked for; a skirt is no capsule, nor is hair to the shoulders."""
+    """Required: mean 1 cm, 95 % within 2.5 cm; more for skirts and long hair, which are not shaped like capsules."""
     assert distances(name).mean() < 0.01
     assert np.quantile(distances(name), 0.95) < (0.018 if name in SHAPES else 0.035)
     assert distances(name).max() < 0.11
@@ -142,23 +142,23 @@ def test_skin_and_capsules_of_a_crowd_differ_little(distances):
     assert np.quantile(crowd, 0.95) < 0.02
 
 
-def test_capsules_neither_top_the_crown_nor_sink_below_the_soles(name):
-    body = somebody(name)
+def test_capsules_end_at_the_crown_and_at_the_soles(name):
+    body = body_of(name)
     starts, ends, radii = placed(body, fitted(name))
     ends = np.stack([starts, ends])[..., 2]
     assert (ends + radii).max() == pytest.approx(body.vertices[:, 2].max(), abs=0.015)
     assert (ends - radii).min() == pytest.approx(body.vertices[:, 2].min(), abs=0.015)
 
 
-def test_no_more_capsules_than_rays_can_afford(name):
+def test_the_number_of_capsules_is_limited_for_ray_casting(name):
     capsules = fitted(name)
     assert 35 <= len(capsules) <= 46
     assert min(capsule.radius for capsule in capsules) > 0.005
 
 
-def test_a_body_of_another_size_gets_capsules_of_that_size():
-    """Nothing is in absolute numbers: half the body, half the capsules."""
-    body = somebody("slight woman")
+def test_capsules_scale_with_the_body():
+    """No size in the fit is absolute: half the body gives half the capsules."""
+    body = body_of("slight woman")
     half = replace(body, vertices=body.vertices * np.float32(0.5), heads=body.heads * 0.5)
     for whole, small in zip(fitted("slight woman"), fit_capsules(half), strict=True):
         assert small.bone == whole.bone
@@ -167,9 +167,9 @@ def test_a_body_of_another_size_gets_capsules_of_that_size():
         assert small.radius == pytest.approx(whole.radius / 2, abs=2e-4)
 
 
-def test_a_body_of_capsules_is_found_again():
-    """Skin that really is a capsule: the forearm's is replaced by a tube and comes out as that tube."""
-    body = somebody("heavy man")
+def test_the_capsule_of_a_tube_is_that_tube():
+    """The skin of the forearm is replaced by a tube; its capsule has the radius and axis of the tube."""
+    body = body_of("heavy man")
     elbow, wrist = (body.heads[body.index(bone)] for bone in ("LeftForeArm", "LeftHand"))
     bones = [body.index(bone) for bone in ("LeftForeArm", "LeftForeArmTwist")]
     arm = np.isin(body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(1)], bones)
@@ -186,6 +186,6 @@ def test_a_body_of_capsules_is_found_again():
             assert axis @ (wrist - elbow) / np.linalg.norm(wrist - elbow) > 0.995
 
 
-def test_a_capsules_volume_is_a_tube_and_a_ball():
+def test_the_volume_of_a_capsule_is_that_of_a_cylinder_and_a_ball():
     capsule = replace(fitted("heavy man")[0], start=np.zeros(3), end=np.array([0.0, 0.3, 0.4]), radius=0.1)
     assert capsule.volume == pytest.approx(np.pi * 0.01 * 0.5 + 4 / 3 * np.pi * 0.001)

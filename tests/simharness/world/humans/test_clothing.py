@@ -32,7 +32,7 @@ def test_colors_are_albedos_of_every_face(body, look):
 @pytest.mark.parametrize("legs", LEGS)
 @pytest.mark.parametrize("hem", HEMS)
 def test_garments_end_at_a_clean_line(body, look, sleeves, legs, hem):
-    """The mesh has an edge along every hem: no face reaches more than a little over the line it ends at."""
+    """The mesh has edges along every hem, so the border of a garment lies on a line of constant level."""
     look = replace(look, sleeves=sleeves, legs=legs, hem=hem)
     worn = garments(body, look)
     arm, leg = body.part == Part.ARM, body.part == Part.LEG
@@ -43,7 +43,7 @@ def test_garments_end_at_a_clean_line(body, look, sleeves, legs, hem):
         on, off = limb & (worn == garment), limb & (worn == Garment.NONE)
         assert on.any()
         if not off.any():
-            continue  # a long sleeve or leg: nothing of the limb's suit is bare
+            continue  # a long sleeve or leg: no face of the limb's suit is bare
         shared = np.intersect1d(body.faces[on], body.faces[off])
         left = shared[body.vertices[shared, 1] > 0]
         assert len(left) >= 8
@@ -51,11 +51,11 @@ def test_garments_end_at_a_clean_line(body, look, sleeves, legs, hem):
         k = int(end > 1)
         axis = heads[k + 1] - heads[k]
         level = k + (body.vertices[left] - heads[k]) @ axis / (axis @ axis)
-        assert np.ptp(level) * np.linalg.norm(axis) < 0.012  # on another body than the mean one lines bend a little
+        assert np.ptp(level) * np.linalg.norm(axis) < 0.012  # lines bend a little on bodies other than the mean body
         assert level.mean() == pytest.approx(end, abs=0.06)
 
 
-def test_a_look_colors_what_it_covers(body, look):
+def test_faces_have_the_colour_of_their_garment_or_skin(body, look):
     look = replace(look, sleeves="long", legs="shorts")
     colors = face_colors(body, look)
     np.testing.assert_allclose(
@@ -65,7 +65,7 @@ def test_a_look_colors_what_it_covers(body, look):
         np.testing.assert_allclose(np.unique(colors[bare], axis=0), [look.skin], atol=1e-6)
 
 
-def test_clothes_have_thickness_and_change_nothing_else(body, look):
+def test_clothes_add_thickness_and_change_nothing_else(body, look):
     dressed = dress(body, look)
     np.testing.assert_array_equal(dressed.part, body.part)
     np.testing.assert_array_equal(dressed.keypoints, body.keypoints)
@@ -79,18 +79,18 @@ def test_clothes_have_thickness_and_change_nothing_else(body, look):
     np.testing.assert_allclose(dressed.weights.sum(1), 1, atol=1e-6)
 
 
-def test_dressed_people_stand_on_the_same_floor(body, look):
+def test_soles_of_a_dressed_body_are_on_the_floor(body, look):
     assert dress(body, look).vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
 
 
 def test_vertices_of_two_garments_are_not_shared(body, look):
     dressed, worn = dress(body, look), garments(body, look)
-    owner = np.full(len(dressed.vertices), -1)
+    garment_of_vertex = np.full(len(dressed.vertices), -1)
     for garment in Garment:
         used = np.unique(dressed.faces[worn == garment])
-        assert (owner[used] == -1).all()
-        owner[used] = garment
-    assert (owner >= 0).all()
+        assert (garment_of_vertex[used] == -1).all()
+        garment_of_vertex[used] = garment
+    assert (garment_of_vertex >= 0).all()
 
 
 def test_wide_clothes_stand_out_further(body, look):
@@ -104,7 +104,7 @@ def test_wide_clothes_stand_out_further(body, look):
 
 
 def test_wide_trousers_lie_on_the_shoe(body, look):
-    """Seen from the side there is no gap between hem and shoe: the hem is lower than the top of the shoe."""
+    """There is no gap between hem and shoe: the hem is lower than the top of the shoe."""
     for fit in (0.0, 1.0):
         wide = replace(look, fit=fit, legs="long")
         dressed, worn = dress(body, wide), garments(body, wide)
@@ -115,7 +115,7 @@ def test_wide_trousers_lie_on_the_shoe(body, look):
 
 @pytest.mark.parametrize("below", ["trousers", "skirt", "dress", "coat"])
 @pytest.mark.parametrize("hair_style", ["short", "long", "bun"])
-def test_joints_do_not_move_when_dressed_and_nothing_of_the_body_is_lost(body, look, below, hair_style):
+def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, below, hair_style):
     dressed = dress(body, replace(look, below=below, hair_style=hair_style))
     pose = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
     np.testing.assert_array_equal(dressed.landmarks(pose), body.landmarks(pose))
@@ -127,28 +127,27 @@ def test_joints_do_not_move_when_dressed_and_nothing_of_the_body_is_lost(body, l
     np.testing.assert_allclose(dressed.skin(pose), dressed.vertices, atol=1e-5)
 
 
-def test_dress_and_coat_are_of_the_tops_colour_and_a_skirt_is_not(body, look):
+def test_dresses_and_coats_have_the_colour_of_the_top_and_skirts_that_of_trousers(body, look):
     for below, color in (("skirt", "trousers"), ("dress", "top"), ("coat", "top")):
-        own = replace(look, below=below)
-        dressed = dress(body, own)
-        shown = face_colors(dressed, own)[dressed.part == Part.SKIRT]
-        np.testing.assert_allclose(np.unique(shown, axis=0), [getattr(own, color)], atol=1e-6)
+        changed = replace(look, below=below)
+        dressed = dress(body, changed)
+        shown = face_colors(dressed, changed)[dressed.part == Part.SKIRT]
+        np.testing.assert_allclose(np.unique(shown, axis=0), [getattr(changed, color)], atol=1e-6)
 
 
-def test_plain_clothes_need_no_texture(body, look):
-    coat = paint(body, replace(look, top_pattern="plain", bottom_pattern="plain"))
-    assert coat.texture is None
-    assert coat.uv is None
-    np.testing.assert_array_equal(coat.colors, face_colors(body, look))
+def test_plain_clothes_have_no_texture(body, look):
+    surface = paint(body, replace(look, top_pattern="plain", bottom_pattern="plain"))
+    assert surface.texture is None
+    assert surface.uv is None
+    np.testing.assert_array_equal(surface.colors, face_colors(body, look))
 
 
-def test_people_can_be_painted_in_every_light(body, look):
-    """What a renderer multiplies is within its range, and cloth with a pattern gets all its colour from that."""
-    own = replace(look, top_pattern="checks", bottom_pattern="stripes", below="skirt")
-    dressed = dress(body, own)
-    coat, worn = paint(dressed, own), garments(dressed, own)
-    assert coat.uv.shape == (len(dressed.faces), 3, 2)
-    assert coat.texture.dtype == np.uint8
+def test_patterned_faces_take_their_whole_colour_from_the_texture(body, look):
+    patterns = replace(look, top_pattern="checks", bottom_pattern="stripes", below="skirt")
+    dressed = dress(body, patterns)
+    surface, worn = paint(dressed, patterns), garments(dressed, patterns)
+    assert surface.uv.shape == (len(dressed.faces), 3, 2)
+    assert surface.texture.dtype == np.uint8
     patterned = np.isin(worn, [Garment.TOP, Garment.TROUSERS])
-    assert (coat.colors[patterned] == 1).all()
-    np.testing.assert_array_equal(coat.colors[~patterned], face_colors(dressed, own)[~patterned])
+    assert (surface.colors[patterned] == 1).all()
+    np.testing.assert_array_equal(surface.colors[~patterned], face_colors(dressed, patterns)[~patterned])

@@ -12,11 +12,11 @@ X, Y, Z = np.eye(3)
 
 
 class Person:
-    """A body and its compiled model, posed by angles in degrees."""
+    """Body with its compiled MuJoCo model, posed by angles in degrees."""
 
     def __init__(self, shape):
         self.body = make_body(shape)
-        self.model = person_spec(self.body, "somebody").compile()
+        self.model = person_spec(self.body, "person").compile()
 
     def transforms(self, **degrees):
         data = mujoco.MjData(self.model)
@@ -40,7 +40,7 @@ def person(request):
     return Person(request.param)
 
 
-def test_neutral_stands_on_the_floor_with_flat_soles_and_feet_forward(person):
+def test_neutral_pose_stands_on_the_floor_with_flat_soles_and_feet_forward(person):
     skin = person.body.skin(person.transforms())
     assert skin[:, 2].min() == pytest.approx(0, abs=1e-5)
     heads = person.heads()
@@ -52,19 +52,19 @@ def test_neutral_stands_on_the_floor_with_flat_soles_and_feet_forward(person):
         assert np.ptp(sole[:, 0]) > 0.15  # heel and ball are both down
 
 
-def test_neutral_legs_are_straight_and_vertical(person):
+def test_legs_of_the_neutral_pose_are_straight_and_vertical(person):
     heads = person.heads()
     for side in ("Left", "Right"):
         for bone in ("Leg", "Foot"):
             np.testing.assert_allclose(heads[f"{side}{bone}"][:2], heads[f"{side}UpLeg"][:2], atol=1e-9)
 
 
-def test_neutral_arms_hang_straight_with_palms_to_the_thighs(person):
+def test_arms_of_the_neutral_pose_hang_straight_with_palms_to_the_thighs(person):
     heads = person.heads()
     for side in ("Left", "Right"):
         for bone in ("ForeArm", "Hand"):
             np.testing.assert_allclose(heads[f"{side}{bone}"][:2], heads[f"{side}Arm"][:2], atol=1e-9)
-        # The thumb is in front of the fingers and nowhere near as far out as a palm that looks forward would have it.
+        # The thumb is in front of the fingers; if the palm faced forward, it would be beside them.
         thumb = heads[f"{side[0]}Thumb"] - heads[f"{side}FingerBase"]
         assert thumb[0] > 0.005
         assert thumb[0] > np.abs(thumb[1])
@@ -86,8 +86,8 @@ def test_neutral_transforms_are_the_models_initial_configuration(person):
         ("elbow_flexion", "wrist", X),
     ],
 )
-def test_limb_joints_move_as_their_names_say(person, dof, joint, direction):
-    """Directions are of the left side; y is mirrored for the right."""
+def test_positive_angles_of_limbs_move_joints_in_the_named_direction(person, dof, joint, direction):
+    """Directions are those of the left side; y is mirrored for the right side."""
     before = person.joints()
     for side, mirror in (("left", [1, 1, 1]), ("right", [1, -1, 1])):
         moved = person.joints(**{f"{side}_{dof}": 20})[f"{side}_{joint}"] - before[f"{side}_{joint}"]
@@ -102,7 +102,7 @@ def test_limb_joints_move_as_their_names_say(person, dof, joint, direction):
         ("wrist_flexion", "HandFinger1", -Y),
     ],
 )
-def test_hands_and_feet_move_as_their_names_say(person, dof, bone, direction):
+def test_positive_angles_of_hands_and_feet_move_them_in_the_named_direction(person, dof, bone, direction):
     for side, mirror in (("left", [1, 1, 1]), ("right", [1, -1, 1])):
         name = side.capitalize() + bone
         moved = person.heads(**{f"{side}_{dof}": 20})[name] - person.heads()[name]
@@ -139,19 +139,19 @@ def test_pronation_turns_the_thumb_inwards(person):
         np.testing.assert_allclose(thumb[1] - thumb[0], [np.cos(np.pi / 3) - 1, -out * np.sin(np.pi / 3), 0], atol=0.1)
 
 
-def test_inversion_turns_the_soles_to_each_other(person):
+def test_inversion_turns_the_soles_towards_each_other(person):
     for side, out in (("left", 1), ("right", -1)):
         foot = person.body.index(f"{side.capitalize()}Foot")
         sole = person.transforms(**{f"{side}_ankle_inversion": 20})[foot, :, :3] @ -Z
         np.testing.assert_allclose(sole, [0, -out * np.sin(np.radians(20)), -np.cos(np.radians(20))], atol=1e-9)
 
 
-@pytest.mark.parametrize("where", ["lumbar", "thorax", "neck"])
-def test_spine_joints_move_as_their_names_say(person, where):
+@pytest.mark.parametrize("region", ["lumbar", "thorax", "neck"])
+def test_positive_angles_of_the_spine_move_the_nose_in_the_named_direction(person, region):
     before, nose = person.joints(), "nose"
-    assert person.joints(**{f"{where}_flexion": 15})[nose][2] < before[nose][2] - 0.005
-    assert person.joints(**{f"{where}_bending": 15})[nose][1] > 0.01
-    turned = person.joints(**{f"{where}_rotation": 15})[nose]
+    assert person.joints(**{f"{region}_flexion": 15})[nose][2] < before[nose][2] - 0.005
+    assert person.joints(**{f"{region}_bending": 15})[nose][1] > 0.01
+    turned = person.joints(**{f"{region}_rotation": 15})[nose]
     assert turned[1] > 0.02
     assert turned[2] == pytest.approx(before[nose][2], abs=1e-9)
 
@@ -169,7 +169,7 @@ def test_mirrored_joints_give_the_mirrored_pose(person, dof):
 
 
 def test_hinges_act_in_the_order_flexion_abduction_rotation(person):
-    """By hand: R = flexion about -y, then abduction about x, then rotation about -z, innermost last."""
+    """The rotation is the product of flexion about -y, abduction about x and rotation about -z, in this order."""
 
     def about(axis, degrees):
         quaternion, matrix = np.empty(4), np.empty(9)
@@ -184,7 +184,7 @@ def test_hinges_act_in_the_order_flexion_abduction_rotation(person):
         np.testing.assert_allclose(turn, about(-Y, 40) @ about(X, 30) @ about(-Z, 20), atol=1e-9)
 
 
-def test_the_root_carries_everything(person):
+def test_the_root_joint_moves_the_whole_body(person):
     data = mujoco.MjData(person.model)
     address = person.model.joint("root").qposadr[0]
     data.qpos[address : address + 7] = [1, 2, 3, np.cos(0.4), 0, 0, np.sin(0.4)]
@@ -197,7 +197,7 @@ def test_the_root_carries_everything(person):
     np.testing.assert_allclose(joints, (still - pelvis) @ turn.T + [1, 2, 3], atol=1e-9)
 
 
-def test_transforms_are_rigid_and_bring_the_heads_to_the_bodies(person):
+def test_bone_transforms_are_rigid(person):
     transforms = person.transforms(left_hip_flexion=50, right_shoulder_abduction=100, neck_rotation=30)
     turns = transforms[..., :3]
     np.testing.assert_allclose(turns @ turns.swapaxes(-1, -2), np.tile(np.eye(3), (len(turns), 1, 1)), atol=1e-9)
@@ -212,7 +212,7 @@ def test_model_has_the_named_hinges_with_their_ranges(person):
     assert person.model.nbody == len(person.body.bones) + 1
 
 
-def test_segment_masses_sum_to_the_body(person):
+def test_segment_masses_sum_to_the_mass_of_the_body(person):
     assert person.model.body_mass.sum() == pytest.approx(person.body.mass)
     thigh = person.model.body("LeftUpLeg").mass[0] / person.body.mass
     assert thigh == pytest.approx(0.1416 if person.body.shape.gender == 0 else 0.1478, abs=1e-4)
@@ -230,11 +230,11 @@ def test_segment_masses_sum_to_the_body(person):
     ],
 )
 def test_limbs_have_the_inertia_that_de_leva_published(person, bones, end, male, female):
-    """Centre of mass and radii of gyration (sagittal, transverse, longitudinal) in percent of the segment's length."""
+    """Values are centre of mass and radii of gyration (sagittal, transverse, longitudinal), percent of the length."""
     body, model = person.body, person.model
     head = body.heads[body.index(bones[0])]
-    way = body.heads[body.index(end)] - head
-    length = np.linalg.norm(way)
+    axis = body.heads[body.index(end)] - head
+    length = np.linalg.norm(axis)
     parts = []
     for bone in bones:
         i = model.body(bone).id
@@ -249,11 +249,11 @@ def test_limbs_have_the_inertia_that_de_leva_published(person, bones, end, male,
         t + m * ((c - center) @ (c - center) * np.eye(3) - np.outer(c - center, c - center)) for m, c, t in parts
     )
     percent, sagittal, transverse, longitudinal = male if body.shape.gender == 0 else female
-    np.testing.assert_allclose(center, percent / 100 * way, atol=1e-6)
+    np.testing.assert_allclose(center, percent / 100 * axis, atol=1e-6)
     gyration = 100 * np.sqrt(np.sort(np.linalg.eigvalsh(tensor)) / mass) / length
     assert gyration[0] == pytest.approx(longitudinal, abs=0.01)
     np.testing.assert_allclose(gyration[1:], np.sqrt((sagittal**2 + transverse**2) / 2), atol=0.01)
-    assert 100 * np.sqrt(way @ tensor @ way / mass) / length**2 == pytest.approx(longitudinal, abs=0.01)
+    assert 100 * np.sqrt(axis @ tensor @ axis / mass) / length**2 == pytest.approx(longitudinal, abs=0.01)
 
 
 def test_capsules_are_named_after_their_bones(person):
@@ -291,7 +291,7 @@ def test_wrong_shapes_are_refused(person):
 
 
 def test_skin_does_not_tear_in_a_wide_pose(person):
-    """No edge grows beyond what an armpit or a hip needs, and none of the shoulder's faces turns to a needle."""
+    """No edge grows by more than armpits and hips need, and no face of the shoulder becomes a needle."""
     body = person.body
     skin = body.skin(
         person.transforms(

@@ -6,7 +6,7 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.anthropometry import ADULTS, child_mass_index, child_stature
 from simharness.world.humans.body import make_body
-from simharness.world.humans.population import draw_shape, fitted, is_child, measures
+from simharness.world.humans.population import draw_shape, fit_shape, is_child, measures
 from simharness.world.humans.shape import LIMITS, Shape
 
 
@@ -25,9 +25,9 @@ def children():
 
 @pytest.mark.parametrize("gender", [0.0, 1.0])
 @pytest.mark.parametrize("stature", [1.5, 1.68, 1.9])
-def test_a_body_measures_what_was_asked_for(gender, stature):
+def test_a_fitted_body_has_the_target_measures(gender, stature):
     targets = {"stature": stature, "bmi": 24.0, "upper_arm": 0.16 * stature, "thigh": 0.235 * stature}
-    shape = fitted(Shape(gender=gender, muscle=0.3, weight=0.7), targets)
+    shape = fit_shape(Shape(gender=gender, muscle=0.3, weight=0.7), targets)
     body = make_body(shape)
     joints = body.joints(np.tile(np.eye(3, 4), (len(body.bones), 1, 1)))
     assert body.stature == pytest.approx(stature, abs=0.001)
@@ -37,11 +37,11 @@ def test_a_body_measures_what_was_asked_for(gender, stature):
         assert np.linalg.norm(joints[first] - joints[second]) == pytest.approx(share * stature, abs=0.002)
 
 
-def test_measures_that_nobody_has_are_refused():
-    with pytest.raises(ValueError, match=r"no body has a stature of 3 .* nearest found has"):
-        fitted(Shape(), {"stature": 3.0})
-    with pytest.raises(ValueError, match="no measure 'nose' of a body; there are stature, bmi"):
-        fitted(Shape(), {"nose": 0.06})
+def test_unreachable_and_unknown_measures_are_refused():
+    with pytest.raises(ValueError, match=r"no body has a stature of 3 .* nearest body has"):
+        fit_shape(Shape(), {"stature": 3.0})
+    with pytest.raises(ValueError, match="unknown body measure 'nose'; the measures are stature, bmi"):
+        fit_shape(Shape(), {"nose": 0.06})
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_an_impossible_shape_is_refused(field, value):
 @pytest.mark.parametrize("sex", ADULTS)
 @pytest.mark.parametrize("measure", ["stature", "bmi", "upper_arm", "forearm", "thigh", "knee"])
 def test_drawn_adults_are_spread_as_published(adults, sex, measure):
-    """Means within three standard errors; deviations too, and a tenth for the tails that are cut at 2.5."""
+    """Means and deviations agree within three standard errors; clipped tails allow another 10 % of the deviation."""
     values = np.array([m[measure] for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")])
     spread, count = ADULTS[sex][measure], len(values)
     assert 55 <= count <= 105
@@ -65,38 +65,38 @@ def test_drawn_adults_are_spread_as_published(adults, sex, measure):
 
 @pytest.mark.parametrize(("sex", "upper_arm", "forearm"), [("male", 0.1618, 0.1545), ("female", 0.1586, 0.1523)])
 def test_arms_agree_with_another_source(adults, sex, upper_arm, forearm):
-    """Nothing was fitted to de Leva (1996, table 4), who has students between joints: 4 % is what surveys differ by."""
-    mine = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
+    """Nothing was fitted to de Leva (1996, table 4: students, between joints); surveys differ by about 4 %."""
+    same_sex = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
     for limb, share in (("upper_arm", upper_arm), ("forearm", forearm)):
-        assert np.mean([m[limb] / m["stature"] for m in mine]) == pytest.approx(share, rel=0.04)
+        assert np.mean([m[limb] / m["stature"] for m in same_sex]) == pytest.approx(share, rel=0.04)
 
 
-def test_limbs_go_with_stature_as_published(adults):
-    """Sitting people differ less than standing ones: within a sex limbs and stature are correlated, but not wholly."""
+def test_limbs_correlate_with_stature_as_published(adults):
+    """Within a sex limbs and stature are correlated, but not completely: sitting people differ less than standing."""
     for sex in ADULTS:
-        mine = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
+        same_sex = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
         for limb in ("upper_arm", "forearm", "thigh", "knee"):
-            found = np.corrcoef([m["stature"] for m in mine], [m[limb] for m in mine])[0, 1]
-            assert found == pytest.approx(ADULTS[sex][limb].correlation, abs=0.2)
+            correlation = np.corrcoef([m["stature"] for m in same_sex], [m[limb] for m in same_sex])[0, 1]
+            assert correlation == pytest.approx(ADULTS[sex][limb].correlation, abs=0.2)
 
 
 def test_hips_are_as_high_as_published(adults):
     """Nothing was fitted to trochanterion height, ANSUR II: 0.901 +- 0.049 m of men, 0.845 +- 0.045 m of women."""
     for sex, mean, deviation in (("male", 0.9009, 0.0492), ("female", 0.8454, 0.0447)):
-        mine = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
-        hips = np.array([m["knee"] + m["thigh"] for m in mine])
+        same_sex = [m for s, m in zip(*adults, strict=True) if (s.gender > 0.5) == (sex == "female")]
+        hips = np.array([m["knee"] + m["thigh"] for m in same_sex])
         assert hips.mean() == pytest.approx(mean, abs=0.015)
         assert hips.std() == pytest.approx(deviation, rel=0.25)
 
 
-def test_drawn_children_are_as_tall_and_heavy_as_the_who_has_them(children):
-    shapes, found = children
+def test_drawn_children_follow_the_who_reference_in_stature_and_mass_index(children):
+    shapes, measured = children
     for sex in ADULTS:
-        mine = [(s, m) for s, m in zip(shapes, found, strict=True) if (s.gender > 0.5) == (sex == "female")]
-        years = np.array([4 + 7 * (s.age - 0.215) / 0.2 for s, _ in mine])
+        same_sex = [(s, m) for s, m in zip(shapes, measured, strict=True) if (s.gender > 0.5) == (sex == "female")]
+        years = np.array([4 + 7 * (s.age - 0.215) / 0.2 for s, _ in same_sex])
         assert 5 <= years.min() <= years.max() <= 12
         scores = []
-        for year, (_, m) in zip(years, mine, strict=True):
+        for year, (_, m) in zip(years, same_sex, strict=True):
             spread = child_stature(sex, year)
             scores.append((m["stature"] - spread.mean) / spread.deviation)
             assert child_mass_index(sex, year, -2.6) - 0.1 < m["bmi"] < child_mass_index(sex, year, 2.6) + 0.1
@@ -104,15 +104,15 @@ def test_drawn_children_are_as_tall_and_heavy_as_the_who_has_them(children):
         assert np.std(scores) == pytest.approx(1, abs=3 / np.sqrt(2 * len(scores)))
 
 
-def test_growth_curves_are_the_whos():
-    """Published: boys of 10 years 137.8 cm, one deviation 6.4 cm; girls of 8 at the median 15.7 kg/m2."""
+def test_growth_curves_are_those_of_the_who():
+    """Published: boys of 10 years 137.8 cm, standard deviation 6.4 cm; girls of 8 years 15.7 kg/m2 at the median."""
     assert child_stature("male", 10).mean == pytest.approx(1.378, abs=0.001)
     assert child_stature("male", 10).deviation == pytest.approx(0.064, abs=0.001)
     assert child_mass_index("female", 8, 0.0) == pytest.approx(15.68)
 
 
-def test_children_have_the_build_of_children(adults, children):
-    """Their legs are shorter for their stature, and more so the younger they are; their heads are larger."""
+def test_children_have_the_proportions_of_children(adults, children):
+    """Legs are shorter relative to stature, the more so the younger the child, and heads are larger."""
     legs = [(s.age, (m["knee"] + m["thigh"]) / m["stature"]) for s, m in zip(*children, strict=True)]
     grown = np.mean([(m["knee"] + m["thigh"]) / m["stature"] for m in adults[1]])
     assert np.mean([share for _, share in legs]) < grown - 0.01
@@ -125,7 +125,7 @@ def test_children_have_the_build_of_children(adults, children):
     assert np.mean([head(s) for s in children[0][:5]]) > 1.1 * np.mean([head(s) for s in adults[0][:5]])
 
 
-def test_who_is_a_child_stays_one_when_there_are_more():
+def test_a_child_remains_a_child_when_the_share_of_children_grows():
     before = {i for i in range(200) if is_child(3, i, 0.2)}
     after = {i for i in range(200) if is_child(3, i, 0.5)}
     assert before < after
@@ -161,10 +161,10 @@ def test_a_longer_limb_is_longer_and_nothing_else(limb, bones):
     edges = short.faces[:, [0, 1]]
     grown = np.linalg.norm(np.diff(long.vertices[edges], axis=1), axis=2)
     old = np.linalg.norm(np.diff(short.vertices[edges], axis=1), axis=2)
-    assert (grown - old).max() < 0.012  # spread over the limb, not torn at a joint
+    assert (grown - old).max() < 0.012  # the stretch is spread over the limb, no joint is torn
     assert LIMITS[limb][0] < 1.2 < LIMITS[limb][1]
 
 
-def test_a_draw_that_no_body_has_is_drawn_nearer_to_the_mean():
-    smallest = draw_shape(stream(2000000000022, "people", 3, "shape"))  # 1.484 m at first, with a build that none has
+def test_a_draw_without_a_body_is_moved_towards_the_mean():
+    smallest = draw_shape(stream(2000000000022, "people", 3, "shape"))  # first 1.484 m, with a build that no body has
     assert 1.484 < measures(smallest)["stature"] < 1.60

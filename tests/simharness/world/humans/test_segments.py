@@ -14,22 +14,22 @@ def body():
 
 
 def test_every_segment_shows_and_lies_between_its_joints(body):
-    """Along the limb no face lies further beyond the joints that bound its segment than flesh blends."""
+    """The faces of a limb segment reach from joint to joint, give or take the blending of skinning weights."""
     middle = body.vertices[body.faces].mean(1)
     chains = {"UPPER_ARM": ("Arm", "ForeArm"), "FOREARM": ("ForeArm", "Hand"), "THIGH": ("UpLeg", "Leg")}
     chains["SHANK"] = ("Leg", "Foot")
     for name, bones in chains.items():
         for side in ("Left", "Right"):
-            mine = middle[body.segments == Segment[f"{side.upper()}_{name}"]]
+            centers = middle[body.segments == Segment[f"{side.upper()}_{name}"]]
             first, last = (body.heads[body.index(side + bone)] for bone in bones)
             axis = last - first
-            along = (mine - first) @ axis / (axis @ axis)
+            along = (centers - first) @ axis / (axis @ axis)
             assert -0.3 < along.min() < 0.2, name
             assert 0.8 < along.max() < 1.25, name
-            assert (np.sign(mine[:, 1]) == (1 if side == "Left" else -1)).mean() > 0.99
+            assert (np.sign(centers[:, 1]) == (1 if side == "Left" else -1)).mean() > 0.99
 
 
-def test_left_and_right_have_as_many_faces_and_none_is_missing(body):
+def test_left_and_right_segments_have_similar_numbers_of_faces(body):
     count = np.bincount(body.segments, minlength=len(Segment))
     assert (count > 100).all()
     for segment in Segment:
@@ -38,7 +38,7 @@ def test_left_and_right_have_as_many_faces_and_none_is_missing(body):
             assert count[segment] == pytest.approx(count[other], rel=0.12)
 
 
-def test_face_hands_and_shoes_are_of_head_hands_and_feet(body):
+def test_face_hands_and_soles_belong_to_head_hands_and_feet(body):
     for parts, segments in (
         ([Part.SCALP, Part.LIPS, Part.IRIS, Part.BROW], {Segment.HEAD}),
         ([Part.SOLE], {Segment.LEFT_FOOT, Segment.RIGHT_FOOT}),
@@ -50,7 +50,7 @@ def test_face_hands_and_shoes_are_of_head_hands_and_feet(body):
         assert (body.segments[hand][side] == segment).mean() > 0.97
 
 
-def test_what_is_worn_belongs_to_a_segment_too(body):
+def test_faces_of_clothes_and_hair_have_segments(body):
     for look in draw_looks(0, 6):
         dressed = dress(body, look)
         assert dressed.segments.shape == (len(dressed.faces),)
@@ -60,11 +60,11 @@ def test_what_is_worn_belongs_to_a_segment_too(body):
         assert np.isin(dressed.segments[dressed.part == Part.SCALP], [Segment.HEAD]).all()
 
 
-def test_the_heavier_weight_decides():
+def test_a_face_belongs_to_the_segment_with_the_larger_weight():
     faces, bones = [[0, 1, 2], [1, 2, 3]], ("Hips", "LeftArm", "LeftArmTwist", "Nothing")
     weight_bones = np.array([[1, 0], [1, 0], [0, 2], [0, 3]])
     weights = np.array([[0.9, 0.1], [0.6, 0.4], [0.7, 0.3], [1.0, 0.0]])
     assert of_bones(bones).tolist() == [Segment.TORSO, Segment.LEFT_UPPER_ARM, Segment.LEFT_UPPER_ARM, Segment.TORSO]
-    # First face: 0.9 + 0.6 + 0.3 of the arm against 1.2; second: 0.6 + 0.3 against 2.1.
-    found = of_faces(faces, weight_bones, weights, bones=bones)
-    assert found.tolist() == [Segment.LEFT_UPPER_ARM, Segment.TORSO]
+    # First face: arm 0.9 + 0.6 + 0.3 against torso 1.2; second face: arm 0.6 + 0.3 against torso 2.1.
+    segments = of_faces(faces, weight_bones, weights, bones=bones)
+    assert segments.tolist() == [Segment.LEFT_UPPER_ARM, Segment.TORSO]

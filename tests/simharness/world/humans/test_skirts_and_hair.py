@@ -29,7 +29,7 @@ COLUMNS = 40
 
 
 class Walker:
-    """A body in a skirt, and its MuJoCo model."""
+    """Body in a skirt, with its MuJoCo model."""
 
     def __init__(self, seed, *, below="skirt", length=0.9, fit=0.2, child=False):
         bare = make_body(draw_shape(stream(seed, "test"), child=child))
@@ -47,13 +47,13 @@ class Walker:
         return bone_transforms(self.body, data.xpos[rows], data.xmat[rows].reshape(-1, 3, 3))
 
     def rings(self, skin):
-        first, count = self.body.skirt.first, len(self.body.skirt.held)
+        first, count = self.body.skirt.first, len(self.body.skirt.pelvis_share)
         return skin[first : first + count].reshape(-1, COLUMNS, 3)
 
     def thighs(self):
-        """Vertices of the legs well above the hem."""
-        mine = (self.body.part == Part.LEG) & (self.body.level < self.length - 0.08)
-        return np.unique(self.body.faces[mine])
+        """Return the vertices of the legs that are well above the hem."""
+        faces = (self.body.part == Part.LEG) & (self.body.level < self.length - 0.08)
+        return np.unique(self.body.faces[faces])
 
 
 @cache
@@ -62,7 +62,7 @@ def walker_of(seed, **wear):
 
 
 def slice_at(rings, height):
-    """Where the columns of a skirt cross a height, (40, 2), or None where not all do."""
+    """Return the points where the columns of a skirt cross a height, (40, 2), or None if not all columns do."""
     above, below = rings[:-1, :, 2] >= height, rings[1:, :, 2] < height
     crossing = above & below
     if not crossing.any(0).all():
@@ -98,8 +98,8 @@ def test_no_thigh_comes_through_a_skirt_in_a_stride(seed, wear, pose):
     assert worst < 0.02
 
 
-def test_a_skirt_is_a_closed_tube_that_looks_outwards():
-    """Every edge has two faces but those of the waist and the hem; the flux through the tube is positive."""
+def test_a_skirt_is_a_closed_tube_with_faces_pointing_outwards():
+    """Every edge has two faces, except those of the waist and the hem; the faces point outwards."""
     body = walker_of(0).body
     faces = body.faces[body.part == Part.SKIRT]
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -112,7 +112,7 @@ def test_a_skirt_is_a_closed_tube_that_looks_outwards():
 
 
 def test_a_ring_is_the_hull_of_two_round_thighs():
-    """With one leg forward and the other back, the hem reaches as far as either does, and runs straight between."""
+    """With one leg forward and the other back, the hem extends as far as each leg and is nearly convex."""
     walker = walker_of(2, fit=0.0, length=0.9)
     transforms = walker.transforms({"left_hip_flexion": 30, "right_hip_flexion": -20})
     hem = walker.rings(walker.body.skin(transforms))[-1].astype(float)
@@ -139,8 +139,8 @@ def test_a_skirt_turns_and_moves_with_the_body():
     np.testing.assert_allclose(walker.body.skin(moved), expected, atol=1e-4)
 
 
-def test_a_skirt_moves_steadily_with_the_legs():
-    """It changes from leg to leg without a jump: half the step moves every vertex about half as far."""
+def test_a_skirt_moves_continuously_with_the_legs():
+    """No vertex jumps when it changes from one leg to the other."""
     walker = walker_of(1)
     last, largest = None, 0.0
     for angle in np.linspace(-25, 25, 101):
@@ -149,15 +149,15 @@ def test_a_skirt_moves_steadily_with_the_legs():
         if last is not None:
             largest = max(largest, float(np.linalg.norm(rings - last, axis=2).max()))
         last = rings.copy()
-    assert 0.002 < largest < 0.02  # metres in half a degree; a thigh alone moves by 4 mm
+    assert 0.002 < largest < 0.02  # metres per half degree; a thigh alone moves by 4 mm
 
 
 def test_long_hair_hangs_behind_the_face_and_turns_with_the_head():
     body = walker_of(0).body
-    hair = np.unique(body.faces[(body.part == Part.SCALP) & (body.faces.min(1) >= body.snug)])
+    hair = np.unique(body.faces[(body.part == Part.SCALP) & (body.faces.min(1) >= body.skinned_count)])
     head = body.heads[body.index("Head")]
     added = body.vertices[hair]
     assert added[:, 2].min() < body.heads[body.index("Neck"), 2]
     assert added[:, 0].max() < head[0] + 0.03
-    owner = body.weight_bones[hair, body.weights[hair].argmax(1)]
-    assert (owner == body.index("Head")).all()
+    bone = body.weight_bones[hair, body.weights[hair].argmax(1)]
+    assert (bone == body.index("Head")).all()

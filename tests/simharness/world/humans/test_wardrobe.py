@@ -18,7 +18,7 @@ from simharness.world.humans.wardrobe import (
     draw_looks,
 )
 
-OWN = ("skin", "hair", "lips", "eyes", "volume", "hair_style")
+INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style")
 
 
 def hue(look):
@@ -26,7 +26,7 @@ def hue(look):
 
 
 def distance(a, b):
-    """Colours by the sum of their differences, choices by one each."""
+    """Return the difference of two looks: the sum of colour and number differences, and 1 for every other choice."""
     colors = sum(np.abs(np.subtract(getattr(a, key), getattr(b, key))).sum() for key in UNIFORM_COLORS)
     numbers = sum(abs(getattr(a, key) - getattr(b, key)) for key in UNIFORM_NUMBERS)
     return colors + numbers + sum(getattr(a, key) != getattr(b, key) for key in UNIFORM_CHOICES)
@@ -41,16 +41,15 @@ def test_hues_of_one_scene_are_spread_over_the_circle(count):
 
 
 @pytest.mark.parametrize("look_alike", [0.0, 0.4, 1.0])
-def test_looks_depend_on_the_seed_and_not_on_who_else_is_there(look_alike):
+def test_looks_depend_on_the_seed_and_not_on_the_number_of_people(look_alike):
     assert draw_looks(0, 3, look_alike=look_alike) == draw_looks(0, 5, look_alike=look_alike)[:3]
     assert draw_looks(0, 3, look_alike=look_alike) != draw_looks(1, 3, look_alike=look_alike)
     assert draw_looks(0, 0, look_alike=look_alike) == ()
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_any_two_people_come_nearer_as_the_dial_is_turned_up(seed):
-    dial = np.linspace(0, 1, 9)
-    looks = [draw_looks(seed, 5, look_alike=share) for share in dial]
+def test_any_two_looks_come_closer_as_look_alike_grows(seed):
+    looks = [draw_looks(seed, 5, look_alike=share) for share in np.linspace(0, 1, 9)]
     for a, b in combinations(range(5), 2):
         apart = np.array([distance(scene[a], scene[b]) for scene in looks])
         assert (np.diff(apart) <= 1e-12).all()
@@ -64,17 +63,17 @@ def test_at_one_all_wear_one_uniform_and_keep_skin_and_hair():
         values = [getattr(look, key) for look in after]
         assert all(value == pytest.approx(values[0]) for value in values), key
     for a, b in zip(before, after, strict=True):
-        assert [getattr(a, key) for key in OWN] == [getattr(b, key) for key in OWN]
+        assert [getattr(a, key) for key in INDIVIDUAL] == [getattr(b, key) for key in INDIVIDUAL]
     assert len({look.skin for look in after}) == 6
-    assert set(OWN) | set(UNIFORM_COLORS) | set(UNIFORM_NUMBERS) | set(UNIFORM_CHOICES) == set(vars(after[0]))
+    assert set(INDIVIDUAL) | set(UNIFORM_COLORS) | set(UNIFORM_NUMBERS) | set(UNIFORM_CHOICES) == set(vars(after[0]))
 
 
-def test_colours_go_to_the_uniforms_in_proportion():
+def test_colours_change_linearly_to_those_of_the_uniform():
     start, half, end = (np.array([look.top for look in draw_looks(3, 4, look_alike=share)]) for share in (0, 0.5, 1))
     np.testing.assert_allclose(half, (start + end) / 2)
 
 
-def test_every_cut_and_pattern_is_worn_by_somebody():
+def test_every_cut_and_pattern_is_drawn():
     looks = [look for seed in range(40) for look in draw_looks(seed, 5)]
     assert {look.below for look in looks} == set(BELOW)
     assert {look.hair_style for look in looks} == set(HAIR)
@@ -83,14 +82,14 @@ def test_every_cut_and_pattern_is_worn_by_somebody():
     assert 0.2 < np.mean([pattern != "plain" for pattern in patterned]) < 0.7
 
 
-def test_a_pattern_can_be_told_from_its_ground():
+def test_the_accent_colour_differs_from_the_colour_of_the_top():
     for seed in range(100):
         look = draw_look(stream(seed, "test"))
         assert abs(sum(look.accent) - sum(look.top)) / 3 > 0.1
 
 
-def test_skirts_are_worn_by_women():
-    """The wardrobe asks the stream of the body for the sex that the body will have."""
+def test_skirts_are_worn_by_women_only():
+    """The look is drawn for the sex that the body will have, from the stream of the body."""
     for seed in range(30):
         for i, look in enumerate(draw_looks(seed, 4)):
             key = (seed, "people", i, "shape")
@@ -121,13 +120,13 @@ def test_an_impossible_look_is_refused(key, value):
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
-def test_a_dial_beyond_its_range_is_refused(share):
+def test_look_alike_out_of_range_is_refused(share):
     with pytest.raises(ValueError, match="look_alike must be from 0 to 1"):
         draw_looks(0, 2, look_alike=share)
 
 
-def test_only_so_many_may_look_alike():
-    free, some, all_ = (draw_looks(3, 4, look_alike=dial, alike=n) for dial, n in ((0.0, 0), (1.0, 2), (1.0, 0)))
+def test_look_alike_can_be_limited_to_the_first_people():
+    free, some, all_ = (draw_looks(3, 4, look_alike=share, alike=n) for share, n in ((0.0, 0), (1.0, 2), (1.0, 0)))
     assert some[:2] == all_[:2]
     assert some[2:] == free[2:]
     assert some[0].top == some[1].top != some[2].top
