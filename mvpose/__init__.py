@@ -1,4 +1,4 @@
-"""Multi-person 3D pose from a few calibrated cameras (Dong et al., CVPR 2019), without a simulator or a GPU."""
+"""Multi-person 3D pose estimation from a few calibrated cameras (Dong et al., CVPR 2019); needs no GPU."""
 
 from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections

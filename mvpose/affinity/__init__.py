@@ -1,7 +1,8 @@
-"""How likely two detections of different views are one person (paper, section 3.2, "Affinity matrix").
+"""Affinity between detections of different views (paper, section 3.2, "Affinity matrix").
 
-Every affinity is a frozen object that is called with rig, detections and their rays (:class:`Affinity`). Scales are
-absolute, so that one person or two views are enough; detections of one view are never compared.
+The affinity of two detections is the likelihood that they show the same person. Every affinity is a frozen object that
+is called with the rig, the detections and their rays (:class:`Affinity`). Scales are absolute, so one person or two
+views are enough. Detections of the same view are never compared.
 """
 
 from mvpose.affinity.appearance import AppearanceAffinity

@@ -1,4 +1,4 @@
-"""What the affinities share: the protocol, the sigmoid, and the pairs of views that their kernels run over."""
+"""Shared parts of the affinities: protocol, sigmoid, and grouping of detections by view for the kernels."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.rays import Rays
 
-LANES = 8  # kernels pad the joints to full vector registers, so that no loop has a scalar remainder
-FASTMATH = {"reassoc", "contract", "arcp", "nsz"}  # sums may be vectorised; NaN and infinity keep their meaning
+LANES = 8  # joints are padded to full vector registers, so no loop has a scalar remainder
+FASTMATH = {"reassoc", "contract", "arcp", "nsz"}  # allows vectorised sums; keeps the semantics of NaN and infinity
 
 
 class Affinity(Protocol):
-    """How likely two detections of different views are one person."""
+    """Likelihood that two detections of different views show the same person."""
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
-        """Affinity matrix, (m, m), 0 to 1, symmetric; 0 for two detections of one view and on the diagonal.
+        """Return the affinity matrix, (m, m), 0 to 1, symmetric; 0 for detections of one view and on the diagonal.
 
         Args:
             rig: V cameras.
-            detections: m poses of their views.
-            rays: the same m poses as viewing rays.
+            detections: m detections.
+            rays: viewing rays of the same m detections.
         """
         ...
 
 
 def sigmoid(distance: Floats, *, midpoint: float, slope: float) -> Floats:
-    """Map distances to affinities in (0, 1), 1/2 at ``midpoint``, falling; 0 for an infinite distance."""
+    """Map distances to affinities in (0, 1) by a decreasing sigmoid, 1/2 at ``midpoint``; 0 for infinite distance."""
     return 1.0 / (1.0 + np.exp(np.clip((distance - midpoint) / slope, -700.0, 700.0))) * np.isfinite(distance)
 
 
 @njit(cache=True)
-def falling(distance, midpoint, slope):
-    """:func:`sigmoid` of one finite distance."""
+def scalar_sigmoid(distance, midpoint, slope):
+    """Return the :func:`sigmoid` of one finite distance."""
     return 1.0 / (1.0 + math.exp((distance - midpoint) / slope))
 
 
 @njit(cache=True)
-def by_view(view):
-    """Detections in the order of their views, (m,), and where each view that has any starts and the last ends."""
+def group_by_view(view):
+    """Return the detections ordered by view, (m,), the start of each view that has any, and the end of the last."""
     m = len(view)
     order = np.arange(m)
-    for i in range(1, m):  # insertion: nearly always in order already
+    for i in range(1, m):  # insertion sort, because detections are nearly always sorted already
         k = i
         while k > 0 and view[order[k - 1]] > view[i]:
             order[k] = order[k - 1]
@@ -64,24 +64,24 @@ def by_view(view):
 
 
 @njit(cache=True)
-def lay_out(directions, weights, order, channels):
-    """Poses for the kernels, (m, channels, J and zeros up to full registers): x, y, z, weight, and room for more.
+def pack_poses(directions, weights, order, channels):
+    """Return poses as (m, channels, J padded with zeros to full registers): x, y, z, weight, and unused channels.
 
-    A joint without a weight or without a direction is missing: all zeros.
+    A joint without a weight or without a direction is missing and all zeros.
     """
     m, joints = weights.shape
     pose = np.zeros((m, channels, (joints + LANES - 1) // LANES * LANES))
     for i in range(m):
         for j in range(joints):
             x, y, z = directions[order[i], j, 0], directions[order[i], j, 1], directions[order[i], j, 2]
-            if weights[order[i], j] > 0.0 and x * x + y * y + z * z > 0.5:  # false of NaN
+            if weights[order[i], j] > 0.0 and x * x + y * y + z * z > 0.5:  # false for NaN
                 pose[i, 0, j], pose[i, 1, j], pose[i, 2, j], pose[i, 3, j] = x, y, z, weights[order[i], j]
     return pose
 
 
 @njit(cache=True, fastmath=FASTMATH)
-def in_common(one, other):
-    """Sum of the products of two poses' weights, (J,) each, and how many joints both have."""
+def shared_joints(one, other):
+    """Return the sum of the products of the weights of two poses, (J,) each, and the number of joints both have."""
     mass, count = 0.0, 0
     for j in range(len(one)):
         weight = one[j] * other[j]

@@ -1,4 +1,4 @@
-"""Appearance and geometry together (paper, section 3.2)."""
+"""Affinity from appearance and geometry combined (paper, section 3.2)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numba import njit
 
-from mvpose.affinity.appearance import AppearanceAffinity, apart, cosines, likeness
+from mvpose.affinity.appearance import AppearanceAffinity, cosine_affinity, cosine_distance, cosines
 from mvpose.affinity.base import Floats
 from mvpose.affinity.epipolar import EpipolarAffinity
 from mvpose.affinity.geometry import GeometricAffinity
@@ -24,28 +24,30 @@ Rule = Literal["evidence", "mean"]
 class FusedAffinity:
     """Affinity from appearance and geometry where geometry allows a match, else 0.
 
-    By the rule ``"mean"`` it is the paper's geometric mean of both, sqrt(A_a A_g) if D_g <= th. That gives appearance
-    half the say, whatever it can tell: who looks unlike from two sides is lost at any distance between rays, and where
-    people wear one uniform all affinities rise towards 1, so that geometry parts them no more.
+    The rule ``"mean"`` is the geometric mean of the paper, sqrt(A_a A_g) if D_g <= th. It gives appearance half the
+    weight regardless of how informative it is: a person who looks different from two sides is lost whatever the
+    distance between the rays, and where people wear one uniform all affinities rise towards 1, so geometry no longer
+    separates them.
 
-    By the rule ``"evidence"`` geometry's odds, A_g / (1 - A_g), are multiplied by those of appearance,
-    exp(weight (r - d) / slope): d is the distance of the two descriptors, r that of a rival. A rival of i against j is
-    whoever stands beside i in i's picture, so surely is another person; the one most like j counts. Where a rival is as
-    like as i is, appearance cannot tell who is who and says nothing. What distance is much thus depends on who is
-    there, not on a scale for all scenes. Only where nobody stands beside i the scale decides: exp((midpoint - d) /
-    slope), the odds of the sigmoid. That is one side; the other is j against i, and the evidence is the geometric mean
-    of both.
+    The rule ``"evidence"`` multiplies the odds of geometry, A_g / (1 - A_g), by those of appearance,
+    exp(weight (r - d) / slope), where d is the distance of the two descriptors and r that of a rival. The rivals of i
+    against j are the other detections in the view of i, which show other people; the rival most similar to j counts.
+    Where a rival is as similar to j as i is, appearance has no information and the factor is 1. So the distance that
+    counts as large depends on the people present, not on a scale for all scenes. The scale decides only where i has
+    no rival: the factor is then exp((midpoint - d) / slope), the odds of the sigmoid. The same holds for j against i,
+    and the evidence is the geometric mean of both directions.
 
-    Geometry alone decides for a pair where either detection has no descriptor, and for everybody where the
-    detections carry none.
+    Geometry alone decides for a pair where either detection has no descriptor, and for all pairs where the detections
+    carry no descriptors.
 
     Attributes:
-        appearance: compares descriptors.
-        geometry: compares poses, and is 0 beyond its threshold.
-        rule: how they are combined.
-        weight: of evidence against rivals; unused by the mean. Below 1, for that compares two distances, each as
-            noisy as the one that the sigmoid was fitted to, and one bad crop spoils all pairs of its detection at once.
-            On simulated rings of 3 to 6 cameras anything from 0.25 to 0.35 was as good.
+        appearance: affinity from descriptors.
+        geometry: affinity from poses, 0 beyond its threshold.
+        rule: rule of combination.
+        weight: weight of the evidence against rivals; unused by the mean. It is below 1 because this evidence compares
+            two distances, each as noisy as the one that the sigmoid was fitted to, and because one bad crop affects
+            all pairs of its detection at once. On simulated rings of 3 to 6 cameras all values from 0.25 to 0.35 were
+            equally good.
 
     Raises:
         ValueError: an unknown rule, or a weight that is negative or not finite.
@@ -63,7 +65,7 @@ class FusedAffinity:
             raise ValueError(f"weight must be a finite number, 0 or more, got {self.weight}")
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
-        """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
+        """Return the affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
         affinity = self.geometry(rig, detections, rays)
         if detections.descriptors is not None:
             cosine, described = cosines(detections)
@@ -77,28 +79,28 @@ class FusedAffinity:
 
 @njit(cache=True)
 def _average(affinity, cosine, described, midpoint, slope):
-    """Turn geometric affinities into fused ones, in place: a second matrix would cost more than what it holds."""
+    """Replace geometric affinities by fused ones, in place because a second matrix would dominate the cost."""
     m = len(affinity)
     for i in range(m):
         for k in range(i + 1, m):
             if affinity[i, k] > 0.0 and described[i] and described[k]:
-                appearance = likeness(cosine[i, k], midpoint, slope)
+                appearance = cosine_affinity(cosine[i, k], midpoint, slope)
                 affinity[i, k] = affinity[k, i] = math.sqrt(appearance * affinity[i, k])
 
 
 @njit(cache=True)
 def _weigh(affinity, cosine, described, view, midpoint, slope, weight):
-    """As :func:`_average`, by evidence."""
+    """Replace geometric affinities by those of the rule "evidence", in place."""
     m = len(affinity)
     views = 0
     for i in range(m):
         views = max(views, view[i] + 1)
-    nobody = -2.0  # less than any cosine
-    first, second = np.empty(views), np.empty(views)  # of each view, the greatest cosine to k, and the next
+    no_rival = -2.0  # below any cosine
+    first, second = np.empty(views), np.empty(views)  # greatest and second greatest cosine to k in each view
     nearest = np.full(views, -1)
-    side = np.empty((m, m))  # [i, k]: how much nearer k is to i than to a rival of i, as it counts
+    side = np.empty((m, m))  # [i, k]: weighted difference of the distances of k to the rival of i and to i
     for k in range(m):
-        first[:], second[:], nearest[:] = nobody, nobody, -1
+        first[:], second[:], nearest[:] = no_rival, no_rival, -1
         for i in range(m):
             v, c = view[i], cosine[i, k]
             if not described[i]:
@@ -110,8 +112,8 @@ def _weigh(affinity, cosine, described, view, midpoint, slope, weight):
         for i in range(m):
             if affinity[i, k] > 0.0:
                 c = second[view[i]] if nearest[view[i]] == i else first[view[i]]
-                distance = apart(cosine[i, k])
-                side[i, k] = weight * (apart(c) - distance) if c > nobody else midpoint - distance
+                distance = cosine_distance(cosine[i, k])
+                side[i, k] = weight * (cosine_distance(c) - distance) if c > no_rival else midpoint - distance
     for i in range(m):
         for k in range(i + 1, m):
             geometric = affinity[i, k]

@@ -1,7 +1,7 @@
-"""Affinity from the distance between viewing rays in metres: the default geometric cue.
+"""Affinity from the distance between viewing rays in metres, the default geometric cue.
 
-It is the same evidence as the paper's epipolar distance (:mod:`mvpose.affinity.epipolar`), but its scale does not
-change with resolution, focal length or the distance of the people, so one threshold serves every rig.
+It uses the same evidence as the epipolar distance of the paper (:mod:`mvpose.affinity.epipolar`), but its scale does
+not change with resolution, focal length or the distance of the people, so one threshold serves every rig.
 """
 
 from __future__ import annotations
@@ -13,41 +13,42 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mvpose.affinity.base import FASTMATH, Floats, by_view, falling, in_common, lay_out
+from mvpose.affinity.base import FASTMATH, Floats, group_by_view, pack_poses, scalar_sigmoid, shared_joints
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.detections import Detections
 from mvpose.rays import Rays
 
-_SURE = 0.35  # quantile: more than a third of the nearest are one person, whatever phantoms there are
-_ENOUGH = 12  # nearest pairs, below which a frame says too little
-_EXPLAINED = 0.05  # metres: what keypoints alone make of that quantile, whose scatter is 0.06 m (OKS)
-_PARALLEL = 1e-9  # squared sine: rays this near to parallel differ by 0.3 mm at 10 m
+_QUANTILE = 0.35  # more than a third of the mutual nearest pairs show one person, even with phantoms
+_LEAST_PAIRS = 12  # mutual nearest pairs, below which a frame has too little information
+_EXPLAINED = 0.05  # metres; value of that quantile from keypoint errors of 0.06 m (OKS) alone
+_PARALLEL = 1e-9  # squared sine; rays this close to parallel diverge by 0.3 mm over 10 m
 
 
 @dataclass(frozen=True)
 class GeometricAffinity:
-    """Affinity from the mean distance between the viewing rays of two poses' joints.
+    """Affinity from the mean distance between the viewing rays of corresponding joints of two poses.
 
     Attributes:
-        midpoint: distance in metres at which a match is as likely as not (affinity 1/2). Keypoints scatter by
-            about 0.06 m across the ray (OKS sigmas of the limbs on an adult), so rays of one joint pass each
-            other at 0.07 m on average; two people who do not touch differ by 0.3 m and more unless they share
-            an epipolar plane.
-        slope: metres over which the affinity falls from 1/2 to 1/(1 + e).
-        threshold: the paper's ``th``: the affinity is 0 beyond this distance, metres.
-        saturation: a joint counts at most this far apart, metres, so that one wrong limb cannot part two
+        midpoint: distance at affinity 1/2, metres. Keypoints have a standard deviation of about 0.06 m across the ray
+            (OKS sigmas of the limbs on an adult), so rays of one joint pass each other at 0.07 m on average. Two
+            people who do not touch differ by 0.3 m or more unless they share an epipolar plane.
+        slope: distance over which the affinity falls from 1/2 to 1/(1 + e), metres.
+        threshold: ``th`` of the paper: distance beyond which the affinity is 0, metres.
+        saturation: greatest distance that one joint contributes, metres, so that one wrong limb cannot separate two
             otherwise equal poses.
-        least_joints: poses that share fewer detected joints than this are not compared; their affinity is 0.
-        nearest: where a viewing ray starts, metres from the optical centre; a body that is nearer does not fit
-            in the picture. Without it, all rays of two cameras side by side would pass each other closely in
-            front of the lenses, whoever they show.
-        widest: how far midpoint, slope and threshold may grow together in a frame whose rays all meet badly, because
-            the calibration is off or the clocks are: the factor by which :func:`misfit` exceeds what keypoints
-            explain, at least 1. 1 keeps them as they are. Beyond 2 two people who do not touch would match.
+        least_joints: least number of shared detected joints; the affinity of poses that share fewer is 0.
+        nearest: start of a viewing ray, metres from the optical centre; a nearer body does not fit in the picture.
+            Without it, all rays of two cameras side by side would pass each other closely in front of the lenses,
+            whichever person they show.
+        widest: greatest factor by which midpoint, slope and threshold grow together in a frame where all rays meet
+            badly because the calibration or the clocks are off. The factor is the ratio of :func:`misfit` to the value
+            that keypoint errors explain, at least 1; ``widest=1`` turns this off. Beyond 2, two people who do not
+            touch would match.
 
     Raises:
-        ValueError: a scale that is not above 0, ``widest`` below 1.
+        ValueError: ``midpoint``, ``slope``, ``threshold`` or ``saturation`` not above 0, ``nearest`` below 0,
+            ``widest`` below 1.
     """
 
     midpoint: float = 0.15
@@ -70,30 +71,30 @@ class GeometricAffinity:
             raise ValueError(f"widest of the geometric affinity must be at least 1 and finite, got {self.widest}")
 
     def __call__(self, rig: Rig, detections: Detections, rays: Rays) -> Floats:
-        """Affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
+        """Return the affinity matrix, (m, m); see :class:`mvpose.affinity.Affinity`."""
         distance, _ = _compare_rays(
             rays.view, rays.origins, rays.directions, rays.weights, self.nearest, self.saturation,
             self.widest * self.threshold, max(self.least_joints, 1), False,
         )  # fmt: skip
         factor = min(max(misfit(rays.view, distance) / _EXPLAINED, 1.0), self.widest) if self.widest > 1.0 else 1.0
-        _fall(distance, factor * self.midpoint, factor * self.slope, factor * self.threshold)
+        _to_affinity(distance, factor * self.midpoint, factor * self.slope, factor * self.threshold)
         return distance
 
 
 def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0) -> tuple[Floats, NDArray[np.int64]]:
-    """Mean distance between the viewing rays of corresponding joints, weighted by both scores.
+    """Return the mean distance between viewing rays of corresponding joints, weighted by both scores.
 
-    Rays start ``nearest`` ahead of the camera: where the lines meet behind that, the distance is taken from there.
-    The distance of parallel rays is the distance of their lines. Missing joints are left out.
+    Rays start ``nearest`` in front of the camera; where the lines meet behind that point, the distance is taken from
+    there. The distance of parallel rays is that of their lines. Missing joints are left out.
 
     Args:
-        rays: m poses; those of one view share its optical centre.
-        saturation: greatest distance that one joint can add, metres.
-        nearest: where a ray starts, metres from the optical centre.
+        rays: m detections; those of one view share its optical centre.
+        saturation: greatest distance that one joint contributes, metres.
+        nearest: start of a ray, metres from the optical centre.
 
     Returns:
-        Distances, (m, m), metres, infinite for two poses of one view or without a common joint; and the number
-        of joints that both poses have, (m, m), 0 for two poses of one view.
+        Distances, (m, m), metres, infinite for two poses of one view or without a common joint; and the number of
+        joints that both poses have, (m, m), 0 for two poses of one view.
     """
     distance, shared = _compare_rays(
         rays.view, rays.origins, rays.directions, rays.weights, nearest, saturation, np.inf, 1, True
@@ -103,17 +104,17 @@ def ray_distance(rays: Rays, *, saturation: float = np.inf, nearest: float = 0.0
 
 @njit(cache=True)
 def misfit(view, distance):
-    """How far from each other the rays pass of those who are surely one person, metres; 0 if too few are.
+    """Return the typical ray distance between detections of one person, metres; 0 if there are too few pairs.
 
-    Surely one person are, in two views, those who are nearer to each other than to anybody else there. Some of them
-    are phantoms, which are far from each other, so it is a lower quantile.
+    Mutual nearest neighbours in two views are taken as detections of one person. Some of them are phantoms, which are
+    far from each other, so the result is a lower quantile.
 
     Args:
-        view: of each detection, (m,).
-        distance: between detections, (m, m), metres; infinite where they are not compared.
+        view: camera of each detection, (m,).
+        distance: distances between detections, (m, m), metres; infinite where they are not compared.
     """
-    order, start = by_view(view)
-    found, count = np.empty(len(view) * len(start)), 0
+    order, start = group_by_view(view)
+    distances, count = np.empty(len(view) * len(start)), 0
     for p in range(len(start) - 2):
         for q in range(p + 1, len(start) - 1):
             for a in range(start[p], start[p + 1]):
@@ -125,36 +126,36 @@ def misfit(view, distance):
                 for c in range(start[p], start[p + 1]):
                     mutual = mutual and (c == a or distance[near, order[c]] >= distance[near, i])
                 if mutual:
-                    found[count] = distance[i, near]
+                    distances[count] = distance[i, near]
                     count += 1
-    return np.sort(found[:count])[int(_SURE * count)] if count >= _ENOUGH else 0.0
+    return np.sort(distances[:count])[int(_QUANTILE * count)] if count >= _LEAST_PAIRS else 0.0
 
 
 @njit(cache=True)
-def _fall(distance, midpoint, slope, threshold):
-    """Turn distances into affinities, in place."""
+def _to_affinity(distance, midpoint, slope, threshold):
+    """Replace distances by affinities, in place."""
     m = len(distance)
     for i in range(m):
         distance[i, i] = 0.0
         for k in range(i + 1, m):
             d = distance[i, k]
-            distance[i, k] = distance[k, i] = falling(d, midpoint, slope) if d <= threshold else 0.0
+            distance[i, k] = distance[k, i] = scalar_sigmoid(d, midpoint, slope) if d <= threshold else 0.0
 
 
 @njit(cache=True, fastmath=FASTMATH, error_model="numpy")
 def _compare_rays(view, origins, directions, weights, nearest, saturation, reach, least, counted):
-    """Mean distances up to ``reach``, else infinite; and, if they are to be counted, the numbers of common joints."""
-    order, start = by_view(view)
-    pose = lay_out(directions, weights, order, 4)
+    """Return mean distances, infinite beyond ``reach``, and, if ``counted``, the numbers of shared joints."""
+    order, start = group_by_view(view)
+    pose = pack_poses(directions, weights, order, 4)
     m, _, padded = pose.shape
     result = np.full((m, m), np.inf)
     shared = np.zeros((m, m) if counted else (0, 0), np.int64)
-    level = min(reach, 1.0)  # any finite number if there is no reach
+    level = min(reach, 1.0)  # any finite number serves if ``reach`` is infinite
     normal, first, second = np.empty((3, padded)), np.empty(padded), np.empty((m, padded))
     excess = np.empty(m)
     for p in range(len(start) - 2):
         for q in range(p + 1, len(start) - 1):
-            # Between two views the baseline w is one: what depends on it and one ray is computed once.
+            # All pairs of two views share the baseline w: terms of the baseline and one ray are computed once.
             o, r = order[start[p]], order[start[q]]
             wx, wy, wz = origins[o, 0] - origins[r, 0], origins[o, 1] - origins[r, 1], origins[o, 2] - origins[r, 2]
             baseline2 = wx * wx + wy * wy + wz * wz
@@ -172,12 +173,12 @@ def _compare_rays(view, origins, directions, weights, nearest, saturation, reach
                 for b in range(start[q], start[q + 1]):
                     vx, vy, vz, weight_b, along_b = pose[b, 0], pose[b, 1], pose[b, 2], pose[b, 3], second[b]
                     total = 0.0
-                    for j in range(padded):  # no branch, so that it runs on whole registers of joints
+                    for j in range(padded):  # no branches, so that it vectorises over joints
                         cosine = ux[j] * vx[j] + uy[j] * vy[j] + uz[j] * vz[j]
                         volume = nx[j] * vx[j] + ny[j] * vy[j] + nz[j] * vz[j]  # w . (u x v)
                         sine2 = 1.0 - cosine * cosine
-                        # Along the rays from their starts, minimise |w' + s u - t v|^2 over s, t >= 0: inside if
-                        # the lines meet ahead of both starts, else with s = 0 or t = 0.
+                        # Minimise |w' + s u - t v|^2 over s, t >= 0 along the rays from their starts: the minimum is
+                        # interior if the lines meet ahead of both starts, else at s = 0 or t = 0.
                         shift = nearest * (1.0 - cosine)
                         s, t = first[j] - shift, along_b[j] - shift
                         ahead = min(s + t * cosine, t + s * cosine)
@@ -188,9 +189,9 @@ def _compare_rays(view, origins, directions, weights, nearest, saturation, reach
                         total += weight_a[j] * weight_b[j] * (min(math.sqrt(square), saturation) - level)
                     excess[b] = total
                 for b in range(start[q], start[q + 1]):
-                    if excess[b] > 0.0 and level == reach:  # on average beyond it
+                    if excess[b] > 0.0 and level == reach:  # the mean distance exceeds ``reach``
                         continue
-                    mass, count = in_common(weight_a, pose[b, 3])
+                    mass, count = shared_joints(weight_a, pose[b, 3])
                     if count < least:
                         continue
                     i, k = order[a], order[b]
