@@ -1,1 +1,1 @@
-"""Pages that people read: of one run, of a whole study; their plots, pictures and films."""
+"""HTML reports of a run and of a study, with their plots, pictures and films."""

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from simharness.trial.stages.frame_tasks import picture_source_of
+from simharness.trial.stages.capture import picture_source_of
 
 from mvpose.arrays import Floats
 from simharness.report.documents import fill_template

@@ -1,1 +1,1 @@
-"""Drawing shared by pages and tools: SVG figures, overlays, mosaics, colours."""
+"""Drawing shared by reports and tools: SVG plots, overlays on pictures, mosaics and colours."""

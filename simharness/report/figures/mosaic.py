@@ -1,4 +1,4 @@
-"""Several pictures as one: a grid of titled tiles, and a legend that fits into it."""
+"""Mosaic of pictures: a grid of titled tiles, and a legend that fits into a tile."""
 
 from __future__ import annotations
 
@@ -15,29 +15,35 @@ from simharness.report.figures.palette import PAPER, Color
 
 Mark = Literal["skeleton", "limbs", "box", "none"]
 
-_TITLE = 24.0  # pixels high in a picture 600 high: still legible when three tiles share a page's width
+_TITLE = 24.0  # height in pixels for a picture 600 pixels high: legible when three tiles share the width of a page
 _ZIGZAG = ((0, 1), (1, 2))
 
 
 def mosaic(
     images: Sequence[NDArray[np.uint8]], titles: Sequence[str], *, columns: int | None = None, gap: int | None = None
 ) -> NDArray[np.uint8]:
-    """Lay out pictures row by row, each under its title; smaller ones keep their shape amid tiles of the largest size.
+    """Arrange pictures row by row, each below its title.
+
+    All tiles have the size of the largest picture; a smaller picture is enlarged to fit its tile and keeps its aspect
+    ratio.
 
     Args:
-        images: (h, w, 3) uint8 each.
-        titles: one for each picture.
-        columns: tiles in a row; by default as many as make the grid about square (five pictures: three and two).
-        gap: pixels between tiles and around them; by default a 60th of a picture's height.
+        images: pictures, each (h, w, 3) uint8.
+        titles: one title for each picture.
+        columns: tiles in a row; by default about as many as there are rows (five pictures: three and two).
+        gap: pixels between tiles and around them; by default a 60th of the picture height.
 
     Returns:
         (H, W, 3) uint8.
 
     Raises:
-        ValueError: no picture, or a title too few or too many.
+        ValueError: there is no picture, or there are not as many titles as pictures.
     """
     if not images or len(images) != len(titles):
-        raise ValueError(f"a mosaic needs pictures and as many titles, got {len(images)} and {len(titles)}")
+        raise ValueError(
+            f"a mosaic needs one picture or more and one title for each, got {len(images)} pictures and {len(titles)} "
+            "titles"
+        )
     height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
     gap = max(2, height // 60) if gap is None else gap
     columns = math.ceil(math.sqrt(len(images))) if columns is None else columns
@@ -58,22 +64,22 @@ def mosaic(
 
 
 def _fitted(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
-    """The picture as large as it can be within a tile."""
-    grow = min(height / picture.shape[0], width / picture.shape[1])
-    if grow == 1.0:
+    """Return the picture scaled to the largest size that fits into a tile."""
+    scale = min(height / picture.shape[0], width / picture.shape[1])
+    if scale == 1.0:
         return picture
-    size = (min(width, round(grow * picture.shape[1])), min(height, round(grow * picture.shape[0])))
+    size = (min(width, round(scale * picture.shape[1])), min(height, round(scale * picture.shape[0])))
     return cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR).astype(np.uint8, copy=False)
 
 
 def legend(entries: Sequence[tuple[Mark, Color, str]], *, size: tuple[int, int], title: str = "") -> NDArray[np.uint8]:
-    """Make a picture that explains the others.
+    """Draw a legend as a picture, (height, width, 3) uint8.
 
     Args:
-        entries: what is drawn ("skeleton": thin with a dark rim, "limbs": thick and translucent, "box", "none":
-            text alone), its colour, and what it means.
-        size: width and height of the picture, pixels.
-        title: a heading.
+        entries: mark ("skeleton": thin with a dark rim, "limbs": thick and translucent, "box", or "none": text alone),
+            colour and meaning of each entry.
+        size: width and height of the picture in pixels.
+        title: heading.
     """
     width, height = size
     paper = Overlay(np.full((height, width, 3), PAPER, np.uint8))

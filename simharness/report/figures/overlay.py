@@ -1,7 +1,7 @@
-"""Drawing on pictures for people to look at: skeletons, boxes, labels; smooth at any resolution.
+"""Overlays on pictures: anti-aliased skeletons, boxes and labels at any resolution.
 
-Everything is painted through coverage masks drawn four times as large and averaged, so that lines may have any
-width and fall between pixels, and so that a translucent figure is evenly translucent where its limbs meet.
+Everything is painted through coverage masks that are drawn four times as large and averaged. So lines may have any
+width and position, and a translucent skeleton is evenly translucent where its limbs meet.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Edges = Sequence[tuple[int, int]]
 
-# How a person is drawn, which is not the tree that a method infers on: both sides of the trunk, no line through it.
+# Limbs as drawn, which differ from the tree of the pictorial structure: both sides of the trunk, no line through it.
 COCO17_FACE: Edges = ((0, 1), (0, 2), (1, 3), (2, 4))
 COCO17_BODY: Edges = (
     *((5, 6), (5, 11), (6, 12), (11, 12)),  # trunk
@@ -31,21 +31,24 @@ COCO17_BODY: Edges = (
 )
 COCO17_LIMBS: Edges = (*COCO17_FACE, *COCO17_BODY)
 
-_FINER = 4  # masks are drawn this much larger
+_FINER = 4  # mask pixels for each pixel of the picture, in each direction
 _SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates
 _RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
-_USUAL_HEIGHT = 600.0  # pixels; widths below are right at this height
+_USUAL_HEIGHT = 600.0  # picture height in pixels at which widths and sizes apply unscaled
 
 
 class Overlay:
-    """A picture to draw on. Widths and sizes are pixels of a picture 600 high and grow with the picture.
+    """Picture to draw on. Widths and sizes are pixels of a picture 600 pixels high, and grow with the picture.
 
     Args:
-        rgb: (h, w, 3) uint8; copied.
-        scale: what widths are multiplied by; by default the height / 600.
+        rgb: picture, (h, w, 3) uint8; it is copied.
+        scale: factor of all widths and sizes; by default height / 600.
 
     Attributes:
-        rgb: the picture so far, (h, w, 3) uint8.
+        rgb: picture with everything drawn so far, (h, w, 3) uint8.
+
+    Raises:
+        ValueError: the picture is not (h, w, 3) uint8.
     """
 
     def __init__(self, rgb: NDArray[np.uint8], *, scale: float | None = None) -> None:
@@ -68,13 +71,13 @@ class Overlay:
         """Draw limbs and joints.
 
         Args:
-            joints: pixels, (J, 2); what is NaN, and limbs to it, are left out.
-            color: of all of it.
-            edges: pairs of joints to join.
-            width: of the limbs.
+            joints: pixels, (J, 2); NaN joints and their limbs are left out.
+            color: colour of limbs and joints.
+            edges: pairs of joints that limbs connect.
+            width: width of the limbs.
             dots: radius of the joints; 0 leaves them out.
             opacity: 0 to 1.
-            outline: width of a dark rim around it all, which makes a thin pale line stand out on any ground.
+            outline: width of a dark rim around the skeleton, which makes a thin pale line visible on any background.
         """
         joints = np.asarray(joints, float)
         seen = np.isfinite(joints).all(axis=1)
@@ -87,7 +90,7 @@ class Overlay:
         return self
 
     def box(self, box: ArrayLike, *, color: Color, width: float = 1.5, label: str = "", opacity: float = 1.0) -> Self:
-        """Draw a box x, y, width, height in pixels with a tag on its upper left corner; not if it has NaN."""
+        """Draw a box (x, y, width, height in pixels) with a tag on its upper left corner; skip a box with NaN."""
         x, y, w, h = np.asarray(box, float)
         if not np.isfinite([x, y, w, h]).all():
             return self
@@ -98,7 +101,7 @@ class Overlay:
         return self
 
     def tag(self, text: str, *, at: tuple[float, float], color: Color, size: float = 15.0) -> Self:
-        """Draw text on a patch of colour whose lower left corner is ``at``, moved so that it stays on the picture."""
+        """Draw text on a coloured patch with its lower left corner at ``at``, moved to lie within the picture."""
         glyphs = text_mask(text, size * self.scale)
         pad_x, pad_y = round(4 * self.scale), round(2 * self.scale)
         height, width = glyphs.shape[0] + 2 * pad_y, glyphs.shape[1] + 2 * pad_x
@@ -109,14 +112,14 @@ class Overlay:
         return self
 
     def text(self, text: str, *, at: tuple[float, float], size: float = 15.0, color: Color = INK) -> Self:
-        """Write a line whose upper left corner is ``at``."""
+        """Draw a line of text with its upper left corner at ``at``."""
         self._paint((max(0, round(at[1])), max(0, round(at[0])), text_mask(text, size * self.scale)), color, 1.0)
         return self
 
     def _mask(
         self, lines: Sequence[NDArray], points: NDArray, width: float, radius: float
     ) -> tuple[int, int, NDArray[np.float32]]:
-        """Coverage 0..1 of lines and dots over the rectangle that holds them: its top, its left and the mask."""
+        """Return the coverage of lines and dots: top and left of their bounding rectangle, and its mask, 0 to 1."""
         width, radius = width * self.scale, radius * self.scale
         ends = np.concatenate([np.zeros((0, 2)), *lines, points if radius else np.zeros((0, 2))])
         if not len(ends):
@@ -159,21 +162,21 @@ class Overlay:
 
 
 def _fixed(points: NDArray) -> NDArray[np.int32]:
-    """Points to cv2's fixed-point coordinates; far ones are brought within its reach."""
+    """Convert points to cv2's fixed-point coordinates; distant points are clipped to their range."""
     return np.round(np.clip(points, -1e6, 1e6) * 2**_SUBPIXEL_BITS).astype(np.int32)
 
 
 def readable_on(color: Color) -> Color:
-    """Dark or light ink, whichever reads better on a ground of this colour (by its luma, Rec. 601)."""
+    """Return dark or light ink, the one with more contrast on a background of this colour (luma, Rec. 601)."""
     return INK if np.dot(color, (0.299, 0.587, 0.114)) > 150 else PAPER
 
 
 def text_mask(text: str, size: float) -> NDArray[np.float32]:
-    """Coverage 0..1 of a line of text ``size`` pixels high, (h, w); h depends on the size alone."""
+    """Return the coverage, 0 to 1, of a line of text ``size`` pixels high, (h, w); h depends on the size alone."""
     font = _font(max(6, round(size)))
     *_, bottom = font.getbbox("Åg" + text)
     glyphs, (x, y) = font.getmask2(text, mode="L")  # type: ignore[union-attr]
-    x = max(x, 0)  # some letters lean out to the left of where they stand
+    x = max(x, 0)  # some letters extend to the left of their position
     mask = np.zeros((int(np.ceil(bottom)), max(int(np.ceil(font.getlength(text))) + 1, glyphs.size[0] + x)), np.float32)
     if glyphs.size[0] and glyphs.size[1]:
         drawn = np.array(glyphs, np.float32).reshape(glyphs.size[::-1])[: mask.shape[0] - y]

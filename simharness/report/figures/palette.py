@@ -1,7 +1,8 @@
-"""The colours of people in pictures and plots: one qualitative palette, safe for colour-blind readers.
+"""Colours of people in pictures and plots: one qualitative palette, safe for colour-blind readers.
 
-Picked from Paul Tol's schemes ("Colour schemes", SRON technical note 3.2, 2021) and Okabe and Ito's, so that the
-first six and the grey of nobody stay at least 17 CIELAB units apart to usual, protanopic and deuteranopic eyes.
+The colours are from the schemes of Paul Tol ("Colour schemes", SRON technical note 3.2, 2021) and of Okabe and Ito. The
+first six and the grey of unmatched detections are at least 17 CIELAB units apart for normal, protanopic and
+deuteranopic vision.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ Color = tuple[int, int, int]
 
 TRUTH: Color = (255, 255, 255)
 OUTLINE: Color = (22, 24, 28)
-UNMATCHED: Color = (150, 150, 150)  # a detection that no person took, or an estimate that is nobody
+UNMATCHED: Color = (150, 150, 150)  # a detection assigned to no person, or a ghost
 INK: Color = (34, 38, 44)
 PAPER: Color = (250, 250, 248)
 
@@ -27,10 +28,10 @@ _PEOPLE: tuple[Color, ...] = (
 
 
 def person_color(index: int) -> Color:
-    """SRGB colour, 0 to 255, of person ``index``; colours repeat after eight, grey for -1, nobody."""
+    """Return the sRGB colour, 0 to 255, of person ``index``; colours repeat after eight, -1 (no person) is grey."""
     return UNMATCHED if index < 0 else _PEOPLE[index % len(_PEOPLE)]
 
 
 def css(color: Color) -> str:
-    """The colour as style sheets and plots write it: ``"#0077bb"``."""
+    """Return a colour in the notation of style sheets: ``"#0077bb"``."""
     return "#{:02x}{:02x}{:02x}".format(*color)

@@ -1,1 +1,1 @@
-"""The page of one run: plots, pictures, film."""
+"""Report of one run: page, plots, pictures and film."""

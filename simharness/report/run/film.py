@@ -1,4 +1,4 @@
-"""The film of a run: what every camera recorded, as one moving picture that a browser plays."""
+"""Film of a run: the pictures of all cameras as one animation that a browser plays."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from PIL import Image
 from simharness.report.figures.mosaic import mosaic
 from simharness.trial.run_folder import Record
 
-_MOST_FRAMES = 60  # of a film: more would outweigh the rest of the page
-_MOST_VIEWS = 9
+_MAX_FRAMES = 60  # more would be larger than the rest of the page
+_MAX_VIEWS = 9
 _QUALITY = 60
 
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture.
+    """Animated picture.
 
     Attributes:
-        caption: what to see in it.
-        webp: the file.
+        caption: description for the page.
+        webp: contents of the WebP file.
     """
 
     caption: str
@@ -38,19 +38,19 @@ class Animation:
 
 
 def animated_frames(count: int) -> list[int]:
-    """Which of ``count`` frames a film shows: evenly spaced, all where there are few."""
-    return list(range(0, count, -(-count // _MOST_FRAMES)))
+    """Return the frames of ``count`` that a film shows: all where there are few, else evenly spaced ones."""
+    return list(range(0, count, -(-count // _MAX_FRAMES)))
 
 
 def animate(previews: Mapping[int, Sequence[NDArray[np.uint8]]], record: Record) -> Animation:
-    """Lay out the views of each frame as one picture and join them at the speed of life.
+    """Make a film with the mosaic of all views of each frame, played in real time.
 
     Args:
-        previews: colour pictures by frame, one (h, w, 3) of each view, at least one frame.
-        record: names the cameras and knows when each frame was.
+        previews: colour pictures by frame index, one (h, w, 3) for each view; at least one frame.
+        record: the run, for the names of the cameras and the times of the frames.
     """
     frames = sorted(previews)
-    shown = min(len(record.rig), _MOST_VIEWS)
+    shown = min(len(record.rig), _MAX_VIEWS)
     titles = [camera.name for camera in record.rig][:shown]
     sheets = [Image.fromarray(mosaic(list(previews[frame][:shown]), titles)) for frame in frames]
     step = float(record.time[frames[1]] - record.time[frames[0]]) if len(frames) > 1 else 1.0

@@ -1,4 +1,4 @@
-"""The headline numbers of a summary: what they are called, how they are written, which way is better."""
+"""Headline scores of a summary: titles, units and number formats."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-NOTHING = "–"  # a score that does not apply
+from simharness.runtime.number_text import fixed
+
+NOTHING = "–"
+"""Text of a score that does not apply."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One headline number.
+    """A headline score.
 
     Attributes:
-        title: short, for a table.
-        unit: of the number; empty for a count or a ratio.
-        about: one line for whoever sees it for the first time.
-        value: the number in a variant's summary, or None.
-        digits: behind the point.
+        title: short name for the head of a table.
+        unit: unit of the number; empty for a count or a ratio.
+        about: explanation in one line.
+        value: function that returns the number from a variant's summary, or None where it does not apply.
+        digits: decimals.
     """
 
     title: str
@@ -28,12 +31,12 @@ class Column:
     digits: int
 
     def number(self, scores: Mapping[str, Any]) -> str:
-        """The number of a variant, for a column that tells the unit."""
+        """Return the number of a variant without its unit."""
         value = self.value(scores)
-        return NOTHING if value is None else f"{value:.{self.digits}f}"
+        return NOTHING if value is None else fixed(value, self.digits)
 
     def text(self, scores: Mapping[str, Any]) -> str:
-        """The number of a variant with its unit."""
+        """Return the number of a variant with its unit."""
         number = self.number(scores)
         return number if number == NOTHING or not self.unit else f"{number} {self.unit}"
 
@@ -43,12 +46,12 @@ def _percent(share: float | None) -> float | None:
 
 
 COLUMNS: tuple[Column, ...] = (
-    Column("PCP", "%", "body parts placed within half their length", lambda s: s["pcp"], 1),
-    Column("Precision", "%", "estimated people who are true ones", lambda s: _percent(s["precision"]), 1),
-    Column("Recall", "%", "true people found, over all frames", lambda s: _percent(s["recall"]), 1),
-    Column("MPJPE", "mm", "mean joint error of those found", lambda s: s["mpjpe_mm"]["mean"], 1),
-    Column("Ghosts", "", "estimated people a frame who are not there", lambda s: s["ghosts_per_frame"], 3),
-    Column("Missed", "", "true people a frame who are not found", lambda s: s["missed_per_frame"], 3),
-    Column("Match F1", "", "detections put together rightly", lambda s: s["matching"]["f1"], 3),
-    Column("Time", "ms", "median of a frame", lambda s: s["timings_ms"]["total"]["median"], 1),
+    Column("PCP", "%", "body parts whose error is at most half their length", lambda s: s["pcp"], 1),
+    Column("Precision", "%", "estimates that match a true person", lambda s: _percent(s["precision"]), 1),
+    Column("Recall", "%", "true people who were found, over all frames", lambda s: _percent(s["recall"]), 1),
+    Column("MPJPE", "mm", "mean joint error of the people found", lambda s: s["mpjpe_mm"]["mean"], 1),
+    Column("Ghosts", "", "estimates per frame that match no person", lambda s: s["ghosts_per_frame"], 3),
+    Column("Missed", "", "true people per frame who were not found", lambda s: s["missed_per_frame"], 3),
+    Column("Match F1", "", "pairs of detections matched correctly", lambda s: s["matching"]["f1"], 3),
+    Column("Time", "ms", "median time per frame", lambda s: s["timings_ms"]["total"]["median"], 1),
 )

@@ -1,4 +1,4 @@
-"""The page that a person reads: one HTML file with everything in it."""
+"""Report of a run as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from simharness.types.views import Visibility
 from simharness.world.motion.choreography import roles
 
 _HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
-_LIGHTEST = 165.0  # luma of a line, 0 to 255
+_MAX_LUMA = 165.0  # of a line on white, 0 to 255
 _VISIBILITY_LABELS = {
     Visibility.VISIBLE: "visible",
     Visibility.SELF_OCCLUDED: "self-occluded",
@@ -43,13 +43,13 @@ def render(
     things: Sequence[Floats] = (),
     animation: Animation | None = None,
 ) -> str:
-    """Make the page of a run.
+    """Return the page of a run.
 
     Args:
         record: the run.
-        pictures: shown below the headline numbers.
-        things: outlines of the clutter seen from above, each (n, 2) metres.
-        animation: the film of the run.
+        pictures: pictures below the headline scores.
+        things: outlines of the clutter from above, each (n, 2) metres.
+        animation: film of the run.
 
     Returns:
         A self-contained HTML document.
@@ -81,7 +81,7 @@ def _facts(record: Record) -> list[tuple[str, str]]:
     return [
         ("people", f"{scenario.people.count}"),
         ("cameras", f"{len(record.rig)} × {record.rig[0].size[0]}×{record.rig[0].size[1]}"),
-        ("things in the way", f"{sum(things)}"),
+        ("objects", f"{sum(things)}"),
         ("detector", "a pose head" if scenario.detector.onnx else scenario.detector.name),
         ("frames", f"{len(record.time)} at {scenario.rate:g} Hz"),
         ("detections", f"{sum(map(len, record.detections))}"),
@@ -95,7 +95,7 @@ def _command(record: Record) -> str:
 
 
 def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """PCP of each group of parts: a row each, a number for each variant."""
+    """Return the table of PCP: a row for each group of parts, a number for each variant."""
     rows = [
         {
             "part": group.replace("_", " "),
@@ -107,13 +107,13 @@ def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
-    """How each person fared: a row each."""
+    """Return the table of people: a row with the scores of each true person."""
     errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
     doing = roles(record.scenario.people)
     rows = []
     for person in range(errors.shape[1]):
-        mine, counted = errors[:, person], parts[:, person] != Part.UNDEFINED
-        found = np.isfinite(mine)
+        person_error, counted = errors[:, person], parts[:, person] != Part.UNDEFINED
+        found = np.isfinite(person_error)
         correct = (parts[:, person] == Part.CORRECT).sum()
         rows.append(
             {
@@ -122,14 +122,14 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
                 "activity": doing[person],
                 "found": f"{100 * found.mean():.1f}",
                 "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
-                "mpjpe": f"{mine[found].mean():.1f}" if found.any() else NOTHING,
+                "mpjpe": f"{person_error[found].mean():.1f}" if found.any() else NOTHING,
             }
         )
     return rows
 
 
 def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
-    """Mean joint error of every true person in every frame, (T, P), millimetres; NaN where not found."""
+    """Return the mean joint error of every true person in every frame, (T, P) millimetres; NaN where not found."""
     rows = scores.filter(pl.col("variant") == variant).sort("frame")["errors_mm"].to_list()
     return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
         len(rows), -1
@@ -137,14 +137,14 @@ def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
 
 
 def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
-    """What became of the ten parts of every true person in every frame, (T, P, 10)."""
+    """Return the :class:`Part` value of the ten parts of every true person in every frame, (T, P, 10)."""
     rows = scores.filter(pl.col("variant") == variant).sort("frame")["parts"].to_list()
     people = len(rows[0]) // 10
     return np.array(rows, np.int8).reshape(len(rows), people, 10)
 
 
 def joint_errors(record: Record, variant: str) -> Floats:
-    """How far every true joint is from its estimate, (T, P, J), millimetres; NaN where there is none."""
+    """Return the distance of every true joint from its estimate, (T, P, J) millimetres; NaN without an estimate."""
     errors = np.full((len(record.time), *record.truth[0].joints.shape[:2]), np.nan)
     for frame, (true, estimate) in enumerate(zip(record.truth, record.estimates[variant], strict=True)):
         partner = pair(true.joints, estimate.joints).estimate
@@ -155,15 +155,15 @@ def joint_errors(record: Record, variant: str) -> Floats:
 
 
 def _line_color(person: int) -> str:
-    """The colour of a person, darkened where it would be lost as a line on white."""
+    """Return the colour of a person, darkened where a line of it would be invisible on white."""
     color = person_color(person)
     luma = float(np.dot(color, (0.299, 0.587, 0.114)))  # Rec. 601
-    red, green, blue = (round(part * min(1.0, _LIGHTEST / luma)) for part in color)
+    red, green, blue = (round(part * min(1.0, _MAX_LUMA / luma)) for part in color)
     return css((red, green, blue))
 
 
 def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Markup]:
-    """The SVG of each plot; those that nothing can be drawn in are left out."""
+    """Return the SVG of each plot by name; plots without data are left out."""
     joints = np.stack([true.joints for true in record.truth])
     people = joints.shape[1]
     colors = [_line_color(person) for person in range(people)]

@@ -1,4 +1,4 @@
-"""What a frame looked like: every camera's picture with the truth, the detections and the answers drawn in."""
+"""Pictures of a frame: the view of every camera with truth, detections and estimates drawn in."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import polars as pl
 from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
-from simharness.capture.picture import Studio
-from simharness.capture.rendering.optics import appear
+from simharness.capture.picture import PictureSource
+from simharness.capture.rendering.lens import project_to_image
+from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic
 from simharness.report.figures.overlay import COCO17_BODY, Overlay
 from simharness.report.figures.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.scenario.sections.people import People
-from simharness.scoring.pose import LIMIT, pair
 from simharness.trial.run_folder import Record
-from simharness.trial.stages.build import Trial
-from simharness.trial.stages.frame_tasks import studio_of
+from simharness.trial.stages.build_trial import Trial
+from simharness.trial.stages.capture import picture_source_of
 from simharness.types.truth import Truth
 from simharness.world.motion.choreography import roles
 from simharness.world.scene.build import Scene
@@ -29,20 +29,20 @@ from simharness.world.scene.playback import Playback
 
 Rgb = NDArray[np.uint8]
 
-MOST_VIEWS = 8  # with the legend a square of tiles
-MOST_NAMED = 6  # people in the legend
-_WIDEST = 2400  # pixels of a picture on the page
+MAX_VIEWS = 8  # with the legend, three rows of three tiles
+MAX_NAMED = 6  # people in the legend
+_MAX_WIDTH = 2400  # pixels of a picture on the page
 _JPEG_QUALITY = 88
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture on the page.
+    """Picture on a page.
 
     Attributes:
-        title: its heading.
-        caption: what to see in it.
-        rgb: (h, w, 3) uint8.
+        title: heading.
+        caption: description.
+        rgb: pixels, (h, w, 3) uint8.
     """
 
     title: str
@@ -50,13 +50,13 @@ class Picture:
     rgb: Rgb = field(repr=False)
 
     def png(self) -> bytes:
-        """The picture without loss."""
+        """Return the picture as a PNG file, without loss."""
         return _encoded(self.rgb, ".png", [])
 
     @property
     def uri(self) -> str:
-        """The picture as a data URI for a page: JPEG, no wider than a page needs."""
-        shrink = min(1.0, _WIDEST / self.rgb.shape[1])
+        """Picture as a data URI for a page: JPEG, at most 2400 pixels wide."""
+        shrink = min(1.0, _MAX_WIDTH / self.rgb.shape[1])
         small = cv2.resize(self.rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
         jpeg = _encoded(small.astype(np.uint8, copy=False), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
         return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode()
@@ -65,14 +65,14 @@ class Picture:
 def _encoded(rgb: Rgb, suffix: str, options: list[int]) -> bytes:
     done, encoded = cv2.imencode(suffix, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), options)
     if not done:
-        raise RuntimeError(f"OpenCV cannot encode a picture of {rgb.shape} as {suffix}")
+        raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as {suffix}")
     return encoded.tobytes()
 
 
 def draw_pictures(
     trial: Trial, record: Record, *, progress: Callable[[int], None] = lambda pictures: None
 ) -> list[Picture]:
-    """Draw the typical frame of a run, and the worst where it is worse; by the first variant's scores."""
+    """Draw the typical frame of a run, and its worst frame if that is worse, by the scores of the first variant."""
     variant = next(iter(record.estimates))
     costs = frame_costs(record.scores, variant)
     typical = int(np.argsort(costs, kind="stable")[(len(costs) - 1) // 2])
@@ -80,12 +80,12 @@ def draw_pictures(
     frames = {"A typical frame": typical}
     if costs[worst] > costs[typical]:
         frames["The worst frame"] = worst
-    studio = studio_of(trial.scenario, Playback(trial.scene))
+    picture_source = picture_source_of(trial.scenario, Playback(trial.scene))
     pictures = []
     for title, frame in frames.items():
         rgb = draw_frame(
             trial,
-            studio,
+            picture_source,
             frame,
             truth=record.truth[frame],
             detections=record.detections[frame],
@@ -97,7 +97,7 @@ def draw_pictures(
 
 
 def frame_costs(scores: pl.DataFrame, variant: str) -> NDArray[np.float64]:
-    """How bad each frame is, (T,), millimetres: the errors summed, and the limit for everyone missed or made up."""
+    """Return the cost of each frame, (T,) millimetres: sum of the errors of people, 500 per missed person or ghost."""
     rows = scores.filter(pl.col("variant") == variant).sort("frame")
     wrong = (rows["missed"] + rows["ghosts"]).to_numpy()
     return rows["errors_mm"].list.sum().to_numpy() + 1000 * LIMIT * wrong
@@ -109,13 +109,13 @@ def _caption(record: Record, variant: str, frame: int) -> str:
     ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
     error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.1f} mm"
     where = f"Frame {frame} of {len(record.time)}, at {record.time[frame]:.1f} s, variant {variant}"
-    views = f"; {MOST_VIEWS} of {len(record.rig)} cameras" if len(record.rig) > MOST_VIEWS else ""
+    views = f"; {MAX_VIEWS} of {len(record.rig)} cameras" if len(record.rig) > MAX_VIEWS else ""
     return f"{where}: {found}, {ghosts}{error}{views}."
 
 
 def draw_frame(
     trial: Trial,
-    studio: Studio,
+    picture_source: PictureSource,
     frame: int,
     *,
     truth: Truth,
@@ -123,17 +123,27 @@ def draw_frame(
     estimate: Estimate,
     explained: bool = True,
 ) -> Rgb:
-    """Draw every view of a frame into one picture, with a legend where it is to be explained: see :func:`annotate`."""
-    rig = trial.shots.believed
-    views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MOST_VIEWS)).astype(int))
+    """Draw up to :data:`MAX_VIEWS` views of a frame as a mosaic, with :func:`annotate`.
+
+    Args:
+        trial: the trial.
+        picture_source: renderer of the views.
+        frame: frame index.
+        truth: truth of the frame.
+        detections: detections of the frame.
+        estimate: estimate of the frame.
+        explained: add a legend as the last tile.
+    """
+    rig = trial.exposures.believed_rig
+    views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_VIEWS)).astype(int))
     tiles = []
     for view in map(int, views):
-        rgb = studio.picture(trial.shots, frame, view, finer=2)
-        camera = trial.shots.camera(frame, view)
+        rgb = picture_source.picture(trial.exposures, frame, view, finer=2)
+        camera = trial.exposures.camera(frame, view)
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
     titles = [rig[view].name for view in views]
     if explained:
-        tiles.append(legend(_legend_entries(trial.scenario.people), size=rig[0].size, title="What is drawn"))
+        tiles.append(legend(_legend_entries(trial.scenario.people), size=rig[0].size, title="Legend"))
         titles.append("")
     return mosaic(tiles, titles)
 
@@ -148,29 +158,29 @@ def annotate(
     estimate: Estimate | None = None,
     show_truth: bool = True,
 ) -> Rgb:
-    """Draw what is known about one view into its picture.
+    """Draw truth, detections and estimates of one view into its picture.
 
-    True skeletons are thin and white. Detections are boxes and dots, estimates broad limbs; both take the colour of
-    the true person that the estimate is paired with, and grey where there is none. Without estimates detections take
-    the colour of the person that they truly show.
+    True skeletons are thin and white. Detections are boxes and dots, estimates are broad limbs; both have the colour of
+    the true person that the estimate is paired with, and are grey without one. Without an estimate, detections have
+    the colour of the person that they show.
 
     Args:
-        rgb: the picture, (h, w, 3).
-        camera: that took it.
-        view: of the rig.
-        truth: about the frame.
-        detections: of the frame; drawn where given.
-        estimate: of the frame; drawn where given.
+        rgb: picture, (h, w, 3).
+        camera: camera that took the picture.
+        view: index of the camera in the rig.
+        truth: truth of the frame.
+        detections: detections of the frame; None draws none.
+        estimate: estimate of the frame; None draws none.
         show_truth: draw the true skeletons.
     """
     overlay = Overlay(rgb)
-    said = truth.person
+    assigned = truth.person
     if estimate is not None:
         owner = np.full(len(estimate), -1)  # true person of each estimate
         partner = pair(truth.joints, estimate.joints).estimate
         owner[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
-        # True person of each detection as the method sees it; label -1 has none.
-        said = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
+        # True person of each detection by the matching of the method; label -1 has none.
+        assigned = np.append(owner, -1)[estimate.matching.labels_of(len(truth.person))]
         for joints, person in zip(estimate.joints, owner, strict=True):
             _draw_estimate(overlay, camera, joints, person_color(int(person)))
     if show_truth:
@@ -178,38 +188,39 @@ def annotate(
             overlay.skeleton(pixels, color=TRUTH, width=1.3, dots=1.8, outline=0.9)
     if detections is not None:
         for index in np.flatnonzero(detections.view == view):
-            _draw_detection(overlay, detections, int(index), said=int(said[index]), true=int(truth.person[index]))
+            person = int(assigned[index])
+            _draw_detection(overlay, detections, int(index), assigned=person, true=int(truth.person[index]))
     return overlay.rgb
 
 
 def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64], color: Color) -> None:
-    overlay.skeleton(appear(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
+    overlay.skeleton(project_to_image(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
 
 
-def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, said: int, true: int) -> None:
-    """Box and dots; a tag says who it is taken for, and who it truly is where that is another."""
-    color = person_color(said)
-    told = "" if said < 0 else f"{said}"
-    if said not in (-1, true):
-        told += " (nobody)" if true < 0 else f" (is {true})"
-    overlay.box(detections.boxes[index], color=color, label=told)
+def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, assigned: int, true: int) -> None:
+    """Draw box and joints, and a tag with the assigned person, and with the true one where they differ."""
+    color = person_color(assigned)
+    label = "" if assigned < 0 else f"{assigned}"
+    if assigned not in (-1, true):
+        label += " (no person)" if true < 0 else f" (is {true})"
+    overlay.box(detections.boxes[index], color=color, label=label)
     overlay.skeleton(detections.keypoints[index], color=color, edges=(), dots=2.6, outline=0.9)
 
 
 def _legend_entries(people: People) -> list[tuple[Mark, Color, str]]:
     named: Sequence[tuple[Mark, Color, str]] = [
-        ("limbs", person_color(person), f"person {person} as estimated ({role})")
-        for person, role in enumerate(roles(people)[:MOST_NAMED])
+        ("limbs", person_color(person), f"estimate of person {person} ({role})")
+        for person, role in enumerate(roles(people)[:MAX_NAMED])
     ]
     return [
         ("skeleton", TRUTH, "true skeleton"),
         *named,
-        ("box", person_color(0), "detection, in the colour of who it is taken for"),
-        ("box", UNMATCHED, "detection taken for nobody"),
-        ("limbs", UNMATCHED, "estimate of nobody: a ghost"),
+        ("box", person_color(0), "detection assigned to a person"),
+        ("box", UNMATCHED, "detection assigned to no person"),
+        ("limbs", UNMATCHED, "ghost: estimate that matches no person"),
     ]
 
 
 def outlines(scene: Scene) -> list[NDArray[np.float64]]:
-    """The things in the room seen from above: the ground plan of each thing, (4, 2) metres."""
+    """Return the ground plan of each object in the room, (4, 2) metres."""
     return [solid.hull.corners[[0, 2, 6, 4], :2] for solid in scene.solids if solid.kind != "room"]

@@ -1,4 +1,4 @@
-"""The plots of one run."""
+"""Plots of one run, as SVG."""
 
 from __future__ import annotations
 
@@ -25,7 +25,13 @@ from simharness.report.figures.svg_plots import (
 
 
 def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) -> str:
-    """Mean joint error of each person, (T, P) millimetres; NaN where not found: marked below the axis."""
+    """Plot the mean joint error of each person over time.
+
+    Args:
+        time: seconds, (T,).
+        errors: millimetres, (T, P); NaN where a person was not found, which is marked below the axis.
+        colors: colours of the P people.
+    """
     with svg_plot("error-over-time") as (axes, written):
         top = float(np.nanmax(errors)) * 1.15 if np.isfinite(errors).any() else 100.0
         for person in range(errors.shape[1]):
@@ -43,21 +49,26 @@ def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) ->
 
 
 def error_distribution(errors: Mapping[str, Floats], *, limit: float = 150.0) -> str:
-    """The share of true joints placed within a distance, for each variant; NaN is infinitely far."""
+    """Plot the share of true joints with at most a given error, for each variant.
+
+    Args:
+        errors: millimetres by variant, (n,); NaN counts as infinite.
+        limit: end of the axis, millimetres.
+    """
     with svg_plot("error-distribution") as (axes, written):
         grid = np.linspace(0, limit, 301)
         for (variant, values), color in zip(errors.items(), VARIANT_COLORS * len(errors), strict=False):
             ranked = np.sort(np.where(np.isnan(values), np.inf, values))
             share = np.searchsorted(ranked, grid, side="right") / max(1, len(ranked))
             axes.plot(grid, 100 * share, color=color, lw=1.8, label=variant, zorder=3)
-        axes.set(xlabel="within, mm", ylabel="share of all true joints, %", xlim=(0, limit), ylim=(0, 101))
+        axes.set(xlabel="joint error up to, mm", ylabel="share of all true joints, %", xlim=(0, limit), ylim=(0, 101))
         axes.grid()
         axes.legend(loc="lower right", labelcolor=INK)
     return written[0]
 
 
 def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequence[str]) -> str:
-    """How many of the joints each camera sees: shares (V, 5), 0 to 1, by visibility label."""
+    """Plot the visibility of the joints in each camera: shares (V, 5), 0 to 1, by visibility label."""
     with svg_plot("visibility", size=(5.2, max(2.0, 1.1 + 0.36 * len(cameras)))) as (axes, written):
         left = np.zeros(len(cameras))
         rows = np.arange(len(cameras))
@@ -74,7 +85,11 @@ def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequenc
 
 
 def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
-    """Median milliseconds a frame of each stage of each variant; a method without stages is one, ``method``."""
+    """Plot the median time of each stage of each variant.
+
+    Args:
+        times: milliseconds per frame, by variant and stage. A variant with a "total" alone has one stage, "method".
+    """
     times = {name: {"method": each["total"]} if set(each) == {"total"} else each for name, each in times.items()}
     with svg_plot("stage-times", size=(5.2, max(1.9, 1.2 + 0.42 * len(times)))) as (axes, written):
         rows = np.arange(len(times))
@@ -85,8 +100,8 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
             axes.barh(rows, width, left=left, height=0.6, color=STAGE_COLORS.get(stage, spare), label=stage, lw=0)
             left += width
         for row, (end, each) in enumerate(zip(left.tolist(), times.values(), strict=True)):
-            told = f"{each.get('total', end):.1f} ms"
-            axes.annotate(told, (end, row), xytext=(4, 0), textcoords="offset points", va="center")
+            text = f"{each.get('total', end):.1f} ms"
+            axes.annotate(text, (end, row), xytext=(4, 0), textcoords="offset points", va="center")
         axes.set(xlabel="median, ms", yticks=rows, yticklabels=list(times))
         axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.18)
         axes.invert_yaxis()
@@ -105,15 +120,15 @@ def floor_plan(
     estimates: Floats,
     colors: Sequence[Color],
 ) -> str:
-    """The scene from above.
+    """Plot the scene from above.
 
     Args:
-        rig: cameras, drawn with the wedge that each sees.
-        room: its x and y, metres, about the origin.
+        rig: cameras, drawn with their horizontal fields of view.
+        room: size in x and y, metres, centred at the origin.
         things: outlines of the clutter, each (n, 2) metres.
-        paths: where the people truly went, (T, P, 2) metres.
-        estimates: where the method saw people, (k, 2) metres.
-        colors: of the people, P of them.
+        paths: true paths of the people, (T, P, 2) metres.
+        estimates: positions of the estimates, (k, 2) metres.
+        colors: colours of the P people.
     """
     with svg_plot("floor-plan", size=(5.2, 4.8)) as (axes, written):
         half = np.array(room) / 2
@@ -148,7 +163,7 @@ def floor_plan(
 
 def _camera(axes: Axes, center: Floats, forward: Floats, *, tangent: float, name: str) -> None:
     length = float(np.linalg.norm(forward))
-    if length < 1e-6:  # it looks straight down
+    if length < 1e-6:  # the camera looks straight down
         axes.plot(*center, "s", color=INK, ms=4)
         return
     bearing = math.atan2(forward[1], forward[0])

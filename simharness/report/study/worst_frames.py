@@ -12,7 +12,7 @@ import polars as pl
 
 from simharness.gate.trial_command import overrides
 from simharness.pairing.pairing import LIMIT
-from simharness.report.run.pictures import MOST_VIEWS, Picture, draw_frame
+from simharness.report.run.pictures import MAX_VIEWS, Picture, draw_frame
 from simharness.report.study.replay import Replay, replay
 from simharness.report.study.skeleton_view_3d import SkeletonView3D, skeleton_view_3d
 from simharness.scenario.named_files import relative_files
@@ -147,7 +147,7 @@ def _caption(results: Results, frame: Frame, again: Replay) -> str:
     ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
     error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.0f} mm"
     cameras = len(again.trial.exposures.believed_rig)
-    views = f"; {MOST_VIEWS} of {cameras} cameras" if cameras > MOST_VIEWS else ""
+    views = f"; {MAX_VIEWS} of {cameras} cameras" if cameras > MAX_VIEWS else ""
     return (
         f"Frame {frame.frame} of {len(again.time)}, at {again.time[frame.frame]:.1f} s, variant {frame.variant}: "
         f"{row['found']} of {row['people']} people found, {ghosts}{error}{views}."

@@ -165,8 +165,8 @@ def test_mosaic_fits_smaller_pictures_into_its_tiles_without_stretching_them():
 @pytest.mark.parametrize(
     ("pictures", "titles", "message"),
     [
-        ([], [], "needs pictures and as many titles, got 0 and 0"),
-        ([BLACK], [], "got 1 and 0"),
+        ([], [], "got 0 pictures and 0 titles"),
+        ([BLACK], [], "got 1 pictures and 0 titles"),
     ],
 )
 def test_bad_mosaics_are_refused(pictures, titles, message):
