@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 
 if TYPE_CHECKING:
-    from simharness.gate.trial_command import Trial
+    from simharness.gate.trial_command import TrialKey
     from simharness.scenario.study_definition import Study
 
 __all__ = ["assert_robust"]
@@ -59,7 +59,7 @@ def assert_robust(
     study = load_study(scenario, seeds=seeds, variants=[variant])
 
     from simharness.gate.suite import run_suite
-    from simharness.runtime.frame_pool import RunError
+    from simharness.runtime.errors import RunError
 
     done = run_suite(study, workers=workers)
     if done.failed:
@@ -84,7 +84,7 @@ def _check(thresholds: Mapping[str, float]) -> None:
             raise ValueError(f"{key}={limit!r}: expected a finite number, for example {key}=95")
 
 
-def _wrong(key: str, limit: float, scores: Mapping[Trial, Mapping[str, float | None]], study: Study) -> str:
+def _wrong(key: str, limit: float, scores: Mapping[TrialKey, Mapping[str, float | None]], study: Study) -> str:
     """What is wrong with a score; nothing where it is on the good side of its threshold."""
     from simharness.gate.trial_command import command_of
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from simharness.trial import measure
 from simharness.trial.stages import build as trial
 
 QUICKSTART = Path(__file__).parents[1] / "scenarios" / "quickstart.toml"
@@ -47,20 +46,13 @@ _made: dict = {}
 
 
 def remember_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Build, simulate, film and detect a scene once: the gate measures the method, which works anew every time."""
-    build, look = trial.build, measure.look
+    """Simulate and detect a scenario once: the gate measures the method, which is built and run every time."""
+    simulate = trial._simulate
 
-    def built(scenario, rig):
-        key = "built", scenario.model_dump_json()
+    def remembered(scenario, *arguments):
+        key = scenario.model_dump_json()
         if key not in _made:
-            _made[key] = build(scenario, rig)
-        return _made[key]
+            _made[key] = simulate(scenario, *arguments)[:2]
+        return *_made[key], trial.build_variants(scenario)
 
-    def looked(prepared):
-        key = "looked", prepared.scenario.model_dump_json()
-        if key not in _made:
-            _made[key] = look(prepared)
-        return _made[key]
-
-    monkeypatch.setattr(trial, "build", built)
-    monkeypatch.setattr(measure, "look", looked)
+    monkeypatch.setattr(trial, "_simulate", remembered)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,10 +64,11 @@ def check(
             return
         from simharness.gate.runner import baseline_of
         from simharness.gate.runner import check as check_suite
+        from simharness.runtime.progress import reporter
 
         before = baseline_of(study, baseline)
-        with after_reading(), _progress(study) as advance:
-            result = check_suite(study, before, workers=workers, progress=advance)
+        with after_reading(), reporter() as bars:
+            result = check_suite(study, before, workers=workers, reporter=bars)
         _print(result, Console())
         unwritten = _write(result, reports)
     if not result.passed:
@@ -98,10 +98,11 @@ def _update(study: Study, path: Path, workers: int) -> None:
     from simharness.gate.baseline import write_baseline
     from simharness.gate.required_seeds import require_seeds
     from simharness.gate.suite import run_suite
+    from simharness.runtime.progress import reporter
 
     require_seeds(study)
-    with after_reading(), _progress(study) as advance:
-        done = run_suite(study, workers=workers, progress=advance)
+    with after_reading(), reporter() as bars:
+        done = run_suite(study, workers=workers, reporter=bars)
     if done.failed:
         said = f"{_list_failed(done.failed)}\n{path} was not written, for it would lack these trials"
         Console(stderr=True).print(said, soft_wrap=True, highlight=False, markup=False)
@@ -114,15 +115,6 @@ def _update(study: Study, path: Path, workers: int) -> None:
         highlight=False,
         markup=False,
     )
-
-
-@contextlib.contextmanager
-def _progress(study: Study) -> Iterator[Callable[[int], None]]:
-    """A bar over the trials."""
-    from simharness.runtime.progress import reporter
-
-    with reporter() as bars, bars.stage("check", study.trials) as advance:
-        yield advance
 
 
 def _print(check: Check, console: Console) -> None:

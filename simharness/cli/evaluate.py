@@ -99,8 +99,8 @@ def twin(
         from simharness.scenario.profiles import SHIPPED
 
         loaded, recorded = load(scenario or SHIPPED.parent / "shelf.toml"), read_shelf(folder)
-        with reporter() as bars, bars.stage("compare", 1 + twins) as advance:
-            comparison = compare(recorded, loaded, count=twins, progress=advance)
+        with reporter() as bars:
+            comparison = compare(recorded, loaded, count=twins, reporter=bars)
         if json_file is not None:
             _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
     print_comparison(comparison, Console())
@@ -122,8 +122,8 @@ def evaluate_seeds(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or ())
-        with reporter() as bars, bars.stage("evaluate", seeds) as advance:
-            result = evaluate_at(loaded, seeds, progress=advance)
+        with reporter() as bars:
+            result = evaluate_at(loaded, seeds, reporter=bars)
         if json_file is not None:
             _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
     print_seeds(result, Console())

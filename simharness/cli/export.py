@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simharness.cli.exit_codes import after_reading, border
+from simharness.cli.exit_codes import border
 from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
 
 
@@ -34,15 +34,11 @@ def export(
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
         from simharness.export.export import Export
-        from simharness.export.export import export as export_trial
-        from simharness.trial.stages.build import prepare
+        from simharness.export.export import export as export_scenario
 
         plan = Export(folder / loaded.name, every=every, pictures=pictures)
         with reporter() as bars:
-            with bars.stage("build", 1):
-                trial = prepare(loaded)
-            with after_reading():
-                made = export_trial(trial, plan, reporter=bars, command=command_line())
+            made = export_scenario(loaded, plan, reporter=bars, command=command_line())
     files = [file for file in made.rglob("*") if file.is_file()]
     megabytes = sum(file.stat().st_size for file in files) / 1e6
     typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

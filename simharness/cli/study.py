@@ -73,22 +73,22 @@ def study(
         limits = None if yes else LIMIT
         loaded = load_study(file, overrides=overrides or (), seeds=seeds, variants=variant or None, limit=limits)
         part = _part(shard)
+        from simharness.runtime.progress import reporter
         from simharness.study.runner import run_shard, run_study
-        from simharness.study.study_progress import watching
 
         if part is not None:
             kept_in = store or out / "store"
-            with watching() as watch:
-                tally = run_shard(loaded, part, store=kept_in, workers=workers, scheduler=scheduler, watch=watch)
+            with reporter() as bars:
+                tally = run_shard(loaded, part, store=kept_in, workers=workers, scheduler=scheduler, reporter=bars)
             info: dict[str, Any] = {**vars(tally), "failed": [vars(each) for each in tally.failed]}
             _say(_counts(info, f"part {shard}"))
             _say(f"store: {kept_in}")
             _say("when all parts are run: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
             command = command_line()
-            with watching() as watch:
+            with reporter() as bars:
                 results = run_study(
-                    loaded, out=out, store=store, workers=workers, scheduler=scheduler, watch=watch, command=command
+                    loaded, out=out, store=store, workers=workers, scheduler=scheduler, reporter=bars, command=command
                 )
             info = dict(results.info)
             if len(results.trials):
@@ -118,7 +118,7 @@ def merge(
 @contextlib.contextmanager
 def _stopping() -> Iterator[None]:
     """Say in one message why a study stopped before its end."""
-    from simharness.runtime.frame_pool import RunError
+    from simharness.runtime.errors import RunError
 
     try:
         yield

@@ -18,14 +18,15 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.export.cameras import hd_names, renamed, write_cameras
 from simharness.export.layout import Layout, check_place
 from simharness.export.manifest import manifest
-from simharness.export.openpose import people_file
+from simharness.formats.openpose import people_file
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.runtime.atomic_files import appearing
 from simharness.runtime.progress import Reporter, Silence
+from simharness.runtime.stages import Stages
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_writer import dumps
-from simharness.trial.looking import look
-from simharness.trial.stages.build import Trial
-from simharness.trial.stages.frame_tasks import studio_of
+from simharness.trial.run_trial import run_trial
+from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
 _QUALITY = 95  # of JPEG
@@ -55,31 +56,36 @@ class Export:
         check_place(self.folder)
 
 
-def export(trial: Trial, plan: Export, *, reporter: Reporter | None = None, command: str | None = None) -> Path:
-    """Write a trial as a sequence in the layout of the CMU Panoptic toolbox (:mod:`simharness.export.layout`).
+def export(scenario: Scenario, plan: Export, *, reporter: Reporter | None = None, command: str | None = None) -> Path:
+    """Write a scenario as a sequence in the layout of the CMU Panoptic toolbox (:mod:`simharness.export.layout`).
 
     The folder appears when it is whole. What the cameras see is known of all frames before the first is written, for
     a detector's errors last; pictures are drawn and written one by one.
 
     Args:
-        trial: what to write; its method is not run.
+        scenario: a resolved scenario with its seed; its method is not run.
         plan: how much of it, and where.
-        reporter: is told of the stages.
-        command: how the user asked for this, for the manifest.
+        reporter: receiver of progress.
+        command: the user's command, for the manifest.
 
     Returns:
         The folder of the sequence.
+
+    Raises:
+        ValueError: the scenario cannot be built.
+        RunError: any error after that.
     """
     reporter, start = reporter or Silence(), time.perf_counter()
-    scenario, shots = trial.scenario, trial.shots
-    with reporter.stage("film", 1):
-        sequence, detected = look(trial)
-    names = hd_names([camera.name for camera in shots.believed])
-    taking, told = renamed(shots.taking, names), renamed(shots.believed, names)
+    result = run_trial(scenario, until="detect", reporter=reporter)
+    assert result.simulation is not None
+    trial, sequence = result.simulation.trial, result.simulation.sequence
+    exposures, detected = trial.exposures, result.detected.frames
+    names = hd_names([camera.name for camera in exposures.believed_rig])
+    taking, told = renamed(exposures.true_rig, names), renamed(exposures.believed_rig, names)
     joints = sequence.of_skeleton(PANOPTIC19)
-    studio = studio_of(scenario, Playback(trial.scene)) if plan.pictures else None
+    picture_source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures else None
     frames = range(0, scenario.frames, plan.every)
-    with reporter.stage("write", len(frames)) as advance, appearing(plan.folder) as partial:
+    with Stages(reporter).stage("write", len(frames)) as advance, appearing(plan.folder) as partial:
         layout = Layout(partial, scenario.name)
         layout.make_folders(names, pictures=plan.pictures)
         layout.scenario.write_text(dumps(scenario), encoding="utf-8")
@@ -97,9 +103,11 @@ def export(trial: Trial, plan: Export, *, reporter: Reporter | None = None, comm
             )
             _write_json(layout.bodies(frame), bodies)
             _write_people(layout, names, frame, seen.detections)
-            if studio is not None:
+            if picture_source is not None:
                 for view, name in enumerate(names):
-                    _write_picture(layout.picture(name, frame), studio.picture(shots, frame, view, finer=_FINER))
+                    _write_picture(
+                        layout.picture(name, frame), picture_source.picture(exposures, frame, view, finer=_FINER)
+                    )
             advance(1)
         about = manifest(
             trial,

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
-from simharness.capture.picture import Studio
+from simharness.capture.picture import PictureSource
 from simharness.report.figures.mosaic import mosaic
 from simharness.report.run.pictures import annotate
 from simharness.runtime.atomic_files import appearing
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
-from simharness.trial.looking import look
-from simharness.trial.stages.build import Trial, prepare
-from simharness.trial.stages.frame_tasks import Estimating, studio_of
+from simharness.trial.run_trial import Goal, run_trial
+from simharness.trial.stages.build_trial import Trial, build_trial
+from simharness.trial.stages.capture import picture_source_of
 from simharness.types.truth import Truth
 from simharness.world.scene.playback import Playback
 
@@ -79,18 +79,16 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
         ValueError: the scenario cannot be built, or a layer that does not exist.
     """
     reporter = reporter or Silence()
-    with reporter.stage("build", 1):
-        trial = prepare(scenario)
-    layers = _layers(trial, footage, reporter)
-    studio = studio_of(scenario, Playback(trial.scene))
+    trial, layers = _layers(scenario, footage, reporter)
+    picture_source = picture_source_of(scenario, Playback(trial.scene))
     frames = range(0, scenario.frames, footage.every)
-    names = [*(camera.name for camera in trial.shots.believed), "mosaic"]
+    names = [*(camera.name for camera in trial.exposures.believed_rig), "mosaic"]
     folder = out / scenario.name
     with reporter.stage("render", len(frames)) as advance, appearing(folder) as partial, ExitStack() as stack:
         write: Callable[[str, int, Rgb], None] = _Stills(partial)
         if footage.video:
             write = stack.enter_context(_Films(partial, rate=scenario.rate / footage.every))
-        for frame, pictures in zip(frames, _pictures(trial, studio, footage, layers, frames), strict=True):
+        for frame, pictures in zip(frames, _pictures(trial, picture_source, footage, layers, frames), strict=True):
             sheet = mosaic(pictures, names[:-1])
             shrink = min(1.0, _WIDEST / sheet.shape[1])
             small = cv2.resize(sheet, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA).astype(np.uint8)
@@ -98,7 +96,10 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
                 write(name, frame, picture)
             for view, name in enumerate(names[:-1]):
                 for channel in sorted(footage.channels):
-                    _write(partial / name / f"{frame:04d}.{channel}.png", _channel(studio, trial, frame, view, channel))
+                    _write(
+                        partial / name / f"{frame:04d}.{channel}.png",
+                        _channel(picture_source, trial, frame, view, channel),
+                    )
             advance(1)
     return folder
 
@@ -112,34 +113,31 @@ class _Layers:
     estimates: Sequence[Estimate] | None
 
 
-def _layers(trial: Trial, footage: Footage, reporter: Reporter) -> _Layers | None:
+def _layers(scenario: Scenario, footage: Footage, reporter: Reporter) -> tuple[Trial, _Layers | None]:
+    """Build the trial, and run it as far as the overlays need."""
     if not footage.overlay:
-        return None
-    with reporter.stage("film", 1):
-        _, answers = look(trial)
-    detections, truth = tuple(each.detections for each in answers), tuple(each.truth for each in answers)
-    estimates = None
-    if "estimates" in footage.overlay:
-        with reporter.stage("estimate", 1):
-            name, pipeline = next(iter(trial.pipelines.items()))
-            estimating = Estimating(trial.shots.believed, tuple(answers), {name: pipeline})
-            estimates = estimating(range(len(answers)))[name]
-    return _Layers(truth, detections, estimates)
+        with reporter.stage("build", 1):
+            return build_trial(scenario), None
+    first = scenario.method.variants[:1]
+    until: Goal = "estimate" if "estimates" in footage.overlay else "detect"
+    result = run_trial(scenario, variants=first, until=until, reporter=reporter)
+    recording = result.recording
+    return result.trial, _Layers(recording.truth, recording.detections, result.estimates.get(first[0]))
 
 
 def _pictures(
-    trial: Trial, studio: Studio, footage: Footage, layers: _Layers | None, frames: range
+    trial: Trial, picture_source: PictureSource, footage: Footage, layers: _Layers | None, frames: range
 ) -> Iterator[list[Rgb]]:
     """The pictures of all views of each frame, one frame after the other."""
     shown = footage.overlay
     for frame in frames:
         pictures = []
-        for view in range(len(trial.shots.believed)):
-            rgb = studio.picture(trial.shots, frame, view, finer=footage.finer)
+        for view in range(len(trial.exposures.believed_rig)):
+            rgb = picture_source.picture(trial.exposures, frame, view, finer=footage.finer)
             if layers is not None:
                 rgb = annotate(
                     rgb,
-                    trial.shots.camera(frame, view),
+                    trial.exposures.camera(frame, view),
                     view,
                     truth=layers.truth[frame],
                     detections=layers.detections[frame] if "detections" in shown else None,
@@ -150,12 +148,14 @@ def _pictures(
         yield pictures
 
 
-def _channel(studio: Studio, trial: Trial, frame: int, view: int, channel: str) -> NDArray[np.unsignedinteger]:
+def _channel(
+    picture_source: PictureSource, trial: Trial, frame: int, view: int, channel: str
+) -> NDArray[np.unsignedinteger]:
     """What is known of every pixel of a picture, as integers that a PNG holds; zeros where no picture arrives."""
-    if not trial.shots.delivered[frame, view]:
-        width, height = trial.shots.believed[view].size
+    if not trial.exposures.delivered[frame, view]:
+        width, height = trial.exposures.believed_rig[view].size
         return np.zeros((height, width), np.uint16 if channel == "depth" else np.uint8)
-    image = studio.image(trial.shots, frame, view)
+    image = picture_source.image(trial.exposures, frame, view)
     if channel == "depth":
         millimetres = np.where(np.isfinite(image.depth), 1000.0 * image.depth, 0.0)
         return np.clip(np.rint(millimetres), 0, 65535).astype(np.uint16)

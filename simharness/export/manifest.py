@@ -12,10 +12,10 @@ from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
 from simharness.formats.openpose import BODY_25
 from simharness.formats.panoptic_poses import CONFIDENCES
 from simharness.trial.provenance import provenance
-from simharness.trial.stages.build import Trial
+from simharness.trial.stages.build_trial import Trial
 from simharness.world.humans.population import is_child
 from simharness.world.motion.choreography import roles
-from simharness.world.rigs.shots import Shots
+from simharness.world.rigs.exposure_schedule import ExposureSchedule
 
 _UNITS = {
     "calibration": "x_cam = R X + t; t in centimetres; K in pixels, of which integers are the centres; distCoef k1 k2 "
@@ -90,26 +90,26 @@ def manifest(
             "nobody": "no picture shows any joint of the person",
         },
         "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _MADE},
-        "rolling_shutter": trial.shots.readout,
-        "cameras": [_camera(trial.shots, trial.scene.time, frames, view, name) for view, name in enumerate(names)],
+        "rolling_shutter": trial.exposures.readout,
+        "cameras": [_camera(trial.exposures, trial.scene.time, frames, view, name) for view, name in enumerate(names)],
         "people": _people(trial),
         "provenance": provenance(command=command, seeds=[scenario.seed], variants=[], seconds=seconds),
     }
 
 
-def _camera(shots: Shots, time: np.ndarray, frames: range, view: int, name: str) -> dict[str, Any]:
+def _camera(exposures: ExposureSchedule, time: np.ndarray, frames: range, view: int, name: str) -> dict[str, Any]:
     """One view: whose pictures it has, when they were taken, which are missing."""
     numbers = np.array(frames)
-    source, taker = shots.source[numbers, view], int(shots.taker[view])
+    source, taker = exposures.source[numbers, view], int(exposures.camera_of_view[view])
     taken = source >= 0
-    late = shots.time[numbers, view][taken] - time[source[taken]]
-    turn, travel = shots.turn[taker], shots.travel[taker]
+    late = exposures.time[numbers, view][taken] - time[source[taken]]
+    turn, travel = exposures.rotation_rate[taker], exposures.velocity[taker]
     drifts = turn.any() or travel.any()
     return {
         "name": name,
-        "called": shots.believed[view].name,
-        "pictures_of": shots.true[taker].name,
-        "size": list(shots.believed[view].size),
+        "called": exposures.believed_rig[view].name,
+        "pictures_of": exposures.true_cameras[taker].name,
+        "size": list(exposures.believed_rig[view].size),
         "clock": {"mean": _short(late.mean()), "deviation": _short(late.std())} if taken.any() else None,
         "lost": numbers[~taken].tolist(),
         "repeated": [[int(frame), int(old)] for frame, old in zip(numbers, source, strict=True) if 0 <= old < frame],

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 from simharness.runtime.atomic_files import write_whole
 from simharness.scoring.catalogue import HEADLINE
 
@@ -37,7 +37,7 @@ class Measurement:
     suite: str
     fingerprint: str
     code: str
-    scores: Mapping[Trial, Mapping[str, float | None]]
+    scores: Mapping[TrialKey, Mapping[str, float | None]]
 
     def __post_init__(self) -> None:
         rounded = {
@@ -129,11 +129,11 @@ def _text(data: Any, key: str) -> str:
     return str(data[key])
 
 
-def _row(row: Any) -> tuple[Trial, dict[str, float | None]]:
+def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
     """One line, checked."""
     if not isinstance(row, dict):
         raise TypeError(f"trials: expected objects, got {json.dumps(row)}")
-    trial = Trial(row["case"], row["seed"], row["variant"])
+    trial = TrialKey(row["case"], row["seed"], row["variant"])
     if not (isinstance(trial.case, str) and isinstance(trial.seed, int) and isinstance(trial.variant, str)):
         raise TypeError(f"trials: expected case, seed and variant, got {json.dumps(list(trial))}")
     scores = {key: row[key] for key in KEPT}

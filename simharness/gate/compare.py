@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.required_seeds import least_p
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 from simharness.statistics.bootstrap import block_weights, interval
@@ -79,7 +79,7 @@ class Change:
     loss: float
     verdict: Verdict
     undecided: bool
-    worst: Trial
+    worst: TrialKey
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class _Pairs:
     """A score of a variant in the trials that have it in both measurements: (n,) each."""
 
     variant: str
-    trials: tuple[Trial, ...]
+    trials: tuple[TrialKey, ...]
     before: Floats
     after: Floats
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from simharness.gate.compare import Comparison
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 
 
@@ -46,7 +46,7 @@ class Check:
     comparison: Comparison
     failed: tuple[Failed, ...]
     trials: int
-    worst: Trial
+    worst: TrialKey
     command: str
     seconds: float
 

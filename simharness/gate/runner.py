@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 from simharness.gate.baseline import Measurement, read_baseline
@@ -11,7 +10,8 @@ from simharness.gate.compare import Comparison, compare
 from simharness.gate.gate_result import Check
 from simharness.gate.required_seeds import require_seeds
 from simharness.gate.suite import SuiteRun, fingerprint, run_suite
-from simharness.gate.trial_command import Trial, command_of, name_of, scenes_of
+from simharness.gate.trial_command import TrialKey, command_of, name_of, scenes_of
+from simharness.runtime.progress import Reporter
 from simharness.scenario.study_definition import Study
 
 
@@ -33,19 +33,17 @@ def baseline_of(study: Study, path: Path) -> Measurement:
     return baseline
 
 
-def check(
-    study: Study, baseline: Measurement, *, workers: int = 1, progress: Callable[[int], None] = lambda trials: None
-) -> Check:
+def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Reporter | None = None) -> Check:
     """Run a suite and compare it with its baseline.
 
     Args:
         study: the suite.
         baseline: from :func:`baseline_of`.
         workers: processes that share the trials.
-        progress: is told of every trial that is done.
+        reporter: receiver of progress, a step a trial.
     """
     start = time.perf_counter()
-    done = run_suite(study, workers=workers, progress=progress)
+    done = run_suite(study, workers=workers, reporter=reporter)
     comparison = compare(baseline, done.measurement(study), study.gate)
     worst = _worst_trial(done, comparison, study.variants[0])
     return Check(
@@ -61,10 +59,10 @@ def check(
     )
 
 
-def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> Trial:
+def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> TrialKey:
     """The trial to look at: one that could not be run, one that lost most, or else that of the lowest PCP."""
     if done.failed:
-        return Trial(done.failed[0].case, done.failed[0].seed, variant)
+        return TrialKey(done.failed[0].case, done.failed[0].seed, variant)
     if worse := comparison.that_are("worse"):
         return worse[0].worst
     scores = {trial: scores["pcp"] for trial, scores in done.scores.items() if trial.variant == variant}
@@ -73,7 +71,9 @@ def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> Trial:
 
 def _what_differs(baseline: Measurement, study: Study) -> str:
     """In a few words."""
-    now = {Trial(name_of(setting, study), seed, name) for setting, seed in scenes_of(study) for name in study.variants}
+    now = {
+        TrialKey(name_of(setting, study), seed, name) for setting, seed in scenes_of(study) for name in study.variants
+    }
     gone, new = sorted(baseline.scores.keys() - now), sorted(now - baseline.scores.keys())
     said = [
         f"{len(trials)} trials {what}, the first {trials[0]}"

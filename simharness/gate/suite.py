@@ -15,9 +15,9 @@ from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
+from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.study.scheduler import TrialSuccess, Unit, work_off
 from simharness.trial.identity import trial_identity
-from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of
 

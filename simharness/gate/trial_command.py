@@ -18,7 +18,7 @@ _VALUES = ("true", "false", "inf", "nan")  # words that TOML takes for something
 _ALONE = {"cases": "{}", "sweep": "{}", "seeds": "1"}  # what makes one scenario of a study
 
 
-class Trial(NamedTuple):
+class TrialKey(NamedTuple):
     """One variant at one setting and seed.
 
     Attributes:
@@ -48,7 +48,7 @@ def name_of(setting: Setting, study: Study) -> str:
     return ", ".join(filter(None, (setting.case, factors))) or study.name
 
 
-def command_of(study: Study, trial: Trial) -> str:
+def command_of(study: Study, trial: TrialKey) -> str:
     """``simharness run FILE --set KEY=VALUE ... --seed N``, for a shell: runs a trial by itself, with all variants.
 
     Raises:

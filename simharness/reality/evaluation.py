@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from mvpose import Estimate
 from mvpose.pipeline import Estimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.published_scores import ABLATION
@@ -74,38 +75,57 @@ def evaluate(
     head: HeadMapping = "voxelpose",
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Run any methods on frames of Shelf and score them.
+    """Run methods on frames of a recording and score them.
 
-    Frames in which nobody is annotated (people are in them all the same) are run and timed, but not scored.
-    Each method sees the first frame once more beforehand, so that compilation is not in the timings.
+    Frames in which nobody is annotated are run and timed, but not scored, because people may be in them all the same.
+    Each method gets the first frame once more beforehand, so that compilation is not in the timings.
 
     Args:
-        shelf: the data.
+        shelf: the recording.
         estimators: methods by name.
         head: the head mapping.
-        progress: called after every frame with how many are done, and of how many.
+        progress: called after every frame with the number of finished frames and of all.
 
     Raises:
         ValueError: an unknown head mapping, or no frame.
     """
     if not len(shelf):
         raise ValueError("no frame to evaluate")
+    estimates: dict[str, list[Estimate]] = {}
+    for number, (name, estimator) in enumerate(estimators.items()):
+        estimator.estimate(shelf.rig, shelf.detections[0])
+        estimates[name] = []
+        for frame, detections in enumerate(shelf.detections, start=1):
+            estimates[name].append(estimator.estimate(shelf.rig, detections))
+            if progress is not None:
+                progress(number * len(shelf) + frame, len(estimators) * len(shelf))
+    return score_estimates(shelf, estimates, head=head)
+
+
+def score_estimates(
+    shelf: Shelf, estimates: Mapping[str, Sequence[Estimate]], *, head: HeadMapping = "voxelpose"
+) -> Evaluation:
+    """Score the estimates of methods on a recording.
+
+    Args:
+        shelf: the recording of F frames.
+        estimates: estimates by method, F of each.
+        head: the head mapping.
+
+    Raises:
+        ValueError: an unknown head mapping, or another number of estimates.
+    """
     annotated = np.any(np.isfinite(shelf.truth), axis=(1, 2, 3))
     variants: dict[str, VariantScores] = {}
     violations: dict[str, int] = {}
-    for name, estimator in estimators.items():
-        estimator.estimate(shelf.rig, shelf.detections[0])
-        scores, timings, violations[name] = [], [], 0
-        for frame, detections in enumerate(shelf.detections):
-            estimate = estimator.estimate(shelf.rig, detections)
-            timings.append(estimate.timings)
-            if len(estimate.matching.labels):  # a method that groups no detections has none to mix up
+    for name, answers in estimates.items():
+        scores, violations[name] = [], 0
+        for frame, (detections, estimate) in enumerate(zip(shelf.detections, answers, strict=True)):
+            if len(estimate.matching.labels):  # a method without matching has no labels that could be violated
                 violations[name] += count_violations(detections.view, estimate.matching.labels)
             if annotated[frame]:
                 scores.append(score_frame(shelf.truth[frame], estimate.joints, head=head))
-            if progress is not None:
-                progress(len(variants) * len(shelf) + frame + 1, len(estimators) * len(shelf))
-        variants[name] = VariantScores(tuple(scores), tuple(timings))
+        variants[name] = VariantScores(tuple(scores), tuple(estimate.timings for estimate in answers))
     return Evaluation("shelf", head, len(shelf), int(annotated.sum()), variants, violations)
 
 

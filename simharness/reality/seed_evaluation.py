@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,16 +13,15 @@ from rich.console import Console
 from rich.table import Table
 
 from mvpose.arrays import Floats
-from mvpose.pipeline import Estimator
 from mvpose.skeleton import SHELF14, HeadMapping
-from simharness.reality.evaluation import Evaluation, evaluate
+from simharness.reality.evaluation import Evaluation, score_estimates
 from simharness.reality.shelf import Shelf
+from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.summary import VariantScores
 from simharness.statistics.bootstrap import block_weights, interval, resampled
-from simharness.trial.looking import look
-from simharness.trial.stages.build import prepare
+from simharness.trial.run_trial import TrialResult, run_trial
 
 _SKIPPED = 3  # times as many seeds are tried, for people drawn at random may not fit about a thing
 _LIMBS = 12  # joints of SHELF14, before those of the head
@@ -110,7 +109,7 @@ def evaluate_seeds(
     count: int,
     *,
     head: HeadMapping = "voxelpose",
-    progress: Callable[[int], None] = lambda runs: None,
+    reporter: Reporter | None = None,
 ) -> Seeds:
     """Run a scenario at ``count`` seeds: its own and those after it, but for those at which people do not fit.
 
@@ -118,42 +117,43 @@ def evaluate_seeds(
         scenario: with its variants.
         count: of seeds.
         head: the head mapping.
-        progress: is told of every seed that is done.
+        reporter: receiver of progress, a step a seed.
 
     Raises:
         ValueError: it cannot be built, at three times as many seeds as asked for.
     """
     done: dict[int, Evaluation] = {}
-    for seed in itertools.count(scenario.seed):
-        try:
-            recording, estimators = record(scenario.model_copy(update={"seed": seed}))
-        except ValueError:
-            if seed - scenario.seed >= _SKIPPED * count:
-                raise
-            continue
-        done[seed] = evaluate(recording, estimators, head=head)
-        progress(1)
-        if len(done) == count:
-            break
+    with (reporter or Silence()).stage("seeds", count) as advance:
+        for seed in itertools.count(scenario.seed):
+            try:
+                result = run_trial(scenario.model_copy(update={"seed": seed}), until="estimate")
+            except ValueError:
+                if seed - scenario.seed >= _SKIPPED * count:
+                    raise
+                continue
+            done[seed] = score_estimates(annotated_recording(result), result.estimates, head=head)
+            advance(1)
+            if len(done) == count:
+                break
     return Seeds(scenario, head, done)
 
 
-def record(scenario: Scenario) -> tuple[Shelf, Mapping[str, Estimator]]:
-    """A simulated recording in the form of a real one, and the variants of the scenario that estimate it.
+def annotated_recording(result: TrialResult) -> Shelf:
+    """Return a simulated trial in the form of a recording that people have annotated.
 
-    Annotated are, by the body's own landmarks, those whose limbs all cameras but one have whole in their pictures (at
-    least two): of the 510 people who are annotated in Shelf's test frames 504 are so.
+    A person is annotated, by the body's landmarks, where all cameras but one (at least two cameras) have the person's
+    limbs whole in their pictures: this holds for 504 of the 510 people who are annotated in Shelf's test frames.
 
     Raises:
-        ValueError: it cannot be built.
+        ValueError: the trial was not simulated.
     """
-    trial = prepare(scenario)
-    sequence, answers = look(trial)
-    rig, truth = trial.shots.believed, sequence.of_skeleton(SHELF14)
-    seen = np.stack([camera.inside(camera.project(truth[..., :_LIMBS, :])).all(axis=-1) for camera in rig])
-    truth[seen.sum(axis=0) < max(2, len(rig) - 1)] = np.nan
-    detections = tuple(answer.detections for answer in answers)
-    return Shelf(rig, truth, detections, np.arange(len(sequence)), people=scenario.people.count), trial.pipelines
+    recording = result.recording
+    assert result.simulation is not None
+    rig, truth = recording.rig, result.simulation.sequence.of_skeleton(SHELF14)
+    inside = np.stack([camera.inside(camera.project(truth[..., :_LIMBS, :])).all(axis=-1) for camera in rig])
+    truth[inside.sum(axis=0) < max(2, len(rig) - 1)] = np.nan
+    people = result.scenario.people.count
+    return Shelf(rig, truth, recording.detections, np.arange(len(recording)), people=people)
 
 
 def score(recordings: Sequence[VariantScores], people: Sequence[int], *, rate: float) -> Score:

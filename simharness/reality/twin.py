@@ -6,7 +6,7 @@ recording's (:mod:`simharness.reality.detector_fit`). Both are scored by the rec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from mvpose.skeleton import HeadMapping
 from simharness.reality.evaluation import ACTORS, evaluate
 from simharness.reality.seed_evaluation import Score, evaluate_seeds, score
 from simharness.reality.shelf import Shelf
+from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.stages.estimators import estimators_of
 
@@ -91,7 +92,7 @@ def compare(
     *,
     count: int,
     head: HeadMapping = "voxelpose",
-    progress: Callable[[int], None] = lambda runs: None,
+    reporter: Reporter | None = None,
 ) -> Comparison:
     """Score variants on a recording and on twins of it.
 
@@ -100,15 +101,15 @@ def compare(
         scenario: the twin, which names the variants.
         count: of twins: with the scenario's seed and those after it, but for those that do not fit.
         head: the head mapping.
-        progress: is told of every recording and twin that is done.
+        reporter: receiver of progress.
 
     Raises:
         ValueError: twins cannot be built.
     """
     estimators = estimators_of(scenario.method)
-    real = evaluate(recorded, estimators, head=head)
-    progress(1)
-    twins = evaluate_seeds(scenario, count, head=head, progress=progress)
+    with (reporter or Silence()).stage("recording", 1):
+        real = evaluate(recorded, estimators, head=head)
+    twins = evaluate_seeds(scenario, count, head=head, reporter=reporter)
     return Comparison(
         name=scenario.name,
         detector=scenario.detector.name,

@@ -10,14 +10,12 @@ from typing import Any, Protocol, TypeVar
 
 import threadpoolctl
 
+from simharness.runtime.errors import RunError
+
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
 
 _CHUNKS_PER_WORKER = 8  # enough for the slowest chunk not to hold the others up, few enough to send cheaply
-
-
-class RunError(RuntimeError):
-    """A run that failed after its input was found good: a bug, a lack of memory, a dead worker."""
 
 
 class FrameFunction(Protocol[Result_co]):

@@ -1,43 +1,97 @@
-"""What a person sees while a run works: a bar for each stage, on stderr, where that is a terminal."""
+"""Progress of long commands on stderr: one protocol for every command, from a run's stages to a study's trials."""
 
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-)
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-Advance = Callable[[int], None]
+_LINE_SECONDS = 10.0  # between two lines where stderr is no terminal
+_UNSETTLED = 2  # first steps include compilation: a rate that counts them gives many times the remaining time
+_TIMED_SECONDS = 2.0  # from the first steps on, for two workers finish at nearly the same time
+
+
+class Advance(Protocol):
+    """Report finished steps of a stage."""
+
+    def __call__(self, steps: int, /, *, failed: int = 0) -> None:
+        """Report ``steps`` more steps, of which ``failed`` failed."""
+        ...
 
 
 class Reporter(Protocol):
-    """Anything that is told of the stages of a run."""
+    """Receiver of the progress of a command."""
 
-    def stage(self, name: str, total: int) -> contextlib.AbstractContextManager[Advance]:
-        """A stage of ``total`` steps begins; the context gives a function to say how many more are done."""
+    def stage(self, name: str, total: int, *, done: int = 0) -> contextlib.AbstractContextManager[Advance]:
+        """Begin a stage of ``total`` steps, ``done`` of which were finished earlier; the context gives its advance."""
         ...
 
 
 class Silence:
-    """Says nothing."""
+    """Reporter that prints nothing."""
 
     @contextlib.contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Advance]:
-        """Begin a stage, unseen."""
-        yield lambda steps: None
+    def stage(self, name: str, total: int, *, done: int = 0) -> Iterator[Advance]:
+        """Begin a stage without output."""
+        yield _ignore
+
+
+def _ignore(steps: int, /, *, failed: int = 0) -> None:
+    """Drop a progress report."""
+
+
+class Pace:
+    """Rate of a stage, and the time that it still needs.
+
+    Steps that were finished in an earlier run do not count, nor do the first ones of this run: they include imports
+    and compilation.
+
+    Args:
+        total: steps of the stage.
+        done: steps finished earlier.
+        clock: time in seconds.
+    """
+
+    def __init__(self, total: int, done: int = 0, *, clock: Callable[[], float] = time.monotonic) -> None:
+        self.total, self.done, self.failed = total, done, 0
+        self._clock = clock
+        self._fresh = 0
+        self._settled: tuple[int, float] | None = None  # fresh steps and time from which the rate is measured
+
+    def advance(self, steps: int, *, failed: int = 0) -> None:
+        """Count finished steps."""
+        self.done += steps
+        self.failed += failed
+        self._fresh += steps
+        if self._settled is None and self._fresh >= _UNSETTLED:
+            self._settled = self._fresh, self._clock()
+
+    @property
+    def rate(self) -> float | None:
+        """Steps a second; None until enough steps have been timed."""
+        if self._settled is None:
+            return None
+        steps, since = self._fresh - self._settled[0], self._clock() - self._settled[1]
+        return steps / since if steps > 0 and since >= _TIMED_SECONDS else None
+
+    def __str__(self) -> str:
+        parts = []
+        rate = self.rate
+        if rate is not None:
+            parts.append(f"{rate:.1f}/s" if rate >= 1 else f"{60 * rate:.1f}/min")
+            if self.done < self.total:
+                parts.append(f"{duration((self.total - self.done) / rate)} left")
+        if self.failed:
+            parts.append(f"{self.failed} failed")
+        return ", ".join(parts)
 
 
 class Bars:
-    """A bar for each stage; use it as a context manager."""
+    """Reporter with a bar for each stage. Use it as a context manager."""
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
@@ -46,6 +100,7 @@ class Bars:
             BarColumn(bar_width=36),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[pace]}"),
             console=console,
         )
 
@@ -57,19 +112,55 @@ class Bars:
         self._progress.stop()
 
     @contextlib.contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Advance]:
-        """Begin a stage with a bar of its own."""
-        task = self._progress.add_task(name, total=total)
-        yield lambda steps: self._progress.advance(task, steps)
-        self._progress.update(task, completed=total)
+    def stage(self, name: str, total: int, *, done: int = 0) -> Iterator[Advance]:
+        """Begin a stage with a new bar."""
+        pace = Pace(total, done)
+        task = self._progress.add_task(name, total=total, completed=done, pace="")
+
+        def advance(steps: int, /, *, failed: int = 0) -> None:
+            pace.advance(steps, failed=failed)
+            self._progress.update(task, advance=steps, pace=str(pace))
+
+        yield advance
+        self._progress.update(task, completed=total, pace=f"{pace.failed} failed" if pace.failed else "")
+
+
+class Lines:
+    """Reporter that prints a line from time to time, for logs."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._last = time.monotonic()
+
+    @contextlib.contextmanager
+    def stage(self, name: str, total: int, *, done: int = 0) -> Iterator[Advance]:
+        """Begin a stage; it prints a line when the last line of this reporter is old enough."""
+        pace = Pace(total, done)
+
+        def advance(steps: int, /, *, failed: int = 0) -> None:
+            pace.advance(steps, failed=failed)
+            now = time.monotonic()
+            if now - self._last >= _LINE_SECONDS:
+                self._last = now
+                text = ", ".join(filter(None, (f"{name}: {pace.done} of {pace.total}", str(pace))))
+                self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        yield advance
 
 
 @contextlib.contextmanager
 def reporter() -> Iterator[Reporter]:
-    """Bars on stderr where that is a terminal, else silence."""
+    """Give a reporter for stderr: bars on a terminal, else a line every ten seconds."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield Silence()
+        yield Lines(console)
         return
     with Bars(console) as bars:
         yield bars
+
+
+def duration(seconds: float) -> str:
+    """Return a duration in words: "45 s", "12 min", "3.5 h"."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
+from simharness.pairing.pairing import Pairing
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.bones import bone_errors
 from simharness.scoring.catalogue import AP_MM, PCK_MM
@@ -20,11 +21,10 @@ from simharness.scoring.jitter import jitter
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pck import joint_errors, pck, pck_area
 from simharness.scoring.pcp import Part
-from simharness.scoring.pose import Pairing
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
 from simharness.types.recording import Recording
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 Labels = NDArray[np.int64]
 Scores = dict[str, float | None]
@@ -51,12 +51,14 @@ class Assessment:
             hidden by nothing but the person. Errors are null where the person is missed.
         errors: of every joint of every true person, (T, P, 17), metres: infinite where missed or not placed, NaN where
             the truth does not say where it is. :func:`simharness.scoring.pck.pck` makes the curve of them.
+        variant_scores: the scores of every frame, for summaries.
     """
 
     scores: Scores
     frames: pl.DataFrame
     people: pl.DataFrame
     errors: Floats
+    variant_scores: VariantScores
 
 
 def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
@@ -92,6 +94,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         _frame_table(recording, variant, groups),
         _people_table(recording, variant, errors),
         errors,
+        variant,
     )
 
 

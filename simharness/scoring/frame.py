@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose import COCO17, SHELF14
 from mvpose.checks import as_array
 from mvpose.skeleton import HeadMapping, coco17_to_shelf14
+from simharness.pairing.pairing import Pairing, pair
 from simharness.scoring.matching import PairCounts
 from simharness.scoring.pcp import percent, score_parts
-from simharness.scoring.pose import Pairing, pair
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Ten parts of the 14 joints. A part is correct when the mean of the errors of its two ends is at most half its
 true length (Belagiannis et al., CVPR 2014; as Dong et al., CVPR 2019, use it). Every true person takes the
 nearest estimate; an estimate may serve two people, and one that nobody takes costs nothing. So PCP never sees
-a ghost: read it beside :mod:`simharness.scoring.pose`.
+a ghost: read it beside :mod:`simharness.pairing.pairing`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.scoring.distance import mean_distances
+from simharness.pairing.distance import mean_distances
 
 ALPHA = 0.5
 

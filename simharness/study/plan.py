@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Setting, Study
-from simharness.trial.identity import entry_identity, own_code, trial_identity
+from simharness.trial.identity import entry_identity, estimator_code, trial_identity
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Planned:
 def plan(study: Study) -> list[Planned]:
     """All trials of a study: every setting at the first seed, then at the second, for half a study is of use then."""
     places = study.base.method.estimators.places
-    own = {variant: own_code(places[variant]) if variant in places else "" for variant in study.variants}
+    own = {variant: estimator_code(places[variant]) if variant in places else "" for variant in study.variants}
     return [_planned(study, setting, seed, own) for seed in study.seeds for setting in study.settings]
 
 

@@ -10,15 +10,18 @@ from time import perf_counter
 from typing import Any
 
 from simharness.runtime.atomic_files import appearing
+from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.study_definition import Study, Value
+from simharness.study.measure import StoredTrial
+from simharness.study.measure import measure as measure_trial
 from simharness.study.plan import Planned, plan
 from simharness.study.result_folder import Results, read_study, write_study
-from simharness.study.scheduler import Failure, Measure, Success, Unit, told, work_off
+from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, told, work_off
 from simharness.study.study_file import document
-from simharness.study.study_progress import Quiet, Watch
 from simharness.study.tables import tables
-from simharness.study.trial_store import Entry, Store, StoreError
-from simharness.trial.measure import measure as measure_trial
+from simharness.study.trial_store import Entry, State, Store, StoreError
+from simharness.trial.archive import TrialArchive
+from simharness.trial.identity import code
 from simharness.trial.provenance import provenance
 from simharness.trial.stages.estimators import estimators_of
 
@@ -79,7 +82,7 @@ def run_study(
     store: Path | None = None,
     workers: int = 1,
     scheduler: str | None = None,
-    watch: Watch | None = None,
+    reporter: Reporter | None = None,
     command: str | None = None,
     measure: Measure = measure_trial,
 ) -> Results:
@@ -91,7 +94,7 @@ def run_study(
         store: the folder of finished trials; ``out / "store"`` by default.
         workers: processes; see :func:`simharness.study.scheduler.work_off`.
         scheduler: address of a Dask scheduler, instead.
-        watch: is told of every trial.
+        reporter: receiver of progress, a step a trial.
         command: how the user asked for this.
         measure: what is done with a trial.
 
@@ -109,7 +112,7 @@ def run_study(
     _check_place(folder, store)
     estimators_of(study.base.method)  # better now than at every trial
     opened, planned = Store(store), plan(study)
-    tally = _run(planned, opened, workers=workers, scheduler=scheduler, watch=watch, measure=measure)
+    tally = _run(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
     order = {id(setting): index for index, setting in enumerate(study.settings)}
     ordered = sorted(planned, key=lambda each: (order[id(each.setting)], each.seed))
     failed = {each.trial for each in tally.failed}
@@ -133,7 +136,7 @@ def run_shard(
     store: Path,
     workers: int = 1,
     scheduler: str | None = None,
-    watch: Watch | None = None,
+    reporter: Reporter | None = None,
     measure: Measure = measure_trial,
 ) -> Tally:
     """Run one of ``n`` parts of a study, into a store alone: ``simharness merge`` puts the stores together.
@@ -144,7 +147,7 @@ def run_shard(
         store: the folder of finished trials.
         workers: as of :func:`run_study`.
         scheduler: as of :func:`run_study`.
-        watch: as of :func:`run_study`.
+        reporter: as of :func:`run_study`.
         measure: as of :func:`run_study`.
 
     Raises:
@@ -155,7 +158,7 @@ def run_shard(
         raise ValueError(f"a shard is i/n with i from 1 to n, got {part}/{parts}")
     estimators_of(study.base.method)
     planned = list(_different(plan(study)))[part - 1 :: parts]
-    return _run(planned, Store(store), workers=workers, scheduler=scheduler, watch=watch, measure=measure)
+    return _run(planned, Store(store), workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
 
 
 def _run(
@@ -164,32 +167,32 @@ def _run(
     *,
     workers: int,
     scheduler: str | None,
-    watch: Watch | None,
+    reporter: Reporter | None,
     measure: Measure,
 ) -> Tally:
     """Measure what the store lacks."""
     start = perf_counter()
-    watch = watch or Quiet()
     different = {each.trial: each for each in _different(planned)}
-    missing = {trial: _missing(store, each) for trial, each in different.items()}
-    units = [Unit(trial, different[trial].scenario, variants) for trial, variants in missing.items() if variants]
+    units = [unit for each in different.values() if (unit := _unit(store, each)).variants]
     damaged = tuple(sorted(store.damaged))
-    kept, run, failed = len(different) - len(units), 0, dict[str, Failure]()
-    watch.begin(len(different), kept)
+    kept, run, failed = len(different) - len(units), 0, dict[str, TrialFailure]()
     try:
-        with closing(work_off(units, measure, workers=workers, scheduler=scheduler)) as results:
+        with (
+            (reporter or Silence()).stage("trials", len(different), done=kept) as advance,
+            closing(work_off(units, measure, workers=workers, scheduler=scheduler)) as results,
+        ):
             for result in results:
                 each = different[result.unit.trial]
                 for part in result.parts:
-                    if isinstance(part, Success):
+                    if isinstance(part, TrialSuccess):
                         _keep(store, each, part)
                     else:
                         _note(store, each, part)
-                if isinstance(result, Failure):
+                if isinstance(result, TrialFailure):
                     failed[each.trial] = result
                 else:
                     run += 1
-                watch.advance(isinstance(result, Failure))
+                advance(1, failed=int(isinstance(result, TrialFailure)))
     except KeyboardInterrupt:  # which may come between a trial's last entry and its count: the store knows
         finished = sum(all(map(store.holds, different[unit.trial].entries.values())) for unit in units)
         raise Interrupted(kept + finished, len(different)) from None
@@ -206,24 +209,39 @@ def _different(planned: Sequence[Planned]) -> Iterator[Planned]:
             yield each
 
 
-def _missing(store: Store, planned: Planned) -> tuple[str, ...]:
-    return tuple(variant for variant, identity in planned.entries.items() if not store.has(identity))
+def _unit(store: Store, planned: Planned) -> Unit:
+    """Return the work that is left of a trial: no variants where nothing is."""
+    entries = {variant: store.read(identity) for variant, identity in planned.entries.items()}
+    left = tuple(name for name, entry in entries.items() if entry is None or entry.state is not State.CURRENT)
+    stored = StoredTrial()
+    if left and (detected := store.read_detections(planned.trial)):
+        known = {name: entry for name, entry in entries.items() if name in left and entry and entry.estimates}
+        stored = StoredTrial(
+            TrialArchive(detected, {name: entry.estimates for name, entry in known.items()}),
+            {name: entry.result.failures for name, entry in known.items() if entry.failures_code == code().failures},
+        )
+    return Unit(planned.trial, planned.scenario, left, stored)
 
 
-def _keep(store: Store, planned: Planned, success: Success) -> None:
-    for variant, measured in success.measured.items():
-        entry = Entry(planned.trial, variant, measured, success.seconds / len(success.measured))
+def _keep(store: Store, planned: Planned, success: TrialSuccess) -> None:
+    """Store a finished unit. Detections come first: an entry without them could never be scored again."""
+    output = success.output
+    if output.archive.detected:
+        store.write_detections(planned.trial, output.archive.detected)
+    for variant, result in output.results.items():
+        estimates = output.archive.estimates.get(variant, b"")
+        entry = Entry(planned.trial, variant, result, success.seconds / len(output.results), estimates)
         store.write(planned.entries[variant], entry)
 
 
-def _note(store: Store, planned: Planned, failure: Failure) -> None:
+def _note(store: Store, planned: Planned, failure: TrialFailure) -> None:
     for variant in failure.unit.variants:
         noted = {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback}
         store.write_failure(planned.entries[variant], noted)
 
 
-def _failed(planned: Planned, failure: Failure) -> FailedTrial:
-    lost = [part for part in failure.parts if isinstance(part, Failure)]
+def _failed(planned: Planned, failure: TrialFailure) -> FailedTrial:
+    lost = [part for part in failure.parts if isinstance(part, TrialFailure)]
     return FailedTrial(
         trial=planned.trial,
         case=planned.setting.case,

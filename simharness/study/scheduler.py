@@ -12,15 +12,16 @@ import logging
 import secrets
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.sections.scenario import Scenario
+from simharness.study.measure import StoredTrial, TrialOutput
+from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code
-from simharness.trial.trial_result import Measured
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -31,8 +32,8 @@ ATTEMPTS = 3
 _PATIENCE = 30.0  # seconds to wait for a scheduler
 _FIRST_WORKER = 30.0  # seconds to wait for the first worker of one that has none
 
-Measure = Callable[[Scenario, Sequence[str]], Mapping[str, Measured]]
-"""What is done with a trial, in whatever process: :func:`simharness.trial.measure.measure`. It must be picklable, and
+Measure = Callable[[Scenario, Sequence[str], StoredTrial], TrialOutput]
+"""What is done with a trial, in whatever process: :func:`simharness.study.measure.measure`. It must be picklable, and
 say by a ValueError that the scenario is to blame."""
 
 
@@ -44,35 +45,37 @@ class Unit:
         trial: its identity.
         scenario: at its seed.
         variants: of the method.
+        stored: what the store has of the trial.
     """
 
     trial: str
     scenario: Scenario
     variants: tuple[str, ...]
+    stored: StoredTrial = field(default_factory=StoredTrial)
 
 
 @dataclass(frozen=True)
-class Success:
+class TrialSuccess:
     """A unit that is done.
 
     Attributes:
         unit: which.
-        measured: by variant.
+        output: results by variant, and what is to be stored beside them.
         seconds: that it took.
     """
 
     unit: Unit
-    measured: Mapping[str, Measured]
+    output: TrialOutput
     seconds: float
 
     @property
-    def parts(self) -> tuple[Success]:
+    def parts(self) -> tuple[TrialSuccess]:
         """It is one whole."""
         return (self,)
 
 
 @dataclass(frozen=True)
-class Failure:
+class TrialFailure:
     """A unit that failed.
 
     Attributes:
@@ -89,17 +92,17 @@ class Failure:
     traceback: str
     final: bool = False
     deaths: int = 0
-    alone: tuple[Success | Failure, ...] = ()
+    alone: tuple[TrialSuccess | TrialFailure, ...] = ()
 
     @property
-    def parts(self) -> tuple[Success | Failure, ...]:
+    def parts(self) -> tuple[TrialSuccess | TrialFailure, ...]:
         """What is known of its variants: each by itself, or that all failed together."""
         return self.alone or (self,)
 
 
 def work_off(
     units: Collection[Unit], measure: Measure, *, workers: int = 1, scheduler: str | None = None
-) -> Generator[Success | Failure, None, None]:
+) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """Measure units, each until it is done or has failed for good, and yield them as they come.
 
     A unit of several variants that has failed :data:`ATTEMPTS` times is divided: each variant is tried by itself, and
@@ -127,18 +130,18 @@ def work_off(
             yield from _work_there(units, measure, client)
 
 
-def attempt(measure: Measure, unit: Unit) -> Success | Failure:
+def attempt(measure: Measure, unit: Unit) -> TrialSuccess | TrialFailure:
     """Measure a unit once. Errors come back as text, for not every exception can travel."""
     start = perf_counter()
     try:
-        measured = measure(unit.scenario, unit.variants)
+        output = measure(unit.scenario, unit.variants, unit.stored)
     except Exception as error:
         said = str(error) if isinstance(error, ValueError | RunError) else f"{type(error).__name__}: {error}"
-        return Failure(unit, said, traceback.format_exc(), final=isinstance(error, ValueError))
-    return Success(unit, measured, perf_counter() - start)
+        return TrialFailure(unit, said, traceback.format_exc(), final=isinstance(error, ValueError))
+    return TrialSuccess(unit, output, perf_counter() - start)
 
 
-def told(failures: Iterable[Failure], variants: Collection[str]) -> str:
+def told(failures: Iterable[TrialFailure], variants: Collection[str]) -> str:
     """The errors of failures in a line, with whose they are, but where all variants have the same one.
 
     Args:
@@ -153,48 +156,56 @@ def told(failures: Iterable[Failure], variants: Collection[str]) -> str:
     return "; ".join(f"{', '.join(names)}: {error}" for error, names in whose.items())
 
 
-def _divided(failure: Failure) -> list[Unit]:
+def _divided(failure: TrialFailure) -> list[Unit]:
     """The variants of a unit that has failed for good, each a unit; none where that would tell nothing new."""
     if failure.final or len(failure.unit.variants) < 2:
         return []
     return [replace(failure.unit, variants=(variant,)) for variant in failure.unit.variants]
 
 
-def _joined(together: Failure, alone: Iterable[Success | Failure]) -> Success | Failure:
+def _joined(together: TrialFailure, alone: Iterable[TrialSuccess | TrialFailure]) -> TrialSuccess | TrialFailure:
     """What came of a unit that failed: what its variants did one by one."""
     unit = together.unit
     alone = tuple(sorted(alone, key=lambda each: unit.variants.index(each.unit.variants[0])))
-    done = [each for each in alone if isinstance(each, Success)]
-    lost = [each for each in alone if isinstance(each, Failure)]
+    done = [each for each in alone if isinstance(each, TrialSuccess)]
+    lost = [each for each in alone if isinstance(each, TrialFailure)]
     if lost:
-        return Failure(unit, told(lost, unit.variants), lost[0].traceback, alone=alone)
-    measured = {variant: each for part in done for variant, each in part.measured.items()}
-    return Success(unit, measured, sum(each.seconds for each in done))
+        return TrialFailure(unit, told(lost, unit.variants), lost[0].traceback, alone=alone)
+    output = TrialOutput(
+        {variant: each for part in done for variant, each in part.output.results.items()},
+        TrialArchive(
+            next((part.output.archive.detected for part in done if part.output.archive.detected), b""),
+            {variant: each for part in done for variant, each in part.output.archive.estimates.items()},
+        ),
+    )
+    return TrialSuccess(unit, output, sum(each.seconds for each in done))
 
 
-def _work_here(units: Iterable[Unit], measure: Measure) -> Generator[Success | Failure, None, None]:
+def _work_here(units: Iterable[Unit], measure: Measure) -> Generator[TrialSuccess | TrialFailure, None, None]:
     for unit in units:
         result = _persist(unit, measure)
-        if isinstance(result, Failure) and (parts := _divided(result)):
+        if isinstance(result, TrialFailure) and (parts := _divided(result)):
             result = _joined(result, [_persist(part, measure, together=result) for part in parts])
         yield result
 
 
-def _persist(unit: Unit, measure: Measure, together: Failure | None = None) -> Success | Failure:
+def _persist(unit: Unit, measure: Measure, together: TrialFailure | None = None) -> TrialSuccess | TrialFailure:
     """Attempt a unit until it is done or has failed for good; ``together``: the failure that it is a part of."""
     for _ in range(ATTEMPTS):
         result = attempt(measure, unit)
-        if isinstance(result, Success) or result.final or _again(result, together):
+        if isinstance(result, TrialSuccess) or result.final or _again(result, together):
             break
     return result
 
 
-def _again(failure: Failure, together: Failure | None) -> bool:
+def _again(failure: TrialFailure, together: TrialFailure | None) -> bool:
     """Whether a variant fails by itself as it did, :data:`ATTEMPTS` times, with the others."""
     return together is not None and failure.error == together.error
 
 
-def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Generator[Success | Failure, None, None]:
+def _work_there(
+    units: Iterable[Unit], measure: Measure, client: Client
+) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """As many units are on their way as the cluster has threads: more would wait at workers that may die under them.
 
     When a worker dies nobody knows which of the units that were at it has killed it. So those come last, one at a time:
@@ -202,8 +213,8 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
     """
     waiting, suspects, alone = iter(units), deque[Unit](), False
     parts = deque[Unit]()  # of units that are divided; they come before what waits
-    together: dict[str, Failure] = {}  # by trial, how they failed
-    finished: dict[str, list[Success | Failure]] = {}  # by trial, what came of its parts so far
+    together: dict[str, TrialFailure] = {}  # by trial, how they failed
+    finished: dict[str, list[TrialSuccess | TrialFailure]] = {}  # by trial, what came of its parts so far
     failed: Counter[tuple[str, tuple[str, ...]]] = Counter()
     running: dict[Future[Any], Unit] = {}
     completed = _completed()
@@ -229,7 +240,7 @@ def _work_there(units: Iterable[Unit], measure: Measure, client: Client) -> Gene
         unit = running.pop(future)
         result, whole = _result(future, unit), together.get(unit.trial)
         del future  # what is held would be measured anew, were the worker that has it to die
-        if isinstance(result, Failure):
+        if isinstance(result, TrialFailure):
             tried = unit.trial, unit.variants
             failed[tried] += max(1, result.deaths) if alone else 1
             if not (result.final or failed[tried] >= ATTEMPTS or _again(result, whole)):
@@ -256,7 +267,7 @@ def _completed() -> Any:
     return as_completed()
 
 
-def _result(future: Future[Any], unit: Unit) -> Success | Failure:
+def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
     """What came back, or that the worker died of it.
 
     Raises:
@@ -265,16 +276,16 @@ def _result(future: Future[Any], unit: Unit) -> Success | Failure:
     from distributed import KilledWorker
 
     if future.status == "finished":
-        result: Success | Failure = future.result()
+        result: TrialSuccess | TrialFailure = future.result()
         return result
     if future.status != "error":
         raise RunError(f"the Dask scheduler went away, or somebody else cancelled trial {unit.trial}")
     error = future.exception()
     if isinstance(error, KilledWorker):
-        return Failure(
+        return TrialFailure(
             unit, "the worker process died; it may have run out of memory", "", deaths=error.allowed_failures + 1
         )
-    return Failure(unit, f"{type(error).__name__}: {error}", "")
+    return TrialFailure(unit, f"{type(error).__name__}: {error}", "")
 
 
 @contextlib.contextmanager

@@ -51,7 +51,7 @@ def _trials(rows: Sequence[tuple[Planned, Entry]], factors: Sequence[str]) -> pl
     for factor in factors:
         columns[factor] = factor_column([planned.setting.factors[factor] for planned, _ in rows])
     for score in SCORES:
-        columns[score] = pl.Series([entry.measured.scores.get(score) for _, entry in rows], dtype=pl.Float64)
+        columns[score] = pl.Series([entry.result.scores.get(score) for _, entry in rows], dtype=pl.Float64)
     columns["seconds"] = pl.Series([entry.seconds for _, entry in rows], dtype=pl.Float64)
     columns["scenario"] = pl.Series([texts[planned.trial] for planned, _ in rows], dtype=pl.String)
     return pl.DataFrame(columns)
@@ -73,7 +73,7 @@ def factor_column(values: Sequence[Value]) -> pl.Series:
 def _joined(entries: Iterable[Entry], name: str) -> pl.DataFrame:
     """The tables of all entries, each row with its trial and variant."""
     parts = [
-        getattr(entry.measured, name).select(
+        getattr(entry.result, name).select(
             pl.lit(entry.trial).alias("trial"), pl.lit(entry.variant).alias("variant"), pl.all()
         )
         for entry in entries

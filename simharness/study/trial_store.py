@@ -1,13 +1,18 @@
-"""The store of finished trials: a file for each trial and variant, there whole or not at all.
+"""Store of finished trials: files that are there whole or not at all.
 
 A store is a folder::
 
-    store.json              which format it is of
-    3f/3f09...b2.trial      an entry: a ZIP of trial.json, frames.parquet, people.parquet and failures.parquet
-    3f/3f09...b2.failed.json    the error of a trial that could not be measured; a later run tries it again
+    store.json                  the format of the store
+    3f/3f09...b2.detections     detections and truth of a trial: a ZIP of trial.json and detected.npz
+    7c/7c51...e0.trial          an entry: a ZIP of trial.json, frames.parquet, people.parquet, failures.parquet and
+                                estimates.npz of one variant in a trial
+    7c/7c51...e0.failed.json    the error of an entry that could not be made; a later run tries it again
 
-Files get their names by renaming, and one name always stands for the same result, so any number of processes may use a
-store at once: the worst that happens is that two do the same work.
+An entry says with which code it was scored. If that code has changed, the entry is scored again from its estimates and
+the detections of its trial, without simulation; see :class:`State`.
+
+Files get their names by renaming, and one name always stands for the same estimates, so any number of processes may use
+a store at once: the worst that happens is that two do the same work.
 """
 
 from __future__ import annotations
@@ -19,41 +24,65 @@ import re
 import time
 import zipfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from simharness.runtime.atomic_files import write_whole
-from simharness.runtime.frame_pool import RunError
-from simharness.trial.trial_result import Measured
+from simharness.runtime.errors import RunError
+from simharness.trial.identity import code
+from simharness.trial.variant_result import VariantResult
 
-FORMAT = 1
+FORMAT = 2
 _TABLES = ("frames", "people", "failures")
+_ESTIMATES, _DETECTIONS = "estimates.npz", "detected.npz"
+_PARTS = ("trial.json", *(f"{name}.parquet" for name in _TABLES), _ESTIMATES)
 _STALE = 24 * 3600.0  # seconds after which nobody is still writing a temporary file
 _ENTRY = re.compile(r"[0-9a-f]{16,}")
 
 
 class StoreError(RunError):
-    """A store that cannot be written to any more: no room, no permission. What is in it stays."""
+    """A store that cannot be written to any more: no room, no permission. Its content stays."""
+
+
+class State(Enum):
+    """State of an entry in a store."""
+
+    MISSING = "missing"  # or damaged
+    OUTDATED = "outdated"  # its scores or failures were made by other code; the estimates are good
+    CURRENT = "current"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What a store keeps of a trial and variant.
+    """Stored result of one variant in one trial.
 
     Attributes:
-        trial: :func:`simharness.trial.identity.trial_identity`.
-        variant: of the method.
-        measured: the result.
-        seconds: what it cost: the trial's time by the number of variants that were measured together.
+        trial: identity of the trial, :func:`simharness.trial.identity.trial_identity`.
+        variant: name of the variant.
+        result: scores and tables.
+        seconds: cost: the time of the trial divided by the number of variants that were measured together.
+        estimates: archive of the estimates; empty where they are not stored.
+        scores_code: digest of the code that scored them.
+        failures_code: digest of the code that found the failures.
     """
 
     trial: str
     variant: str
-    measured: Measured
+    result: VariantResult
     seconds: float
+    estimates: bytes = b""
+    scores_code: str = field(default_factory=lambda: code().scores)
+    failures_code: str = field(default_factory=lambda: code().failures)
+
+    @property
+    def state(self) -> State:
+        """Whether scores and failures were made by the code of this process."""
+        current = self.scores_code == code().scores and self.failures_code == code().failures
+        return State.CURRENT if current else State.OUTDATED
 
 
 class Store:
@@ -81,15 +110,20 @@ class Store:
             raise ValueError(f"store {self.folder}: cannot be used: {error.strerror}: {error.filename}") from None
 
     def holds(self, identity: str) -> bool:
-        """Whether there is an entry that was not found damaged so far; unlike :meth:`has`, without reading it."""
+        """Return whether an entry exists that was not found damaged so far. It is not read."""
         return identity not in self.damaged and self.file_of(identity).exists()
 
     def has(self, identity: str) -> bool:
-        """Whether there is an entry, and all of it can be read."""
+        """Return whether an entry exists and can be read in whole."""
         return self._sound(identity) is not None
 
+    def state(self, identity: str) -> State:
+        """Return whether an entry can be used as it is, scored again, or has to be made."""
+        entry = self.read(identity)
+        return State.MISSING if entry is None else entry.state
+
     def read(self, identity: str) -> Entry | None:
-        """An entry; None where there is none that can be read."""
+        """Return an entry; None where there is none that can be read."""
         content = self._sound(identity)
         if content is None:
             return None
@@ -98,6 +132,27 @@ class Store:
         except Exception:
             self.damaged.add(identity)
             return None
+
+    def read_detections(self, trial: str) -> bytes:
+        """Return the archive of a trial's detections; empty where there is none that can be read."""
+        try:
+            with zipfile.ZipFile(self._detections_path(trial)) as archive:
+                named = json.loads(archive.read("trial.json"))["trial"] == trial
+                return archive.read(_DETECTIONS) if named else b""
+        except Exception:  # missing, or damaged in any way: it is made again
+            return b""
+
+    def write_detections(self, trial: str, content: bytes) -> None:
+        """Keep the archive of a trial's detections.
+
+        Raises:
+            StoreError: as :meth:`write`.
+        """
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w") as archive:
+            archive.writestr("trial.json", json.dumps({"trial": trial}))
+            archive.writestr(_DETECTIONS, content)
+        self._write(self._detections_path(trial), buffer.getvalue())
 
     def write(self, identity: str, entry: Entry) -> None:
         """Keep an entry.
@@ -133,9 +188,13 @@ class Store:
             StoreError: as :meth:`write`.
         """
         content = other._sound(identity)
-        if content is not None:
-            self._write(self.file_of(identity), content)
-        return content is not None
+        if content is None:
+            return False
+        trial = _unpacked(content).trial
+        if not self._detections_path(trial).exists() and (detections := other.read_detections(trial)):
+            self.write_detections(trial, detections)
+        self._write(self.file_of(identity), content)
+        return True
 
     def __iter__(self) -> Iterator[str]:
         """The identities of all entries, damaged ones too, in order."""
@@ -145,6 +204,9 @@ class Store:
         """Where an entry is, or would be."""
         assert _ENTRY.fullmatch(identity), identity
         return self.folder / identity[:2] / f"{identity}.trial"
+
+    def _detections_path(self, trial: str) -> Path:
+        return self.file_of(trial).with_suffix(".detections")
 
     def _failure_path(self, identity: str) -> Path:
         return self.file_of(identity).with_suffix(".failed.json")
@@ -160,7 +222,7 @@ class Store:
             return None
         try:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
-                parts = {name: archive.read(name) for name in ("trial.json", *(f"{name}.parquet" for name in _TABLES))}
+                parts = {name: archive.read(name) for name in _PARTS}
             if json.loads(parts["trial.json"])["entry"] != identity:
                 raise ValueError("this is another entry")
         except Exception:  # of damaged bytes a parser may raise anything
@@ -223,23 +285,35 @@ def parquet(table: pl.DataFrame) -> bytes:
 
 
 def _packed(identity: str, entry: Entry) -> bytes:
-    said = {
+    about = {
         "entry": identity,
         "trial": entry.trial,
         "variant": entry.variant,
         "seconds": entry.seconds,
-        "scores": dict(entry.measured.scores),
+        "scores_code": entry.scores_code,
+        "failures_code": entry.failures_code,
+        "scores": dict(entry.result.scores),
     }
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr("trial.json", json.dumps(said, indent=1, allow_nan=False))
+        archive.writestr("trial.json", json.dumps(about, indent=1, allow_nan=False))
         for name in _TABLES:
-            archive.writestr(f"{name}.parquet", parquet(getattr(entry.measured, name)))
+            archive.writestr(f"{name}.parquet", parquet(getattr(entry.result, name)))
+        archive.writestr(_ESTIMATES, entry.estimates)
     return buffer.getvalue()
 
 
 def _unpacked(content: bytes) -> Entry:
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        said = json.loads(archive.read("trial.json"))
+        about = json.loads(archive.read("trial.json"))
         tables = {name: pl.read_parquet(archive.read(f"{name}.parquet")) for name in _TABLES}
-    return Entry(said["trial"], said["variant"], Measured(scores=said["scores"], **tables), said["seconds"])
+        estimates = archive.read(_ESTIMATES)
+    return Entry(
+        about["trial"],
+        about["variant"],
+        VariantResult(scores=about["scores"], **tables),
+        about["seconds"],
+        estimates,
+        about["scores_code"],
+        about["failures_code"],
+    )

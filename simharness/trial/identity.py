@@ -1,27 +1,26 @@
-"""What a trial is known by: a hash of everything that determines its result, and of nothing else.
+"""Identities of results: hashes of everything that determines a result, and of nothing else.
 
-A trial is a scenario at a seed; a store keeps its result for each variant of the method under an *entry*.
+A trial is a scenario at a seed. Its results are made in steps, and each step has an identity:
 
-What makes a trial anew, and all its entries:
+- detections and truth: the values of the resolved scenario with its seed, the content of the files that it names, the
+  code of the folders in :data:`SIMULATION`, the versions of :data:`PACKAGES`;
+- estimates of a variant: those, the variant, and the code of ``mvpose``; of a user-defined estimator also its place and
+  the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
+- scores: those, and the code of the folders in :data:`SCORES`;
+- failures and the stage to blame: the estimates', and the code of the folders in :data:`FAILURES`.
 
-- a value of the resolved scenario, its seed included, wherever it was said: in the file, in a base file, in a profile;
-- the content or the name of a file that the scenario names (a calibration, a recorded motion, a network), and of those
-  that are read together with it;
-- :func:`code` ``.simulation``: a byte of the code or data of ``simharness`` that films, detects and scores;
-- the versions of the packages in :data:`PACKAGES`.
+The code of a folder is the syntax trees of its modules without docstrings, comments and field descriptions, and the
+bytes of its other files. So a changed docstring changes no identity, and a changed score keeps the simulation and the
+estimates.
 
-What makes an entry anew besides: its variant, and :func:`code` ``.method``, a byte of ``mvpose``. Of a method of one's
-own also where in its file it is, and the sources that :func:`simharness.trial.stages.estimators.sources_of` finds; what
-else it runs or reads is not seen.
-
-What changes neither: names and descriptions of scenarios, detectors and studies, the folder that they lie in, which
-other variants are asked for, the number of workers, the machine; nor the code of the command line, of reports, of the
-gate, of training. So a study may be renamed, moved, or get more seeds, and what is finished stays finished. One thing
-is not seen: ``rendering.renderer = "auto"`` takes one renderer or the other by what the machine has.
+Names and descriptions of scenarios, detectors and studies, the folder of the study, other variants, the number of
+workers and the machine change nothing; nor does code of the command line, of reports and of the gate. One thing is not
+seen: ``rendering.renderer = "auto"`` takes one renderer or the other depending on the machine.
 """
 
 from __future__ import annotations
 
+import ast
 import functools
 import hashlib
 import importlib.metadata
@@ -33,94 +32,145 @@ from typing import Any
 
 import mvpose
 import simharness
-from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
 
 PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "pyrender2", "pillow")
-"""What a result also depends on: distributions whose versions count."""
+"""Distributions whose versions are part of a trial's identity."""
 
-_SIMULATION = (
-    "types",
-    "scenario/sections",  # scenarios are hashed as resolved: what reads files does not count
-    "formats",  # rigs read calibrations by it
-    "world",
-    "capture",
-    "detector",
-    "scoring",
-    "trial/stages",
-    "trial/looking.py",
-    "trial/measure.py",
-    "trial/trial_result.py",
-)
-_NOT: tuple[str, ...] = ()
-_SIZE = 16  # bytes of a digest: by chance no two of all trials ever run are the same
+SIMULATION = ("types", "scenario/sections", "formats", "world", "capture", "detector", "trial/stages")
+"""Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
+
+SCORES = ("types", "pairing", "scoring")
+"""Folders of ``simharness`` that score estimates."""
+
+FAILURES = ("types", "pairing", "failures")
+"""Folders of ``simharness`` that find failures and the stage of the method to blame."""
+
+_SIZE = 16  # bytes of a digest, so that no two trials share one by chance
 
 
 @dataclass(frozen=True)
 class Code:
-    """Digests of the code and data that make results, hexadecimal.
+    """Digests of the code that makes results, hexadecimal.
 
     Attributes:
-        simulation: of ``simharness``: what films, detects and scores.
+        simulation: of the folders :data:`SIMULATION`.
         method: of ``mvpose``.
+        scores: of the folders :data:`SCORES`.
+        failures: of the folders :data:`FAILURES`.
     """
 
     simulation: str
     method: str
+    scores: str
+    failures: str
 
 
 @functools.cache
 def code() -> Code:
-    """The code of this process, as it lies on disk when first asked for."""
-    method = Path(mvpose.__file__).parent
-    return Code(
-        _digest_of_files(Path(simharness.__file__).parent, simulation_files()),
-        _digest_of_files(method, _sources(method)),
-    )
-
-
-def simulation_files() -> list[Path]:
-    """The files of ``simharness`` that make results, code and data."""
+    """Return the digests of the code on disk at the first call in this process."""
     root = Path(simharness.__file__).parent
-    left_out = [root / name for name in _NOT]
-    files = [file for name in _SIMULATION for file in _sources(root / name)]
-    return sorted(file for file in files if not any(file.is_relative_to(each) for each in left_out))
+    parts = {name: digest_of_folders(root, folders) for name, folders in _FOLDERS.items()}
+    return Code(method=digest_of_folders(Path(mvpose.__file__).parent, ("",)), **parts)
+
+
+_FOLDERS = {"simulation": SIMULATION, "scores": SCORES, "failures": FAILURES}
+
+
+def digest_of_folders(root: Path, folders: Iterable[str]) -> str:
+    """Return the digest of all code and data in some folders of a package, hexadecimal.
+
+    Args:
+        root: folder of the package.
+        folders: folders relative to it; "" for all of it.
+    """
+    digest = hashlib.blake2b(digest_size=_SIZE)
+    files = {file for folder in folders for file in files_of(root / folder)}
+    for file in sorted(files):
+        content = _meaning(file)
+        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def files_of(folder: Path) -> Iterator[Path]:
+    """Yield the modules and data files of a folder of code, not what Python, numba and build tools put there."""
+    for file in folder.rglob("*"):
+        inside = file.relative_to(folder).parts
+        generated = any(part in _GENERATED or part.endswith(".egg-info") for part in inside)
+        packaging = len(inside) == 1 and file.suffix in (".toml", ".md")
+        if file.is_file() and not generated and not packaging and not file.name.startswith("."):
+            yield file
+
+
+_GENERATED = ("__pycache__", "build", "dist")
+
+
+def _meaning(file: Path) -> bytes:
+    """Return what a file means: the syntax tree of a module without its documentation, the bytes of any other file."""
+    content = file.read_bytes()
+    if file.suffix != ".py":
+        return content
+    return ast.dump(_Undocumented().visit(ast.parse(content))).encode()
+
+
+class _Undocumented(ast.NodeTransformer):
+    """Removes docstrings, and the descriptions of pydantic fields, from a syntax tree; comments are not in it."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        """Drop a string that is a statement by itself."""
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            return None
+        self.generic_visit(node)
+        return node
+
+    def visit_Call(self, node: ast.Call) -> ast.Call:
+        """Drop ``description=`` of ``Field(...)``."""
+        if isinstance(node.func, ast.Name) and node.func.id == "Field":
+            node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
+        self.generic_visit(node)
+        return node
 
 
 def versions() -> dict[str, str]:
-    """Version of each of :data:`PACKAGES`, "none" where it is not installed."""
+    """Return the version of each of :data:`PACKAGES`, "none" where it is not installed."""
     return {name: _version(name) for name in PACKAGES}
 
 
 def trial_identity(scenario: Scenario) -> str:
-    """The identity of a trial, 32 hexadecimal digits: of a resolved scenario at its seed, whatever its variants."""
-    said = scenario.model_dump(mode="json", exclude={"name": True, "description": True, "method": True})
-    del said["detector"]["name"]
-    said["people"]["motion"] |= {"file": "", "skeleton": ""}  # by content, below
-    said["cameras"]["file"] = said["detector"]["onnx"] = said["appearance"]["network"] = ""
+    """Return the identity of a trial's detections and truth, 32 hexadecimal digits.
+
+    Args:
+        scenario: resolved, with its seed; its variants do not count.
+    """
+    values = scenario.model_dump(mode="json", exclude={"name": True, "description": True, "method": True})
+    del values["detector"]["name"]
+    for *sections, key in FILE_KEYS:  # by content, below
+        functools.reduce(dict.__getitem__, sections, values)[key] = ""
     content = {key: _content(files) for key, files in _files(scenario).items()}
-    return _digest({"scenario": said, "files": content, "code": code().simulation, "versions": _versions()})
+    return _digest({"scenario": values, "files": content, "code": code().simulation, "versions": _versions()})
 
 
-def entry_identity(trial: str, variant: str, own: str = "") -> str:
-    """The identity of what one variant makes of a trial, 32 hexadecimal digits.
+def entry_identity(trial: str, variant: str, estimator: str = "") -> str:
+    """Return the identity of a variant's estimates in a trial, 32 hexadecimal digits.
 
     Args:
         trial: from :func:`trial_identity`.
-        variant: its name.
-        own: from :func:`own_code`, of a method of one's own; "" of a preset of :class:`mvpose.Pipeline`.
+        variant: name of the variant.
+        estimator: from :func:`estimator_code`, of a user-defined estimator; "" for a preset.
     """
-    said: dict[str, Any] = {"trial": trial, "variant": variant, "code": code().method}
-    if own:
-        said["own"] = own
-    return _digest(said)
+    values: dict[str, Any] = {"trial": trial, "variant": variant, "code": code().method}
+    if estimator:
+        values["own"] = estimator
+    return _digest(values)
 
 
-def own_code(place: str) -> str:
-    """Digest of a method of one's own: of its sources, and of its file's and its own name.
+def estimator_code(place: str) -> str:
+    """Return the digest of a user-defined estimator: its sources, and the names of its file and of itself.
 
     Args:
-        place: of section [method.estimators].
+        place: its place as section [method.estimators] gives it.
     """
     source, _, attribute = place.rpartition(":")
     sources = {name: hashlib.blake2b(text).hexdigest() for name, text in sources_of(place).items()}
@@ -128,20 +178,9 @@ def own_code(place: str) -> str:
 
 
 def _files(scenario: Scenario) -> dict[str, list[Path]]:
-    """The files that a scenario names, each with those beside it that its reader takes, too."""
-    motion = scenario.people.motion
-    named = {
-        "people.motion.file": motion.file,
-        "people.motion.skeleton": motion.skeleton,
-        "cameras.file": scenario.cameras.file,
-        "detector.onnx": scenario.detector.onnx,
-        "appearance.network": scenario.appearance.network,
-    }
+    """Return the files that a scenario names, by key, each with the files beside it that its reader also takes."""
     files = {}
-    for key, name in named.items():
-        if not name:
-            continue
-        file = Path(name)
+    for key, file in scenario.named_files.items():
         files[key] = [file]
         suffix = file.suffix.lower()
         if suffix == ".onnx":  # the card beside a network
@@ -179,25 +218,6 @@ def _digest_of_file(file: Path, size: int, changed: int) -> str:
 
 def _digest(value: Any) -> str:
     return hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=_SIZE).hexdigest()
-
-
-def _digest_of_files(root: Path, files: Iterable[Path]) -> str:
-    digest = hashlib.blake2b(digest_size=_SIZE)
-    for file in sorted(files):
-        content = file.read_bytes()
-        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
-        digest.update(content)
-    return digest.hexdigest()
-
-
-def _sources(path: Path) -> Iterator[Path]:
-    """A file, or all files of a package but what Python and numba made of them."""
-    if path.is_file():
-        yield path
-        return
-    for file in path.rglob("*"):
-        if file.is_file() and "__pycache__" not in file.parts and not file.name.startswith("."):
-            yield file
 
 
 @functools.cache

@@ -34,9 +34,8 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
 
 from __future__ import annotations
 
-import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,21 +44,24 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from mvpose.camera import Camera, Rig
+from mvpose.camera import Rig
 from mvpose.detections import Detections
-from mvpose.estimate import Estimate, Matching
-from mvpose.skeleton import COCO17, SHELF14
+from mvpose.estimate import Estimate
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_writer import dumps
+from simharness.trial.arrays import (
+    Arrays,
+    detection_arrays,
+    detections_of,
+    estimate_arrays,
+    estimates_of,
+    rig_arrays,
+    rig_of_arrays,
+    truth_arrays,
+    truth_of,
+)
 from simharness.types.truth import Truth
-
-_SKELETONS = {skeleton.name: skeleton for skeleton in (COCO17, SHELF14)}
-_OF_DETECTIONS = ("view", "keypoints", "scores", "boxes", "box_scores")
-_OF_FRAMES = ("joints", "pixels", "visibility", "boxes")
-_OF_ERRORS = ("person", "error")
-
-Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -96,9 +98,9 @@ def write_run(record: Record, folder: Path) -> None:
     """Write the files of a run into an existing folder."""
     (folder / "scenario.toml").write_text(dumps(record.scenario), encoding="utf-8")
     tables = {
-        "rig": _rig_arrays(record.rig),
-        "detections": _detection_arrays(record.detections),
-        "truth": _truth_arrays(record.time, record.truth),
+        "rig": rig_arrays(record.rig),
+        "detections": detection_arrays(record.detections),
+        "truth": truth_arrays(record.time, record.truth),
         "estimates": _estimate_arrays(record.estimates),
     }
     for name, arrays in tables.items():
@@ -121,13 +123,13 @@ def read_run(folder: Path | str) -> Record:
     if missing:
         raise ValueError(f"{folder}: not the folder of a finished run: it has no {', '.join(missing)}")
     rig, detected, true, answered = (dict(np.load(folder / name)) for name in names[1:5])
-    detections = _detections(detected)
+    detections = detections_of(detected)
     return Record(
         scenario=load(folder / "scenario.toml", folder=Path()),
-        rig=_rig(rig),
+        rig=rig_of_arrays(rig),
         time=true["time"],
         detections=detections,
-        truth=_truth(true, detected["frame"]),
+        truth=truth_of(true, detected["frame"]),
         estimates=_estimates(answered, detected["frame"], pl.read_parquet(folder / "timings.parquet")),
         scores=pl.read_parquet(folder / "scores.parquet"),
         summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")),
@@ -146,135 +148,24 @@ def timings_table(estimates: Mapping[str, Sequence[Estimate]]) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=schema, orient="row")
 
 
-def _rig_arrays(rig: Rig) -> Arrays:
-    return {
-        "names": np.array([camera.name for camera in rig]),
-        **{key: np.stack([getattr(camera, key) for camera in rig]) for key in ("K", "R", "t", "distortion")},
-        "size": np.array([camera.size for camera in rig]),
-    }
-
-
-def _rig(arrays: Arrays) -> Rig:
-    fields = (arrays[key] for key in ("K", "R", "t", "distortion", "size", "names"))
-    cameras = zip(*fields, strict=True)
-    return Rig([Camera(K, R, t, d, (int(w), int(h)), str(name)) for K, R, t, d, (w, h), name in cameras])
-
-
-def _flat(items: Iterable[object], keys: Sequence[str]) -> Arrays:
-    """Fields of one object a frame, one after the other; the objects' lengths are kept in ``frame``."""
-    items = list(items)
-    return {key: np.concatenate([getattr(item, key) for item in items]) for key in keys}
-
-
-def _frame_index(counts: Iterable[int]) -> NDArray[np.int64]:
-    counts = list(counts)
-    return np.repeat(np.arange(len(counts)), counts)
-
-
-def _parts(frame: NDArray[np.int64], frames: int) -> list[slice]:
-    """Where each frame's rows are, of rows sorted by frame."""
-    ends = np.searchsorted(frame, np.arange(frames + 1))
-    return [slice(int(start), int(end)) for start, end in itertools.pairwise(ends)]
-
-
-def _detection_arrays(detections: Sequence[Detections]) -> Arrays:
-    described = all(each.descriptors is not None for each in detections)
-    keys = (*_OF_DETECTIONS, "descriptors") if described else _OF_DETECTIONS
-    return {
-        "frames": np.array(len(detections)),
-        "skeleton": np.array(detections[0].skeleton.name),
-        "frame": _frame_index(map(len, detections)),
-        **_flat(detections, keys),
-    }
-
-
-def _detections(arrays: Arrays) -> tuple[Detections, ...]:
-    skeleton = _SKELETONS[str(arrays["skeleton"])]
-    return tuple(
-        Detections(
-            arrays["view"][part],
-            arrays["keypoints"][part],
-            arrays["scores"][part],
-            arrays["boxes"][part],
-            arrays["box_scores"][part],
-            skeleton,
-            arrays["descriptors"][part] if "descriptors" in arrays else None,
-        )
-        for part in _parts(arrays["frame"], int(arrays["frames"]))
-    )
-
-
-def _truth_arrays(time: NDArray[np.float64], truth: Sequence[Truth]) -> Arrays:
-    stacked = {key: np.stack([getattr(each, key) for each in truth]) for key in _OF_FRAMES}
-    return {"time": time, **stacked, **_flat(truth, _OF_ERRORS)}
-
-
-def _truth(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
-    return tuple(
-        Truth(
-            **{key: arrays[key][index] for key in _OF_FRAMES},
-            **{key: arrays[key][part] for key in _OF_ERRORS},
-        )
-        for index, part in enumerate(_parts(frame, len(arrays["time"])))
-    )
-
-
 def _estimate_arrays(estimates: Mapping[str, Sequence[Estimate]]) -> Arrays:
     arrays: Arrays = {"variants": np.array(list(estimates))}
-    for variant, answers in estimates.items():
-        certain = all(answer.covariance is not None for answer in answers)
-        keys = ("joints", "scores", "covariance") if certain else ("joints", "scores")
-        matchings = [answer.matching for answer in answers]
-        fields = {
-            "frame": _frame_index(map(len, answers)),
-            **_flat(answers, keys),
-            **_flat(matchings, ("labels",)),
-            "iterations": np.array([each.iterations for each in matchings]),
-            "residuals": np.array([each.residuals for each in matchings], float).reshape(-1, 2),
-            "objective": np.array([each.objective for each in matchings], float),
-            "converged": np.array([each.converged for each in matchings], bool),
-        }
-        arrays |= {f"{variant}/{key}": value for key, value in fields.items()}
+    for variant, each in estimates.items():
+        arrays |= {f"{variant}/{key}": value for key, value in estimate_arrays(each).items() if key != "label_counts"}
     return arrays
-
-
-_OF_MATCHING = ("labels", "iterations", "residuals", "objective", "converged")
-_OF_ESTIMATES = ("frame", "joints", "scores", "covariance", *_OF_MATCHING)
 
 
 def _estimates(arrays: Arrays, detected: NDArray[np.int64], timings: pl.DataFrame) -> dict[str, tuple[Estimate, ...]]:
     estimates = {}
     for variant in map(str, arrays["variants"]):
-        fields = {key: arrays.get(f"{variant}/{key}") for key in _OF_ESTIMATES}
-        stages = _stages(timings.filter(pl.col("variant") == variant))
-        estimates[variant] = tuple(_answers(fields, detected, stages))
+        fields = {key.removeprefix(f"{variant}/"): arrays[key] for key in arrays if key.startswith(f"{variant}/")}
+        seconds = _seconds_by_frame(timings.filter(pl.col("variant") == variant))
+        estimates[variant] = tuple(estimates_of(fields, detected, seconds))
     return estimates
 
 
-def _answers(
-    fields: Mapping[str, Any], detected: NDArray[np.int64], stages: list[dict[str, float]]
-) -> Iterator[Estimate]:
-    frames = len(fields["iterations"])
-    parts = zip(_parts(fields["frame"], frames), _parts(detected, frames), strict=True)
-    for index, (mine, seen) in enumerate(parts):
-        primal, dual = fields["residuals"][index]
-        yield Estimate(
-            joints=fields["joints"][mine],
-            scores=fields["scores"][mine],
-            covariance=None if fields["covariance"] is None else fields["covariance"][mine],
-            matching=Matching(
-                labels=fields["labels"][seen],
-                iterations=int(fields["iterations"][index]),
-                residuals=(float(primal), float(dual)),
-                objective=float(fields["objective"][index]),
-                converged=bool(fields["converged"][index]),
-            ),
-            timings=stages[index] if index < len(stages) else {},
-        )
-
-
-def _stages(timings: pl.DataFrame) -> list[dict[str, float]]:
-    """Of one variant: seconds by stage, one for each frame."""
+def _seconds_by_frame(timings: pl.DataFrame) -> list[dict[str, float]]:
+    """Return seconds by stage of one variant, for each frame."""
     stages: dict[int, dict[str, float]] = {}
     for frame, stage, seconds in timings.select("frame", "stage", "seconds").iter_rows():
         stages.setdefault(frame, {})[stage] = seconds

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
+from simharness.pairing.pairing import pair
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scoring.pose import pair
-from simharness.trial.looking import look
-from simharness.trial.stages.build import Trial, prepare
-from simharness.trial.stages.frame_tasks import Estimating
+from simharness.trial.run_trial import run_trial
+from simharness.trial.stages.build_trial import Trial
 from simharness.types.truth import Truth
 
 
@@ -51,15 +50,8 @@ def replay(scenario: Scenario, variant: str) -> Replay:
     Raises:
         ValueError: the scenario cannot be built any more: a file that it names is gone.
     """
-    method = scenario.method.model_copy(update={"variants": (variant,)})
-    trial = prepare(scenario.model_copy(update={"method": method}))
-    sequence, answers = look(trial)
-    estimates = Estimating(trial.shots.believed, tuple(answers), trial.pipelines)(range(len(answers)))
+    result = run_trial(scenario, variants=[variant], until="estimate")
+    recording = result.recording
     return Replay(
-        trial,
-        variant,
-        sequence.time,
-        tuple(each.truth for each in answers),
-        tuple(each.detections for each in answers),
-        tuple(estimates[variant]),
+        result.trial, variant, recording.time, recording.truth, recording.detections, result.estimates[variant]
     )

@@ -36,9 +36,9 @@ from mvpose import Detections, Estimate, Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
 from mvpose.pipeline import Estimator
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.sections.scenario import Method
-from simharness.scenario.sections.variants import wrong_variants
+from simharness.scenario.sections.method import wrong_variants
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 

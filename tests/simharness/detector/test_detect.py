@@ -12,11 +12,11 @@ from simharness.detector.detect import detect
 from simharness.scenario.load import load
 from simharness.scenario.profiles import SHIPPED, read_profile
 from simharness.scenario.sections.detector import Detector
-from simharness.trial.stages.build import prepare
-from simharness.trial.stages.frame_tasks import Filming
+from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.capture import CaptureFrames
 from simharness.types.truth import MISS_FROM, KeypointError
-from simharness.types.visibility import Visibility
-from simharness.world.scene.simulation import simulate
+from simharness.types.views import Visibility
+from simharness.world.scene.playback import simulate
 
 
 def run(where, *, seed=3, **sections):
@@ -53,15 +53,15 @@ def test_what_a_perfect_detector_sees_is_reconstructed_to_under_a_millimetre():
         "scenarios/quickstart.toml",
         overrides=["detector.profile=perfect", "duration=1.0", "rendering.renderer=rays"],
     )
-    trial = prepare(scenario)
+    trial = build_trial(scenario)
     sequence = simulate(trial.scene)
-    views = Filming(scenario, trial.scene, trial.shots, frozenset())(range(scenario.frames))
-    frames = detect(sequence, views, trial.shots.believed, scenario.detector, seed=scenario.seed)
+    views = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset())(range(scenario.frames))
+    frames = detect(sequence, views, trial.exposures.believed_rig, scenario.detector, seed=scenario.seed)
     # The prior of 3DPS has opinions on bone lengths, whatever the detections say.
     for variant, worst, usual in (("fast", 1e-3, 1e-3), ("no-3dps", 1e-3, 1e-3), ("full", 3e-3, 1e-3)):
         errors = []
         for t, frame in enumerate(frames):
-            estimate = Pipeline.preset(variant).estimate(trial.shots.believed, frame.detections)
+            estimate = Pipeline.preset(variant).estimate(trial.exposures.believed_rig, frame.detections)
             away = np.linalg.norm(estimate.joints[:, None] - sequence.joints[t], axis=-1)
             nearest = np.nanmean(away, axis=-1).argmin(axis=1)
             assert sorted(nearest) == [0, 1, 2, 3]

@@ -6,7 +6,7 @@ import pytest
 
 from simharness.export.export import Export, export
 from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
-from simharness.trial.stages.build import prepare
+from simharness.trial.stages.build_trial import build_trial
 
 
 def tiny(**sections) -> Scenario:
@@ -22,7 +22,7 @@ def tiny(**sections) -> Scenario:
 
 @pytest.fixture(scope="session")
 def trial():
-    return prepare(tiny())
+    return build_trial(tiny())
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from trials import simulated
 
 from mvpose import COCO17
 from mvpose.skeleton import PANOPTIC19
@@ -19,11 +20,10 @@ from simharness.formats.calibration.panoptic import read_calibration
 from simharness.formats.openpose import read_frame
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras, Faults, People, Room
-from simharness.trial.looking import look
 from simharness.trial.provenance import PROVENANCE
-from simharness.trial.stages.build import prepare
-from simharness.trial.stages.frame_tasks import studio_of
-from simharness.types.visibility import Visibility
+from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.capture import picture_source_of
+from simharness.types.views import Visibility
 from simharness.world.scene.playback import Playback
 
 SHARED = [joint for joint in PANOPTIC19.joints if joint in COCO17.joints]
@@ -37,7 +37,7 @@ NEIGHBOURS = [(d, e) for d in (-1, 0, 1) for e in (-1, 0, 1)]
 @pytest.fixture(scope="module")
 def known(trial):
     """The truth and the detections, made once more."""
-    return look(trial)
+    return simulated(trial.scenario)
 
 
 def bodies(folder: Path, frame: int) -> dict[int, np.ndarray]:
@@ -87,7 +87,7 @@ def test_joints_are_where_the_cameras_see_them(folder, known):
 def test_what_the_method_believes_lies_beside(folder, trial):
     believed = read_calibration(folder / "calibration_believed_tiny.json")
     true = read_calibration(folder / "calibration_tiny.json")
-    for one, told, other in zip(believed, trial.shots.believed, true, strict=True):
+    for one, told, other in zip(believed, trial.exposures.believed_rig, true, strict=True):
         np.testing.assert_allclose(one.P, told.P, atol=1e-9)
         assert np.degrees(np.arccos((np.trace(one.R @ other.R.T) - 1) / 2)) > 0.2
 
@@ -138,16 +138,16 @@ def test_times_go_by_the_frames(folder):
 def test_pictures_show_the_people_where_the_joints_are(folder, trial, known):
     """Each has its camera's size; what is seen of a person at his visible joints is he; what changes is people."""
     rig = read_calibration(folder / "calibration_tiny.json")
-    studio = studio_of(trial.scenario, Playback(trial.scene))
+    picture_source = picture_source_of(trial.scenario, Playback(trial.scene))
     assert len(list(folder.glob("hdImgs/*/*.jpg"))) == 9
     compared = 0
     for view, camera in enumerate(rig):
         for frame in range(3):
             shown = picture(folder, camera.name, frame)
             assert shown.shape == (240, 320, 3)
-            drawn = studio.picture(trial.shots, frame, view, finer=2)[..., ::-1].astype(int)
+            drawn = picture_source.picture(trial.exposures, frame, view, finer=2)[..., ::-1].astype(int)
             assert np.abs(shown - drawn).mean() < 2  # of this frame and camera, but for the compression
-            ids = studio.image(trial.shots, frame, view).ids
+            ids = picture_source.image(trial.exposures, frame, view).ids
             for person, joints in bodies(folder, frame).items():
                 visible = known[1][frame].truth.visibility[view, person][OF_17] == Visibility.VISIBLE
                 column, row = np.rint(camera.project(in_metres(joints))[OF_19][visible]).astype(int).T
@@ -227,7 +227,7 @@ def test_one_frame_of_many_keeps_its_number(trial, folder, tmp_path):
 
 
 def test_a_rig_that_is_right_has_one_calibration(scenario, tmp_path):
-    made, said = exported(prepare(scenario(faults=Faults())), tmp_path / "tiny", pictures=False)
+    made, said = exported(build_trial(scenario(faults=Faults())), tmp_path / "tiny", pictures=False)
     assert said["files"]["calibration_believed"] is None
     assert [file.name for file in made.glob("calibration*")] == ["calibration_tiny.json"]
     assert said["cameras"][0]["clock"] == {"mean": 0.0, "deviation": 0.0}
@@ -237,7 +237,7 @@ def test_a_rig_that_is_right_has_one_calibration(scenario, tmp_path):
 def test_swapped_and_dead_cameras_and_clocks_are_named(scenario, tmp_path):
     """The calibration is of the camera that takes a view's pictures, whoever is said to."""
     faults = Faults(swapped=((0, 1),), dead=(2,), clock_offset=0.05, rotation_drift=60.0)
-    trial = prepare(scenario(faults=faults))
+    trial = build_trial(scenario(faults=faults))
     made, said = exported(trial, tmp_path / "tiny")
     true, told = (read_calibration(made / f"calibration_{kind}tiny.json") for kind in ("", "believed_"))
     np.testing.assert_allclose(true[0].P, told[1].P)
@@ -248,14 +248,14 @@ def test_swapped_and_dead_cameras_and_clocks_are_named(scenario, tmp_path):
     assert picture(made, "00_00", 1).any()
     assert said["cameras"][2]["clock"] is None
     for view in (0, 1):
-        late = trial.shots.time[0, view] - trial.scene.time[0]
+        late = trial.exposures.time[0, view] - trial.scene.time[0]
         assert abs(late) > 0.001
         assert said["cameras"][view]["clock"]["mean"] == pytest.approx(late, abs=1e-6)
         assert np.linalg.norm(said["cameras"][view]["drift"]["turn"]) > 0
 
 
 def test_pictures_that_repeat_are_named(scenario, tmp_path):
-    made, said = exported(prepare(scenario(faults=Faults(frozen=1.0))), tmp_path / "tiny")
+    made, said = exported(build_trial(scenario(faults=Faults(frozen=1.0))), tmp_path / "tiny")
     for camera in said["cameras"]:
         assert camera["repeated"] == [[1, 0], [2, 0]]
         assert camera["lost"] == []
@@ -266,7 +266,7 @@ def test_pictures_that_repeat_are_named(scenario, tmp_path):
 
 def test_cameras_of_panoptic_keep_their_names(scenario, tmp_path):
     """Loaders list them by number: a twin of CMU0 has HD cameras 3, 6, 12, 13 and 23."""
-    trial = prepare(scenario(cameras=Cameras(layout="preset", preset="cmu0"), room=Room(walls=False)))
+    trial = build_trial(scenario(cameras=Cameras(layout="preset", preset="cmu0"), room=Room(walls=False)))
     made, _ = exported(trial, tmp_path / "tiny", pictures=False)
     entries = json.loads((made / "calibration_tiny.json").read_text())["cameras"]
     assert {(entry["panel"], entry["node"]) for entry in entries} == {(0, node) for node in (3, 6, 12, 13, 23)}
@@ -274,7 +274,7 @@ def test_cameras_of_panoptic_keep_their_names(scenario, tmp_path):
 
 
 def test_an_empty_room_is_a_sequence_too(scenario, tmp_path):
-    made, said = exported(prepare(scenario(people=People(count=0))), tmp_path / "tiny", pictures=False)
+    made, said = exported(build_trial(scenario(people=People(count=0))), tmp_path / "tiny", pictures=False)
     assert bodies(made, 0) == {}
     assert said["people"] == []
 
@@ -303,7 +303,7 @@ class TestWholeOrNotAtAll:
             done.extend(tmp_path.rglob("body3DScene*.json"))
             raise OSError("the disk is full")
 
-        monkeypatch.setattr("simharness.capture.picture.Studio.picture", fail)
+        monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", fail)
         with pytest.raises(OSError, match="disk is full"):
             export(trial, Export(tmp_path / "tiny"))
         assert done
@@ -312,7 +312,7 @@ class TestWholeOrNotAtAll:
     def test_an_error_leaves_an_earlier_export_as_it_was(self, trial, tmp_path, monkeypatch):
         made, _ = exported(trial, tmp_path / "tiny", pictures=False)
         before = {file: file.read_bytes() for file in made.rglob("*.json")}
-        monkeypatch.setattr("simharness.capture.picture.Studio.picture", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             export(trial, Export(made))
         assert {file: file.read_bytes() for file in made.rglob("*.json")} == before
@@ -339,11 +339,11 @@ class TestWholeOrNotAtAll:
         code = (
             "import os, pathlib, sys\n"
             "from conftest import tiny\n"
-            "from simharness.trial.stages.build import prepare\n"
+            "from simharness.trial.stages.build_trial import build_trial\n"
             "from simharness.export.export import Export, export\n"
-            "from simharness.capture.picture import Studio\n"
-            "Studio.picture = lambda *_, **__: os._exit(9)\n"
-            "export(prepare(tiny()), Export(pathlib.Path(sys.argv[1])))\n"
+            "from simharness.capture.picture import PictureSource\n"
+            "PictureSource.picture = lambda *_, **__: os._exit(9)\n"
+            "export(build_trial(tiny()), Export(pathlib.Path(sys.argv[1])))\n"
         )
         folder = tmp_path / "out" / "tiny"
         environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}

@@ -6,16 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 
 VALUES = st.none() | st.floats(-1e6, 1e6)
-TRIALS = st.builds(Trial, st.text(min_size=1), st.integers(0, 99), st.sampled_from(["full", "fast"]))
+TRIALS = st.builds(TrialKey, st.text(min_size=1), st.integers(0, 99), st.sampled_from(["full", "fast"]))
 SCORES = st.dictionaries(TRIALS, st.fixed_dictionaries(dict.fromkeys(KEPT, VALUES)), max_size=5)
 
 
 def measurement(**scores):
     every = dict.fromkeys(KEPT, 1.0) | scores
-    return Measurement("ci", "0123456789", "1.0", {Trial("b", 2, "full"): every, Trial("a", 10, "full"): every})
+    return Measurement("ci", "0123456789", "1.0", {TrialKey("b", 2, "full"): every, TrialKey("a", 10, "full"): every})
 
 
 @given(scores=SCORES)
@@ -33,7 +33,7 @@ def test_a_trial_is_a_line_and_one_that_changes_changes_one_line(tmp_path):
     before = path.read_text().splitlines()
     assert len(json.loads("\n".join(before))["trials"]) == 2
     changed = measurement()
-    changed.scores[Trial("b", 2, "full")]["pcp"] = 3.25
+    changed.scores[TrialKey("b", 2, "full")]["pcp"] = 3.25
     write_baseline(changed, path)
     after = path.read_text().splitlines()
     assert [old == new for old, new in zip(before, after, strict=True)].count(False) == 1
@@ -48,7 +48,7 @@ def test_lines_are_in_order_whatever_the_order_of_the_trials(tmp_path):
 
 
 def test_what_is_no_number_is_none_and_digits_beyond_all_tolerances_go():
-    scores = measurement(pcp=float("nan"), recall=97.123456).scores[Trial("a", 10, "full")]
+    scores = measurement(pcp=float("nan"), recall=97.123456).scores[TrialKey("a", 10, "full")]
     assert (scores["pcp"], scores["recall"]) == (None, 97.1235)
 
 

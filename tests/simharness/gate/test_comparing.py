@@ -6,7 +6,7 @@ import pytest
 
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.compare import compare
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 
@@ -21,7 +21,7 @@ def measured(change=lambda trial: {}, *, cases=CASES, seeds=12, variants=("fast"
     for case in cases:
         for seed in range(seeds):
             for variant in variants:
-                trial = Trial(case, seed, variant)
+                trial = TrialKey(case, seed, variant)
                 own = np.random.default_rng([len(case), cases.index(case), seed, len(variant)]).normal(0, 1)
                 added = change(trial)
                 scores[trial] = {
@@ -88,7 +88,7 @@ def test_one_case_alone_is_seen():
     """Eleven others drown it: the whole suite loses less than its tolerance."""
     worse = regressions(lambda trial: {"pcp": -6.0 - 0.1 * trial.seed} if trial[::2] == ("case07", "full") else {})
     assert named(worse) == {("pcp", "full", "case07")}
-    assert worse[0].worst == Trial("case07", 11, "full")
+    assert worse[0].worst == TrialKey("case07", 11, "full")
     assert worse[0].difference == pytest.approx(-6.55, abs=1e-3)
     assert worse[0].p < 0.01
 
@@ -136,7 +136,7 @@ def flipped(signs, size):
 
     def measurement(change):
         scores = {
-            Trial(case, seed, "fast"): dict.fromkeys(USUAL) | {"pcp": 80.0, TIME: 1.0} | change(index, seed, sign)
+            TrialKey(case, seed, "fast"): dict.fromkeys(USUAL) | {"pcp": 80.0, TIME: 1.0} | change(index, seed, sign)
             for index, case in enumerate(CASES[:3])
             for seed, sign in enumerate(signs)
         }
@@ -166,7 +166,7 @@ def test_over_the_whole_suite_a_seed_is_a_pair_and_its_cases_weigh_alike():
     assert (whole.score, whole.n) == ("pcp", 12)
     assert whole.difference == pytest.approx(-5.5 * 5.0, abs=1e-3)
     assert whole.after - whole.before == pytest.approx(whole.difference, abs=1e-9)
-    assert whole.worst == Trial(CASES[10], 11, "full")
+    assert whole.worst == TrialKey(CASES[10], 11, "full")
 
 
 def test_a_score_that_one_side_lacks_in_a_case_is_not_made_up_by_the_others():

@@ -11,7 +11,7 @@ from simharness.gate.compare import compare
 from simharness.gate.gate_result import Check, Failed
 from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
-from simharness.gate.trial_command import Trial
+from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 
@@ -29,7 +29,7 @@ def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")
         "ghosts": 0.3,
         TIME: 1.0,
     }
-    trials = [Trial(case, seed, variant) for case in cases for seed in range(seeds) for variant in ("full", "fast")]
+    trials = [TrialKey(case, seed, variant) for case in cases for seed in range(seeds) for variant in ("full", "fast")]
     before = Measurement("ci", "0" * 10, "1", {trial: dict(usual) for trial in trials})
     after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
     comparison = compare(before, Measurement("ci", "0" * 10, "1", after), Gate())

@@ -9,7 +9,7 @@ from simharness.gate import suite
 from simharness.gate.baseline import KEPT, TIME
 from simharness.gate.reference_kernel import time_reference
 from simharness.gate.suite import fingerprint, run_suite
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.gate.trial_command import Trial, command_of, name_of, overrides, scenes_of
+from simharness.gate.trial_command import TrialKey, command_of, name_of, overrides, scenes_of
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 
@@ -44,7 +44,7 @@ def test_the_command_of_a_trial_runs_its_scenario(study):
         if seed != study.seeds[-1]:
             continue
         program, run, path, *words = shlex.split(
-            command_of(study, Trial(name_of(setting, study), seed, study.variants[0]))
+            command_of(study, TrialKey(name_of(setting, study), seed, study.variants[0]))
         )
         assert (program, run, words[-2:]) == ("simharness", "run", ["--seed", str(seed)])
         assert set(words[:-2:2]) == {"--set"}
@@ -67,6 +67,6 @@ def test_names_of_settings_differ(study):
 
 
 def test_a_trial_of_another_study_has_no_command(study):
-    for trial in (Trial("nobody", study.seeds[0], "full"), Trial(name_of(study.settings[0], study), 99, "full")):
+    for trial in (TrialKey("nobody", study.seeds[0], "full"), TrialKey(name_of(study.settings[0], study), 99, "full")):
         with pytest.raises(ValueError, match="has no trial"):
             command_of(study, trial)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import threadpoolctl
 
-from simharness.runtime.frame_pool import RunError, map_frames
+from simharness.runtime.errors import RunError
+from simharness.runtime.frame_pool import map_frames
 
 
 def square(frames: range) -> list[int]:

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trials import measured, simulated
 
 from simharness.detector.detect import Detected
 from simharness.scenario.study_definition import Setting, Study, load_study
-from simharness.trial.looking import look
-from simharness.trial.measure import measure
 from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.types.sequence import Sequence
 from simharness.world.rigs.faults import schedule_exposures
@@ -81,7 +80,7 @@ class Seen:
 def see(chosen: Setting, *, seed: int = 0) -> Seen:
     """A second of a setting."""
     trial = build_trial(chosen.scenario.model_copy(update={"seed": seed, "duration": 1.0, "rate": 6.0}))
-    sequence, detected = look(trial)
+    sequence, detected = simulated(trial.scenario)
     seen = Seen(trial, sequence, detected)
     assert len(seen.real) > 20, "hardly anybody was seen"
     return seen
@@ -159,7 +158,7 @@ class TestSettings:
     @pytest.mark.slow
     def test_the_dial_of_stress_goes_from_harmless_to_broken(self):
         settings = shipped("stress").settings
-        low, high = (measure(each.scenario, ["fast"], blame=False)["fast"].scores["pcp"] for each in settings[::5])
+        low, high = (measured(each.scenario, ["fast"], blame=False)["fast"].scores["pcp"] for each in settings[::5])
         assert low is not None
         assert low > 90
         assert high is not None

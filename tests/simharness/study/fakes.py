@@ -20,7 +20,8 @@ import polars as pl
 
 from simharness.scenario.study_definition import Study, load_study
 from simharness.scoring.catalogue import SCORES
-from simharness.trial.trial_result import Measured
+from simharness.study.measure import TrialOutput
+from simharness.trial.variant_result import VariantResult
 
 ALWAYS = 99
 PATIENCE = 120.0  # seconds that a call waits for others, or for its end by them
@@ -47,7 +48,7 @@ class Fake:
     stuck: int = ALWAYS
     together: int = 0
 
-    def __call__(self, scenario, variants):
+    def __call__(self, scenario, variants, stored=None):
         self._note(f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}")
         what, times = self.harm.get(scenario.seed, ("", 0))
         begun = sum(each.startswith(f"{scenario.seed} ") for each in called(self.calls))
@@ -61,10 +62,8 @@ class Fake:
         if scenario.seed >= self.stuck:
             time.sleep(FOR_EVER)
         time.sleep(PATIENCE if self.together and begun == 1 else self.seconds)
-        return {
-            variant: made_up(scenario, variant, rows=3 if scenario.seed < self.large else 130_000)
-            for variant in variants
-        }
+        rows = 3 if scenario.seed < self.large else 130_000
+        return TrialOutput({variant: made_up(scenario, variant, rows=rows) for variant in variants})
 
     def _note(self, call):
         """Leave the file of a call, all at once: others read the folder meanwhile."""
@@ -81,7 +80,7 @@ def made_up(scenario, variant, *, rows=3):
     frames = pl.DataFrame({"frame": np.arange(rows), "noise": np.random.default_rng(int(number)).random(rows)})
     people = pl.DataFrame({"frame": [0], "person": [0], "error_mm": [number]})
     failures = pl.DataFrame({"frame": [0], "kind": ["ghost"], "joints": [["nose"]]})
-    return Measured({key: number + place for place, key in enumerate(SCORES)}, frames, people, failures)
+    return VariantResult({key: number + place for place, key in enumerate(SCORES)}, frames, people, failures)
 
 
 def called(folder: Path) -> list[str]:

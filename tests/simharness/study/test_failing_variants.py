@@ -10,7 +10,7 @@ import pytest
 from fakes import made_up, study_of
 
 from simharness.gate import suite
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.study.plan import plan
 from simharness.study.runner import run_study
 from simharness.study.scheduler import ATTEMPTS, Failure, Success, Unit, work_off

@@ -8,11 +8,11 @@ import pytest
 from mvpose import Rig
 from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
 from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks
-from simharness.trial.stages.build import prepare
-from simharness.trial.stages.frame_tasks import Filming
-from simharness.types.visibility import Visibility
-from simharness.world.rigs.faults import shoot
-from simharness.world.scene.simulation import simulate
+from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.capture import CaptureFrames
+from simharness.types.views import Visibility
+from simharness.world.rigs.faults import schedule_exposures
+from simharness.world.scene.playback import simulate
 
 ALL_FAULTS = Faults(
     focal=0.01, center=3.0, rotation=0.3, translation=0.01, rotation_drift=0.5, translation_drift=0.02,
@@ -32,13 +32,18 @@ def small(**sections) -> Scenario:
 class Ready:
     def __init__(self, scenario):
         self.scenario = scenario
-        trial = prepare(scenario)
-        self.scene, self.shots = trial.scene, trial.shots
+        trial = build_trial(scenario)
+        self.scene, self.exposures = trial.scene, trial.exposures
         self.sequence = simulate(trial.scene)
-        self.views = Filming(scenario, trial.scene, trial.shots, frozenset())(range(scenario.frames))
+        self.views = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset())(range(scenario.frames))
 
     def audit(self, **changed):
-        parts = {"scene": self.scene, "shots": self.shots, "sequence": self.sequence, "views": self.views} | changed
+        parts = {
+            "scene": self.scene,
+            "exposures": self.exposures,
+            "sequence": self.sequence,
+            "views": self.views,
+        } | changed
         audit(self.scenario, **parts)
 
 
@@ -98,10 +103,10 @@ def test_joints_called_visible_that_are_hidden_are_found(ready):
 )
 def test_clocks_that_are_not_as_asked_are_found(ready, done, asked, said):
     time = np.arange(30) / 10.0
-    shots = shoot(ready.shots.true, done, time, seed=0)
-    check_clocks(done, shots, time)
+    exposures = schedule_exposures(ready.exposures.true_cameras, done, time, seed=0)
+    check_clocks(done, exposures, time)
     with pytest.raises(AuditError, match=said):
-        check_clocks(asked, shots, time)
+        check_clocks(asked, exposures, time)
 
 
 @pytest.mark.parametrize(
@@ -117,12 +122,12 @@ def test_clocks_that_are_not_as_asked_are_found(ready, done, asked, said):
     ],
 )
 def test_a_calibration_that_is_not_as_asked_is_found(ready, done, said):
-    shots = shoot(ready.shots.true, done, np.arange(30) / 10.0, seed=0)
-    check_calibration(done, shots)
+    exposures = schedule_exposures(ready.exposures.true_cameras, done, np.arange(30) / 10.0, seed=0)
+    check_calibration(done, exposures)
     with pytest.raises(
         AuditError, match=f"calibration: camera .* is off in its .*{said if said != 'position' else ''}"
     ):
-        check_calibration(Faults(), shots)
+        check_calibration(Faults(), exposures)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
@@ -131,10 +136,10 @@ def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, sh
     time = np.arange(3) / 10.0
     faults = Faults(focal=share)
     for seed in range(150):
-        check_calibration(faults, shoot(ready.shots.true, faults, time, seed=seed))
-    shots = shoot(ready.shots.true, Faults(), time, seed=0)
+        check_calibration(faults, schedule_exposures(ready.exposures.true_cameras, faults, time, seed=seed))
+    exposures = schedule_exposures(ready.exposures.true_cameras, Faults(), time, seed=0)
     for length in np.exp([7 * share, -7 * share]):
         scale = np.diag([length, length, 1.0])
-        wide = Rig([replace(camera, K=camera.K @ scale) for camera in shots.believed])
+        wide = Rig([replace(camera, K=camera.K @ scale) for camera in exposures.believed_rig])
         with pytest.raises(AuditError, match="focal length"):
-            check_calibration(faults, replace(shots, believed=wide))
+            check_calibration(faults, replace(exposures, believed_rig=wide))

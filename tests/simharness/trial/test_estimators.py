@@ -11,6 +11,8 @@ import numpy as np
 import polars as pl
 import pytest
 from moments import crowd, moment, ring
+from trials import measured as measure
+from trials import simulated
 
 from mvpose import Pipeline
 from mvpose.pipeline import PRESETS
@@ -18,18 +20,17 @@ from simharness.report.run.result_folder import run
 from simharness.report.study.digest import write_digest
 from simharness.report.study.page import write_report
 from simharness.report.study.replay import replay
-from simharness.runtime.frame_pool import RunError, map_frames
+from simharness.runtime.errors import RunError
+from simharness.runtime.frame_pool import map_frames
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Estimators, Method
 from simharness.scenario.study_definition import load_study
 from simharness.study.runner import run_study
 from simharness.testing import assert_robust
-from simharness.trial.looking import look
-from simharness.trial.measure import measure
 from simharness.trial.run_folder import read_run
-from simharness.trial.stages.build import prepare
+from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.estimation import EstimateFrames
 from simharness.trial.stages.estimators import OwnEstimator, estimators_of, load_estimator, sources_of
-from simharness.trial.stages.frame_tasks import Estimating
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
 MINE = """
@@ -255,11 +256,11 @@ class TestAnswers:
             "        assert len(detections)\n        return Estimate.of_joints([])\n"
         )
         path.with_name("late.py").write_text(late)
-        trial = prepare(load(path))
-        _, detected = look(trial)
+        trial = build_trial(load(path))
+        _, detected = simulated(trial.scenario)
         empty = detected[1].detections
         detected[1] = type(detected[1])(**{**vars(detected[1]), "detections": type(empty).empty()})
-        estimating = Estimating(trial.shots.believed, tuple(detected), trial.pipelines)
+        estimating = EstimateFrames(trial.exposures.believed_rig, tuple(detected), trial.pipelines)
         for workers in (1, 2):
             with pytest.raises(RunError, match=r"^frame 1: late \(.*late\.py:Late\): AssertionError.*line 6"):
                 map_frames(estimating, range(2), workers=workers)
@@ -308,9 +309,9 @@ class TestInTrials:
 
     def test_heat_maps_are_given_where_there_are_any(self, scenario):
         path = scenario('detector.heatmaps.size = "64x48"\n[method.estimators]\nown = "mine.py:Mine"', "own")
-        trial = prepare(load(path))
-        _, detected = look(trial)
-        estimating = Estimating(trial.shots.believed, tuple(detected), trial.pipelines)
+        trial = build_trial(load(path))
+        _, detected = simulated(trial.scenario)
+        estimating = EstimateFrames(trial.exposures.believed_rig, tuple(detected), trial.pipelines)
         assert estimating.seen(0, "own").likelihoods is not None
         assert estimating.seen(0, "fast").likelihoods is None
 

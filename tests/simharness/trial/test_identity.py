@@ -16,7 +16,7 @@ from simharness.scenario.sections.section import Section
 from simharness.scenario.study_definition import load_study
 from simharness.study.plan import plan
 from simharness.trial import identity
-from simharness.trial.identity import entry_identity, own_code, simulation_files, trial_identity
+from simharness.trial.identity import entry_identity, estimator_code, simulation_files, trial_identity
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 
@@ -103,9 +103,9 @@ def test_a_method_of_ones_own_counts_by_its_content(tmp_path, monkeypatch):
         (tmp_path / folder / "mine.py").write_text(text)
         places[folder] = f"{tmp_path / folder / 'mine.py'}:Mine"
     (tmp_path / "helped" / "helper.py").write_text("3")
-    digests = {folder: own_code(place) for folder, place in places.items()}
+    digests = {folder: estimator_code(place) for folder, place in places.items()}
     assert digests["one"] == digests["same"]
-    digests["name"] = own_code(places["one"] + "2")
+    digests["name"] = estimator_code(places["one"] + "2")
     assert len(set(digests.values())) == 4
 
     def identities(folder):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from onnx_graphs import dots, mean_color
+from trials import simulated as detected_frames
 
 from simharness.report.run.result_folder import run
 from simharness.scenario.load import ScenarioError, load
-from simharness.trial.looking import look
 from simharness.trial.run_folder import read_run
-from simharness.trial.stages.build import prepare
+from simharness.trial.stages.build_trial import build_trial
 
 BODY = """
 name = "tiny"
@@ -61,9 +61,9 @@ def test_the_result_does_not_depend_on_the_workers(scenario, tmp_path):
 
 def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
     dots(tmp_path / "head.onnx")
-    simulated = look(prepare(load(scenario(""), overrides=['method.variants=["full"]'])))[1]
+    simulated = detected_frames(load(scenario(""), overrides=['method.variants=["full"]']))[1]
     changed = ['method.variants=["full"]', f"detector.onnx={tmp_path / 'head.onnx'}", "detector.heatmaps.size=64x48"]
-    read = look(prepare(load(scenario(""), overrides=changed)))[1]
+    read = detected_frames(load(scenario(""), overrides=changed))[1]
     for before, after in zip(simulated, read, strict=True):
         np.testing.assert_array_equal(before.detections.boxes, after.detections.boxes)
         np.testing.assert_array_equal(before.truth.person, after.truth.person)
@@ -76,7 +76,7 @@ def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
 def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
     dots(tmp_path / "head.onnx")
     path, head = scenario('[appearance]\nsource = "drawn"\n'), f"detector.onnx={tmp_path / 'head.onnx'}"
-    simulated, read = (look(prepare(load(path, overrides=changed)))[1] for changed in ([], [head]))
+    simulated, read = (detected_frames(load(path, overrides=changed))[1] for changed in ([], [head]))
     for before, after in zip(simulated, read, strict=True):
         assert len(before.detections.descriptors)
         np.testing.assert_array_equal(before.detections.descriptors, after.detections.descriptors)
@@ -89,17 +89,17 @@ def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
     [
         ('[appearance]\nsource = "pictures"\nnetwork = "none.onnx"\n', "appearance.network: .*none.onnx"),
         ('[appearance]\nsource = "pictures"\nnetwork = "tiny.toml"\n', "appearance.network: .*tiny.toml"),
-        ("", 'appearance goes by descriptors alone.*appearance.source = "pictures"'),
+        ("", 'appearance uses descriptors alone.*appearance.source = "pictures"'),
     ],
 )
 def test_mistakes_are_named_before_any_work(scenario, text, message):
     with pytest.raises(ValueError, match=message):
-        prepare(load(scenario(text)))
+        build_trial(load(scenario(text)))
 
 
 def test_a_pose_head_that_is_none_is_named(scenario):
     with pytest.raises(ValueError, match=r"detector\.onnx: .*tiny.toml"):
-        prepare(load(scenario('[rendering]\nrenderer = "rays"\n'), overrides=["detector.onnx=tiny.toml"]))
+        build_trial(load(scenario('[rendering]\nrenderer = "rays"\n'), overrides=["detector.onnx=tiny.toml"]))
 
 
 def test_sources_are_known(scenario):

@@ -11,14 +11,14 @@ import pytest
 from simharness.report.run import result_folder as running
 from simharness.report.run.pictures import frame_costs
 from simharness.report.run.result_folder import run
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
 from simharness.scenario.profiles import read_profile
 from simharness.scenario.sections.scenario import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
 from simharness.scoring.summary import VariantScores
 from simharness.trial.run_folder import read_run
-from simharness.trial.stages import build as trial
-from simharness.trial.stages.build import prepare
+from simharness.trial.stages import build_trial as trial
+from simharness.trial.stages.build_trial import build_trial
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
 FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.webp", "report.html"}
@@ -160,7 +160,7 @@ class TestPrepare:
     )
     def test_what_cannot_be_built_is_a_value_error(self, scenario, said):
         with pytest.raises(ValueError, match=said):
-            prepare(scenario)
+            build_trial(scenario)
 
     def test_a_renderer_that_is_not_there_is_named(self, monkeypatch):
         from simharness.capture.rendering.renderer import Unavailable
@@ -170,7 +170,7 @@ class TestPrepare:
 
         monkeypatch.setattr(trial, "renderer_of", nothing)
         with pytest.raises(ValueError, match=r"rendering\.renderer: no EGL here"):
-            prepare(tiny(rendering=Rendering(renderer="gl")))
+            build_trial(tiny(rendering=Rendering(renderer="gl")))
 
 
 class TestScoring:

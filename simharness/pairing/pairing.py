@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from mvpose.checks import as_array
-from simharness.scoring.distance import mean_distances
+from simharness.pairing.distance import mean_distances
 
 LIMIT = 0.5  # metres
 

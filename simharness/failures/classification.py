@@ -1,6 +1,6 @@
 """What went wrong with whom: one class for every wrong person-frame, and for every ghost.
 
-A true person in a frame is wrong where they have no estimate of their own (:func:`simharness.scoring.pose.pair`), where
+A true person in a frame is wrong where they have no estimate of their own (:func:`simharness.pairing.pairing.pair`), where
 a joint of theirs is displaced, or where a second estimate stands beside their own. A joint is displaced if it is more
 than 150 mm off, or not placed at all although some view sees it: where nobody can see a joint, saying nothing is right,
 and saying something wrong is still wrong. A person whom no camera sees is a failure all the same, as recall counts it:
@@ -33,11 +33,11 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import as_array
-from simharness.scoring.distance import mean_distances
-from simharness.scoring.pose import LIMIT, pair
+from simharness.pairing.distance import mean_distances
+from simharness.pairing.pairing import LIMIT, pair
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 DISPLACED = 0.15
 """Metres from which a joint is wrong: PCK@150 mm, as MPI-INF-3DHP (Mehta et al., 3DV 2017) and others score 3D pose."""

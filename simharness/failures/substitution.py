@@ -11,9 +11,8 @@ from mvpose.arrays import Floats, Integers
 from mvpose.estimate import Matching
 from mvpose.pipeline import Estimator, UnmatchedPipeline
 from mvpose.rays import Rays
-from simharness.trial.stages.estimators import OwnEstimator
 from simharness.types.truth import KeypointError, Truth
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 
 def perfect_detections(detections: Detections, truth: Truth) -> tuple[Detections, Truth]:
@@ -22,7 +21,7 @@ def perfect_detections(detections: Detections, truth: Truth) -> tuple[Detections
     Everybody who has a joint in a picture is found in it, with those joints exactly where they are in that picture,
     hidden or not, as the profile "perfect" finds them; nobody else is. Scores are 1 and there are no heat maps. A
     detection has the descriptor of the real one of the same person and view, of the surest if there are several; NaN,
-    that is none, where there is no real one: geometry places such a one, and a method that goes by descriptors alone
+    that is none, where there is no real one: geometry places such a one, and a method that uses descriptors alone
     cannot.
 
     Args:
@@ -75,8 +74,7 @@ def with_labels(estimator: Estimator, labels: Integers) -> Pipeline | None:
         estimator: the method.
         labels: person of each detection that it will get, (m,).
     """
-    if isinstance(estimator, OwnEstimator):
-        estimator = estimator.loaded  # which may be a pipeline with stages of one's own
+    estimator = getattr(estimator, "loaded", estimator)  # a user-defined estimator may be a pipeline
     if isinstance(estimator, UnmatchedPipeline):
         estimator = Pipeline()
     if not isinstance(estimator, Pipeline):

@@ -1,4 +1,4 @@
-"""What measuring a trial gives. Apart from how it is done, for stores and pages need no simulator."""
+"""Result of one variant in one trial. Stores and pages read it without the simulator."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import polars as pl
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What a variant of the method did in a trial.
+class VariantResult:
+    """Scores and tables of one variant of the method in one trial.
 
     Attributes:
-        scores: by the keys of :data:`simharness.scoring.catalogue.SCORES`; None where one does not apply.
+        scores: by the keys of :data:`simharness.scoring.catalogue.SCORES`; None where a score does not apply.
         frames: a row for each frame.
         people: a row for each frame and true person.
-        failures: a row for each failure, by kind and stage.
+        failures: a row for each failure, with its kind and the stage to blame.
 
     Raises:
         ValueError: a score that is not finite.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scoring.pose import pair
+from simharness.pairing.pairing import pair
 
 
 def points(*xs):

@@ -8,19 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from moments import crowd, moment, recorded, ring, said
+from trials import simulated
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
 from mvpose.estimate import Matching
 from mvpose.matching import Matcher
 from mvpose.reconstruction import PictorialStructure, Triangulation
+from simharness.failures.blame import FAILURE_SCHEMA, Stage, blame, failure_scores, failure_table
+from simharness.failures.classification import FailureKind, find_failures
+from simharness.failures.substitution import perfect_detections, true_labels, with_labels
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Detector
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.failures import FailureKind, find_failures
-from simharness.scoring.stage_blame import FAILURE_SCHEMA, Stage, blame, failure_scores, failure_table
-from simharness.scoring.truth_substitution import perfect_detections, true_labels, with_labels
-from simharness.trial.looking import look
-from simharness.trial.stages.build import prepare
 
 RIG = ring(4)
 PEOPLE = crowd(3, spacing=1.2)
@@ -187,8 +186,8 @@ class TestSubstitution:
     def test_perfect_detections_are_those_of_the_perfect_profile(self):
         settings = ["rendering.renderer=rays", "duration=0.4", "rate=5", "people.count=3", "cameras.count=3"]
         scenario = load("scenarios/quickstart.toml", overrides=settings)
-        _, real = look(prepare(scenario))
-        _, perfect = look(prepare(scenario.model_copy(update={"detector": Detector()})))
+        _, real = simulated(scenario)
+        _, perfect = simulated(scenario.model_copy(update={"detector": Detector()}))
         hidden = 0
         for seen, exact in zip(real, perfect, strict=True):
             detections, truth = perfect_detections(seen.detections, seen.truth)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from moments import crowd, moment, recorded, ring, said
 
 from mvpose import COCO17, Detections
-from simharness.scoring.failures import FailureKind, failures_of_frame, find_failures
-from simharness.scoring.pose import pair
-from simharness.types.visibility import Visibility
+from simharness.failures.classification import FailureKind, failures_of_frame, find_failures
+from simharness.pairing.pairing import pair
+from simharness.types.views import Visibility
 
 RIG = ring(4)
 PEOPLE = crowd(3)

@@ -27,9 +27,9 @@ from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.pipeline import Estimator
-from simharness.scoring.distance import mean_distances
-from simharness.scoring.failures import Failure, FailureKind, failures_of_frame
-from simharness.scoring.truth_substitution import perfect_detections, true_labels, with_labels
+from simharness.failures.classification import Failure, FailureKind, failures_of_frame
+from simharness.failures.substitution import perfect_detections, true_labels, with_labels
+from simharness.pairing.distance import mean_distances
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 
@@ -87,7 +87,7 @@ def blame(
         estimator: the method. If it is none of mvpose's pipelines, true labels cannot be put in, and what perfect
             detections do not mend is the method's.
         estimates: what it said of the frames, T.
-        failures: :func:`simharness.scoring.failures.find_failures` of these.
+        failures: :func:`simharness.failures.classification.find_failures` of these.
 
     Returns:
         The failures in the same order.

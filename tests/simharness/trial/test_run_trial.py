@@ -4,14 +4,15 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from trials import measured as measure
 
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
 from simharness.study.runner import run_study
-from simharness.trial import measure as module
-from simharness.trial.measure import Measured, measure
+from simharness.trial import run_trial as module
+from simharness.trial.variant_result import VariantResult
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 CHEAP = ("rendering.renderer=rays", "duration=0.6", "rate=5", "people.count=2", "cameras.count=3")
@@ -85,8 +86,8 @@ def test_failures_are_looked_into_with_what_the_variant_saw(monkeypatch):
         seen.setdefault(id(estimator), detections.likelihoods is not None)
         return find_stages(recording, estimator, estimates, failures)
 
-    find_stages = module.find_stages
-    monkeypatch.setattr(module, "find_stages", look)
+    find_stages = module.blame
+    monkeypatch.setattr(module, "blame", look)
     measure(cheap("detector.heatmaps.size=64x48"), ["full", "fast"])
     assert sorted(seen.values()) == [False, True]
 
@@ -109,7 +110,7 @@ def test_what_goes_wrong_later_is_not(monkeypatch):
 def test_a_score_is_a_finite_number_or_none(both, score):
     some = both["fast"]
     with pytest.raises(ValueError, match=r"pcp = (nan|inf)"):
-        Measured({**some.scores, "pcp": score}, some.frames, some.people, some.failures)
+        VariantResult({**some.scores, "pcp": score}, some.frames, some.people, some.failures)
 
 
 @pytest.mark.slow

@@ -1,0 +1,1 @@
+"""Estimates paired one to one with the true people of a frame."""

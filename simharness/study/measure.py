@@ -1,0 +1,73 @@
+"""Work of a study on one trial: simulate, estimate, score and blame, or only what is not stored yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import polars as pl
+
+from simharness.scenario.sections.scenario import Scenario
+from simharness.trial.archive import TrialArchive, pack_detected, pack_estimates, unpack_detected, unpack_estimates
+from simharness.trial.run_trial import Known, run_trial
+from simharness.trial.variant_result import VariantResult
+
+
+@dataclass(frozen=True)
+class StoredTrial:
+    """What a store has of a trial.
+
+    Attributes:
+        archive: detections, and estimates by variant.
+        failures: tables of failures by variant, as far as the code that makes them has not changed.
+    """
+
+    archive: TrialArchive = field(default_factory=TrialArchive)
+    failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TrialOutput:
+    """What is to be stored of a trial.
+
+    Attributes:
+        results: results by variant.
+        archive: detections, where they were simulated now, and the estimates of these variants.
+    """
+
+    results: Mapping[str, VariantResult]
+    archive: TrialArchive = field(default_factory=TrialArchive)
+
+
+def measure(scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None) -> TrialOutput:
+    """Measure variants of the method in one trial, all on the same detections, in this process.
+
+    Args:
+        scenario: resolved, with its seed.
+        variants: variants of the method.
+        stored: what the store has of the trial. Without detections in it everything is simulated.
+
+    Raises:
+        ValueError: the scenario cannot be built at this seed.
+        RunError: any error after that, which is its cause.
+    """
+    stored = stored or StoredTrial()
+    known = Known()
+    if stored.archive.detected:
+        detected = unpack_detected(stored.archive.detected, scenario)
+        estimates = {
+            variant: unpack_estimates(content, detected)
+            for variant, content in stored.archive.estimates.items()
+            if variant in variants
+        }
+        failures = {variant: table for variant, table in stored.failures.items() if variant in estimates}
+        known = Known(detected, estimates, failures)
+    result = run_trial(scenario, variants=variants, known=known)
+    archive = TrialArchive(
+        b"" if known.detected is not None else pack_detected(result.detected),
+        {
+            variant: stored.archive.estimates[variant] if variant in known.estimates else pack_estimates(estimates)
+            for variant, estimates in result.estimates.items()
+        },
+    )
+    return TrialOutput(result.results, archive)

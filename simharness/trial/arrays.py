@@ -1,0 +1,181 @@
+"""Rigs, detections, truth and estimates of a sequence as plain arrays, for files.
+
+Arrays that have a row for each detection or estimate of all T frames come with ``frame``, the frame of each row,
+ascending.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.camera import Camera, Rig
+from mvpose.detections import Detections
+from mvpose.estimate import Estimate, Matching
+from mvpose.skeleton import COCO17, SHELF14
+from simharness.types.truth import Truth
+
+Arrays = dict[str, NDArray[Any]]
+
+_SKELETONS = {skeleton.name: skeleton for skeleton in (COCO17, SHELF14)}
+_OF_DETECTIONS = ("view", "keypoints", "scores", "boxes", "box_scores")
+_OF_FRAMES = ("joints", "pixels", "visibility", "boxes")
+_OF_ERRORS = ("person", "error")
+
+
+def rig_arrays(rig: Rig) -> Arrays:
+    """Return the calibration: ``names`` (V,), ``K``, ``R``, ``t`` (metres), ``distortion``, ``size`` of V cameras."""
+    return {
+        "names": np.array([camera.name for camera in rig]),
+        **{key: np.stack([getattr(camera, key) for camera in rig]) for key in ("K", "R", "t", "distortion")},
+        "size": np.array([camera.size for camera in rig]),
+    }
+
+
+def rig_of_arrays(arrays: Arrays) -> Rig:
+    """Restore a rig from :func:`rig_arrays`."""
+    fields = (arrays[key] for key in ("K", "R", "t", "distortion", "size", "names"))
+    cameras = zip(*fields, strict=True)
+    return Rig([Camera(K, R, t, d, (int(w), int(h)), str(name)) for K, R, t, d, (w, h), name in cameras])
+
+
+def detection_arrays(detections: Sequence[Detections]) -> Arrays:
+    """Return the detections of T frames: ``frames`` () is T, ``skeleton`` () its name, ``frame`` (n,), and the fields
+    of :class:`mvpose.Detections` with a row for each of the n detections; ``descriptors`` where all frames have them.
+    """
+    described = all(each.descriptors is not None for each in detections)
+    keys = (*_OF_DETECTIONS, "descriptors") if described else _OF_DETECTIONS
+    return {
+        "frames": np.array(len(detections)),
+        "skeleton": np.array(detections[0].skeleton.name),
+        "frame": _frame_index(map(len, detections)),
+        **_joined(detections, keys),
+    }
+
+
+def detections_of(arrays: Arrays) -> tuple[Detections, ...]:
+    """Restore detections from :func:`detection_arrays`, one for each frame."""
+    skeleton = _SKELETONS[str(arrays["skeleton"])]
+    return tuple(
+        Detections(
+            arrays["view"][rows],
+            arrays["keypoints"][rows],
+            arrays["scores"][rows],
+            arrays["boxes"][rows],
+            arrays["box_scores"][rows],
+            skeleton,
+            arrays["descriptors"][rows] if "descriptors" in arrays else None,
+        )
+        for rows in rows_of_frames(arrays["frame"], int(arrays["frames"]))
+    )
+
+
+def truth_arrays(time: NDArray[np.float64], truth: Sequence[Truth]) -> Arrays:
+    """Return the truth of T frames: ``time`` (T,), the fields of frames stacked, those of detections joined."""
+    stacked = {key: np.stack([getattr(each, key) for each in truth]) for key in _OF_FRAMES}
+    return {"time": time, **stacked, **_joined(truth, _OF_ERRORS)}
+
+
+def truth_of(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
+    """Restore the truth from :func:`truth_arrays`, one for each frame.
+
+    Args:
+        arrays: the arrays.
+        frame: frame of each detection, (n,).
+    """
+    return tuple(
+        Truth(
+            **{key: arrays[key][index] for key in _OF_FRAMES},
+            **{key: arrays[key][rows] for key in _OF_ERRORS},
+        )
+        for index, rows in enumerate(rows_of_frames(frame, len(arrays["time"])))
+    )
+
+
+def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
+    """Return the estimates of one variant over T frames: ``frame`` (k,), ``joints``, ``scores`` and, where all frames
+    have it, ``covariance`` of the k estimated people; ``labels`` (n,) of the detections; ``iterations``, ``residuals``,
+    ``objective`` and ``converged`` of the matching of each frame.
+    """
+    certain = all(estimate.covariance is not None for estimate in estimates)
+    keys = ("joints", "scores", "covariance") if certain else ("joints", "scores")
+    matchings = [estimate.matching for estimate in estimates]
+    return {
+        "frame": _frame_index(map(len, estimates)),
+        **_joined(estimates, keys),
+        **_joined(matchings, ("labels",)),
+        "iterations": np.array([each.iterations for each in matchings]),
+        "residuals": np.array([each.residuals for each in matchings], float).reshape(-1, 2),
+        "objective": np.array([each.objective for each in matchings], float),
+        "converged": np.array([each.converged for each in matchings], bool),
+        "label_counts": np.array([len(each.labels) for each in matchings]),
+    }
+
+
+def estimates_of(
+    arrays: Mapping[str, Any], detected: NDArray[np.int64], timings: Sequence[Mapping[str, float]]
+) -> Iterator[Estimate]:
+    """Restore the estimates of one variant from :func:`estimate_arrays`.
+
+    Args:
+        arrays: the arrays; ``label_counts`` may be missing where every frame has a label for each detection.
+        detected: frame of each detection, (n,).
+        timings: seconds by stage, for each frame; frames at the end may be missing.
+    """
+    frames = len(arrays["iterations"])
+    counts = arrays.get("label_counts")
+    labelled = detected if counts is None else np.repeat(np.arange(frames), counts)
+    parts = zip(rows_of_frames(arrays["frame"], frames), rows_of_frames(labelled, frames), strict=True)
+    covariance = arrays.get("covariance")
+    for index, (people, labels) in enumerate(parts):
+        primal, dual = arrays["residuals"][index]
+        yield Estimate(
+            joints=arrays["joints"][people],
+            scores=arrays["scores"][people],
+            covariance=None if covariance is None else covariance[people],
+            matching=Matching(
+                labels=arrays["labels"][labels],
+                iterations=int(arrays["iterations"][index]),
+                residuals=(float(primal), float(dual)),
+                objective=float(arrays["objective"][index]),
+                converged=bool(arrays["converged"][index]),
+            ),
+            timings=dict(timings[index]) if index < len(timings) else {},
+        )
+
+
+def timing_arrays(estimates: Sequence[Estimate]) -> Arrays:
+    """Return the timings of one variant: ``stages`` (S,) by name, ``seconds`` (T, S), NaN where not timed."""
+    stages = list(dict.fromkeys(stage for estimate in estimates for stage in estimate.timings))
+    seconds = [[estimate.timings.get(stage, np.nan) for stage in stages] for estimate in estimates]
+    return {"stages": np.array(stages, dtype=str), "seconds": np.array(seconds, float).reshape(-1, len(stages))}
+
+
+def timings_of(arrays: Arrays) -> list[dict[str, float]]:
+    """Restore the timings of each frame from :func:`timing_arrays`."""
+    stages = [str(stage) for stage in arrays["stages"]]
+    return [
+        {stage: float(value) for stage, value in zip(stages, row, strict=True) if not np.isnan(value)}
+        for row in arrays["seconds"]
+    ]
+
+
+def rows_of_frames(frame: NDArray[np.int64], frames: int) -> list[slice]:
+    """Return the rows of each frame, of rows sorted by frame."""
+    ends = np.searchsorted(frame, np.arange(frames + 1))
+    return [slice(int(start), int(end)) for start, end in itertools.pairwise(ends)]
+
+
+def _joined(items: Iterable[object], keys: Sequence[str]) -> Arrays:
+    """Join fields of one object a frame into one array each."""
+    items = list(items)
+    return {key: np.concatenate([getattr(item, key) for item in items]) for key in keys}
+
+
+def _frame_index(counts: Iterable[int]) -> NDArray[np.int64]:
+    counts = list(counts)
+    return np.repeat(np.arange(len(counts)), counts)

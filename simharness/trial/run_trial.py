@@ -1,0 +1,291 @@
+"""One trial from its scenario to its scores: build, capture, audit, detect, read, estimate, score, classify, blame.
+
+Every command runs trials through :func:`run_trial`: ``run``, ``render``, ``export``, ``study``, ``check``,
+``evaluate``, :func:`simharness.testing.assert_robust` and the Python interface. Stages whose results are known
+already, such as those of a stored trial, are given as :class:`Known` and left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+import polars as pl
+import threadpoolctl
+
+from mvpose import Estimate
+from mvpose.pipeline import PRESETS, Estimator
+from simharness.detector.detect import detect
+from simharness.failures.blame import Blamed, blame, failure_scores, failure_table
+from simharness.failures.classification import failures_of_frame, find_failures
+from simharness.runtime.frame_pool import map_frames
+from simharness.runtime.progress import Reporter, Silence
+from simharness.runtime.stages import Stages
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scoring.assessment import Assessment, assess
+from simharness.scoring.catalogue import SCORES
+from simharness.trial.audit import audit
+from simharness.trial.detected_sequence import DetectedSequence
+from simharness.trial.kernel_compilation import Compilation
+from simharness.trial.stages.build_trial import Trial, build_trial, build_variants
+from simharness.trial.stages.capture import CaptureFrames
+from simharness.trial.stages.estimation import EstimateFrames, naming_frame
+from simharness.trial.stages.networks import ReadFrames
+from simharness.trial.variant_result import VariantResult
+from simharness.types.recording import Recording
+from simharness.types.sequence import Sequence as TrueSequence
+from simharness.types.views import Views
+from simharness.world.scene.playback import simulate
+
+Goal = Literal["detect", "estimate", "score", "classify", "blame"]
+"""Last stage of a trial that is wanted. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
+
+_GOALS: tuple[str, ...] = get_args(Goal)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What only simulating a trial gives; stored detections have none of it.
+
+    Attributes:
+        trial: the built scenario.
+        sequence: the true poses.
+        views: the truth in the pictures, with previews where they were requested.
+    """
+
+    trial: Trial
+    sequence: TrueSequence
+    views: Views
+
+
+@dataclass(frozen=True)
+class Known:
+    """Results of stages that need not run again.
+
+    Attributes:
+        detected: detections and truth of the trial; None where they have to be simulated.
+        estimates: estimates by variant. They need the detections that they were made from.
+        failures: table of failures by variant, from the last stage that is wanted now.
+    """
+
+    detected: DetectedSequence | None = None
+    estimates: Mapping[str, Sequence[Estimate]] = field(default_factory=dict)
+    failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """Everything that a trial gave, up to its goal.
+
+    Attributes:
+        scenario: the resolved scenario at its seed.
+        detected: what the method was given, and the truth.
+        simulation: scene and pictures behind the detections; None where these were known.
+        estimates: estimates of each variant, one a frame; empty before the goal ``estimate``.
+        assessments: scores of each variant; empty before the goal ``score``.
+        failures: table of failures of each variant; empty before the goal ``classify``.
+        seconds: duration of each stage that ran.
+    """
+
+    scenario: Scenario
+    detected: DetectedSequence
+    simulation: Simulation | None
+    estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    assessments: Mapping[str, Assessment] = field(default_factory=dict)
+    failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def trial(self) -> Trial:
+        """The built scenario.
+
+        Raises:
+            ValueError: the detections were known, so nothing was built.
+        """
+        if self.simulation is None:
+            raise ValueError("this trial was not simulated, because its detections were known")
+        return self.simulation.trial
+
+    @property
+    def recording(self) -> Recording:
+        """The input of scoring."""
+        return self.detected.recording
+
+    @property
+    def results(self) -> dict[str, VariantResult]:
+        """Scores and tables by variant, from the goal ``classify`` on."""
+        results = {}
+        for variant, table in self.failures.items():
+            assessment = self.assessments[variant]
+            scores = {**assessment.scores, **failure_scores(table, len(self.detected.time))}
+            ordered = {key: scores[key] for key in SCORES}
+            results[variant] = VariantResult(ordered, assessment.frames, assessment.people, table)
+        return results
+
+
+def run_trial(
+    scenario: Scenario,
+    *,
+    variants: Sequence[str] | None = None,
+    until: Goal = "blame",
+    workers: int = 1,
+    previews: Collection[int] = (),
+    compile_ahead: bool = False,
+    known: Known | None = None,
+    reporter: Reporter | None = None,
+) -> TrialResult:
+    """Run a trial up to a goal. All variants get the same detections.
+
+    Every trial that is simulated is audited (:mod:`simharness.trial.audit`) before its detections are made.
+
+    Args:
+        scenario: a resolved scenario with its seed.
+        variants: variants of the method; the scenario's by default.
+        until: last stage that is wanted.
+        workers: processes that share the frames; the results do not depend on how many.
+        previews: frames whose colour pictures are kept in the views.
+        compile_ahead: compile the method's kernels in a second process while this one simulates.
+        known: results of stages that need not run again.
+        reporter: receiver of progress.
+
+    Raises:
+        ValueError: the scenario cannot be built at this seed, or an unknown goal.
+        RunError: any error after that, with the stage in front; :class:`simharness.trial.audit.AuditError` where the
+            trial is not what the scenario describes.
+    """
+    if until not in _GOALS:
+        raise ValueError(f"until must be one of {', '.join(_GOALS)}, got {until!r}")
+    if variants is not None:
+        scenario = with_variants(scenario, variants)
+    known = known or Known()
+    stages = Stages(reporter or Silence())
+    goal = _GOALS.index(until)
+    with threadpoolctl.threadpool_limits(1):  # matrices are small: threads would only compete
+        if known.detected is None:
+            simulation, detected, pipelines = _simulate(
+                scenario, stages, workers, previews, compile_ahead and goal >= _GOALS.index("estimate")
+            )
+        else:
+            simulation, detected = None, known.detected
+            with stages.stage("build", 1, input_errors=True):
+                pipelines = build_variants(scenario)
+        result = TrialResult(scenario, detected, simulation, seconds=stages.seconds)
+        if goal >= _GOALS.index("estimate"):
+            result = replace(result, estimates=_estimate(detected, pipelines, known.estimates, workers, stages))
+        if goal >= _GOALS.index("score"):
+            result = replace(result, assessments=_score(result, stages))
+        if goal >= _GOALS.index("classify"):
+            result = replace(
+                result, failures=_find_failures(result, pipelines, known.failures, until == "blame", stages)
+            )
+    return result
+
+
+def with_variants(scenario: Scenario, variants: Sequence[str]) -> Scenario:
+    """Return the scenario with other variants of the method."""
+    return scenario.model_copy(
+        update={"method": scenario.method.model_copy(update={"variants": tuple(dict.fromkeys(variants))})}
+    )
+
+
+def _simulate(
+    scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
+) -> tuple[Simulation, DetectedSequence, Mapping[str, Estimator]]:
+    """Run the stages from the build to the detections."""
+    frames = range(scenario.frames)
+    with stages.stage("build", 1, input_errors=True):
+        trial = build_trial(scenario)
+    compilation = Compilation(trial.pipelines.keys() & PRESETS.keys()) if compile_ahead else None
+    if compilation is not None:
+        compilation.start()
+    with stages.stage("simulate", 1):
+        sequence = simulate(trial.scene)
+    with stages.stage("film", len(frames)) as advance:
+        capture = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset(previews))
+        views = Views.concatenate(map_frames(capture, frames, workers=workers, progress=advance))
+    with stages.stage("audit", 1):
+        audit(scenario, trial.scene, trial.exposures, sequence, views)
+    with stages.stage("detect", len(frames)):
+        frames_detected = detect(
+            sequence,
+            views,
+            trial.exposures.true_rig,
+            scenario.detector,
+            seed=scenario.seed,
+            descriptors=trial.descriptors,
+        )
+    if ReadFrames.needed(scenario):
+        with stages.stage("read", len(frames)) as advance:
+            reading = ReadFrames(scenario, trial.scene, trial.exposures, tuple(frames_detected))
+            parts = map_frames(reading, frames, workers=workers, progress=advance)
+            frames_detected = [each for part in parts for each in part]
+    if compilation is not None:
+        with stages.stage("compile", 1):
+            compilation.wait()
+    detected = DetectedSequence(sequence.time, trial.exposures.believed_rig, tuple(frames_detected))
+    return Simulation(trial, sequence, views), detected, trial.pipelines
+
+
+def _estimate(
+    detected: DetectedSequence,
+    pipelines: Mapping[str, Estimator],
+    known: Mapping[str, Sequence[Estimate]],
+    workers: int,
+    stages: Stages,
+) -> dict[str, tuple[Estimate, ...]]:
+    """Return the estimates of all variants; those that are known are not made again."""
+    missing = {name: pipeline for name, pipeline in pipelines.items() if name not in known}
+    estimates = {name: tuple(answers) for name, answers in known.items()}
+    if missing:
+        frames = range(len(detected.frames))
+        with stages.stage("estimate", len(frames)) as advance:
+            estimation = EstimateFrames(detected.rig, detected.frames, missing)
+            parts = map_frames(estimation, frames, workers=workers, progress=advance)
+            estimates |= {name: tuple(each for part in parts for each in part[name]) for name in missing}
+    return {name: estimates[name] for name in pipelines}
+
+
+def _score(result: TrialResult, stages: Stages) -> dict[str, Assessment]:
+    assessments = {}
+    with stages.stage("score", len(result.estimates)) as advance:
+        for variant, estimates in result.estimates.items():
+            assessments[variant] = assess(result.recording, estimates)
+            advance(1)
+    return assessments
+
+
+def _find_failures(
+    result: TrialResult,
+    pipelines: Mapping[str, Estimator],
+    known: Mapping[str, pl.DataFrame],
+    blamed: bool,
+    stages: Stages,
+) -> dict[str, pl.DataFrame]:
+    tables = {}
+    with stages.stage("blame" if blamed else "classify", len(result.estimates)) as advance:
+        for variant, estimates in result.estimates.items():
+            if variant in known:
+                tables[variant] = known[variant]
+            elif blamed:
+                tables[variant] = failure_table(_blame(result.detected, variant, pipelines[variant], estimates))
+            else:
+                tables[variant] = failure_table(find_failures(result.recording, estimates))
+            advance(1)
+    return tables
+
+
+def _blame(
+    detected: DetectedSequence, variant: str, pipeline: Estimator, estimates: Sequence[Estimate]
+) -> Iterator[Blamed]:
+    """Find the failures of a variant and the stage to blame, a frame at a time: heat maps of all frames are large."""
+    recording = detected.recording
+    estimation = EstimateFrames(detected.rig, detected.frames, {variant: pipeline})
+    for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
+        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
+            detections = estimation.input_of(frame, variant)
+            moment = Recording(recording.time[[frame]], recording.rig, (detections,), (truth,))
+            with naming_frame(frame):
+                stages = blame(moment, pipeline, [estimate], failures)
+            for blamed in stages:
+                yield replace(blamed, failure=replace(blamed.failure, frame=frame))

@@ -1,0 +1,80 @@
+"""Capture stage: what every camera records of the scene, frame by frame, in any process."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simharness.capture.film import Observer
+    from simharness.capture.picture import PictureSource
+    from simharness.capture.rendering.renderer import Renderer, RendererName
+    from simharness.scenario.sections.scenario import Scenario
+    from simharness.types.views import Views
+    from simharness.world.rigs.exposure_schedule import ExposureSchedule
+    from simharness.world.scene.build import Scene
+    from simharness.world.scene.playback import Playback
+
+
+@dataclass(frozen=True)
+class CaptureFrames:
+    """Frame function that captures frames of a scene.
+
+    It carries the renderer's name and not the renderer: a GL context cannot be sent to another process.
+
+    Attributes:
+        scenario: the scenario that names the renderer and the sensor.
+        scene: the built scene.
+        exposures: time and camera of every picture.
+        previews: frames whose colour pictures are kept.
+    """
+
+    scenario: Scenario
+    scene: Scene
+    exposures: ExposureSchedule
+    previews: frozenset[int]
+
+    def __call__(self, frames: range) -> Views:
+        """Return what the cameras see in these frames."""
+        from simharness.capture.film import film
+        from simharness.world.scene.playback import Playback
+
+        playback = Playback(self.scene)
+        return film(
+            playback,
+            self.exposures,
+            observer_of(self.scenario, playback),
+            frames=frames,
+            picture_source=picture_source_of(self.scenario, playback) if self.previews else None,
+            previews=self.previews,
+        )
+
+
+def observer_of(scenario: Scenario, playback: Playback) -> Observer:
+    """Return the method by which a scenario determines visibility: rendered pictures or cast rays."""
+    from simharness.capture.film import PictureObserver
+    from simharness.capture.ray_visibility import RayObserver
+
+    if scenario.rendering.renderer == "rays":
+        return RayObserver(playback)
+    return PictureObserver(playback, renderer_of(scenario.rendering.renderer))
+
+
+def picture_source_of(scenario: Scenario, playback: Playback) -> PictureSource:
+    """Return the source of a scenario's colour pictures; the rasteriser where the scenario itself renders none."""
+    from simharness.capture.picture import PictureSource
+
+    name = "raster" if scenario.rendering.renderer == "rays" else scenario.rendering.renderer
+    return PictureSource(playback, renderer_of(name), sensor=scenario.sensor, seed=scenario.seed)
+
+
+@functools.cache
+def renderer_of(name: RendererName) -> Renderer:
+    """Return the renderer of this process by name.
+
+    There is one of each name: two GL contexts cannot share a scene, and shaders load once.
+    """
+    from simharness.capture.rendering.renderer import make_renderer
+
+    return make_renderer(name)
