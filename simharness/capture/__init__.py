@@ -1,1 +1,1 @@
-"""What cameras record of the world: pictures, visibility, boxes."""
+"""Simulated cameras: pictures, visibility of joints, boxes of people."""

@@ -1,7 +1,7 @@
-"""Boxes around people without pictures: the outermost points of each body part, skinned and projected.
+"""Boxes around people without rendering: extreme vertices of each body part, skinned and projected.
 
-A part's skin is nearly convex, so its extremes in a few directions, and the edges of their convex hull, have its
-outline from wherever it is seen; where the image's border cuts a person the edges are cut.
+The skin of a part is nearly convex, so its extreme vertices in a few directions and the edges of their convex hull give
+its outline from every viewpoint. Edges are clipped at the image border.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.body import Body
 from simharness.world.humans.skinning import skin
 
-_DIRECTIONS = 24  # in which the extremes of a part are taken
-_SHARE = 0.2  # of a vertex's weight makes it the part's: neighbouring parts overlap, so that no gap is between them
+_DIRECTIONS = 24  # in which the extreme vertices of a part are taken
+_MIN_WEIGHT = 0.2  # least skinning weight of a vertex in a part: neighbouring parts overlap, which avoids gaps
 
 
 @dataclass(frozen=True)
 class Outline:
-    """The outermost vertices of one body and how they hang together: a few hundred instead of ten thousand.
+    """Outermost vertices and edges of one body: a few hundred vertices instead of ten thousand.
 
     Attributes:
-        vertices: at rest, (n, 3) float32 metres.
-        weight_bones, weights: their skinning, (n, w).
+        vertices: positions in the rest pose, (n, 3) float32, metres.
+        weight_bones, weights: skinning bones and weights, (n, w).
         edges: pairs of vertices, (e, 2).
     """
 
@@ -42,14 +42,14 @@ class Outline:
 
     @classmethod
     def of(cls, body: Body) -> Outline:
-        """Choose the outermost vertices of a body: of each bone's skin the extremes in directions all around."""
-        directions = _around(_DIRECTIONS)
+        """Choose the outermost vertices of a body: the extreme vertices of the skin of each bone in all directions."""
+        directions = _directions(_DIRECTIONS)
         share = np.zeros((len(body.vertices), len(body.bones)), np.float32)
         np.add.at(share, (np.arange(len(body.vertices))[:, None], body.weight_bones), body.weights)
         parts = []
-        for mine in share.T > _SHARE:
-            if mine.any():
-                candidates = np.flatnonzero(mine)
+        for in_part in share.T > _MIN_WEIGHT:
+            if in_part.any():
+                candidates = np.flatnonzero(in_part)
                 parts.append(np.unique(candidates[(body.vertices[candidates] @ directions.T).argmax(axis=0)]))
         chosen = np.unique(np.concatenate(parts))
         edges = np.concatenate([np.searchsorted(chosen, part)[_hull(body.vertices[part])] for part in parts])
@@ -61,14 +61,14 @@ class Outline:
         )
 
     def at(self, transforms: Floats) -> NDArray[np.float32]:
-        """The vertices (n, 3) in the world from bone transforms (B, 3, 4)."""
+        """Return the vertices in the world, (n, 3), for bone transforms (B, 3, 4)."""
         moved = np.empty_like(self.vertices)
         skin(self.vertices, self.weight_bones, self.weights, transforms.astype(np.float32), moved)
         return moved
 
 
-def _around(count: int) -> NDArray[np.float32]:
-    """Unit vectors all around, (count, 3): a Fibonacci spiral."""
+def _directions(count: int) -> NDArray[np.float32]:
+    """Return evenly spread unit vectors, (count, 3): a Fibonacci spiral."""
     height = 1 - (2 * np.arange(count) + 1) / count
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
     radius = np.sqrt(1 - height**2)
@@ -76,7 +76,7 @@ def _around(count: int) -> NDArray[np.float32]:
 
 
 def _hull(points: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Edges (e, 2) of the convex hull of points (n, 3); of points in a plane or fewer than five, all pairs."""
+    """Return the edges (e, 2) of the convex hull of points (n, 3); all pairs of coplanar or fewer than five points."""
     n = len(points)
     if n > 4 and np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-4) == 3:
         triangles = ConvexHull(points).simplices
@@ -85,42 +85,44 @@ def _hull(points: NDArray[np.float32]) -> NDArray[np.int64]:
 
 
 NO_EDGES = np.zeros((0, 2), np.int64)
-"""Of a skin so fine that its vertices tell where the border of an image cuts it."""
+"""Edges for a mesh so fine that clipping its edges at the image border is not necessary."""
 
 
 def boxes(bands: Sequence[Sequence[NDArray]], edges: Sequence[Integers], cameras: Sequence[Camera]) -> Floats:
-    """Boxes x, y, width, height of the parts of people that fall on each image, (V, P, 4); zeros where nobody is.
+    """Return boxes x, y, width, height of the parts of people inside each image, (V, P, 4); zeros if none is inside.
 
     Args:
-        bands: vertices of every person, (n, 3) metres, in the moments of the bands of rows from the top; one moment
-            where all rows are taken at once.
-        edges: of every person's outline, (e, 2).
-        cameras: V.
+        bands: vertices of every person, (n, 3) metres, at the times of the bands of rows from the top; one time if all
+            rows are exposed at once.
+        edges: edges of the outline of every person, (e, 2).
+        cameras: V cameras.
     """
     table = np.stack([packed(camera) for camera in cameras])
-    found = np.empty((len(bands), len(cameras), len(edges), 4))
+    limits = np.empty((len(bands), len(cameras), len(edges), 4))
     for k, people in enumerate(bands):
         rows = k / len(bands), (k + 1) / len(bands)
         for person, (vertices, lines) in enumerate(zip(people, edges, strict=True)):
-            framed(vertices, lines, table, *rows, found[k, :, person])
-    low, high = found[..., :2].min(axis=0), found[..., 2:].max(axis=0)
-    there = (high >= low).all(axis=-1, keepdims=True)
-    return np.where(there, np.concatenate([low, np.where(there, high - low, 0.0)], axis=-1), 0.0)
+            bounding_box(vertices, lines, table, *rows, limits[k, :, person])
+    low, high = limits[..., :2].min(axis=0), limits[..., 2:].max(axis=0)
+    inside = (high >= low).all(axis=-1, keepdims=True)
+    return np.where(inside, np.concatenate([low, np.where(inside, high - low, 0.0)], axis=-1), 0.0)
 
 
 def packed(camera: Camera) -> Floats:
-    """A camera for the kernel, (26,).
+    """Return the parameters of a camera for the kernel, (26,).
 
-    fx, skew, cx, fy, cy; R by rows; t; distortion; size; the square of where the lens ends; 1 where it distorts, or 0.
+    fx, skew, cx, fy, cy; R by rows; t; distortion; size; squared radius at which the lens folds over; 1 if the lens
+    distorts, else 0.
     """
     K = camera.K
     bent = float(camera.distortion.any())
     intrinsics = (K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2])
-    return np.array([*intrinsics, *camera.R.ravel(), *camera.t, *camera.distortion, *camera.size, _end(camera), bent])
+    lens = (_fold_radius(camera), bent)
+    return np.array([*intrinsics, *camera.R.ravel(), *camera.t, *camera.distortion, *camera.size, *lens])
 
 
-def _end(camera: Camera) -> float:
-    """Squared distance from the axis, at unit depth, at which the radial polynomial of a lens folds over."""
+def _fold_radius(camera: Camera) -> float:
+    """Return the squared distance from the axis, at unit depth, at which the radial polynomial folds over."""
     k1, k2, _, _, k3 = camera.distortion
     if k1 == k2 == k3 == 0:
         return np.inf
@@ -130,16 +132,16 @@ def _end(camera: Camera) -> float:
 
 
 @njit(cache=True)
-def framed(points, edges, cameras, first_row, last_row, out):
-    """Box the part of a person that falls on each image.
+def bounding_box(points, edges, cameras, first_row, last_row, out):
+    """Compute the box of the part of a person inside each image.
 
     Args:
         points: vertices of the outline in the world, (n, 3).
-        edges: between them, (e, 2).
-        cameras: as :func:`packed`, (V, 26).
-        first_row: of the band of each image to look at, as a share of its height.
-        last_row: the same of its end.
-        out: left, top, right, bottom in pixels, (V, 4); left beyond right where nothing falls on the image.
+        edges: edges of the outline, (e, 2).
+        cameras: parameters of the cameras as returned by :func:`packed`, (V, 26).
+        first_row: start of the band of rows, as a share of the height of the image.
+        last_row: end of the band of rows, as a share of the height of the image.
+        out: output, left, top, right, bottom in pixels, (V, 4); left > right if nothing is inside the image.
     """
     n = len(points)
     local, pixel, state = np.empty((n, 3)), np.empty((n, 2)), np.empty(n, np.int8)
@@ -171,12 +173,12 @@ def framed(points, edges, cameras, first_row, last_row, out):
         out[view] = box
 
 
-_BEYOND, _BEHIND, _IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond what the lens images; nearer than ``NEAR``
+_BEYOND, _BEHIND, _IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond the fold of the lens; depth below ``NEAR``
 
 
 @njit(cache=True)
 def _project(x, y, z, c):
-    """Whether a point of the camera's frame is imaged, and its pixel."""
+    """Return the state of a point in camera coordinates (``_BEYOND`` to ``_IN_FRONT``) and its pixel."""
     if z < NEAR:
         return _BEHIND, 0.0, 0.0
     x, y = x / z, y / z
@@ -195,7 +197,7 @@ def _widen(box, u, v):
 
 @njit(cache=True)
 def _cut(i, j, local, pixel, state, c, image, box):
-    """Widen a box by what an edge has within the image: Liang and Barsky, ACM Trans. Graphics 3, 1984."""
+    """Widen a box by the part of an edge inside the image (Liang and Barsky, ACM Trans. Graphics 3, 1984)."""
     one, two = state[i], state[j]
     if one == _BEYOND or two == _BEYOND or (one == _BEHIND and two == _BEHIND):
         return

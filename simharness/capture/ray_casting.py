@@ -1,7 +1,7 @@
-"""What a ray from a lens meets first: MuJoCo's geoms of things, the capsules of people.
+"""First hits of rays from the cameras: on MuJoCo geoms of objects and on capsules of people.
 
-MuJoCo's rays look at every geom of the model in turn, so a joint more costs the more the more people there are. People
-are met by a kernel of our own instead, which passes by whoever is out of the way; a test holds it to ``mj_multiRay``.
+MuJoCo tests each ray against every geom of the model, so the cost of a ray grows with the number of people. People are
+therefore tested by a separate kernel, which skips people far from the ray; a test compares it with ``mj_multiRay``.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from simharness.world.scene.playback import State
 
 
-_THINGS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # groups of geoms that MuJoCo looks at
+_OBJECT_GROUPS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # geom groups tested by MuJoCo
 
 
 class RayCaster:
-    """Casts rays into a scene. Has a state of its own, so it is not for sharing.
+    """Ray caster for a scene. It holds a state of the scene, so it must not be shared between threads.
 
     Args:
-        scene: people and things.
+        scene: scene with people and objects.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -55,7 +55,7 @@ class RayCaster:
         self._around = np.empty((self._people, 4))
 
     def place(self, state: State) -> None:
-        """Put everyone and everything where a state says."""
+        """Move all people and objects to their positions in a state."""
         bones = np.ascontiguousarray(state.bones)
         _place(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)
         if len(self._moving):
@@ -64,11 +64,11 @@ class RayCaster:
             mujoco.mj_kinematics(self._model, self._data)
 
     def cast(self, camera: Camera, targets: Floats) -> tuple[Integers, Floats]:
-        """What a camera meets first on the way to targets (n, 3), from ``NEAR`` in front of it.
+        """Cast rays from a camera to targets (n, 3), starting ``NEAR`` in front of it; return the first hits.
 
         Returns:
-            Whose surface it is, (n,): 0 to P - 1 the people, P a thing, -1 nothing as near as the targets; and how far
-            in front of the target, (n,) metres, -inf where nothing is.
+            Owner of the surface hit, (n,): 0 to P - 1 a person, P an object, -1 no hit before the target; and the
+            distance of the hit in front of the target, (n,) metres, -inf without a hit.
         """
         count = len(targets)
         owner, distance = np.full(count, -1), np.full(count, np.inf)
@@ -78,13 +78,17 @@ class RayCaster:
         length = np.sqrt((way * way).sum(axis=1))
         way /= length[:, None]
         near = NEAR / (way @ camera.R[2])
-        _meet(camera.center, way, near, length, self._placed, self._radii, self._first, self._around, owner, distance)
-        thing, away = self._things(camera.center, way, near, length)
-        first = thing & (away < distance)
-        return np.where(first, self._people, owner), length - np.where(first, away, distance)
+        _hit_people(
+            camera.center, way, near, length, self._placed, self._radii, self._first, self._around, owner, distance
+        )
+        on_object, object_distance = self._hit_objects(camera.center, way, near, length)
+        first = on_object & (object_distance < distance)
+        return np.where(first, self._people, owner), length - np.where(first, object_distance, distance)
 
-    def _things(self, start: Floats, way: Floats, near: Floats, length: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """Which rays meet a thing before their ends, and how far off."""
+    def _hit_objects(
+        self, start: Floats, way: Floats, near: Floats, length: Floats
+    ) -> tuple[NDArray[np.bool_], Floats]:
+        """Return which rays hit an object before their ends, and the distances of the hits."""
         geom, distance = np.empty(len(way), np.int32), np.empty(len(way))
         self._cast(start, way, geom, distance, float(length.max()))
         for i in np.flatnonzero((geom >= 0) & (distance < near)):
@@ -98,7 +102,7 @@ class RayCaster:
             self._data,
             pnt=start,
             vec=way.ravel(),
-            geomgroup=_THINGS,
+            geomgroup=_OBJECT_GROUPS,
             flg_static=1,
             bodyexclude=-1,
             geomid=geom,
@@ -110,7 +114,7 @@ class RayCaster:
 
 
 def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Floats]:
-    """Ends (3,) of a capsule's axis in the rest body, of which ``head`` (3,) is where its bone begins."""
+    """Return the ends (3,) of the axis of a capsule in the rest pose; its bone begins at ``head`` (3,)."""
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     reach = model.geom_size[geom, 1] * turn.reshape(3, 3)[:, 2]
@@ -119,7 +123,7 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
 
 @njit(cache=True)
 def _place(rest, bone, radii, first, bones, placed, around):
-    """Carry capsules (c, 2, 3) by their bones' transforms (P, B, 3, 4) and put a ball around each person, (P, 4)."""
+    """Transform capsules (c, 2, 3) by their bones (P, B, 3, 4) and compute a bounding sphere of each person, (P, 4)."""
     for person in range(len(bones)):
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for c in range(first[person], first[person + 1]):
@@ -136,8 +140,8 @@ def _place(rest, bone, radii, first, bones, placed, around):
 
 
 @njit(cache=True)
-def _meet(start, way, near, length, placed, radii, first, around, owner, distance):
-    """Who is nearest on each ray between ``near`` and its ``length``, and how far off; untouched where nobody is."""
+def _hit_people(start, way, near, length, placed, radii, first, around, owner, distance):
+    """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
     for i in range(len(way)):
         dx, dy, dz = way[i, 0], way[i, 1], way[i, 2]
         x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz
@@ -153,29 +157,29 @@ def _meet(start, way, near, length, placed, radii, first, around, owner, distanc
                 reach = radii[c] + 0.5 * np.sqrt(ux * ux + uy * uy + uz * uz)
                 if _misses((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2, reach, dx, dy, dz, best):
                     continue
-                away = _enter(ax, ay, az, bx, by, bz, radii[c], dx, dy, dz)
-                if away < 0.0:  # it begins inside: what it meets is the other side, from within
-                    away = -_enter(ax, ay, az, bx, by, bz, radii[c], -dx, -dy, -dz)
-                if 0.0 <= away < best:
-                    best = away
-                    owner[i], distance[i] = person, away + near[i]
+                entry = _enter(ax, ay, az, bx, by, bz, radii[c], dx, dy, dz)
+                if entry < 0.0:  # the ray starts inside the capsule: it hits the far side, from inside
+                    entry = -_enter(ax, ay, az, bx, by, bz, radii[c], -dx, -dy, -dz)
+                if 0.0 <= entry < best:
+                    best = entry
+                    owner[i], distance[i] = person, entry + near[i]
 
 
 @njit(cache=True)
 def _misses(cx, cy, cz, radius, dx, dy, dz, best):
-    """Whether a ray of length ``best`` from the origin passes by a ball."""
+    """Return whether a ray of length ``best`` from the origin misses a sphere."""
     along = cx * dx + cy * dy + cz * dz
     return along < -radius or along - radius > best or cx * cx + cy * cy + cz * cz - along * along > radius * radius
 
 
 @njit(cache=True)
 def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):
-    """Where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite where it passes by."""
+    """Return where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite if it misses."""
     ux, uy, uz = bx - ax, by - ay, bz - az
     square = ux * ux + uy * uy + uz * uz
     aligned, begins = ux * dx + uy * dy + uz * dz, ux * ax + uy * ay + uz * az
     seen, far = ax * dx + ay * dy + az * dz, ax * ax + ay * ay + az * az
-    # The endless cylinder first, in units of the axis' length squared.
+    # First the infinite cylinder, in units of the squared length of the axis.
     p = square - aligned * aligned
     q = square * seen - begins * aligned
     r = square * far - begins * begins - radius * radius * square
@@ -190,7 +194,7 @@ def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):
             return away
         cap_b = height >= square
     else:
-        cap_b = aligned < 0.0  # along the axis: the cap that is met first
+        cap_b = aligned < 0.0  # parallel to the axis: the cap that is hit first
     if cap_b:
         seen, far = bx * dx + by * dy + bz * dz, bx * bx + by * by + bz * bz
     inner = seen * seen - far + radius * radius

@@ -1,7 +1,7 @@
-"""Seeing without pictures: a ray from every lens to every joint, and boxes from the outlines of bodies.
+"""Visibility without rendering: rays from every camera to every joint, and boxes from the outlines of bodies.
 
-For sweeps that need no images. What a ray meets first is :mod:`simharness.capture.ray_casting`'s to say; from there on
-the rule is that of pictures, :func:`simharness.capture.joint_visibility.decide`.
+For studies that need no images. :mod:`simharness.capture.ray_casting` finds the first hit of each ray; the rule for
+visibility is the same as for pictures, :func:`simharness.capture.joint_visibility.classify`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
 from simharness.capture.body_outlines import Outline, boxes
 from simharness.capture.film import Observation
-from simharness.capture.joint_visibility import decide
+from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.rendering.lens import project_to_image
-from simharness.capture.shutter import rolled
+from simharness.capture.shutter import joints_at_exposure
 from simharness.types.views import Visibility
 from simharness.world.scene.lookalikes import Lookalikes
 
@@ -26,17 +26,19 @@ if TYPE_CHECKING:
     from simharness.world.scene.playback import Playback, State
 
 
-_FILLED = 0.47  # of a box is the person: median over simulated people who walk and wave (0.33 to 0.60 of 80 % of them)
+# Share of a box that the person fills: median over simulated people who walk and wave (10th to 90th percentile: 0.33 to
+# 0.60).
+_FILLED = 0.47
 
 
 class RayObserver:
-    """Sees by rays and by the outlines of bodies.
+    """Observer that casts rays and projects the outlines of bodies.
 
-    ``area_visible`` is an estimate: of a person's box 0.47 is the person, and of that as much is seen as of the joints
-    in the picture are hidden by nobody and nothing else.
+    ``area_visible`` is an estimate: 0.47 times the area of the box times the share of the joints inside the picture
+    that no other person or object occludes.
 
     Args:
-        playback: the scene.
+        playback: scene to observe.
     """
 
     def __init__(self, playback: Playback) -> None:
@@ -48,44 +50,44 @@ class RayObserver:
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
     def observe(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Observation]:
-        """See :class:`simharness.capture.film.Observer`."""
+        """Return the observations: see :class:`simharness.capture.film.Observer`."""
         people = len(self._radii)
         bands = np.stack([state.joints for state in states])
         bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
-        targets = np.stack([rolled(bands, camera) for camera in cameras])
+        targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
         pixels = np.stack([project_to_image(camera, where) for camera, where in zip(cameras, targets, strict=True)])
-        there = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
+        in_picture = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
         for v, camera in enumerate(cameras):
             targets[v, people:], shown = self._lookalikes.targets(camera.center, targets[v, people:])
-            there[v, people:] &= shown
-        owner, in_front = self._meet(states, cameras, pixels, targets, there)
-        inside = there[:, :people]
-        labels = decide(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
-        own = (owner == people) & (in_front <= self._allowed[:, None])
-        found = there & ((owner < 0) | own)
+            in_picture[v, people:] &= shown
+        owner, in_front = self._cast(states, cameras, pixels, targets, in_picture)
+        inside = in_picture[:, :people]
+        labels = classify(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
+        same_object = (owner == people) & (in_front <= self._allowed[:, None])
+        visible = in_picture & ((owner < 0) | same_object)
         skins = [
             [outline.at(bones) for outline, bones in zip(self._outlines, state.bones, strict=True)] for state in states
         ]
         framed = boxes(skins, [outline.edges for outline in self._outlines], cameras)
-        seen = ((labels == Visibility.VISIBLE) | (labels == Visibility.SELF_OCCLUDED)).sum(axis=-1)
-        share = seen / np.maximum(inside.sum(axis=-1), 1)
+        unoccluded = ((labels == Visibility.VISIBLE) | (labels == Visibility.SELF_OCCLUDED)).sum(axis=-1)
+        share = unoccluded / np.maximum(inside.sum(axis=-1), 1)
         areas = np.rint(_FILLED * framed[..., 2] * framed[..., 3] * share).astype(np.int64)
         return [
-            Observation(at[:people], label, box, area, at[people:], visible[people:])
-            for at, label, box, area, visible in zip(pixels, labels, framed, areas, found, strict=True)
+            Observation(at[:people], label, box, area, at[people:], shown[people:])
+            for at, label, box, area, shown in zip(pixels, labels, framed, areas, visible, strict=True)
         ]
 
-    def _meet(
-        self, states: Sequence[State], cameras: Sequence[Camera], pixels: Floats, targets: Floats, there: Bools
+    def _cast(
+        self, states: Sequence[State], cameras: Sequence[Camera], pixels: Floats, targets: Floats, in_picture: Bools
     ) -> tuple[Integers, Floats]:
-        """What :meth:`RayCaster.cast` meets on the way to targets (V, n, 17, 3), each in the moment of its own row."""
-        owner, in_front = np.full(there.shape, -1), np.full(there.shape, -np.inf)
+        """Return the results of :meth:`RayCaster.cast` for targets (V, n, 17, 3), each at the time of its row."""
+        owner, in_front = np.full(in_picture.shape, -1), np.full(in_picture.shape, -np.inf)
         for k, state in enumerate(states):
             self._caster.place(state)
             for v, camera in enumerate(cameras):
-                mine = there[v]
+                in_band = in_picture[v]
                 if len(states) > 1:
                     share = (pixels[v, ..., 1] + 0.5) / camera.size[1]
-                    mine = mine & (np.floor(np.where(mine, share, -1.0) * len(states)) == k)
-                owner[v, mine], in_front[v, mine] = self._caster.cast(camera, targets[v][mine])
+                    in_band = in_band & (np.floor(np.where(in_band, share, -1.0) * len(states)) == k)
+                owner[v, in_band], in_front[v, in_band] = self._caster.cast(camera, targets[v][in_band])
         return owner, in_front

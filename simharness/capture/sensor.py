@@ -1,7 +1,7 @@
-"""What a camera's electronics make of the light: exposure, colour, contrast, noise, compression and motion blur.
+"""Image sensor: exposure, white balance, contrast, noise, compression and motion blur.
 
-Nothing moves in the picture: the truth about it stays. Every camera has a character of its own, drawn once; noise is
-drawn for every picture.
+The geometry of the picture does not change, so its ground truth stays valid. Each camera has a response drawn once;
+noise is drawn for every picture.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from simharness.types.random_streams import stream
 
 Rgb = NDArray[np.uint8]
 
-_GRAY = 0.5  # sRGB: contrast turns about it
+_GRAY = 0.5  # sRGB value that contrast leaves unchanged
 _LEAST_CONTRAST = 0.2
 
 
 @dataclass(frozen=True)
-class Character:
-    """How one camera differs from a perfect one.
+class Response:
+    """Deviation of one camera from an ideal one.
 
     Attributes:
-        contrast: slope of the response about middle gray; 1 is faithful.
-        balance: factor of red, green and blue in linear light; green stays.
-        stops: how much longer than right it exposes, as a power of two.
+        contrast: slope of the response about middle gray; 1 is ideal.
+        balance: factors of red, green and blue in linear light; green is 1.
+        stops: overexposure as a power of two.
     """
 
     contrast: float = 1.0
@@ -37,10 +37,10 @@ class Character:
     stops: float = 0.0
 
 
-def character(sensor: Sensor, *, seed: int, view: int) -> Character:
-    """Draw the character of camera ``view``; every dial scales a draw of its own, so none shifts another."""
+def draw_response(sensor: Sensor, *, seed: int, view: int) -> Response:
+    """Draw the response of camera ``view``; each parameter scales a separate draw, so none shifts another."""
     contrast, red, blue, stops = stream(seed, "sensor", "character", view).standard_normal(4).tolist()
-    return Character(
+    return Response(
         contrast=max(1.0 + sensor.gain * contrast, _LEAST_CONTRAST),
         balance=(float(np.exp(sensor.white_balance * red)), 1.0, float(np.exp(sensor.white_balance * blue))),
         stops=sensor.exposure * stops,
@@ -48,37 +48,37 @@ def character(sensor: Sensor, *, seed: int, view: int) -> Character:
 
 
 def develop(rgb: Rgb, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rgb:
-    """What camera ``view`` delivers of a picture in frame ``frame``; with all dials at zero the picture itself.
+    """Apply the sensor of camera ``view`` to a picture; with all parameters at zero the picture is unchanged.
 
-    In the order of a camera: white balance and exposure of the light, which clips; contrast; noise; compression. Motion
-    blur is made before, from several pictures: :func:`blur`.
+    The order is that of a camera: white balance and exposure of the light, which clips; contrast; noise; compression.
+    Motion blur comes before, from several pictures: :func:`blur`.
 
     Args:
-        rgb: (h, w, 3) uint8, sRGB.
-        sensor: the dials.
-        seed: of the scenario.
+        rgb: ideal picture, (h, w, 3) uint8, sRGB.
+        sensor: parameters of the sensor.
+        seed: seed of the scenario.
         view: index of the camera.
         frame: index of the frame in which the picture was taken.
     """
-    own = character(sensor, seed=seed, view=view)
-    table = _response(own)
+    response = draw_response(sensor, seed=seed, view=view)
+    table = _lookup_table(response)
     result = rgb
     if sensor.noise:
-        # Drawn whole and then scaled: more noise is the same noise, only stronger.
+        # Drawn at unit strength and then scaled: a larger parameter gives the same noise, only stronger.
         noise = stream(seed, "sensor", "noise", view, frame).standard_normal(rgb.shape, np.float32)
         exact = np.stack([table[k, rgb[..., k]] for k in range(3)], axis=-1)
         result = np.clip(exact + np.float32(sensor.noise) * noise + np.float32(0.5), 0, 255).astype(np.uint8)
-    elif own != Character():
+    elif response != Response():
         rounded = np.clip(table + 0.5, 0, 255).astype(np.uint8)
         result = cv2.LUT(rgb, np.ascontiguousarray(rounded.T)[:, None]).astype(np.uint8, copy=False)
     return compressed(result, sensor.jpeg) if sensor.jpeg else result
 
 
 def blur(pictures: Iterable[Rgb]) -> Rgb:
-    """One exposure during which all ``pictures`` (h, w, 3) were seen for equally long: their mean in linear light.
+    """Return an exposure that sees all ``pictures`` (h, w, 3) for equally long: their mean in linear light.
 
     Raises:
-        ValueError: no pictures.
+        ValueError: no pictures are given.
     """
     total, count = None, 0
     linear = to_linear(np.arange(256)).astype(np.float32)
@@ -92,30 +92,30 @@ def blur(pictures: Iterable[Rgb]) -> Rgb:
 
 
 def compressed(rgb: Rgb, quality: int) -> Rgb:
-    """The picture after JPEG of ``quality`` 1 to 100."""
-    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    back = cv2.imdecode(data, cv2.IMREAD_COLOR) if done else None
-    if back is None:
-        raise RuntimeError(f"JPEG of quality {quality} failed on a picture of {rgb.shape}")
-    return np.ascontiguousarray(back[..., ::-1]).astype(np.uint8, copy=False)
+    """Return the picture after JPEG compression with ``quality`` 1 to 100."""
+    success, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    decoded = cv2.imdecode(data, cv2.IMREAD_COLOR) if success else None
+    if decoded is None:
+        raise RuntimeError(f"JPEG compression with quality {quality} failed for a picture of shape {rgb.shape}")
+    return np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8, copy=False)
 
 
 def to_linear(values: NDArray) -> NDArray[np.floating]:
-    """Light, 0 to 1, of sRGB values 0 to 255 (IEC 61966-2-1)."""
+    """Convert sRGB values 0 to 255 to linear light 0 to 1 (IEC 61966-2-1)."""
     share = np.asarray(values) / 255
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
 def from_linear(light: NDArray) -> NDArray[np.floating]:
-    """SRGB values, 0 to 255, of light 0 to 1; what is brighter goes on beyond 255."""
+    """Convert linear light 0 to 1 to sRGB values 0 to 255; brighter light gives values above 255."""
     light = np.maximum(light, 0)
     return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
-def _response(own: Character) -> NDArray[np.float32]:
-    """What each value 0..255 of red, green and blue becomes, (3, 256) of 255; not rounded, nor clipped."""
-    if own == Character():
-        return np.tile(np.arange(256, dtype=np.float32), (3, 1))  # to the last digit
-    factors = np.array(own.balance)[:, None] * 2.0**own.stops
+def _lookup_table(response: Response) -> NDArray[np.float32]:
+    """Return the output for each value 0 to 255 of red, green and blue, (3, 256); neither rounded nor clipped."""
+    if response == Response():
+        return np.tile(np.arange(256, dtype=np.float32), (3, 1))  # exact
+    factors = np.array(response.balance)[:, None] * 2.0**response.stops
     values = np.minimum(from_linear(to_linear(np.arange(256.0)) * factors), 255)
-    return (255 * _GRAY + own.contrast * (values - 255 * _GRAY)).astype(np.float32)
+    return (255 * _GRAY + response.contrast * (values - 255 * _GRAY)).astype(np.float32)

@@ -1,1 +1,1 @@
-"""Types that cross borders between packages, and the keyed random streams that all of them draw from."""
+"""Types passed between the packages of simharness, and the keyed random streams that all of them draw from."""

@@ -1,4 +1,4 @@
-"""The light in a room: a key light that throws shadows, a sky from above, a little from the camera."""
+"""Lighting of a scene: a key light that casts shadows, a sky light from above and a fill light at the camera."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Lighting:
-    """The light of a whole scene; both renderers shade by the same rule.
+    """Lighting of a whole scene; both renderers use the same shading rule.
 
-    A surface whose unit normal is n, turned to the camera, gets the light ``key max(n . direction, 0)``, but none of it
-    in shadow, ``+ sky (0.65 + 0.35 n_z) + fill max(n . to the camera, 0)``, and that times ``tint`` is what it
-    reflects times its albedo; sRGB is taken as the root of linear light. Light of 1 shows the albedo as it is, and
-    what is more is clipped.
+    For a surface with unit normal n on the side of the camera, the light is ``key max(n . direction, 0)`` (0 in
+    shadow) ``+ sky (0.65 + 0.35 n_z) + fill max(n . direction to the camera, 0)``. The surface reflects this times
+    ``tint`` times its albedo; sRGB is approximated as the square root of linear light. Light of 1 shows the albedo
+    unchanged, and brighter values are clipped.
 
     Attributes:
-        direction: to the key light, any length but 0; kept as a unit vector.
-        key: strength of the key light, which comes from afar.
-        sky: strength of the light from all around, most of it from above.
-        fill: strength of the light from the camera, so that nothing is flat in the shade.
-        tint: colour of all this light, linear, 0 to 1.
-        background: sRGB of what is not hit, 0 to 1; light does not change it.
+        direction: vector to the key light, of any length except 0; stored as a unit vector.
+        key: strength of the key light, which is far away (parallel rays).
+        sky: strength of the ambient light, most of it from above.
+        fill: strength of the light at the camera, which keeps surfaces in shadow from looking flat.
+        tint: colour of all light, linear, 0 to 1.
+        background: sRGB of pixels that show no surface, 0 to 1; light does not change it.
 
     Raises:
-        ValueError: a wrong shape, a direction without length or from below the horizon, a negative strength, a colour
+        ValueError: a wrong shape, a direction of length 0 or below the horizon, a negative strength, or a colour
             outside 0..1.
     """
 
-    direction: Vector = (0.38, 0.24, 0.89)  # high: short shadows at the feet
+    direction: Vector = (0.38, 0.24, 0.89)  # high above, so that shadows are short
     key: float = 0.62
     sky: float = 0.40
     fill: float = 0.12
@@ -58,13 +58,13 @@ class Lighting:
         length = float(np.linalg.norm(self.direction))
         if length == 0 or self.direction[2] < 0:
             raise ValueError(
-                f"lighting direction points to the light, which must not be under the floor: got {self.direction}"
+                f"lighting direction must point to a light above the floor (z >= 0, length > 0), got {self.direction}"
             )
         object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
 
 
 def facing(direction: ArrayLike) -> NDArray[np.float64]:
-    """Axes of a view that looks against ``direction`` (3,), as rows: x right, y down, z forward; (3, 3)."""
+    """Return the axes of a camera that looks against ``direction`` (3,) as rows x right, y down, z forward, (3, 3)."""
     forward = -np.asarray(direction, float)
     right = np.cross(forward, np.eye(3)[np.abs(forward).argmin()])
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""The one thing that renderers draw: a triangle mesh in the world with a colour for each face."""
+"""Triangle mesh with a colour per face: the only primitive that renderers draw."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from mvpose.checks import as_array
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh in the world.
+    """Triangle mesh in the world.
 
-    Faces are opaque from both sides, so a board may be a single sheet and a room may be seen from within.
+    Faces are opaque from both sides, so a board may be a single sheet and a room may be seen from inside.
 
     Attributes:
-        vertices: metres, (n, 3) float32.
+        vertices: positions in metres, (n, 3) float32.
         faces: vertex indices, (k, 3) int32, counter-clockwise as seen from outside.
         colors: sRGB albedo of each face, 0 to 1, (k, 3) float32.
-        smooth: shade with normals interpolated over the faces (skin) or with one normal a face (boxes).
-        texture: a picture that multiplies ``colors``, sRGB, (h, w, 3) uint8; None for plain faces.
-        uv: where the three corners of each face lie in the texture, (k, 3, 2) float32: u to the right and v down, the
-            whole texture from 0 to 1; beyond that it repeats. Given if and only if there is a texture.
-        parts: label of each face, -1 for none, (k,) int8; of a body the
-            :class:`simharness.world.humans.segments.Segment`. None where no face has one.
+        smooth: whether normals are interpolated over the faces (skin) or constant per face (boxes).
+        texture: image that multiplies ``colors``, sRGB, (h, w, 3) uint8; None for plain faces.
+        uv: texture coordinates of the three corners of each face, (k, 3, 2) float32: u to the right and v down, the
+            whole texture from 0 to 1; outside this range it repeats. Required with a texture, forbidden without.
+        parts: label of each face, -1 for none, (k,) int8; for a body the
+            :class:`simharness.world.humans.segments.Segment`. None if no face has a label.
 
     Raises:
-        ValueError: a wrong shape, a vertex or a place in the texture that is not finite, a face that names a vertex
-            that does not exist, a colour outside 0..1, a texture without pixels, ``texture`` without ``uv``.
+        ValueError: a wrong shape, a vertex or texture coordinate that is not finite, a face that refers to a missing
+            vertex, a colour outside 0..1, a texture without pixels, or one of ``texture`` and ``uv`` alone.
     """
 
     vertices: NDArray[np.float32]
@@ -55,7 +55,7 @@ class Mesh:
             object.__setattr__(self, key, value)
         if (self.texture is None) != (self.uv is None):
             missing = "uv" if self.uv is None else "texture"
-            raise ValueError(f"a mesh has both a texture and the uv of its faces, or neither; the {missing} is missing")
+            raise ValueError(f"a mesh needs both texture and uv, or neither; {missing} is missing")
         if self.texture is not None and self.uv is not None:
             texture = as_array(self.texture, ("h", "w", 3), "mesh texture", np.uint8)
             uv = as_array(self.uv, (len(faces), 3, 2), "mesh uv", np.float32)
@@ -73,12 +73,12 @@ class Mesh:
             object.__setattr__(self, "parts", parts)
 
     def moved(self, vertices: ArrayLike) -> Self:
-        """The same mesh with its vertices elsewhere, (n, 3).
+        """Return the mesh with other vertex positions, (n, 3).
 
-        All else is shared, so nothing of it is checked again and renderers keep what they know of it.
+        All other arrays are shared: they are not checked again, and renderers reuse what they computed from them.
 
         Raises:
-            ValueError: another number of vertices, or one that is not finite.
+            ValueError: a different number of vertices, or a vertex that is not finite.
         """
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)

@@ -1,4 +1,4 @@
-"""What the answers to one recording are judged against."""
+"""Recording: detections, ground truth and rig over time."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from simharness.types.truth import Truth
 
 @dataclass(frozen=True)
 class Recording:
-    """What was put before every variant of the method, and what only the scorer sees of it.
+    """Input of every variant of the method, and the truth that only the scorer sees.
 
     Attributes:
-        time: of each frame, (T,), seconds, evenly spaced.
-        rig: the V cameras as believed, that is as the method is told of them.
-        detections: what the method sees, one for each frame.
-        truth: what it should find, one for each frame, all of the same P people in the same order. Its pixels are
-            those of the cameras as they truly stand.
+        time: times of the frames, (T,), seconds, evenly spaced.
+        rig: believed rig, V cameras: the calibration that the method is given.
+        detections: detections that the method is given, one for each frame.
+        truth: ground truth, one for each frame, all of the same P people in the same order. Its pixels are those of the
+            true rig.
 
     Raises:
-        ValueError: no frame, lengths that differ, another skeleton than COCO-17, or frames of different people.
+        ValueError: no frame, different lengths, a skeleton other than COCO-17, or frames of different people.
     """
 
     time: NDArray[np.float64]
@@ -39,25 +39,27 @@ class Recording:
         lengths = {"time": len(self.time), "detections": len(self.detections), "truth": len(self.truth)}
         if len(set(lengths.values())) > 1 or not len(self.time):
             got = ", ".join(f"{count} of {key}" for key, count in lengths.items())
-            raise ValueError(f"a recording has one or more frames, as many of time, detections and truth; got {got}")
+            raise ValueError(
+                f"a recording needs at least one frame and equal numbers of time, detections and truth; got {got}"
+            )
         people = len(self.truth[0].joints)
         for frame, (detected, true) in enumerate(zip(self.detections, self.truth, strict=True)):
             if true.joints.shape[:2] != (people, len(COCO17)) or detected.skeleton != COCO17:
                 raise ValueError(
-                    f"every frame must be of the same people on COCO-17, here ({people}, {len(COCO17)}); frame {frame} "
-                    f"has {true.joints.shape[:2]}, and detections on {detected.skeleton.name}"
+                    f"every frame must have the same people on COCO-17, expected ({people}, {len(COCO17)}) joints; "
+                    f"frame {frame} has {true.joints.shape[:2]}, and detections on {detected.skeleton.name}"
                 )
             if len(true.person) != len(detected) or len(true.pixels) != len(self.rig):
                 raise ValueError(
                     f"frame {frame}: {len(detected)} detections in {len(self.rig)} views, "
-                    f"but truth of {len(true.person)} in {len(true.pixels)}"
+                    f"but truth for {len(true.person)} detections in {len(true.pixels)} views"
                 )
 
     def __len__(self) -> int:
-        """T."""
+        """T, the number of frames."""
         return len(self.time)
 
     @property
     def people(self) -> int:
-        """P."""
+        """P, the number of people."""
         return len(self.truth[0].joints)

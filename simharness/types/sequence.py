@@ -1,4 +1,4 @@
-"""What the simulation knows: where every joint of every person is in every frame."""
+"""Sequence: true landmarks of all people in all frames."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from simharness.types.landmarks import LANDMARKS, of_skeleton
 
 @dataclass(frozen=True)
 class Sequence:
-    """The truth about T frames of P people; P may be 0.
+    """Ground truth of T frames with P people; P may be 0.
 
     Attributes:
-        landmarks: of ``simharness.types.landmarks.LANDMARKS`` in the world, (T, P, L, 3), metres.
-        ids: the people's numbers, (P,) int.
-        time: seconds, (T,).
+        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (T, P, L, 3), metres.
+        ids: numbers of the people, (P,) int.
+        time: times of the frames, (T,), seconds.
 
     Raises:
         ValueError: a wrong shape or a value that is not finite.
@@ -36,7 +36,7 @@ class Sequence:
         landmarks = as_array(self.landmarks, (len(time), len(ids), len(LANDMARKS), 3), "sequence landmarks")
         for key, value in (("landmarks", landmarks), ("ids", ids), ("time", time)):
             if not np.isfinite(value).all():
-                raise ValueError(f"sequence {key} must be finite: the truth is never missing")
+                raise ValueError(f"sequence {key} must be finite: no true value may be missing")
             object.__setattr__(self, key, value)
 
     def __len__(self) -> int:
@@ -48,9 +48,9 @@ class Sequence:
         return self.landmarks[:, :, : len(COCO17)]
 
     def of_skeleton(self, skeleton: Skeleton) -> Floats:
-        """The joints of a skeleton in the world, (T, P, J, 3), metres: the body's own points, not made from COCO's.
+        """Return the joints of a skeleton in the world, (T, P, J, 3), metres: landmarks, not computed from COCO joints.
 
         Raises:
-            ValueError: the skeleton has a joint that the body has no landmark of.
+            ValueError: the skeleton has a joint for which the body has no landmark.
         """
         return self.landmarks[:, :, of_skeleton(skeleton)]

@@ -1,4 +1,4 @@
-"""The truth about one frame: where everyone is, and whom and how wrongly each detection shows."""
+"""Ground truth of one frame: poses of the people, and the person and keypoint errors of each detection."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from mvpose.checks import as_array
 
 
 class KeypointError(IntEnum):
-    """What is wrong with one detected keypoint (Ronchi & Perona, "Benchmarking and error diagnosis in multi-instance
-    pose estimation", ICCV 2017), by its distance from the true one in units of OKS sigma x sqrt(area).
+    """Error class of a detected keypoint (Ronchi & Perona, "Benchmarking and error diagnosis in multi-instance pose
+    estimation", ICCV 2017), by its distance to the true keypoint in units of OKS sigma x sqrt(area).
     """
 
     GOOD = 0  # under 1.14
@@ -29,14 +29,14 @@ GOOD_BELOW, MISS_FROM = 1.14, 2.35
 
 @dataclass(frozen=True)
 class Truth:
-    """What the scorer knows of one frame and the method must not.
+    """Ground truth of one frame: known to the scorer, never given to the method.
 
     Attributes:
-        joints: COCO-17 in the world, (P, J, 3), metres.
-        pixels: their projections, (V, P, J, 2); NaN behind the camera.
+        joints: COCO-17 joints in the world, (P, J, 3), metres.
+        pixels: projections of the joints, (V, P, J, 2); NaN behind the camera.
         visibility: :class:`simharness.types.views.Visibility`, (V, P, J).
-        boxes: x, y, width, height of each whole silhouette within the image, (V, P, 4); zeros where outside.
-        person: true person of each of the frame's detections, (m,), -1 for a phantom.
+        boxes: x, y, width, height of each whole silhouette inside the image, (V, P, 4); zeros if it is outside.
+        person: true person of each detection of the frame, (m,), -1 for a phantom.
         error: :class:`KeypointError` of each detected keypoint, (m, J).
     """
 

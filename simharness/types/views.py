@@ -1,4 +1,4 @@
-"""What the cameras saw of everyone: the truth in the pictures."""
+"""Ground truth in the pictures: pixels, visibility and boxes of all people in all views."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Visibility(IntEnum):
 
 @dataclass(frozen=True)
 class LookalikeViews:
-    """Objects in the same pictures that look like people (:mod:`simharness.world.scene.lookalikes`); D may be 0.
+    """Lookalikes in the pictures (:mod:`simharness.world.scene.lookalikes`); their number D may be 0.
 
     Attributes:
-        names: what each is, (D,).
-        pixels: where its joints are, (T, V, D, J, 2); NaN behind the camera.
-        visible: which of them are seen, (T, V, D, J): in the picture, and nothing nearer in the way.
+        names: names of the lookalikes, (D,).
+        pixels: pixels of their joints, (T, V, D, J, 2); NaN behind the camera.
+        visible: whether each joint is visible: inside the picture and not occluded, (T, V, D, J).
     """
 
     names: tuple[str, ...] = ()
@@ -46,27 +46,27 @@ class LookalikeViews:
 
     @classmethod
     def nothing(cls, frames: int, views: int, names: tuple[str, ...] = (), joints: int = 17) -> Self:
-        """Pictures in which nothing of them is seen."""
+        """Return views in which no lookalike is visible."""
         shape = (frames, views, len(names), joints)
         return cls(names, np.full((*shape, 2), np.nan), np.zeros(shape, bool))
 
 
 @dataclass(frozen=True)
 class Views:
-    """The truth in the pictures that V cameras deliver in T frames.
+    """Ground truth in the pictures that V cameras deliver in T frames.
 
-    A picture that never arrives shows nothing: NaN pixels, everyone OUTSIDE, boxes of zeros.
+    A picture that never arrives has NaN pixels, visibility OUTSIDE and boxes of zeros.
 
     Attributes:
-        pixels: where each joint is in the picture, (T, V, P, J, 2); NaN behind the camera.
+        pixels: pixel of each joint, (T, V, P, J, 2); NaN behind the camera.
         visibility: :class:`simharness.types.views.Visibility`, (T, V, P, J) int8.
-        boxes: x, y, width, height in pixels of the part of each person's silhouette that falls on the image,
-            whatever stands in front, (T, V, P, 4); zeros where none does.
-        area_visible: pixels in which each person is seen, (T, V, P).
-        source: the frame whose picture this is, (T, V): the frame itself, an earlier one where the camera froze, -1
-            where nothing arrived. Counted from the sequence's first frame.
-        previews: reduced colour pictures of some frames, by frame, one (h, w, 3) uint8 of each view.
-        lookalikes: the same of what a detector may take for people; nothing by default.
+        boxes: x, y, width, height in pixels of the part of each silhouette inside the image, occlusion ignored,
+            (T, V, P, 4); zeros if no part is inside.
+        area_visible: number of pixels that show each person, (T, V, P).
+        source: frame in which the delivered picture was taken, (T, V): the frame itself, an earlier one if the camera
+            froze, -1 if nothing arrived. Counted from the first frame of the sequence.
+        previews: reduced colour pictures of some frames by frame number, one (h, w, 3) uint8 for each view.
+        lookalikes: the same of the lookalikes in the scene; none by default.
     """
 
     pixels: NDArray[np.float64]
@@ -92,7 +92,7 @@ class Views:
             object.__setattr__(self, "lookalikes", LookalikeViews.nothing(shape[0], shape[1], joints=shape[3]))
         if self.lookalikes.pixels.shape[:2] != shape[:2]:
             raise ValueError(
-                f"lookalikes must be of {shape[0]} frames and {shape[1]} views as the people are, "
+                f"lookalikes must have {shape[0]} frames and {shape[1]} views as the people have, "
                 f"got {self.lookalikes.pixels.shape[:2]}"
             )
 
@@ -101,17 +101,19 @@ class Views:
 
     @classmethod
     def concatenate(cls, parts: Many[Self]) -> Self:
-        """Join films of consecutive frames.
+        """Join the views of consecutive frames.
 
         Raises:
-            ValueError: no parts, or parts of different views, people, joints or lookalikes.
+            ValueError: no parts, or parts with different views, people, joints or lookalikes.
         """
         shapes = {part.pixels.shape[1:] for part in parts}
         if len(shapes) != 1:
-            raise ValueError(f"films to join must share views, people and joints, got {sorted(shapes) or 'none'}")
+            raise ValueError(
+                f"parts to join must have the same views, people and joints, got {sorted(shapes) or 'none'}"
+            )
         names = {part.lookalikes.names for part in parts}
         if len(names) != 1:
-            raise ValueError(f"films to join must share their lookalikes, got {sorted(names)}")
+            raise ValueError(f"parts to join must have the same lookalikes, got {sorted(names)}")
         keys = ("pixels", "visibility", "boxes", "area_visible", "source")
         return cls(
             **{key: np.concatenate([getattr(part, key) for part in parts]) for key in keys},

@@ -1,1 +1,1 @@
-"""Renderers: cameras and meshes in, colour, depth and ids of every pixel out."""
+"""Renderers: colour, depth and mesh ids of every pixel from cameras and meshes."""

@@ -1,4 +1,4 @@
-"""Compiled loops over faces: their normals, and which of them may throw shadows. Private, on plain arrays."""
+"""Compiled kernels over faces: normals, and selection of shadow casters. Private, on plain arrays."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numba import njit
 
-_BOUND = 0.02  # metres
+_BOUND = 0.02  # metres: depth behind a face below which it cannot shade anything
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals of faces (k, 3) and, area-weighted over the smooth faces, of vertices (n, 3); float32."""
+    """Return unit normals of faces (k, 3), and of vertices (n, 3) area-weighted over the smooth faces; float32."""
     of_face = np.zeros((len(faces), 3), np.float32)
     of_vertex = np.zeros((len(vertices), 3), np.float32)
     for t in range(len(faces)):
@@ -39,9 +39,10 @@ def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tupl
 def casters(
     vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, light: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Faces (m, 3) that may throw shadows, and the least and greatest coordinates of their vertices, (3,) each.
+    """Return the faces (m, 3) that may cast shadows, and the lowest and highest coordinates of their vertices, (3,).
 
-    Those turned to ``light`` (3,) with something of the box around all vertices behind them by more than ``_BOUND``.
+    These are the faces turned to ``light`` (3,) behind which the bounding box of all vertices reaches by more than
+    ``_BOUND``.
     """
     low, high = np.zeros(3), np.zeros(3)
     for i in range(len(vertices)):

@@ -1,11 +1,11 @@
-"""The second renderer: pyrender on EGL, off-screen, no display. It checks the rasteriser and uses a GPU where one is.
+"""OpenGL renderer: pyrender on EGL, off-screen, without a display. It uses a GPU if there is one, and verifies raster.
 
-One pass carries everything: colour in RGB, depth in the z-buffer, and the id in alpha, as (id + 1) / 255, which
-8 bits hold exactly; parts take a second pass. Multi-sampling would blend ids and take depth from beside the pixel's
-centre (measured: 30 % of the pixels more than 5 mm wrong), so the frame buffer has one sample a pixel.
+One pass gives colour in RGB, depth in the z-buffer, and the id in alpha as (id + 1) / 255, which 8 bits represent
+exactly; parts need a second pass. Multi-sampling would blend ids and take depth away from the pixel centre (measured:
+30 % of the pixels wrong by more than 5 mm), so the frame buffer has one sample per pixel.
 
-The shaders (``shaders/``) are our own: light, shadows and textures are those of the rasteriser, down to the map of
-shadows, which its kernel draws. So pictures look the same, whichever renderer made them.
+The shaders (``shaders/``) implement the lighting, shadows and textures of the rasteriser, and use the shadow map that
+its kernel draws. So pictures look the same with both renderers.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from simharness.capture.rendering.shading_kernels import LEAST_COSINE
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
-_FAR = 200.0  # metres; 24 bits of depth between it and NEAR are 0.04 mm at 6 m
+_FAR = 200.0  # metres; 24 bits of depth between NEAR and this resolve 0.04 mm at 6 m
 _MOST_MESHES = 254
 _TO_GL = np.diag([1.0, -1.0, -1.0, 1.0])  # OpenGL cameras look along -z with y up
 _SHADERS = Path(__file__).parent / "shaders"
-_SHADOW_UNIT = 8  # of the texture units; pyrender counts its own from 0
+_SHADOW_UNIT = 8  # texture unit of the shadow map; pyrender uses units from 0
 
 
 class GlRenderer:
-    """Renders with OpenGL. The last scene stays uploaded: all views of a frame share it.
+    """Renderer on OpenGL. The last scene stays uploaded, so all views of a frame share it.
 
     Raises:
-        Unavailable: pyrender is not installed or no EGL context can be made here; the message has the reason.
+        Unavailable: pyrender is not installed or no EGL context can be created; the message gives the reason.
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class GlRenderer:
                 "pyrender is not installed; pip install 'simharness[gl]' (in a checkout: pip install -e '.[gl]') "
                 "or use the renderer 'raster'"
             )
-        # PyOpenGL binds to one platform at its first import; pyglet, which pyrender imports, asks for a display.
+        # PyOpenGL binds to one platform at its first import; pyglet, which pyrender imports, needs a display otherwise.
         os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
         os.environ.setdefault("PYGLET_HEADLESS", "1")
         try:
@@ -58,9 +58,9 @@ class GlRenderer:
             device = get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", "0")))
             self._platform = EGLPlatform(1, 1, device=device)
             self._platform.init_context()
-        except Exception as error:  # missing libraries, drivers and devices surface as a dozen types
+        except Exception as error:  # missing libraries, drivers and devices raise a dozen exception types
             raise Unavailable(
-                f"no EGL context can be made ({type(error).__name__}: {error}); install the GL libraries (Debian: "
+                f"no EGL context can be created ({type(error).__name__}: {error}); install the GL libraries (Debian: "
                 "apt-get install libegl1 libopengl0 libgl1 libgl1-mesa-dri) or use the renderer 'raster'"
             ) from error
         self._pyrender = pyrender
@@ -79,10 +79,10 @@ class GlRenderer:
         lighting: Lighting = DAYLIGHT,
         parts: bool = False,
     ) -> Image:
-        """Picture ``meshes`` as ``camera`` sees them: see :class:`~simharness.capture.rendering.renderer.Renderer`.
+        """Render ``meshes`` from ``camera``: see :class:`~simharness.capture.rendering.renderer.Renderer`.
 
         Raises:
-            ValueError: skewed pixels, more than 254 meshes, or a lens that bends too much.
+            ValueError: skewed pixels, more than 254 meshes, or a lens that distorts too much.
         """
         check_count(meshes, most=_MOST_MESHES)
         if camera.K[0, 1]:
@@ -96,31 +96,31 @@ class GlRenderer:
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
         K = camera.K
-        # OpenGL counts pixels from their corners, the project from their centres.
+        # OpenGL places integer pixel coordinates at pixel corners, this project at pixel centres.
         lens = self._pyrender.IntrinsicsCamera(K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5, znear=NEAR, zfar=_FAR)
-        eye = self._scene.add(lens, pose=pose @ _TO_GL)
+        node = self._scene.add(lens, pose=pose @ _TO_GL)
         try:
-            self._scene.main_camera_node = eye
+            self._scene.main_camera_node = node
             self._scene.bg_color = (*lighting.background, 0.0)
             self._renderer.viewport_width, self._renderer.viewport_height = width, height
             wanted = flags.OFFSCREEN | flags.RGBA | flags.SKIP_CULL_FACES
             rgb, labels = np.zeros((height, width, 3), np.uint8), None
             if color:
-                assert self._geometry is not None  # there is a stage
+                assert self._geometry is not None  # set by _stage()
                 self._renderer.light(lighting, self._geometry)
                 rgba, depth = self._renderer.render(self._scene, wanted)
                 rgb = np.ascontiguousarray(rgba[..., :3])
             if parts or not color:
                 rgba, depth = self._renderer.render(self._scene, wanted | flags.FLAT)
         finally:
-            self._scene.remove_node(eye)
+            self._scene.remove_node(node)
         ids = rgba[..., 3].astype(np.int16) - 1
         if parts:
             labels = np.where(ids >= 0, rgba[..., 0].astype(np.int16) - 1, -1).astype(np.int8)
         return Image(rgb=rgb, depth=np.where(ids >= 0, depth, np.float32(np.inf)), ids=ids, parts=labels)
 
     def _stage(self, meshes: Sequence[Mesh]) -> None:
-        """Put the meshes on stage; those that stand there already, the same objects, stay uploaded."""
+        """Upload the meshes; those that are already uploaded (the same objects) are kept."""
         geometry = SceneGeometry.of(meshes, self._geometry)
         if geometry is self._geometry:
             return
@@ -141,7 +141,7 @@ class GlRenderer:
         self._scene, self._geometry, self._staged, self._textures = scene, geometry, staged, textures
 
     def _primitive(self, mesh: Mesh, index: int, textures: dict[int, tuple[NDArray[np.uint8], Any]]) -> Any:
-        """Every face with corners of its own, so that it can have a colour of its own."""
+        """Return the GL primitive of a mesh, with separate corners for every face so that each can have its colour."""
         of_face, of_vertex = normals(mesh.vertices, mesh.faces.view(np.uint32), np.full(len(mesh.faces), mesh.smooth))
         corners = mesh.faces.ravel()
         colors = np.zeros((len(corners), 4), np.float32)
@@ -164,11 +164,11 @@ class GlRenderer:
 
 
 def _texture(picture: NDArray[np.uint8]) -> Any:
-    """A texture whose levels of detail are those of the rasteriser: drivers halve odd sizes as they please."""
+    """Return a texture with the mipmap levels of the rasteriser, because drivers differ in how they halve odd sizes."""
     import pyrender
     from OpenGL import GL
 
-    class Levelled(pyrender.Texture):
+    class MipmappedTexture(pyrender.Texture):
         def _add_to_context(self) -> None:
             super()._add_to_context()
             GL.glBindTexture(self.tex_type, self._texid)
@@ -180,7 +180,7 @@ def _texture(picture: NDArray[np.uint8]) -> Any:
             GL.glBindTexture(self.tex_type, 0)
 
     sampler = pyrender.Sampler(minFilter=pyrender.GLTF.LINEAR_MIPMAP_NEAREST)
-    return Levelled(source=picture, source_channels="RGB", sampler=sampler)
+    return MipmappedTexture(source=picture, source_channels="RGB", sampler=sampler)
 
 
 def _renderer() -> Any:
@@ -188,8 +188,8 @@ def _renderer() -> Any:
     from OpenGL import GL
     from pyrender.shader_program import ShaderProgramCache
 
-    class OwnShaders(pyrender.Renderer):
-        """pyrender's renderer with our shaders, and its multi-sampled frame buffer at one sample a pixel."""
+    class ShaderRenderer(pyrender.Renderer):
+        """Renderer of pyrender with the project's shaders, and one sample per pixel in the multi-sampled buffer."""
 
         def __init__(self) -> None:
             super().__init__(1, 1)
@@ -197,10 +197,10 @@ def _renderer() -> Any:
             self._lighting = DAYLIGHT
             self._shadows: Shadows | None = None
             self._map: int | None = None
-            GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)  # rows of textures follow each other without gaps
+            GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)  # rows of textures are stored without padding
 
         def light(self, lighting: Lighting, geometry: SceneGeometry) -> None:
-            """Use this light and the shadows of this scene in it."""
+            """Set the lighting and the shadow map of a scene in it."""
             shadows = geometry.shadows(lighting)
             self._lighting = lighting
             GL.glActiveTexture(GL.GL_TEXTURE0 + _SHADOW_UNIT)
@@ -219,7 +219,7 @@ def _renderer() -> Any:
 
         def _bind_lighting(self, scene: Any, program: Any, node: Any, flags: int) -> None:
             lighting, shadows = self._lighting, self._shadows
-            assert shadows is not None  # light() comes first
+            assert shadows is not None  # light() is called first
             program.set_uniform("light", np.array(lighting.direction))
             program.set_uniform("strengths", np.array([lighting.key, lighting.sky, lighting.fill]))
             program.set_uniform("tint", np.array(lighting.tint))
@@ -238,4 +238,4 @@ def _renderer() -> Any:
                 GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
                 GL.glRenderbufferStorageMultisample(GL.GL_RENDERBUFFER, 0, layout, *self._main_fb_dims)
 
-    return OwnShaders()
+    return ShaderRenderer()

@@ -1,8 +1,8 @@
-"""Lenses that bend: the picture of a pinhole camera that sees as much, warped as the lens would have it.
+"""Lens distortion: pictures of a pinhole camera with the same field of view, warped to the lens; and projection.
 
-The pinhole picture covers every direction that the lens images and is nowhere coarser than the bent one. Colours are
-interpolated; depth, ids and parts are those of the nearest pixel, which lies less than 0.75 pixels of the bent picture
-from where it should.
+The pinhole picture covers every direction that the lens images and has at least the resolution of the distorted one
+everywhere. Colours are interpolated; depth, ids and parts are those of the nearest pixel, less than 0.75 pixels of the
+distorted picture away from the exact position.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import Image
 
-_MOST = 16.0  # pixels of the pinhole picture for one of the bent
-_MARGIN = 1  # pixels around it, for interpolation
-_LONGEST_SIDE = 16384  # pixels; of what OpenGL draws
-_SAMPLES = 64  # places along each side where the magnification is taken; it changes smoothly
-_KEPT = 64  # lenses: as many as cameras in a rig
-_ROUND_TRIP = 0.5  # pixels: a lens that folds over brings directions back that it does not image
+_MAX_PIXEL_RATIO = 16.0  # pixels of the pinhole picture per pixel of the distorted one
+_MARGIN = 1  # pixels around the pinhole picture, for interpolation
+_LONGEST_SIDE = 16384  # pixels, limit of OpenGL
+_SAMPLES = 64  # samples of the magnification along each side; it changes smoothly
+_KEPT = 64  # cached lenses: as many as a rig has cameras
+_ROUND_TRIP = 0.5  # pixels: beyond the fold of a lens, undistort does not invert project
 
 
 @dataclass(frozen=True)
 class Lens:
-    """How to make the picture of one lens from that of a pinhole.
+    """Mapping from the picture of a pinhole camera to that of a distorting lens.
 
     Attributes:
-        K: intrinsics of the pinhole.
-        size: of its picture, width and height.
-        columns, rows: where each pixel of the bent picture lies in it, (h, w) float32; far outside where the lens
-            images nothing.
-        nearest: index of the nearest pixel of the flattened pinhole picture, (h, w) intp; 0 where there is none.
-        dark: (h, w), where the lens images nothing; None where there is no such place.
+        K: intrinsics of the pinhole camera.
+        size: width and height of its picture in pixels.
+        columns, rows: position of each pixel of the distorted picture in the pinhole picture, (h, w) float32; far
+            outside if the lens images nothing at the pixel.
+        nearest: index of the nearest pixel of the flattened pinhole picture, (h, w) intp; 0 if there is none.
+        dark: pixels at which the lens images nothing, (h, w) bool; None if there are none.
     """
 
     K: NDArray[np.float64]
@@ -47,11 +47,11 @@ class Lens:
     dark: NDArray[np.bool_] | None
 
     def pinhole(self, camera: Camera) -> Camera:
-        """The camera with a pinhole in place of this lens."""
+        """Return the pinhole camera that takes the place of a camera with this lens."""
         return replace(camera, K=self.K, distortion=np.zeros(5), size=self.size)
 
-    def bent(self, image: Image) -> Image:
-        """The picture through the lens from that through the pinhole; black where it images nothing."""
+    def distorted(self, image: Image) -> Image:
+        """Return the picture through the lens from that of the pinhole camera; black where it images nothing."""
         rgb = cv2.remap(image.rgb, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         return Image(
             rgb=rgb.astype(np.uint8, copy=False),
@@ -68,7 +68,7 @@ class Lens:
 
 
 def through_lens(camera: Camera, picture: Callable[[Camera], Image]) -> Image:
-    """What a camera sees, from a way to picture what a pinhole camera sees.
+    """Render a picture through the lens of a camera, given a function that renders pictures of pinhole cameras.
 
     Raises:
         ValueError: see :func:`lens_of`.
@@ -76,14 +76,14 @@ def through_lens(camera: Camera, picture: Callable[[Camera], Image]) -> Image:
     if not camera.distortion.any():
         return picture(camera)
     lens = lens_of(camera)
-    return lens.bent(picture(lens.pinhole(camera)))
+    return lens.distorted(picture(lens.pinhole(camera)))
 
 
 def lens_of(camera: Camera) -> Lens:
-    """The lens of a camera; worked out once, wherever the camera stands.
+    """Return the lens of a camera; cached by intrinsics, independent of the pose of the camera.
 
     Raises:
-        ValueError: it bends so much that the pinhole picture would be immense.
+        ValueError: the lens distorts so much that the pinhole picture would be too large.
     """
     lens = _lens(camera.K.tobytes(), camera.distortion.tobytes(), camera.size)
     if isinstance(lens, str):
@@ -93,7 +93,7 @@ def lens_of(camera: Camera) -> Lens:
 
 @lru_cache(maxsize=_KEPT)
 def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Lens | str:
-    """The lens, or what is wrong with it."""
+    """Return the lens, or a message if it cannot be rendered."""
     K, distortion = np.frombuffer(K_bytes).reshape(3, 3), np.frombuffer(distortion_bytes)
     camera = Camera(K, np.eye(3), np.zeros(3), distortion=distortion, size=size)
     width, height = size
@@ -105,10 +105,10 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
     few = np.concatenate([few, straight[-1], straight[:, -1]])
     finer = max(1.0, _magnification(camera, few[np.isfinite(few).all(axis=-1)]))
     shape = np.ceil((high - low) * finer).astype(np.int64) + 1 + 2 * _MARGIN
-    if shape.prod() > _MOST * width * height or shape.max() > _LONGEST_SIDE:
+    if shape.prod() > _MAX_PIXEL_RATIO * width * height or shape.max() > _LONGEST_SIDE:
         return (
-            f"its lens, distortion {distortion.tolist()}, bends so much that a straight picture of what it sees would "
-            f"be {shape[0]} x {shape[1]} pixels for {width} x {height}: take weaker terms (cameras.distortion), or a "
+            f"its lens, distortion {distortion.tolist()}, distorts so much that the undistorted picture would have "
+            f"{shape[0]} x {shape[1]} pixels for {width} x {height}: use smaller terms (cameras.distortion) or a "
             "longer focal length (a smaller cameras.fov)"
         )
     enlarged = np.diag([finer, finer, 1.0]) @ K
@@ -126,11 +126,11 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
 
 
 def _magnification(camera: Camera, straight: NDArray[np.float64]) -> float:
-    """By how much a lens magnifies where it does most: the largest singular value of its derivative.
+    """Return the largest magnification of a lens: the largest singular value of its derivative.
 
     Args:
-        camera: its K and distortion count.
-        straight: places in the picture of the pinhole with the same K, (n, 2).
+        camera: camera with the lens; only K and distortion are used.
+        straight: positions in the picture of the pinhole camera with the same K, (n, 2).
     """
     step = 1e-3  # pixels
 

@@ -1,8 +1,8 @@
-"""Mirrors: pictures in which they reflect what stands before them.
+"""Reflections in flat mirrors.
 
-A flat mirror shows the scene on its other side, turned over: so the reflected scene, cut off at the glass, is
-rendered with the same camera, and its colours go where the glass is seen. Ids and depth stay those of the glass. It
-is done with what every renderer can do, so every renderer can do it. Mirrors in mirrors are plain glass.
+The scene is reflected at the plane of the glass, clipped at that plane and rendered with the same camera; its colours
+replace those of the pixels that show the glass. Ids and depth stay those of the glass. This needs no support by the
+renderer, so it works with all of them. Mirrors seen in mirrors are plain glass.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
 
-_NEAR_GLASS = 0.004  # metres: depth from a picture is as good as this; frames stand out farther
+_NEAR_GLASS = 0.004  # metres: accuracy of depth from a picture; frames stand out farther
 _REFLECTANCE = (0.87, 0.90, 0.89)  # glass is a little green; sRGB
 
 
@@ -30,20 +30,20 @@ def with_mirrors(
     meshes: Sequence[Mesh],
     mirrors: Mapping[int, Mirror],
     image: Image,
-    **how: Any,
+    **options: Any,
 ) -> NDArray[np.uint8]:
-    """Let the mirrors of a picture reflect.
+    """Add reflections to the mirrors of a picture.
 
     Args:
-        renderer: what made the picture.
-        camera: whose picture it is.
-        meshes: the scene that was rendered.
-        mirrors: the glass of those meshes that are mirrors, by their index.
-        image: the picture, with depth and ids.
-        how: as ``renderer.render`` was called; a ``lighting`` among it is reflected too.
+        renderer: renderer of the picture.
+        camera: camera of the picture.
+        meshes: meshes that were rendered.
+        mirrors: glass of the meshes that are mirrors, by mesh index.
+        image: picture with depth and ids.
+        options: further arguments of ``renderer.render``; a ``lighting`` among them is reflected too.
 
     Returns:
-        The colours (h, w, 3), the same array where no mirror is seen.
+        Colours, (h, w, 3); the same array if no mirror is visible.
     """
     rgb = image.rgb
     for index, mirror in mirrors.items():
@@ -51,18 +51,18 @@ def with_mirrors(
         if not glass.any():
             continue
         behind = [reflected(mesh, mirror) for k, mesh in enumerate(meshes) if k != index]
-        lit = dict(how)
-        if "lighting" in lit:
-            towards = np.asarray(lit["lighting"].direction, float)
+        reflected_options = dict(options)
+        if "lighting" in reflected_options:
+            towards = np.asarray(options["lighting"].direction, float)
             turned = towards - 2 * (towards @ np.array(mirror.normal)) * np.array(mirror.normal)
-            lit["lighting"] = replace(lit["lighting"], direction=tuple(turned.tolist()))
-        other = renderer.render(camera, [mesh for mesh in behind if len(mesh.faces)], **lit).rgb
+            reflected_options["lighting"] = replace(options["lighting"], direction=tuple(turned.tolist()))
+        other = renderer.render(camera, [mesh for mesh in behind if len(mesh.faces)], **reflected_options).rgb
         rgb = np.where(glass[..., None], np.round(other * np.array(_REFLECTANCE)).astype(np.uint8), rgb)
     return rgb
 
 
 def _glass(camera: Camera, image: Image, index: int, mirror: Mirror) -> NDArray[np.bool_]:
-    """Pixels (h, w) in which the glass is seen from its front."""
+    """Return the pixels (h, w) that show the reflecting side of the glass."""
     seen = image.ids == index
     if not seen.any() or mirror.in_front(camera.center) <= 0:
         return np.zeros_like(seen)
@@ -74,7 +74,7 @@ def _glass(camera: Camera, image: Image, index: int, mirror: Mirror) -> NDArray[
 
 
 def reflected(mesh: Mesh, mirror: Mirror) -> Mesh:
-    """What a mirror shows of a mesh: the part in front of the glass's plane, turned over; perhaps without faces."""
+    """Return the mirror image of a mesh: its part in front of the plane of the glass, reflected; may have no faces."""
     cut = _in_front(mesh, mirror)
     changed: dict[str, Any] = {"vertices": mirror.reflect(cut.vertices).astype(np.float32), "faces": cut.faces[:, ::-1]}
     if cut.uv is not None:
@@ -83,7 +83,7 @@ def reflected(mesh: Mesh, mirror: Mirror) -> Mesh:
 
 
 def _in_front(mesh: Mesh, mirror: Mirror) -> Mesh:
-    """The part of a mesh in front of a mirror's plane; faces across it are cut."""
+    """Return the part of a mesh in front of the plane of a mirror; faces across the plane are cut."""
     height = mirror.in_front(mesh.vertices)[mesh.faces]
     count = (height > 0).sum(axis=1)
     if (count == 3).all():
@@ -91,7 +91,7 @@ def _in_front(mesh: Mesh, mirror: Mirror) -> Mesh:
     whole = np.flatnonzero(count == 3)
     source, weights = _pieces(height, count)
     corners = np.einsum("kij,kjc->kic", weights, mesh.vertices[mesh.faces[source]])
-    own = len(mesh.vertices) + np.arange(3 * len(source)).reshape(-1, 3)  # each piece has corners of its own
+    cut_faces = len(mesh.vertices) + np.arange(3 * len(source)).reshape(-1, 3)  # pieces share no vertices
     kept = np.concatenate([whole, source])
     changed: dict[str, Any] = {}
     if mesh.uv is not None:
@@ -103,27 +103,27 @@ def _in_front(mesh: Mesh, mirror: Mirror) -> Mesh:
     return replace(
         mesh,
         vertices=np.concatenate([mesh.vertices, corners.reshape(-1, 3)]).astype(np.float32),
-        faces=np.concatenate([mesh.faces[whole], own]).astype(np.int32),
+        faces=np.concatenate([mesh.faces[whole], cut_faces]).astype(np.int32),
         colors=mesh.colors[kept],
         **changed,
     )
 
 
 def _pieces(height: Floats, count: NDArray[np.int_]) -> tuple[NDArray[np.int_], Floats]:
-    """What is left of the faces across a plane, from the heights of their corners (k, 3) over it.
+    """Cut faces at a plane and return the triangles above it.
 
     Args:
-        height: of every face's corners.
-        count: how many of them are above, (k,).
+        height: heights of the corners of each face over the plane, (k, 3).
+        count: number of corners above the plane, (k,).
 
     Returns:
-        For every piece its face (p,), and its corners as weights of the face's corners (p, 3, 3).
+        Face of each triangle, (p,), and its corners as weights of the corners of the face, (p, 3, 3).
     """
     sources, weights = [], []
     for above in (1, 2):
         cut = np.flatnonzero(count == above)
-        lone = np.argmax((height[cut] > 0) == (above == 1), axis=1)  # the corner that is alone on its side
-        corner = np.eye(3)[(lone[:, None] + np.arange(3)) % 3]  # (c, 3, 3): the lone one, then the two others
+        lone = np.argmax((height[cut] > 0) == (above == 1), axis=1)  # the single corner on its side
+        corner = np.eye(3)[(lone[:, None] + np.arange(3)) % 3]  # (c, 3, 3): the single one, then the two others
         h = np.einsum("kij,kj->ki", corner, height[cut])
         share = (h[:, :1] / (h[:, :1] - h[:, 1:]))[..., None]
         a, b, c = np.moveaxis(corner, 1, 0)

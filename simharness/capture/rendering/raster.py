@@ -1,7 +1,7 @@
-"""The renderer that needs nothing: a z-buffer and one shading pass, compiled by numba.
+"""Software renderer without dependencies on the machine: a z-buffer and one shading pass, compiled by numba.
 
-Depth and ids are exact at pixel centres: the ray of every pixel is met with every triangle in float64 (see
-:func:`simharness.capture.rendering.raster_kernels.rasterise`), no sampling pattern, no fixed-point grid.
+Depth and ids are exact at pixel centres: the ray of every pixel is intersected with the triangles in float64 (see
+:func:`simharness.capture.rendering.raster_kernels.rasterise`), without a sampling pattern or fixed-point grid.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MOST_MESHES = np.iinfo(np.int16).max
 
 
 class RasterRenderer:
-    """Renders on one core of any machine. The last scene is kept: all views of a frame share its shadows."""
+    """Renderer on one CPU core. The last scene is kept, so all views of a frame share its shadows."""
 
     def __init__(self) -> None:
         self._geometry = SceneGeometry.of(())
@@ -39,7 +39,7 @@ class RasterRenderer:
         lighting: Lighting = DAYLIGHT,
         parts: bool = False,
     ) -> Image:
-        """Picture ``meshes`` as ``camera`` sees them: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
+        """Render ``meshes`` from ``camera``: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
         check_count(meshes, most=_MOST_MESHES)
         self._geometry = SceneGeometry.of(meshes, self._geometry)
         return through_lens(camera, lambda pinhole: self._picture(pinhole, color, lighting, parts))
@@ -59,7 +59,7 @@ class RasterRenderer:
         )
 
     def _buffers(self, shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Empty inverse depth and face of every pixel; the memory of the last picture, which is near at hand."""
+        """Return cleared buffers of inverse depth and face per pixel; they reuse the memory of the last picture."""
         if self._triangle.shape != shape:
             self._inverse_depth, self._triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
         self._inverse_depth.fill(0)
@@ -94,7 +94,7 @@ def _shaded(
         np.ascontiguousarray(np.linalg.inv(camera.P[:, :3])),
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
-        255 * np.sqrt(lighting.tint),  # sRGB is about the root of light
+        255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light
         empty,
         shadows.P,
         shadows.nearest,

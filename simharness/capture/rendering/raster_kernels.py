@@ -1,14 +1,15 @@
-"""The compiled loops of the rasteriser: private, on plain arrays, single-threaded.
+"""Compiled kernels of the rasteriser: private, on plain arrays, single-threaded.
 
 A triangle with vertices ``a, b, c`` in homogeneous pixel coordinates (``P @ (x, 1)``, the third is depth) is hit by the
-ray ``d = (x, y, 1)`` of a pixel where all of ``[b x c, c x a, a x b] . d`` have the sign of the determinant
-``a . (b x c)``, and their sum over the determinant is the inverse depth of the hit. That needs no clipping: vertices
-behind the camera are as good as any (Olano & Greer, "Triangle scan conversion using 2D homogeneous coordinates",
-1997). Two triangles on one edge compute it with opposite signs and the same rounding, so no pixel falls between them.
+ray ``d = (x, y, 1)`` of a pixel if all of ``[b x c, c x a, a x b] . d`` have the sign of the determinant
+``a . (b x c)``, and their sum over the determinant is the inverse depth of the hit. This needs no clipping: vertices
+behind the camera are allowed (Olano & Greer, "Triangle scan conversion using 2D homogeneous coordinates",
+1997). Two triangles that share an edge compute it with opposite signs and the same rounding, so no pixel falls between
+them.
 
-Float64 throughout: a room's floor and a fingertip go through the same arithmetic. Most triangles of a body are about as
-large as a pixel, and what they cost is the processor's wrong guesses at a dozen random branches each. So they pass
-through short loops that select, cover and fill without guessing: each loop hands a list to the next.
+All arithmetic is in float64, for large triangles (the floor of a room) and small ones (a fingertip) alike. Most
+triangles of a body are about as large as a pixel, and their cost is dominated by mispredicted branches, a dozen each.
+So they pass through short branch-free loops that select, cover and fill; each loop passes a list to the next.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -18,14 +19,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-# The kernels are typed by the arrays that the first call hands in. What picks entries of others is unsigned, or counts
-# from 0: an index that may be negative would be checked at every use, and keeps loops from running on vectors.
+# The kernels are typed by the arrays of the first call. Indices are unsigned or count from 0: an index that may be
+# negative would be checked at every use, and prevents vectorisation of loops.
 
-_SLACK = 4e-3  # pixels: bounding boxes are of single precision, edges decide
+_SLACK = 4e-3  # pixels: bounding boxes are in single precision; the edges decide
 _TILE = 4  # pixels
 _SMALL = 12  # pixels: larger triangles are drawn row by row
-_CHUNK = 512  # triangles on their way together: their lists stay in the processor's nearest cache
-_LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # set bit of 16, by a de Bruijn sequence
+_CHUNK = 512  # triangles processed together: their lists stay in the first-level cache
+_LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # lowest set bit by de Bruijn sequence
 _DE_BRUIJN = 0x09AF
 
 
@@ -40,30 +41,31 @@ def rasterise(
 ) -> np.ndarray:
     """Write the nearest triangle at every pixel centre into ``inverse_depth`` and ``triangle``, in place.
 
-    Both sides of a triangle are drawn, but those seen from behind last: the far sides of bodies, half of all triangles,
-    are then mostly known to be hidden before any work is spent on them.
+    Both sides of triangles are drawn, but those seen from behind last: most of them, the far sides of bodies and half
+    of all triangles, are then known to be hidden and skipped.
 
     Args:
-        vertices: (n, 3) float32, world.
-        faces: (k, 3) uint32.
-        P: projection matrix, (3, 4), its last row unit: ``K [R | t]``.
+        vertices: positions in the world, (n, 3) float32.
+        faces: vertex indices, (k, 3) uint32.
+        P: projection matrix ``K [R | t]``, (3, 4), with a last row of unit length.
         near: depth below which nothing is drawn.
         inverse_depth: (h, w) float32, zeros before the first call.
-        triangle: (h, w) int32, index of the face seen; -1 before the first call.
+        triangle: index of the visible face, (h, w) int32; -1 before the first call.
 
     Returns:
         Homogeneous pixel coordinates of the vertices, (n, 3).
     """
     height, width = triangle.shape
     q, seen = np.empty((len(vertices), 3)), np.empty((len(vertices), 3), np.float32)
-    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]  # else read anew for every vertex: q might be P
+    # Local copies: otherwise P is read again for every vertex, because q might alias it.
+    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
     p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
     p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
     for i in range(len(vertices)):
         x, y, z = np.float64(vertices[i, 0]), np.float64(vertices[i, 1]), np.float64(vertices[i, 2])
         q[i, 0], q[i, 1] = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
         q[i, 2] = p20 * x + p21 * y + p22 * z + p23
-        # Pixel and inverse depth, which is 0 behind the near plane: there the rest is of no use, and not used.
+        # Pixel and inverse depth, which is 0 behind the near plane: there the pixel is not used.
         scale = 1.0 / q[i, 2]
         seen[i, 0], seen[i, 1] = q[i, 0] * scale, q[i, 1] * scale
         seen[i, 2] = scale if q[i, 2] >= near else 0.0
@@ -84,10 +86,10 @@ def rasterise(
 
 @njit(cache=True, error_model="numpy")
 def _select(faces: np.ndarray, seen: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that may cover a pixel's centre: lists (4, k) and how long they are.
+    """Return triangles that may cover a pixel centre: four lists of indices, (4, k), and their lengths.
 
-    Small ones that face the camera; large ones, and all that the near plane cuts; and the same two of those seen from
-    behind.
+    Small triangles that face the camera; large ones, and all that the near plane cuts; then small and large ones seen
+    from behind.
     """
     lists, counts = np.empty((4, len(faces) + 1), np.uint32), np.zeros(4, np.int64)
     facing_small, facing_large, averted_small, averted_large, slack = 0, 0, 0, 0, np.float32(_SLACK)
@@ -123,11 +125,11 @@ def _select(faces: np.ndarray, seen: np.ndarray, width: int, height: int) -> tup
 
 @njit(cache=True, error_model="numpy")
 def _blocks(inverse_depth: np.ndarray) -> np.ndarray:
-    """The farthest of every 4 x 4 pixels, inverse depth; one row and column more, of zeros."""
+    """Return the smallest inverse depth in every block of 4 x 4 pixels, with one more row and column of zeros."""
     height, width = inverse_depth.shape
     rows, columns = (height + _TILE - 1) // _TILE, (width + _TILE - 1) // _TILE
     blocks = np.zeros((rows + 1, columns + 1), np.float32)
-    for row in range(height // _TILE):  # what the border cuts stays 0: seen through
+    for row in range(height // _TILE):  # blocks cut by the border stay 0: never hidden
         for column in range(width // _TILE):
             least = inverse_depth[_TILE * row, _TILE * column]
             for y in range(_TILE):
@@ -142,7 +144,7 @@ def _blocks(inverse_depth: np.ndarray) -> np.ndarray:
 def _box(
     a: int, b: int, c: int, seen: np.ndarray, width: int, height: int
 ) -> tuple[np.int32, np.int32, np.int32, np.int32, np.float32, np.float32]:
-    """Pixels that a triangle ahead may cover: left, right, top, bottom; its least and greatest inverse depth."""
+    """Return the pixel box (left, right, top, bottom) of a triangle ahead, and its range of inverse depth."""
     slack = np.float32(_SLACK)
     ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
     low, high = (ax, bx) if ax < bx else (bx, ax)
@@ -160,7 +162,7 @@ def _box(
 
 @njit(cache=True, error_model="numpy")
 def _drop_hidden(small: np.ndarray, faces: np.ndarray, seen: np.ndarray, blocks: np.ndarray) -> int:
-    """Move to the front of a list those that are not behind all that is seen where they are; how many."""
+    """Move the triangles that may be visible to the front of a list, and return their number."""
     rows, columns, kept = blocks.shape[0], blocks.shape[1], 0
     for index in range(len(small)):
         t = small[index]
@@ -170,7 +172,7 @@ def _drop_hidden(small: np.ndarray, faces: np.ndarray, seen: np.ndarray, blocks:
         one, two, three, four = blocks[top, left], blocks[top, right], blocks[bottom, left], blocks[bottom, right]
         one, three = two if two < one else one, four if four < three else three
         one = three if three < one else one
-        # Only the corners of the box were asked: enough where it spans no more than two blocks each way.
+        # Only the corners of the box are tested: enough if it spans at most two blocks in each direction.
         small[kept] = t
         kept += (nearest >= one) | (right - left > 1) | (bottom - top > 1)
     return kept
@@ -187,21 +189,21 @@ def _cover(
     hits: np.ndarray,
     planes: np.ndarray,
 ) -> int:
-    """Which pixels small triangles cover, in tiles of 4 x 4.
+    """Find the pixels that small triangles cover, in tiles of 4 x 4.
 
     Args:
         small: indices of triangles.
-        faces: (k, 3) uint32.
+        faces: vertex indices, (k, 3) uint32.
         q: homogeneous pixel coordinates of the vertices, (n, 3).
         seen: pixels and inverse depths of the vertices, (n, 3) float32.
-        width: of the picture.
-        height: of the picture.
-        hits: gets, for every tile with pixels that are covered, the triangle, the tile's first column and row, and one
-            bit for each of its pixels, (most, 4) int32.
-        planes: gets the plane of inverse depth over pixels, and its least and greatest value, (most, 5).
+        width: width of the picture.
+        height: height of the picture.
+        hits: output; for every tile with covered pixels the triangle, the first column and row of the tile, and one bit
+            for each of its pixels, (most, 4) int32.
+        planes: output; plane of inverse depth over pixels, and its lowest and highest value, (most, 5).
 
     Returns:
-        How many tiles.
+        Number of tiles.
     """
     count = 0
     for index in range(len(small)):
@@ -222,13 +224,13 @@ def _cover(
         for tile_top in range(top, bottom + 1, _TILE):
             for tile_left in range(left, right + 1, _TILE):
                 inside, first, row = np.int32(0), np.int32(tile_left), np.int32(tile_top)
-                for i in range(16):  # at once, on processors that can
+                for i in range(16):  # vectorised by the compiler
                     x, y = np.float64(first + np.int32(i & 3)), np.float64(row + np.int32(i >> 2))
                     e, f, g = ex * x + (ey * y + ez), fx * x + (fy * y + fz), gx * x + (gy * y + gz)
                     inside |= np.int32((e >= 0.0) & (f >= 0.0) & (g >= 0.0)) << np.int32(i)
                 columns, rows = min(right - tile_left + 1, _TILE), min(bottom - tile_top + 1, _TILE)
                 box = (0x1111 * ((1 << columns) - 1)) & ((1 << (_TILE * rows)) - 1)
-                covered = (inside & box) if determinant != 0.0 else 0  # 0 is seen from its edge
+                covered = (inside & box) if determinant != 0.0 else 0  # 0: seen edge-on
                 hits[count, 0], hits[count, 1], hits[count, 2], hits[count, 3] = t, tile_left, tile_top, covered
                 planes[count, 0], planes[count, 1], planes[count, 2] = px, py, pz
                 planes[count, 3], planes[count, 4] = low, high
@@ -238,10 +240,10 @@ def _cover(
 
 @njit(cache=True, error_model="numpy")
 def _fill(hits: np.ndarray, planes: np.ndarray, count: int, inverse_depth: np.ndarray, triangle: np.ndarray) -> None:
-    """Write small triangles where they are the nearest; arguments as :func:`_cover` returns them."""
+    """Write small triangles at the pixels where they are the nearest; arguments as written by :func:`_cover`."""
     for index in range(count):
         t, left, top, inside = hits[index, 0], hits[index, 1], hits[index, 2], np.int64(hits[index, 3])
-        # Rounding must not lift a sliver out of its own range of depth.
+        # Rounding must not move a thin triangle out of its range of depth.
         low, high = np.float32(planes[index, 3]), np.float32(planes[index, 4])
         while inside:
             i = _LOWEST[(((inside & -inside) * _DE_BRUIJN) >> 12) & 15]
@@ -264,7 +266,7 @@ def _draw(
     inverse_depth: np.ndarray,
     triangle: np.ndarray,
 ) -> None:
-    """Write triangles of any size where they are the nearest, row by row."""
+    """Write triangles of any size at the pixels where they are the nearest, row by row."""
     height, width = triangle.shape
     edge, run = np.empty((4, 3)), np.empty(4)
     for index in range(len(large)):
@@ -272,7 +274,7 @@ def _draw(
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         least, most = min(q[a, 2], q[b, 2], q[c, 2]), max(q[a, 2], q[b, 2], q[c, 2])
         whole = least >= near
-        # The box around what of it lies before the near plane.
+        # Pixel box of the part beyond the near plane.
         left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
         for k in range(3):
             i, j = (b, c) if k == 0 else ((c, a) if k == 1 else (a, b))
@@ -293,7 +295,7 @@ def _draw(
             edge[k, 1] = q[i, 2] * q[j, 0] - q[i, 0] * q[j, 2]
             edge[k, 2] = q[i, 0] * q[j, 1] - q[i, 1] * q[j, 0]
         determinant = q[a, 0] * edge[0, 0] + q[a, 1] * edge[0, 1] + q[a, 2] * edge[0, 2]
-        if determinant == 0.0:  # seen from its edge
+        if determinant == 0.0:  # seen edge-on
             continue
         scale = 1.0 / determinant
         px = (edge[0, 0] + edge[1, 0] + edge[2, 0]) * scale
@@ -302,11 +304,11 @@ def _draw(
         if determinant < 0:
             for k in range(3):
                 edge[k, 0], edge[k, 1], edge[k, 2] = -edge[k, 0], -edge[k, 1], -edge[k, 2]
-        edge[3, 0], edge[3, 1], edge[3, 2] = -px, -py, 1.0 / near - pz  # where the near plane cuts: one more side
+        edge[3, 0], edge[3, 1], edge[3, 2] = -px, -py, 1.0 / near - pz  # the near plane as a fourth edge
         for n in range(4):
             run[n] = -1.0 / edge[n, 0]
         label = np.int32(t)
-        # Rounding must not lift a sliver out of its own range of depth.
+        # Rounding must not move a thin triangle out of its range of depth.
         low, high = np.float32(1.0 / most), np.float32(1.0 / (least if whole else near))
         for row in range(int(top), int(bottom) + 1):
             start, end = left, right
@@ -314,7 +316,7 @@ def _draw(
                 rise, offset = edge[n, 0], edge[n, 1] * row + edge[n, 2]
                 if rise > 0:
                     edge_x = np.ceil(offset * run[n])
-                    # The sign of the edge at a pixel decides, as in a tile, however this was rounded.
+                    # The sign of the edge at a pixel decides, as in a tile, independent of rounding here.
                     if rise * edge_x + offset < 0:
                         edge_x += 1.0
                     elif rise * (edge_x - 1.0) + offset >= 0:
@@ -334,7 +336,7 @@ def _draw(
             first = int(start)
             depths, triangles = inverse_depth[row, first : int(end) + 1], triangle[row, first : int(end) + 1]
             offset = px * first + (py * row + pz)
-            for x in range(len(depths)):  # without a branch: several pixels at once
+            for x in range(len(depths)):  # branch-free, so that the compiler vectorises it
                 w, before, other = np.float32(px * np.int32(x) + offset), depths[x], triangles[x]
                 w = low if w < low else (high if w > high else w)
                 depths[x] = w if w > before else before
@@ -343,7 +345,7 @@ def _draw(
 
 @njit(cache=True, error_model="numpy")
 def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depth (h, w) float32, +inf where nothing is, and the label of the face seen (h, w); ``labels[-1]`` for none."""
+    """Return depth (h, w) float32, +inf without a face, and the label of the visible face, ``labels[-1]`` for none."""
     height, width = triangle.shape
     depth, seen = np.empty((height, width), np.float32), np.empty((height, width), labels.dtype)
     last = np.uint32(len(labels) - 1)
@@ -351,5 +353,5 @@ def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray)
         for x in range(width):
             depth[y, x] = np.float32(1.0) / inverse_depth[y, x]
         for x in range(width):
-            seen[y, x] = labels[min(np.uint32(triangle[y, x]), last)]  # -1 is the greatest of all
+            seen[y, x] = labels[min(np.uint32(triangle[y, x]), last)]  # as unsigned, -1 is the largest index
     return depth, seen

@@ -1,4 +1,4 @@
-"""What a renderer is: a camera and meshes in, colour, depth and mesh index of every pixel out."""
+"""Renderer interface: colour, depth and mesh index of every pixel from a camera and meshes; renderers by name."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from simharness.types.mesh import Mesh
 
 RendererName = Literal["auto", "raster", "gl"]
 
-NEAR = 0.05  # metres in front of the camera's centre; nothing nearer is drawn, by any renderer
+NEAR = 0.05  # metres in front of the camera centre: near plane of all renderers
 DAYLIGHT = Lighting()
 
 
 class Unavailable(RuntimeError):
-    """A renderer cannot work on this machine; the message says why and what to install."""
+    """Error of a renderer that cannot work on this machine; the message gives the reason and what to install."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """What one camera sees. Rows are y, columns x; an array index is the pixel's centre.
+    """Rendered image. Rows are y, columns x; integer indices are pixel centres.
 
     Attributes:
-        rgb: (h, w, 3) uint8; zeros where no colour was asked for.
-        depth: distance along the optical axis, metres, (h, w) float32; +inf where nothing is seen.
-        ids: index of the mesh seen, (h, w) int16; -1 where nothing is seen.
-        parts: label of the face seen, of :attr:`Mesh.parts`, (h, w) int8; -1 where it has none or nothing is seen. None
-            where it was not asked for.
+        rgb: colours, (h, w, 3) uint8; zeros if no colour was requested.
+        depth: distance along the optical axis, metres, (h, w) float32; +inf without a surface.
+        ids: index of the visible mesh, (h, w) int16; -1 without a surface.
+        parts: label of the visible face from :attr:`Mesh.parts`, (h, w) int8; -1 without a label or surface. None if
+            not requested.
     """
 
     rgb: NDArray[np.uint8]
@@ -48,11 +48,11 @@ class Image:
                 f"got {self.rgb.shape}, {shape} and {self.ids.shape}"
             )
         if self.parts is not None and self.parts.shape != shape:
-            raise ValueError(f"parts must be {shape} as depth is, got {self.parts.shape}")
+            raise ValueError(f"parts must have the shape of depth, {shape}, got {self.parts.shape}")
 
 
 class Renderer(Protocol):
-    """Anything that makes pictures of meshes. Faces are opaque from both sides; the nearest is seen."""
+    """Interface of renderers. Faces are opaque from both sides; the nearest is visible."""
 
     def render(
         self,
@@ -63,28 +63,28 @@ class Renderer(Protocol):
         lighting: Lighting = DAYLIGHT,
         parts: bool = False,
     ) -> Image:
-        """Picture ``meshes`` as ``camera`` sees them; ``Image.ids`` are indices into ``meshes``.
+        """Render ``meshes`` from ``camera``; ``Image.ids`` are indices into ``meshes``.
 
-        A lens with distortion bends the picture as it would (:mod:`simharness.capture.rendering.lens`).
+        Lens distortion is simulated (:mod:`simharness.capture.rendering.lens`).
 
         Args:
             camera: any camera.
-            meshes: what is there. Pass the same objects for all views: renderers prepare them once. From frame to frame
-                move meshes with :meth:`Mesh.moved`: what does not change with it is prepared once for all.
-            color: shade the picture; without it ``Image.rgb`` is zeros and the rest comes sooner.
-            lighting: the light in it.
-            parts: label the parts as well.
+            meshes: meshes of the scene. Pass the same objects for all views: renderers prepare them once. Between
+                frames move meshes with :meth:`Mesh.moved`: the arrays that it shares are prepared only once.
+            color: whether to shade the picture; without it ``Image.rgb`` is zeros and rendering is faster.
+            lighting: lighting of the scene.
+            parts: whether to label the parts.
 
         Raises:
-            ValueError: a lens so wide that no picture can be made of it, or there are more meshes than ids.
+            ValueError: a lens that distorts too much to be rendered, or more meshes than ids.
         """
         ...
 
 
 def check_count(meshes: Sequence[Mesh], *, most: int) -> None:
-    """Refuse more than ``most`` meshes."""
+    """Raise ``ValueError`` for more than ``most`` meshes."""
     if len(meshes) > most:
-        raise ValueError(f"this renderer tells at most {most} meshes apart, got {len(meshes)}: merge some")
+        raise ValueError(f"this renderer distinguishes at most {most} meshes, got {len(meshes)}: merge some")
 
 
 def make_renderer(name: RendererName = "raster") -> Renderer:

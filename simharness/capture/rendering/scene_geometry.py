@@ -1,7 +1,7 @@
-"""All triangles of a scene in one, and what shading them needs: normals, texture pyramids, the shadows of the light.
+"""Geometry of a whole scene for shading: merged triangles, normals, texture pyramids, shadow map.
 
-From frame to frame most of it stays: only vertices move. So what hangs on the meshes' faces is a :class:`SceneTopology`, kept
-as long as they are the same, and what hangs on the vertices a :class:`SceneGeometry`.
+Between frames mostly vertices move. So everything that depends on the faces of the meshes is in :class:`SceneTopology`,
+reused while they are the same, and everything that depends on the vertices in :class:`SceneGeometry`.
 """
 
 from __future__ import annotations
@@ -24,46 +24,46 @@ from simharness.types.mesh import Mesh
 Floats = NDArray[np.float32]
 
 SHADOW_SIZE = 768  # pixels
-_LIGHT_DISTANCE = 1000.0  # in radii of what casts shadows: its rays are all but parallel
+_LIGHT_DISTANCE = 1000.0  # in radii of the shadow casters: rays are almost parallel
 
 
 @dataclass(frozen=True)
 class SceneTopology:
-    """The faces of a scene: n vertices and k faces in all."""
+    """Faces of a scene with n vertices and k faces in total."""
 
     meshes: tuple[Mesh, ...]
 
     def matches(self, meshes: Sequence[Mesh]) -> bool:
-        """Whether meshes are these but for where their vertices are."""
+        """Return whether meshes are the same except for their vertex positions."""
         return len(meshes) == len(self.meshes) and all(map(_same_topology, meshes, self.meshes))
 
     @cached_property
     def faces(self) -> NDArray[np.uint32]:
-        """(k, 3) into all vertices."""
+        """Indices of all faces into all vertices, (k, 3)."""
         starts = np.cumsum([0, *(len(mesh.vertices) for mesh in self.meshes)]).astype(np.int32)
         faces = [mesh.faces + start for mesh, start in zip(self.meshes, starts, strict=False)]
         return np.concatenate([np.zeros((0, 3), np.int32), *faces]).view(np.uint32)
 
     @cached_property
     def mesh(self) -> NDArray[np.int16]:
-        """Index of the mesh of every face; one entry more, -1, for face -1: nothing. (k + 1,)."""
+        """Mesh index of every face, then -1 for face -1 (no face), (k + 1,)."""
         return np.append(self._per_face(range(len(self.meshes))), -1).astype(np.int16)
 
     @cached_property
     def parts(self) -> NDArray[np.int8]:
-        """Label of every face and one more, -1, for face -1. (k + 1,)."""
+        """Part label of every face, then -1 for face -1 (no face), (k + 1,)."""
         none = (np.full(len(mesh.faces), -1, np.int8) for mesh in self.meshes)
         labels = [rest if mesh.parts is None else mesh.parts for mesh, rest in zip(self.meshes, none, strict=True)]
         return np.concatenate([*labels, np.array([-1], np.int8)])
 
     @cached_property
     def colors(self) -> Floats:
-        """(k, 3)."""
+        """Colours of the faces, (k, 3)."""
         return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.colors for mesh in self.meshes)])
 
     @cached_property
     def smooth(self) -> NDArray[np.bool_]:
-        """(k,)."""
+        """Whether each face has interpolated normals, (k,)."""
         return self._per_face(mesh.smooth for mesh in self.meshes).astype(bool)
 
     @cached_property
@@ -74,7 +74,7 @@ class SceneTopology:
 
     @cached_property
     def uv(self) -> Floats:
-        """Corners in the textures, (k, 3, 2); zeros for faces without, (1, 3, 2) where no face has any."""
+        """Texture coordinates of the corners, (k, 3, 2); zeros for faces without texture, (1, 3, 2) if none has one."""
         if not self._textures:
             return np.zeros((1, 3, 2), np.float32)
         corners = [
@@ -84,10 +84,10 @@ class SceneTopology:
 
     @cached_property
     def pyramids(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
-        """Texels of all textures at all sizes, packed, (m,), and of each its levels' first texel, height and width.
+        """Packed texels of all textures at all mipmap levels, (m,), and first texel, height and width of each level.
 
-        The latter is (textures, levels, 3); small textures repeat their last level. Around every level there is
-        one texel more, that of the other side.
+        The latter is (textures, levels, 3); small textures repeat their last level. Every level has a border of one
+        texel, copied from the opposite side.
         """
         pyramids = [list(pyramid(texture)) for texture in self._textures] or [[np.full((1, 1, 3), 255, np.uint8)]]
         table = np.zeros((len(pyramids), max(map(len, pyramids)), 3), np.int64)
@@ -102,7 +102,7 @@ class SceneTopology:
 
     @cached_property
     def _textures(self) -> list[NDArray[np.uint8]]:
-        """Each once."""
+        """Distinct textures."""
         return list({id(mesh.texture): mesh.texture for mesh in self.meshes if mesh.texture is not None}.values())
 
     def _per_face(self, values: Iterable[int]) -> NDArray:
@@ -111,31 +111,31 @@ class SceneTopology:
 
 @dataclass(frozen=True)
 class SceneGeometry:
-    """The triangles of a scene where they are; what only the shading needs is made when it asks."""
+    """Triangles of a scene at their positions; what only shading needs is computed on first use."""
 
     topology: SceneTopology
     meshes: tuple[Mesh, ...]
 
     @classmethod
     def of(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
-        """Of a scene; the ``last`` one as far as it is the same."""
+        """Return the geometry of a scene; reuses the ``last`` one as far as it is unchanged."""
         if last is not None and len(meshes) == len(last.meshes) and all(map(operator.is_, meshes, last.meshes)):
-            return last  # the very objects, and frozen: nothing in them changed
+            return last  # the same frozen objects: nothing changed
         kept = last is not None and last.topology.matches(meshes)
         return cls(last.topology if last is not None and kept else SceneTopology(tuple(meshes)), tuple(meshes))
 
     @cached_property
     def vertices(self) -> Floats:
-        """(n, 3) world."""
+        """Vertices in the world, (n, 3)."""
         return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.vertices for mesh in self.meshes)])
 
     @cached_property
     def normals(self) -> tuple[Floats, Floats]:
-        """Of the faces, (k, 3), and of the vertices, (n, 3)."""
+        """Normals of the faces, (k, 3), and of the vertices, (n, 3)."""
         return normals(self.vertices, self.topology.faces, self.topology.smooth)
 
     def shadows(self, lighting: Lighting) -> Shadows:
-        """What stands in a light; the last one asked for is kept."""
+        """Return the shadow map for a lighting; the last one is cached."""
         kept: Shadows | None = self.__dict__.get("_shadows")
         if kept is None or kept.direction != lighting.direction:
             kept = cast_shadows(self, lighting)
@@ -145,13 +145,13 @@ class SceneGeometry:
 
 @dataclass(frozen=True)
 class Shadows:
-    """A map of what a far light meets first.
+    """Shadow map of a distant light.
 
     Attributes:
-        direction: to the light.
+        direction: unit vector to the light.
         P: projection into the map, (3, 4).
-        nearest: inverse depth from the light of what it meets first, (s, s) float32, 0 where nothing stands.
-        bias: by how much more inverse depth something must have to shade a surface that faces the light.
+        nearest: inverse depth from the light of the first surface, (s, s) float32, 0 if there is none.
+        bias: least lead in inverse depth of a surface that shades another one that faces the light.
     """
 
     direction: tuple[float, float, float]
@@ -161,16 +161,16 @@ class Shadows:
 
     @cached_property
     def blocks(self) -> Floats:
-        """The nearest in every block of the map, for the rasteriser."""
+        """Highest inverse depth in every block of the map, for the rasteriser."""
         return nearest_blocks(self.nearest)
 
 
 def cast_shadows(geometry: SceneGeometry, lighting: Lighting) -> Shadows:
-    """Look from the light.
+    """Render the shadow map of a scene from the light.
 
-    Only faces turned to the light cast shadows: that is all a closed body needs, and a room, whose walls face inwards,
-    lets the light in. The floor and the walls that the light falls on have nothing behind them. The map just holds
-    what is left.
+    Only faces turned to the light cast shadows: this is sufficient for closed bodies, and lets the light into a room,
+    whose walls face inwards. The floor and the walls that receive light have nothing behind them. The map covers just
+    the remaining faces.
     """
     vertices, direction = geometry.vertices, np.array(lighting.direction)
     nearest = np.zeros((SHADOW_SIZE, SHADOW_SIZE), np.float32)
@@ -180,7 +180,7 @@ def cast_shadows(geometry: SceneGeometry, lighting: Lighting) -> Shadows:
     K = np.array([[half * (_LIGHT_DISTANCE - 1), 0, half], [0, half * (_LIGHT_DISTANCE - 1), half], [0, 0, 1]])
     P = K @ np.column_stack([R, -R @ (middle + _LIGHT_DISTANCE * radius * direction)])
     rasterise(vertices, faces, P, radius, nearest, np.full(nearest.shape, -1, np.int32))
-    bias = BIAS * (radius / half) / (_LIGHT_DISTANCE * radius) ** 2  # of inverse depth, where all is about as far
+    bias = BIAS * (radius / half) / (_LIGHT_DISTANCE * radius) ** 2  # as inverse depth, which is nearly constant here
     return Shadows(lighting.direction, P, nearest, bias)
 
 
@@ -197,7 +197,7 @@ def _same_topology(one: Mesh, other: Mesh) -> bool:
 
 
 def pyramid(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
-    """A texture, and half its size, and half of that, down to one texel."""
+    """Yield a texture and its halved versions (mipmap levels) down to one texel."""
     picture = texture
     while True:
         yield picture

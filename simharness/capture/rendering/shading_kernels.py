@@ -1,12 +1,12 @@
-"""The compiled shading pass of the rasteriser: private, on plain arrays, single-threaded.
+"""Compiled shading pass of the rasteriser: private, on plain arrays, single-threaded.
 
-A row of the picture at a time. What is the same rule for every pixel (its place in the map of shadows, its colour out
-of light and albedo) is a loop over the row that the compiler turns into vector instructions; what depends on the
-triangle is worked out once for every run of pixels that show the same one.
+One row of the picture at a time. Computations with the same rule for every pixel (its position in the shadow map, its
+colour from light and albedo) are loops over the row that the compiler vectorises; values that depend on the triangle
+are computed once for every run of pixels that show the same triangle.
 
 Over a triangle the weights of its corners are ``edge . d`` up to a common factor, in the notation of
-:mod:`simharness.capture.rendering.raster_kernels`; so is what hangs on the corners (normals, places in a texture),
-and everything that is linear in space is linear in ``d = (x, y, 1)`` and in inverse depth.
+:mod:`simharness.capture.rendering.raster_kernels`. So attributes of the corners (normals, texture coordinates) and all
+quantities that are linear in space are linear in ``d = (x, y, 1)`` and in inverse depth.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -18,16 +18,16 @@ import math
 import numpy as np
 from numba import njit
 
-BIAS = 2.5  # pixels of the map of shadows, over the cosine: what a surface must be nearer to throw a shadow
+BIAS = 2.5  # pixels of the shadow map, divided by the cosine: least lead in depth of a surface that casts a shadow
 LEAST_COSINE = 0.25
 _BRIGHTEST = 4.0
-_STRIDE = 32  # pixels along a row over which a texture keeps its level of detail
+_STRIDE = 32  # pixels along a row that share one texture level
 _BLOCK_SHIFT = np.uint32(3)
-_BLOCK = 1 << 3  # pixels of the map of shadows
+_BLOCK = 1 << 3  # pixels of the shadow map
 _LAST = np.uint32(3)
-_FILTER = 4  # pixels of the map under the filter that softens edges
+_FILTER = 4  # side of the filter that softens shadow edges, pixels of the shadow map
 _SHIFT = 6
-_STEPS = 1 << _SHIFT  # between two texels
+_STEPS = 1 << _SHIFT  # interpolation steps between two texels
 _ONE = np.uint64(1)
 _ZERO, _UNIT, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-30)
 _LANE = np.uint64(20)  # bits: 255 x 64 x 64 fits
@@ -63,32 +63,32 @@ def shade(
     """Colour every pixel by the rule of :class:`simharness.types.lighting.Lighting`.
 
     Args:
-        triangle: (h, w) int32, face seen or -1.
-        inverse_depth: (h, w) float32, 1/m.
+        triangle: visible face or -1, (h, w) int32.
+        inverse_depth: inverse depth, 1/m, (h, w) float32.
         q: homogeneous pixel coordinates of the vertices, (n, 3).
-        faces: (k, 3) int32.
-        colors: (k, 3) float32, sRGB albedo.
-        smooth: (k,) bool, interpolate the normals of the vertices.
-        face_normals: (k, 3) float32.
-        vertex_normals: (n, 3) float32.
+        faces: vertex indices, (k, 3) int32.
+        colors: sRGB albedo, (k, 3) float32.
+        smooth: whether to interpolate vertex normals, (k,) bool.
+        face_normals: unit normals of the faces, (k, 3) float32.
+        vertex_normals: unit normals of the vertices, (n, 3) float32.
         texture: index of each face's texture, -1 for none, (k,) int16.
-        uv: places of the corners in it, (k, 3, 2) float32; anything where no face has one.
-        texels: of all textures and their levels of detail, (m,) uint64, see :func:`packed`.
-        pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); around each
-            level there is one texel more of what it is when it repeats.
-        center: the camera in the world, (3,).
-        rays: (3, 3), so that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
+        uv: texture coordinates of the corners, (k, 3, 2) float32; ignored if no face has a texture.
+        texels: texels of all textures at all mipmap levels, (m,) uint64, see :func:`packed`.
+        pyramids: first texel, height and width of every level of every texture, (textures, levels, 3); each level has
+            a border of one texel, copied from the opposite side.
+        center: camera centre in the world, (3,).
+        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
         light: unit direction to the key light, (3,).
-        strengths: of key, sky and fill, (3,).
-        gains: 255 times what the colour of the light makes of an albedo, sRGB, (3,).
-        empty: what is not hit, of 255, (3,).
-        light_P: projection into the map of shadows, (3, 4).
-        shadow: the map: inverse depth from the light, (s, s) float32, 0 where nothing stands in the light.
-        blocks: the nearest in every block of it, see :func:`nearest_blocks`.
-        bias: see ``BIAS``, for a surface that faces the light, in inverse depth.
+        strengths: strengths of key, sky and fill light, (3,).
+        gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
+        empty: background colour, 0 to 255, (3,).
+        light_P: projection into the shadow map, (3, 4).
+        shadow: shadow map: inverse depth from the light, (s, s) float32, 0 if nothing blocks the light.
+        blocks: highest inverse depth in every block of the map, see :func:`nearest_blocks`.
+        bias: ``BIAS`` as inverse depth, for a surface that faces the light.
 
     Returns:
-        (h, w, 3) uint8, sRGB.
+        Picture, (h, w, 3) uint8, sRGB.
     """
     height, width = triangle.shape
     rgb = np.empty((height, width, 3), np.uint8)
@@ -97,7 +97,7 @@ def shade(
     light_x, light_y, light_z = np.float32(light[0]), np.float32(light[1]), np.float32(light[2])
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     slope_bias, least_cosine = np.float32(bias), np.float32(LEAST_COSINE)
-    # The light's view of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
+    # Shadow map position of a pixel times its inverse depth: away * inverse depth + seen @ (x, y, 1), homogeneous.
     seen, away = np.zeros((3, 3)), np.zeros(3)
     for i in range(3):
         away[i] = light_P[i, 0] * center[0] + light_P[i, 1] * center[1] + light_P[i, 2] * center[2] + light_P[i, 3]
@@ -107,8 +107,8 @@ def shade(
     seen_x, seen_y, seen_w = np.float32(seen[0, 0]), np.float32(seen[1, 0]), np.float32(seen[2, 0])
     away_x, away_y, away_w = np.float32(away[0]), np.float32(away[1]), np.float32(away[2])
 
-    # Of every pixel of a row: place in the map of shadows and inverse depth there, light in the shade and light of
-    # the key, albedo times gain.
+    # For every pixel of a row: position in the shadow map and inverse depth there, light without and with the key
+    # light, albedo times gain.
     map_x, map_y, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     shade_light, key_light = np.empty(width, np.float32), np.empty(width, np.float32)
     red, green, blue = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
@@ -166,14 +166,14 @@ def shade(
                     normal[k] = np.float32(wa * na + wb * nb + wc * nc)
                     turning[k] = np.float32(-(edge[0, 0] * na + edge[1, 0] * nb + edge[2, 0] * nc))
                 nx, ny, nz = normal[0], normal[1], normal[2]
-                # Often a pixel or two: the end is found on the way, for the end of a loop of its own is one guess more.
+                # Runs are often one or two pixels long: a separate loop for the end would add a mispredicted branch.
                 end = start
                 while end < width and triangle[y, end] == label:
                     x, place = end, np.float32(end)
                     end += 1
                     scale = _UNIT / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), _TINY)
                     cosine = (nx * light_x + ny * light_y + nz * light_z) * scale
-                    # The ray to the pixel is a little longer than 1: near enough.
+                    # The ray to the pixel is slightly longer than 1; the error is negligible.
                     glance = nx * (rise_x * place + ray_x) + ny * (rise_y * place + ray_y)
                     glance += nz * (rise_z * place + ray_z)
                     key_light[x] = key * max(cosine, _ZERO)
@@ -189,7 +189,7 @@ def shade(
                 nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
                 more = nx * rise_x + ny * rise_y + nz * rise_z
                 first = nx * ray_x + ny * ray_y + nz * ray_z + more * np.float32(start)
-                turn = -_UNIT if first > 0 else _UNIT  # seen from behind: the sheet's other side
+                turn = -_UNIT if first > 0 else _UNIT  # seen from behind: the other side of the face
                 cosine = turn * (nx * light_x + ny * light_y + nz * light_z)
                 lit, nearer = key * max(cosine, _ZERO), slope_bias / max(cosine, least_cosine)
                 least = sky_all + sky_up * turn * nz
@@ -230,7 +230,7 @@ def shade(
                     column = np.float64(begin + n)
                     scale = 1.0 / (sum_rise * column + sum_first)
                     u, v = (u_rise * column + u_first) * scale, (v_rise * column + v_first) * scale
-                    # In steps between the middles of texels; the pyramid has a texel more all around.
+                    # In steps between texel centres; each level has a border of one texel.
                     steps_x[n] = np.int32((u - np.floor(u)) * wide) + half
                     steps_y[n] = np.int32((v - np.floor(v)) * high) + half
                 for n in range(count):
@@ -258,7 +258,7 @@ def shade(
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def _level(across: np.ndarray, x: int, y: int, pyramid: np.ndarray) -> int:
-    """The level of detail of a texture whose texels are about as large as the pixel."""
+    """Return the mipmap level whose texels are about as large as the pixel."""
     scale = 1.0 / (across[2, 0] * x + (across[2, 1] * y + across[2, 2]))
     u = (across[0, 0] * x + (across[0, 1] * y + across[0, 2])) * scale
     v = (across[1, 0] * x + (across[1, 1] * y + across[1, 2])) * scale
@@ -284,7 +284,7 @@ def _darken(
     shadow: np.ndarray,
     blocks: np.ndarray,
 ) -> None:
-    """Take the key light, in place, from the pixels of a row that something shades, softly at the edges."""
+    """Remove the key light, in place, from the shaded pixels of a row, with soft edges."""
     end = np.float32(len(shadow) - _FILTER + 1)
     for x in range(len(key_light)):
         if key_light[x] <= 0:
@@ -293,10 +293,10 @@ def _darken(
         if not ((u >= 0) & (u < end) & (v >= 0) & (v < end)):
             continue
         i, j = np.uint32(u), np.uint32(v)
-        if blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] <= here:  # nothing thereabouts is nearer to the light
+        if blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] <= here:  # no surface nearby is nearer to the light
             continue
-        # Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3, but for the most part the corners
-        # agree and speak for the rest.
+        # Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3; mostly the four corners agree,
+        # and their result is used for all.
         corners = int(shadow[j, i] > here) + int(shadow[j, i + _LAST] > here)
         corners += int(shadow[j + _LAST, i] > here) + int(shadow[j + _LAST, i + _LAST] > here)
         blocked = 0.25 * corners
@@ -314,7 +314,7 @@ def _darken(
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def nearest_blocks(shadow: np.ndarray) -> np.ndarray:
-    """The nearest to the light, inverse depth, under all filters that begin in a block of 8 x 8 pixels of the map."""
+    """Return the highest inverse depth under all filters that begin in each block of 8 x 8 pixels of the shadow map."""
     side = len(shadow)
     count = (side + _BLOCK - 1) // _BLOCK
     bands, blocks = np.zeros((count, side), np.float32), np.zeros((count, count), np.float32)
@@ -331,6 +331,6 @@ def nearest_blocks(shadow: np.ndarray) -> np.ndarray:
 
 
 def packed(picture: np.ndarray) -> np.ndarray:
-    """Texels (m, 3) uint8 as numbers (m,) uint64: red, green and blue 20 bits apart, so that one product weighs all."""
+    """Pack texels (m, 3) uint8 into (m,) uint64: colours 20 bits apart, so that one product weights all three."""
     red, green, blue = picture.astype(np.uint64).T
     return np.asarray(red | green << _LANE | blue << _TWO_LANES)

@@ -253,7 +253,7 @@ def test_an_antialiased_dot_stays_where_it_projects(renderer, finer):
 def test_views_are_checked(views):
     with pytest.raises(ValueError, match=r"boxes must be \(4, 3, 2, 4\)"):
         replace(views, boxes=views.boxes[..., :3])
-    with pytest.raises(ValueError, match="must share views, people and joints"):
+    with pytest.raises(ValueError, match="must have the same views, people and joints"):
         Views.concatenate([views, replace(views, **{k: getattr(views, k)[:, :2] for k in ARRAYS})])
     with pytest.raises(ValueError, match="got none"):
         Views.concatenate([])
@@ -270,7 +270,7 @@ def test_lookalikes_are_none_by_default_and_checked(views):
         replace(views, lookalikes=LookalikeViews.nothing(2, len(RIG), ("poster0",)))
     with pytest.raises(ValueError, match=r"lookalike pixels must be \(T, V, 2, J, 2\), got \(4, 3, 1, 17, 2\)"):
         replace(poster, names=("poster0", "poster1"))
-    with pytest.raises(ValueError, match="films to join must share their lookalikes"):
+    with pytest.raises(ValueError, match="parts to join must have the same lookalikes"):
         Views.concatenate([views, replace(views, lookalikes=poster)])
 
 

@@ -152,7 +152,7 @@ def test_one_lens_serves_wherever_the_camera_stands():
 
 def test_an_absurd_lens_is_refused_by_name(renderer):
     camera = replace(bent_camera((-0.5, 0.115, 0.0, 0.0, 0.0), fov=100.0), name="fisheye")
-    with pytest.raises(ValueError, match=r"'fisheye'.*bends so much.*cameras\.distortion"):
+    with pytest.raises(ValueError, match=r"'fisheye'.*distorts so much.*cameras\.distortion"):
         renderer.render(camera, [])
 
 

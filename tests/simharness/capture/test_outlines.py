@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_renderers import camera_at
 
-from simharness.capture.body_outlines import Outline, framed, packed
+from simharness.capture.body_outlines import Outline, bounding_box, packed
 from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import NEAR
 from simharness.types.random_streams import stream
@@ -40,7 +40,7 @@ def poses(body, count, seed):
 def framed_by_outline(body, transforms, camera, rows=(0.0, 1.0)):
     """Left, top, right, bottom, (4,)."""
     outline, out = Outline.of(body), np.empty((1, 4))
-    framed(outline.at(transforms), outline.edges, packed(camera)[None], *rows, out)
+    bounding_box(outline.at(transforms), outline.edges, packed(camera)[None], *rows, out)
     return out[0]
 
 

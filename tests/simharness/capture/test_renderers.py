@@ -203,7 +203,7 @@ def test_colours_are_those_of_the_faces(renderer):
 
 
 def test_gl_refuses_more_meshes_than_it_can_tell_apart(gl):
-    with pytest.raises(ValueError, match="at most 254 meshes apart, got 255"):
+    with pytest.raises(ValueError, match="distinguishes at most 254 meshes, got 255"):
         gl.render(VIEWS[0], [ball((0, 0, 1), 0.1, rings=3)] * 255)
 
 
@@ -242,7 +242,7 @@ def test_the_renderers_agree_on_a_crowd(raster, gl):
 
 
 def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
-    from simharness.capture.joint_visibility import label
+    from simharness.capture.joint_visibility import label_joints
     from simharness.capture.picture import meshes_at
     from simharness.scenario.sections.scenario import Clutter, People, Scenario
     from simharness.world.scene.build import build
@@ -267,7 +267,7 @@ def test_the_renderers_agree_on_people_of_a_scenario(raster, gl):
             one, other = raster.render(camera, meshes), gl.render(camera, meshes)
             assert set(range(3)) <= set(np.unique(one.ids))
             assert_agree(one, other)
-            labels = [label(image, camera, joints=state.joints, radii=radii) for image in (one, other)]
+            labels = [label_joints(image, camera, joints=state.joints, radii=radii) for image in (one, other)]
             same, joints = same + (labels[0] == labels[1]).sum(), joints + labels[0].size
     assert same >= 0.999 * joints
 

@@ -8,7 +8,7 @@ from shapes import crowd
 from test_renderers import VIEWS
 
 from simharness.capture.rendering.raster import RasterRenderer
-from simharness.capture.sensor import blur, character, compressed, develop, from_linear, to_linear
+from simharness.capture.sensor import blur, compressed, develop, draw_response, from_linear, to_linear
 from simharness.scenario.sections.cameras import Sensor
 
 GRAY = np.full((120, 160, 3), 128, np.uint8)
@@ -53,43 +53,43 @@ def test_noise_differs_between_frames_and_views_and_repeats():
 def test_exposure_multiplies_light(seed, amount):
     """Stops are powers of two of linear light, until it clips."""
     sensor = Sensor(exposure=amount)
-    stops = character(sensor, seed=seed, view=0).stops
+    stops = draw_response(sensor, seed=seed, view=0).stops
     out = develop(RAMP, sensor, seed=seed, view=0, frame=0)[0, :, 0]
     wanted = from_linear(np.minimum(to_linear(np.arange(256)) * 2.0**stops, 1.0))
     assert np.abs(out - wanted).max() <= 0.51
-    twice = character(Sensor(exposure=2 * amount), seed=seed, view=0).stops
+    twice = draw_response(Sensor(exposure=2 * amount), seed=seed, view=0).stops
     assert twice == pytest.approx(2 * stops)
 
 
 def test_white_balance_leaves_green_and_scales_light_of_red_and_blue():
     sensor = Sensor(white_balance=0.1)
-    own = character(sensor, seed=5, view=1)
-    assert own.balance[1] == 1.0
+    response = draw_response(sensor, seed=5, view=1)
+    assert response.balance[1] == 1.0
     out = develop(RAMP, sensor, seed=5, view=1, frame=0)
     np.testing.assert_array_equal(out[..., 1], RAMP[..., 1])
     for channel in (0, 2):
-        wanted = from_linear(np.minimum(to_linear(np.arange(256)) * own.balance[channel], 1))
+        wanted = from_linear(np.minimum(to_linear(np.arange(256)) * response.balance[channel], 1))
         assert np.abs(out[0, :, channel] - wanted).max() <= 0.51
 
 
 def test_contrast_turns_about_middle_gray():
     sensor = Sensor(gain=0.2)
-    own = character(sensor, seed=2, view=0)
+    response = draw_response(sensor, seed=2, view=0)
     out = develop(RAMP, sensor, seed=2, view=0, frame=0)[0, :, 0].astype(float)
     free = (out > 0) & (out < 255)
     slope, offset = np.polyfit(np.arange(256)[free], out[free], 1)
-    assert slope == pytest.approx(own.contrast, abs=0.01)
+    assert slope == pytest.approx(response.contrast, abs=0.01)
     assert slope * 127.5 + offset == pytest.approx(127.5, abs=0.6)
 
 
 def test_spreads_are_over_cameras():
     sensor = Sensor(gain=0.05, white_balance=0.1, exposure=0.3)
-    many = [character(sensor, seed=0, view=view) for view in range(800)]
+    many = [draw_response(sensor, seed=0, view=view) for view in range(800)]
     wanted = [
-        (np.array([own.contrast - 1 for own in many]), 0.05),
-        (np.log([own.balance[0] for own in many]), 0.1),
-        (np.log([own.balance[2] for own in many]), 0.1),
-        (np.array([own.stops for own in many]), 0.3),
+        (np.array([response.contrast - 1 for response in many]), 0.05),
+        (np.log([response.balance[0] for response in many]), 0.1),
+        (np.log([response.balance[2] for response in many]), 0.1),
+        (np.array([response.stops for response in many]), 0.3),
     ]
     for drawn, deviation in wanted:
         assert drawn.std() == pytest.approx(deviation, rel=4 / np.sqrt(2 * len(drawn)))
@@ -100,7 +100,7 @@ def test_spreads_are_over_cameras():
 def test_dials_do_not_shift_each_other_s_draws():
     alone, all_of_them = Sensor(exposure=0.4), Sensor(exposure=0.4, gain=0.1, white_balance=0.2, noise=3)
     for view in range(4):
-        one, other = (character(sensor, seed=9, view=view) for sensor in (alone, all_of_them))
+        one, other = (draw_response(sensor, seed=9, view=view) for sensor in (alone, all_of_them))
         assert one.stops == other.stops
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Camera
-from simharness.capture.shutter import BANDS, moments, rolled, strips
+from simharness.capture.shutter import BANDS, band_cameras, band_times, joints_at_exposure
 from simharness.world.rigs.layouts import intrinsics, look_at
 
 
@@ -16,20 +16,20 @@ def camera() -> Camera:
 
 
 def test_bands_are_spread_evenly_over_the_readout():
-    times = moments(2.0, 0.03)
+    times = band_times(2.0, 0.03)
     assert len(times) == BANDS
     assert times.mean() == pytest.approx(2.0)
     np.testing.assert_allclose(np.diff(times), 0.03 / BANDS)
     assert times[0] > 2.0 - 0.015
-    assert moments(2.0, 0.0).tolist() == [2.0]
+    assert band_times(2.0, 0.0).tolist() == [2.0]
 
 
 @pytest.mark.parametrize("speed", [(0.0, 1.5, 0.0), (0.0, 0.0, -2.0), (0.5, -1.0, 1.0)])
 def test_a_joint_is_where_it_was_when_its_row_was_read(camera, speed):
     readout, start = 0.04, np.array([[[0.0, 0.2, 1.4], [0.3, -0.4, 0.5], [0.1, 0.0, 1.0]]])
-    times = moments(0.0, readout)
+    times = band_times(0.0, readout)
     joints = start + times[:, None, None, None] * np.array(speed)
-    found = rolled(joints, camera)
+    found = joints_at_exposure(joints, camera)
     pixel = camera.project(found)
     when = readout * ((pixel[..., 1] + 0.5) / camera.size[1] - 0.5)
     np.testing.assert_allclose(found, start + when[..., None] * np.array(speed), atol=1e-5)
@@ -37,18 +37,18 @@ def test_a_joint_is_where_it_was_when_its_row_was_read(camera, speed):
 
 def test_without_a_readout_nothing_is_moved(camera):
     joints = np.array([[[0.0, 0.2, 1.4]]])
-    np.testing.assert_array_equal(rolled(joints[None], camera), joints)
+    np.testing.assert_array_equal(joints_at_exposure(joints[None], camera), joints)
 
 
 def test_a_joint_behind_the_camera_stays_in_the_middle(camera):
     joints = np.array([6.0, 0.0, 1.0]) + np.arange(5)[:, None, None, None] * np.array([0.0, 0.1, 0.0])
-    np.testing.assert_allclose(rolled(joints, camera)[0, 0], [6.0, 0.2, 1.0])
+    np.testing.assert_allclose(joints_at_exposure(joints, camera)[0, 0], [6.0, 0.2, 1.0])
 
 
 @pytest.mark.parametrize(("height", "count"), [(240, 8), (241, 8), (100, 7), (16, 8), (240, 1)])
 def test_strips_see_what_the_camera_sees_row_by_row(camera, height, count):
     whole = replace(camera, size=(320, height))
-    cut = strips(whole, count)
+    cut = band_cameras(whole, count)
     assert [strip.size[0] for strip in cut] == [320] * count
     assert sum(strip.size[1] for strip in cut) == height
     points = np.array([[0.0, y, z] for y in (-0.3, 0.2) for z in np.linspace(0.6, 1.4, 9)])

@@ -7,7 +7,7 @@ import pytest
 from shapes import _mesh, ball, box, room, sheet
 from test_renderers import camera_at
 
-from simharness.capture.joint_visibility import decide, label
+from simharness.capture.joint_visibility import classify, label_joints
 from simharness.types.views import Visibility
 
 VISIBLE, SELF, PERSON, CLUTTER, OUTSIDE = Visibility
@@ -17,7 +17,9 @@ CAMERA = camera_at((3.5, 0.0, 1.0), (0.0, 0.0, 1.0), size=(320, 240), fov=60.0)
 def labels(raster, meshes, joints, radii, camera=CAMERA):
     """``joints`` and ``radii`` of each person; the first meshes are the people."""
     joints = np.array(joints, float)
-    return label(raster.render(camera, meshes), camera, joints=joints, radii=np.broadcast_to(radii, joints.shape[:2]))
+    return label_joints(
+        raster.render(camera, meshes), camera, joints=joints, radii=np.broadcast_to(radii, joints.shape[:2])
+    )
 
 
 def test_a_joint_inside_its_own_limb_is_visible(raster):
@@ -128,8 +130,8 @@ def test_a_body_seen_from_around_it(raster, bearing, seen, hidden):
     assert {name: found[COCO17.index(name)] for name in hidden.split() if found[COCO17.index(name)] != SELF} == {}
 
 
-def test_the_rule_is_the_same_whoever_looked():
-    """Rows: two people with one joint each. Whose surface is seen, how far in front, whether in the picture."""
+def test_classification_of_surfaces():
+    """Rows: two people with one joint each. Owner of the surface, distance in front, whether in the picture."""
     radii = np.array([[0.1], [0.02]])
     for owner, in_front, inside, expected in (
         ([0, 1], [0.139, 0.059], [True, True], [VISIBLE, VISIBLE]),  # own skin, up to the radius and 4 cm
@@ -141,9 +143,9 @@ def test_the_rule_is_the_same_whoever_looked():
         ([0, 2], [1.0, 1.0], [False, False], [OUTSIDE, OUTSIDE]),
     ):
         column = [np.array(values)[:, None] for values in (owner, in_front, inside)]
-        assert decide(*column, radii=radii)[:, 0].tolist() == expected
+        assert classify(*column, radii=radii)[:, 0].tolist() == expected
         views = [np.stack([each, each]) for each in column]  # of several views at once
-        assert decide(*views, radii=radii)[1, :, 0].tolist() == expected
+        assert classify(*views, radii=radii)[1, :, 0].tolist() == expected
 
 
 def test_nobody(raster):
@@ -153,6 +155,8 @@ def test_nobody(raster):
 def test_shapes_are_checked(raster):
     image = raster.render(CAMERA, [])
     with pytest.raises(ValueError, match=r"joints must be \(P, J, 3\)"):
-        label(image, CAMERA, joints=np.zeros((17, 3)), radii=np.zeros(17))
+        label_joints(image, CAMERA, joints=np.zeros((17, 3)), radii=np.zeros(17))
     with pytest.raises(ValueError, match="320 x 240 pixels, got 160 x 120"):
-        label(raster.render(camera_at((1, 1, 1), (0, 0, 0)), []), CAMERA, joints=np.zeros((1, 1, 3)), radii=[[0.1]])
+        label_joints(
+            raster.render(camera_at((1, 1, 1), (0, 0, 0)), []), CAMERA, joints=np.zeros((1, 1, 3)), radii=[[0.1]]
+        )

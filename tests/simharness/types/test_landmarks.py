@@ -19,16 +19,18 @@ def rest(body):
     return np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
 
 
-def test_coco_comes_first_and_all_skeletons_are_there():
+def test_coco_joints_come_first_and_all_skeletons_are_covered():
     assert LANDMARKS[:17] == COCO17.joints
     np.testing.assert_array_equal(of_skeleton(COCO17), np.arange(17))
     for skeleton in (SHELF14, PANOPTIC19):
         assert [LANDMARKS[i] for i in of_skeleton(skeleton)] == list(skeleton.joints)
 
 
-def test_a_skeleton_with_a_joint_of_its_own_is_refused():
+def test_a_skeleton_with_an_unknown_joint_is_refused():
     tail = Skeleton("cat", ("nose", "tail"), (-1, 0), (0, 1), (0.1, 0.1))
-    with pytest.raises(ValueError, match=r"'cat' has joints .* no landmark of: tail; take joints among nose, left_eye"):
+    with pytest.raises(
+        ValueError, match=r"'cat' has joints .* no landmark: tail; expected joints among nose,"
+    ):
         of_skeleton(tail)
 
 
@@ -41,11 +43,11 @@ def test_joints_of_a_skeleton_are_its_landmarks(body, skeleton):
         np.testing.assert_array_equal(joints[:, place], landmarks[:, LANDMARKS.index(name)])
 
 
-def test_landmarks_are_where_anatomy_has_them(body):
-    """Crown on top; neck over the shoulders by the height of C7 over the shoulder joint; the rest in order."""
+def test_landmarks_are_at_anatomical_positions(body):
+    """Heights of the landmarks: crown on top, neck at C7, chin, ears and hips in order."""
     place = dict(zip(LANDMARKS, body.landmarks(rest(body)), strict=True))
     assert place["head_top"][2] == pytest.approx(body.stature, abs=0.006)
-    # ANSUR II: cervicale 0.86 of stature; the axis of the spine lies under the knob on the back that is measured.
+    # ANSUR II: cervicale 0.86 of stature; the axis of the spine lies under the process of C7 that is measured.
     assert place["neck"][2] / body.stature == pytest.approx(0.86, abs=0.02)
     assert place["neck"][2] < place["head_bottom"][2] < place["nose"][2] - 0.05
     assert place["head_bottom"][2] < place["left_ear"][2] < place["head_top"][2]
@@ -55,8 +57,8 @@ def test_landmarks_are_where_anatomy_has_them(body):
         assert body.vertices[:, 0].min() < place[name][0] < place["nose"][0]
 
 
-def test_head_agrees_with_the_published_mapping_within_what_the_mappings_differ(body):
-    """The rule that the field evaluates with guesses head joints from COCO's; the anatomical ones lie near it."""
+def test_head_landmarks_lie_near_those_of_the_published_mappings(body):
+    """Published evaluations compute head joints from COCO joints; the anatomical landmarks lie near these."""
     joints = body.joints(rest(body))
     for rule in ("2019", "voxelpose"):
         guess = coco17_to_shelf14(joints, head=rule)
@@ -64,8 +66,8 @@ def test_head_agrees_with_the_published_mapping_within_what_the_mappings_differ(
         assert np.linalg.norm(guess[13] - body.joints(rest(body), SHELF14)[13]) < 0.1
 
 
-def test_landmarks_of_the_head_nod_with_it_and_those_of_the_pelvis_do_not(body):
-    model = person_spec(body, "somebody").compile()
+def test_head_landmarks_follow_a_nod_and_hip_landmarks_do_not(body):
+    model = person_spec(body, "person").compile()
     data = mujoco.MjData(model)
     rows = [model.body(bone).id for bone in body.bones]
 
@@ -86,7 +88,7 @@ def test_landmarks_of_the_head_nod_with_it_and_those_of_the_pelvis_do_not(body):
     np.testing.assert_allclose(striding[LANDMARKS.index("mid_hip")], striding[hips].mean(0), atol=1e-12)
 
 
-def test_depths_are_those_of_the_joints_and_of_the_rest(body):
+def test_depths_cover_all_landmarks(body):
     assert body.depths.shape == (len(LANDMARKS),)
     np.testing.assert_array_equal(body.joint_radii, body.depths[:17])
     assert body.depths[LANDMARKS.index("head_top")] == pytest.approx(0.015)  # on the skin

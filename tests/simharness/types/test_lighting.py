@@ -20,8 +20,8 @@ def test_the_direction_is_kept_as_a_unit_vector():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"direction": (0, 0, 0)}, "direction points to the light"),
-        ({"direction": (1, 0, -0.1)}, "must not be under the floor"),
+        ({"direction": (0, 0, 0)}, "direction must point to a light above the floor"),
+        ({"direction": (1, 0, -0.1)}, "must point to a light above the floor"),
         ({"direction": (1, 0)}, r"lighting direction must be finite, \(3,\)"),
         ({"direction": (1, 0, float("nan"))}, "lighting direction must be finite"),
         ({"key": -1}, "must not be negative, got key -1"),

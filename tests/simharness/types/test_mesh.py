@@ -21,8 +21,8 @@ GOOD = {"vertices": np.eye(3), "faces": [[0, 1, 2]], "colors": [[0.5, 0.5, 0.5]]
         ({"colors": [[0.5, 0.5, 0.5], [0.1, 0.1, 0.1]]}, r"mesh colors must be \(1, 3\), got \(2, 3\)"),
         ({"colors": [[0.5, 255, 0.5]]}, r"must lie in 0..1, got 0.5 to 255"),
         ({"colors": [[0.5, np.nan, 0.5]]}, r"must lie in 0..1"),
-        ({"texture": np.zeros((2, 2, 3), np.uint8)}, "both a texture and the uv of its faces, or neither; the uv is"),
-        ({"uv": np.zeros((1, 3, 2))}, "the texture is missing"),
+        ({"texture": np.zeros((2, 2, 3), np.uint8)}, "needs both texture and uv, or neither; uv is missing"),
+        ({"uv": np.zeros((1, 3, 2))}, "texture is missing"),
         ({"texture": np.zeros((2, 2), np.uint8), "uv": np.zeros((1, 3, 2))}, r"texture must be \(h, w, 3\)"),
         ({"texture": np.zeros((0, 2, 3), np.uint8), "uv": np.zeros((1, 3, 2))}, "texture must have pixels"),
         ({"texture": np.zeros((2, 2, 3), np.uint8), "uv": np.zeros((3, 2))}, r"uv must be \(1, 3, 2\), got \(3, 2\)"),
@@ -36,7 +36,7 @@ def test_bad_meshes_are_refused(change, message):
         Mesh(**{**GOOD, **change})
 
 
-def test_a_mesh_does_not_change_with_the_arrays_it_came_from():
+def test_a_mesh_keeps_copies_of_its_arrays():
     vertices = np.eye(3, dtype=np.float32)
     mesh = Mesh(**{**GOOD, "vertices": vertices})
     vertices[:] = 9
@@ -51,18 +51,18 @@ def test_a_mesh_may_be_empty():
 
 
 @pytest.mark.parametrize(("mesh", "volume"), [(box((1, 2, 3), (1, 2, 3)), 6.0), (room((2, 2, 2)), -8.0)])
-def test_stand_ins_are_wound_as_meshes_should_be(mesh, volume):
+def test_test_meshes_have_outward_faces(mesh, volume):
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume)
 
 
-def test_the_stand_in_ball_is_closed_and_wound_outwards():
+def test_the_test_ball_is_closed_with_outward_faces():
     mesh = ball((0.3, 0, 1), 0.5, rings=40)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(4 / 3 * np.pi * 0.125, rel=0.01)
 
 
-def test_a_moved_mesh_shares_all_but_its_vertices():
+def test_a_moved_mesh_shares_all_other_arrays():
     mesh = with_parts(chequered((1, 1)), [3, -1])
     moved = mesh.moved(mesh.vertices + 1)
     np.testing.assert_array_equal(moved.vertices, mesh.vertices + 1)
@@ -81,6 +81,6 @@ def test_a_moved_mesh_shares_all_but_its_vertices():
         (np.full((4, 3), np.inf), "must be finite, .* at vertex 0"),
     ],
 )
-def test_a_mesh_cannot_be_moved_just_anywhere(vertices, message):
+def test_moved_vertices_are_checked(vertices, message):
     with pytest.raises(ValueError, match=message):
         chequered((1, 1)).moved(vertices)

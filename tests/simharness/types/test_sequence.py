@@ -25,7 +25,7 @@ def test_any_number_of_people(people):
     [
         ("landmarks", np.zeros((3, 2, 16, 3)), r"sequence landmarks must be \(3, 2, 21, 3\), got \(3, 2, 16, 3\)"),
         ("ids", np.arange(3), "must be"),
-        ("landmarks", np.full((3, 2, len(LANDMARKS), 3), np.nan), "never missing"),
+        ("landmarks", np.full((3, 2, len(LANDMARKS), 3), np.nan), "no true value may be missing"),
     ],
 )
 def test_bad_sequences_are_refused(key, value, message):

@@ -1,5 +1,5 @@
 #version 330 core
-// No light: the label of the part in red, the mesh's id in alpha.
+// Unlit: label of the part in red, id of the mesh in alpha.
 
 struct Material {
     vec4 base_color_factor;

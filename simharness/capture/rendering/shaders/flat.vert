@@ -1,5 +1,5 @@
 #version 330 core
-// Faces with corners of their own. pyrender puts the numbers of the attributes in place of the names in capitals.
+// Faces with separate corners. pyrender replaces the names in capitals by attribute locations.
 
 layout(location = 0) in vec3 position;
 layout(location = NORMAL_LOC) in vec3 normal;

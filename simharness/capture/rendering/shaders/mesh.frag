@@ -1,5 +1,5 @@
 #version 330 core
-// The rule of simharness.types.lighting.Lighting, as simharness.capture.rendering.shading_kernels has it; the mesh's id in alpha.
+// Shading rule of simharness.types.lighting.Lighting, as in simharness.capture.rendering.shading_kernels; id in alpha.
 
 struct Material {
     vec4 base_color_factor;  // 1, 1, 1, id
@@ -10,14 +10,14 @@ struct Material {
 
 uniform Material material;
 uniform vec3 cam_pos;
-uniform vec3 light;      // unit direction to it
-uniform vec3 strengths;  // of key, sky and fill
+uniform vec3 light;      // unit direction to the key light
+uniform vec3 strengths;  // strengths of key, sky and fill light
 uniform vec3 tint;
-uniform vec4 light_x;    // rows of the projection into the map of shadows
+uniform vec4 light_x;    // rows of the projection into the shadow map
 uniform vec4 light_y;
 uniform vec4 light_w;
-uniform sampler2D shadow_map;  // inverse depth from the light of what it meets first
-uniform float bias;            // of inverse depth
+uniform sampler2D shadow_map;  // inverse depth from the light of the first surface
+uniform float bias;            // in inverse depth
 uniform float least_cosine;
 
 in vec3 at;
@@ -36,7 +36,7 @@ float blocked(vec4 point, float cosine)
     if (min(where.x, where.y) < 0.0 || max(where.x, where.y) >= float(side - 3))
         return 0.0;
     ivec2 corner = ivec2(where);
-    // For the most part the corners of the filter agree and speak for the rest.
+    // Mostly the corners of the filter agree, and their result is used for all.
     float corners = 0.0;
     for (int k = 0; k < 4; k++)
         corners += float(texelFetch(shadow_map, corner + ivec2(3 * (k & 1), 3 * (k >> 1)), 0).r > w);
@@ -57,16 +57,16 @@ float blocked(vec4 point, float cosine)
 void main()
 {
     vec3 n = normalize(outwards) * (gl_FrontFacing ? 1.0 : -1.0);
-    vec3 to_camera = (cam_pos - at) * gl_FragCoord.w;  // 1 long along the optical axis
+    vec3 to_camera = (cam_pos - at) * gl_FragCoord.w;  // of length 1 along the optical axis
     float cosine = dot(n, light);
     float lit = cosine > 0.0 ? strengths.x * cosine * (1.0 - blocked(vec4(at, 1.0), cosine)) : 0.0;
     float sky = strengths.y * (0.65 + 0.35 * n.z);
     float fill = strengths.z * clamp(dot(n, to_camera), 0.0, 1.0);
-    vec3 color = albedo.rgb * sqrt(min(lit + sky + fill, 4.0) * tint);  // sRGB is about the root of light
+    vec3 color = albedo.rgb * sqrt(min(lit + sky + fill, 4.0) * tint);  // sRGB is about the square root of linear light
 #ifdef HAS_BASE_COLOR_TEX
     vec2 texels = vec2(textureSize(material.base_color_texture, 0));
     vec2 right = dFdx(place) * texels, down = dFdy(place) * texels;
-    float area = 0.5 * (dot(right, right) + dot(down, down));  // the level whose texels are about as large as a pixel
+    float area = 0.5 * (dot(right, right) + dot(down, down));  // level whose texels are about as large as a pixel
     float level = max(ceil(0.5 * log2(max(0.5 * area, 1.0))), 0.0);
     color *= textureLod(material.base_color_texture, place, level).rgb;
 #endif
