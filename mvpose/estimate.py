@@ -1,4 +1,4 @@
-"""What the method answers: which detections are one person, and where the people are."""
+"""Result types of the method: matching of detections to people, and the people in 3D."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from mvpose.skeleton import COCO17, Skeleton
 
 @dataclass(frozen=True)
 class Matching(Sealed):
-    """Detections grouped into people; at most one detection of a view in a person.
+    """Detections grouped into people, with at most one detection per view and person.
 
     Attributes:
-        labels: person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,). Empty where a
-            method does not say of which detections its people are.
-        P: the relaxed permutation matrix, (m, m), where the method has one.
-        iterations: how many the solver took.
-        residuals: primal and dual residual at the stop.
-        objective: the value reached (see :mod:`mvpose.matching`).
-        converged: whether both residuals fell below the tolerance before the iterations ran out.
+        labels: person of each detection, 0 to n - 1, or -1 for a detection that matches no other, (m,). Empty if a
+            method does not report which detections belong to its people.
+        P: relaxed permutation matrix, (m, m), where the method has one.
+        iterations: number of iterations of the solver.
+        residuals: primal and dual residual at the end.
+        objective: final value of the objective (see :mod:`mvpose.matching`).
+        converged: whether both residuals fell below the tolerance within the iteration limit.
     """
 
     labels: NDArray[np.int64]
@@ -39,34 +39,34 @@ class Matching(Sealed):
 
     @property
     def people(self) -> int:
-        """How many people were found."""
+        """Number of people."""
         return int(self.labels.max(initial=-1)) + 1
 
-    def tells(self, detections: int) -> bool:
-        """Whether it says who is who among so many detections."""
+    def covers(self, detections: int) -> bool:
+        """Return whether labels are known for a frame with this number of detections."""
         return len(self.labels) > 0 or detections == 0
 
     def labels_of(self, detections: int) -> NDArray[np.int64]:
-        """Labels of so many detections, (m,): all -1 where the method does not say.
+        """Return the labels of m = ``detections`` detections, (m,); all -1 if the method reports none.
 
         Raises:
-            ValueError: labels of another number of detections.
+            ValueError: another number of labels.
         """
-        if not self.tells(detections):
+        if not self.covers(detections):
             return np.full(detections, -1)
         return as_array(self.labels, (detections,), "labels", np.int64)
 
 
 @dataclass(frozen=True)
 class Estimate(Sealed):
-    """The people of one frame in 3D.
+    """People of one frame in 3D.
 
     Attributes:
-        joints: metres, (n, J, 3); NaN for a joint that could not be placed.
+        joints: positions in metres, (n, J, 3); NaN for a joint that could not be placed.
         scores: confidence, 0 to 1, (n, J); 0 for a joint that could not be placed.
-        covariance: of each joint, (n, J, 3, 3), square metres, or None.
-        matching: the groups the people come from; person i is label i.
-        timings: seconds by stage ("affinity", "matching", "reconstruction", "total").
+        covariance: covariance of each joint, (n, J, 3, 3), square metres, or None.
+        matching: groups of detections from which the people come; person i has label i.
+        timings: time in seconds by stage ("affinity", "matching", "reconstruction", "total").
     """
 
     joints: NDArray[np.float64]
@@ -93,21 +93,21 @@ class Estimate(Sealed):
         timings: Mapping[str, float] | None = None,
         skeleton: Skeleton = COCO17,
     ) -> Self:
-        """People of whom joints are known and perhaps no more, as a method from elsewhere reports them.
+        """Create an estimate from joints, with scores, labels and covariance optional, for user-defined estimators.
 
         Args:
-            joints: metres, (n, J, 3), in the order of the skeleton; NaN or None for a joint that could not be placed;
-                an empty list for nobody.
-            scores: confidence, 0 to 1, of joints (n, J) or of people (n,); by default 1. A joint that could not be
-                placed has 0 whatever is said.
-            labels: person of each detection that was given, 0 to n - 1, or -1 for nobody's, (m,); leave it out where
-                the method does not say.
-            covariance: of each joint, (n, J, 3, 3), square metres.
-            timings: seconds by stage.
+            joints: positions in metres, (n, J, 3), in the order of the skeleton; NaN or None for a joint that could
+                not be placed; an empty list for no people.
+            scores: confidence, 0 to 1, of joints (n, J) or of people (n,); by default 1. It is set to 0 for a joint
+                that could not be placed.
+            labels: person of each given detection, 0 to n - 1, or -1 for none, (m,); leave it out if the method does
+                not report it.
+            covariance: covariance of each joint, (n, J, 3, 3), square metres.
+            timings: time in seconds by stage.
             skeleton: the J joints.
 
         Raises:
-            ValueError: a wrong shape, scores outside 0..1, labels of people who are not there.
+            ValueError: a wrong shape, scores outside 0..1, or a label without a person.
         """
         if np.asarray(joints, object).shape[:1] == (0,):
             joints = np.zeros((0, len(skeleton), 3))

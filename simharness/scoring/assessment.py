@@ -111,7 +111,7 @@ def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels]
     """Labels of every frame; None of a method that leaves out who is who in one or all."""
     counts = list(map(len, recording.detections))
     matchings = [estimate.matching for estimate in estimates]
-    if not all(matching.tells(count) for matching, count in zip(matchings, counts, strict=True)):
+    if not all(matching.covers(count) for matching, count in zip(matchings, counts, strict=True)):
         return None
     return [matching.labels_of(count) for matching, count in zip(matchings, counts, strict=True)]
 

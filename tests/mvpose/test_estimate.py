@@ -15,7 +15,7 @@ def test_joints_alone_are_an_estimate():
     np.testing.assert_array_equal(estimate.joints, PEOPLE)
     assert (estimate.scores == 1).all()
     assert estimate.covariance is None
-    assert not estimate.matching.tells(3)
+    assert not estimate.matching.covers(3)
     assert estimate.matching.labels_of(3).tolist() == [-1, -1, -1]
 
 
@@ -72,7 +72,7 @@ def test_what_is_wrong_is_said(joints, more, said):
 
 def test_labels_are_of_as_many_detections_or_of_none():
     assert Matching([0, -1]).labels_of(2).tolist() == [0, -1]
-    assert Matching([0, -1]).tells(2)
-    assert Matching([]).tells(0)
+    assert Matching([0, -1]).covers(2)
+    assert Matching([]).covers(0)
     with pytest.raises(ValueError, match=r"labels must be \(3,\), got \(2,\)"):
         Matching([0, -1]).labels_of(3)

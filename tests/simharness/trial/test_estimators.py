@@ -336,8 +336,8 @@ def test_a_run_without_labels_is_read_as_it_was(scenario, tmp_path, capfd):
     record = read_run(folder)
     for detections, own, fast in zip(record.detections, record.estimates["own"], record.estimates["fast"], strict=True):
         assert len(detections)
-        assert not own.matching.tells(len(detections))
-        assert fast.matching.tells(len(detections))
+        assert not own.matching.covers(len(detections))
+        assert fast.matching.covers(len(detections))
         np.testing.assert_array_equal(own.joints, fast.joints)
     assert record.summary["variants"]["own"]["matching"]["f1"] is None
     assert f'own = "{path.with_name("mine.py")}:Silent"' in (folder / "scenario.toml").read_text()
