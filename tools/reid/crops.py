@@ -14,7 +14,7 @@ from mvpose.arrays import Floats
 from mvpose.camera import Camera
 from mvpose.networks.crops import cut, stretched
 from simharness.capture.body_outlines import NO_EDGES, boxes
-from simharness.capture.joint_visibility import label
+from simharness.capture.joint_visibility import label_joints
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import develop
 from simharness.detector.view_geometry import hidden_shares
@@ -178,7 +178,7 @@ class _Filming:
         camera, people, recipe = self.site.cameras[view], len(self.cast), self.recipe
         image = self.renderer.render(camera, moment.meshes, lighting=self.site.lighting)
         radii = np.stack([figure.body.joint_radii for figure in self.cast])
-        seen = label(image, camera, joints=moment.joints, radii=radii)
+        seen = label_joints(image, camera, joints=moment.joints, radii=radii)
         hidden = hidden_shares(seen)
         framed = boxes([[mesh.vertices for mesh in moment.meshes[:people]]], [NO_EDGES] * people, [camera])[0]
         noisy = jittered(framed, rng, recipe)

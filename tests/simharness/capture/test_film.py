@@ -266,7 +266,7 @@ def test_lookalikes_are_none_by_default_and_checked(views):
     assert not poster.visible.any()
     assert np.isnan(poster.pixels).all()
     assert replace(views, lookalikes=poster).lookalikes is poster
-    with pytest.raises(ValueError, match=r"lookalikes must be of 4 frames and 3 views .* got \(2, 3\)"):
+    with pytest.raises(ValueError, match=r"lookalikes must have 4 frames and 3 views .* got \(2, 3\)"):
         replace(views, lookalikes=LookalikeViews.nothing(2, len(RIG), ("poster0",)))
     with pytest.raises(ValueError, match=r"lookalike pixels must be \(T, V, 2, J, 2\), got \(4, 3, 1, 17, 2\)"):
         replace(poster, names=("poster0", "poster1"))
