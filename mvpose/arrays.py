@@ -1,4 +1,4 @@
-"""Array types for annotations. They give the element type; docstrings give shapes and units."""
+"""Array types for annotations: they state the element type; docstrings state shapes and units."""
 
 from __future__ import annotations
 

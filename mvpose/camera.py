@@ -19,26 +19,26 @@ from mvpose.checks import Sealed, as_array, as_points
 from mvpose.lens import distort, undistort
 
 _ORTHONORMAL_TOLERANCE = 1e-3  # published calibrations carry about six digits
-_SINGLE_DIGITS = 1e-6  # what is left of zeros and ones that went through single precision
-_SAME_POINT = 1e-6  # metres; no calibration tells centres so near from one
-_FARTHEST = 1e6  # focal lengths from the principal point: across the line of sight, not on the image plane
+_SINGLE_DIGITS = 1e-6  # rounding error of zeros and ones stored in single precision
+_SAME_POINT = 1e-6  # metres; below the accuracy of any calibration
+_FARTHEST = 1e6  # focal lengths from the principal point; beyond it the ray is parallel to the image plane
 
 
 @dataclass(frozen=True)
 class Camera(Sealed):
-    """A pinhole camera with Brown distortion.
+    """Pinhole camera with Brown distortion.
 
     Attributes:
         K: intrinsics, (3, 3), pixels: ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]``.
-        R: rotation world to camera, (3, 3).
-        t: translation world to camera, (3,), metres.
-        distortion: k1, k2, p1, p2, k3 as OpenCV orders them, (5,); zeros for a pinhole.
+        R: rotation from world to camera, (3, 3).
+        t: translation from world to camera, (3,), metres.
+        distortion: k1, k2, p1, p2, k3 in the order of OpenCV, (5,); zeros for a pinhole.
         size: width and height of the image in pixels.
-        name: how reports and messages call this camera.
+        name: name of the camera in reports and messages.
 
     Raises:
-        ValueError: a wrong shape, a value that is not finite, a K that is not that of a camera, a rotation that is
-            not one, an image size that is not two positive whole numbers.
+        ValueError: a wrong shape, a value that is not finite, an invalid intrinsic matrix K, an R that is not a
+            rotation, or an image size that is not two positive whole numbers.
     """
 
     K: Floats
@@ -51,7 +51,7 @@ class Camera(Sealed):
     def __post_init__(self) -> None:
         camera = f"camera {self.name!r}"
         for key, shape in (("K", (3, 3)), ("R", (3, 3)), ("t", (3,)), ("distortion", (5,))):
-            terms = " (k1 k2 p1 p2 k3, 0 where a model has none)" if key == "distortion" else ""
+            terms = " (k1 k2 p1 p2 k3, 0 for a term that the model lacks)" if key == "distortion" else ""
             array = as_array(getattr(self, key), shape, f"{camera}: {key}{terms}")
             if not np.isfinite(array).all():
                 raise ValueError(f"{camera}: {key} has values that are not finite: {array.tolist()}")
@@ -72,40 +72,40 @@ class Camera(Sealed):
 
     @cached_property
     def center(self) -> Floats:
-        """The optical centre in the world, (3,), metres."""
+        """Optical centre in the world, (3,), metres."""
         return -self.R.T @ self.t
 
     def depth(self, points: ArrayLike) -> Floats:
-        """Distance along the optical axis of world points (..., 3), metres; negative behind the camera."""
+        """Return the distance of world points (..., 3) along the optical axis, metres; negative behind the camera."""
         with np.errstate(all="ignore"):
             return as_points(points, 3, "points") @ self.R[2] + self.t[2]
 
     def project(self, points: ArrayLike) -> Floats:
-        """Project world points (..., 3) to pixels (..., 2), distortion included; NaN where not in front."""
+        """Project world points (..., 3) to pixels (..., 2) with distortion; NaN for points behind the camera."""
         points = as_points(points, 3, "points")
-        with np.errstate(all="ignore"):  # what is not finite, or overflows, has no pixel
+        with np.errstate(all="ignore"):  # points that are not finite, or overflow, become NaN
             local = points @ self.R.T + self.t
             z = local[..., 2:]
             xy = np.where((z > 0) & (z < np.inf), local[..., :2] / z, np.nan)
             return self._to_pixels(_through_lens(xy, self.distortion, inverse=False))
 
     def undistort(self, pixels: ArrayLike) -> Floats:
-        """Pixels (..., 2) of the real lens to the pixels (..., 2) of a lens without distortion.
+        """Map pixels (..., 2) of the real lens to the pixels (..., 2) of a lens without distortion.
 
-        NaN where the lens images no direction: beyond the radius where its polynomial folds over, or farther from
-        the principal point than ten focal lengths (a million, where there is no distortion).
+        The result is NaN where the lens images no direction: beyond the radius where its polynomial folds over, or
+        more than ten focal lengths from the principal point (a million without distortion).
         """
         return self._to_pixels(self._normalized(pixels))
 
     def rays(self, pixels: ArrayLike) -> Floats:
-        """Unit viewing directions in the world (..., 3) of pixels (..., 2); NaN where :meth:`undistort` has it."""
+        """Return unit viewing directions in the world (..., 3) of pixels (..., 2); NaN as in :meth:`undistort`."""
         xy = self._normalized(pixels)
         local = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
         world = local @ self.R
         return world / np.linalg.norm(world, axis=-1, keepdims=True)
 
     def inside(self, pixels: ArrayLike) -> NDArray[np.bool_]:
-        """Which pixels (..., 2) fall on the image: within half a pixel of a pixel's centre."""
+        """Return whether pixels (..., 2) lie in the image, that is, within half a pixel of the centre of a pixel."""
         pixels = as_points(pixels, 2, "pixels")
         with np.errstate(invalid="ignore"):
             low, high = pixels >= -0.5, pixels < np.array(self.size) - 0.5
@@ -117,7 +117,7 @@ class Camera(Sealed):
 
     def _normalized(self, pixels: ArrayLike) -> Floats:
         pixels = as_points(pixels, 2, "pixels")
-        with np.errstate(all="ignore"):  # infinite pixels are none
+        with np.errstate(all="ignore"):  # infinite pixels become NaN
             y = (pixels[..., 1] - self.K[1, 2]) / self.K[1, 1]
             x = (pixels[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
             xy = _through_lens(np.stack([x, y], axis=-1), self.distortion, inverse=True)
@@ -138,17 +138,17 @@ def _check_intrinsics(K: Floats, camera: str) -> None:
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise ValueError(
             f"{camera}: focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}; "
-            "a flipped image axis belongs in R (x right, y down, z forward), not in K"
+            "put a flipped image axis into R (x right, y down, z forward), not into K"
         )
 
 
 def _check_rotation(R: Floats, camera: str) -> None:
-    # Entries beyond 2 are none of a rotation, and their squares might overflow.
+    # No rotation has entries beyond 2, and their squares might overflow.
     off = np.abs(R @ R.T - np.eye(3)).max() if np.abs(R).max() < 2 else np.inf
     if off > _ORTHONORMAL_TOLERANCE:
         raise ValueError(
-            f"{camera}: R is not a rotation (R Rᵀ is off the identity by {off:.2g}), got {R.tolist()}; expected three "
-            "rows of unit length at right angles (a Rodrigues vector goes through cv2.Rodrigues first)"
+            f"{camera}: R is not a rotation (R Rᵀ differs from the identity by {off:.2g}), got {R.tolist()}; expected "
+            "three orthogonal rows of unit length (convert a Rodrigues vector by cv2.Rodrigues first)"
         )
     if np.linalg.det(R) < 0:
         raise ValueError(
@@ -158,7 +158,7 @@ def _check_rotation(R: Floats, camera: str) -> None:
 
 
 def _through_lens(xy: Floats, distortion: Floats, *, inverse: bool) -> Floats:
-    """Bend normalised coordinates (..., 2) as the lens does, or back; NaN where that cannot be."""
+    """Apply lens distortion, or its inverse, to normalised coordinates (..., 2); NaN where there is no solution."""
     if not distortion.any():
         return xy
     return _bend(np.ascontiguousarray(xy).reshape(-1, 2), distortion, inverse).reshape(xy.shape)
@@ -177,27 +177,28 @@ def _bend(points, terms, inverse):
 
 @dataclass(frozen=True)
 class Rig(Sealed):
-    """Two or more cameras in one world, in a fixed order: the view index of every array.
+    """Two or more calibrated cameras in one world, in a fixed order that is the view index of every array.
 
-    Some cameras may stand in one point (a pair without a baseline says nothing of depth), but not all.
+    Some cameras may stand in one point (a pair without a baseline has no depth information), but not all.
 
     Raises:
-        ValueError: fewer than two cameras, something that is no camera, cameras that all stand in one point, or a rig
-            so large (over 200 m) that its calibration can only be in millimetres or centimetres.
+        ValueError: fewer than two cameras, an entry that is not a camera, cameras that all stand in one point, or a
+            rig so large (over 200 m) that its calibration must be in millimetres or centimetres.
     """
 
     cameras: tuple[Camera, ...]
 
-    _LARGEST = 200.0  # metres; a people-watching rig is smaller, one in centimetres or millimetres is not
+    _LARGEST = 200.0  # metres; real rigs are smaller, unless their calibration is in centimetres or millimetres
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
         if not isinstance(cameras, Iterable):
-            raise ValueError(f"a rig is made of a sequence of cameras, got {type(cameras).__name__}")
+            raise ValueError(f"a rig must be a sequence of cameras, got {type(cameras).__name__}: pass Rig([...])")
         object.__setattr__(self, "cameras", tuple(cameras))
         for index, camera in enumerate(self.cameras):
             if not isinstance(camera, Camera):
                 raise ValueError(
-                    f"a rig is made of cameras, but entry {index} is {type(camera).__name__}; pass mvpose.Camera"
+                    f"a rig must be a sequence of cameras, but entry {index} is {type(camera).__name__}; "
+                    "pass mvpose.Camera"
                 )
         if len(self.cameras) < 2:
             raise ValueError(f"a rig needs at least 2 cameras to triangulate, got {len(self.cameras)}")
@@ -205,13 +206,14 @@ class Rig(Sealed):
             extent = np.ptp(self.centers, axis=0).max()
         if not extent <= self._LARGEST:
             raise ValueError(
-                f"the cameras stand up to {extent:.0f} apart, which cannot be metres: the calibration is probably "
-                "in millimetres or centimetres; divide its translations by 1000 or 100"
+                f"the cameras stand up to {extent:.0f} apart, which cannot be metres (expected at most "
+                f"{self._LARGEST:g}): the calibration is probably in millimetres or centimetres; divide its "
+                "translations by 1000 or 100"
             )
         if extent < _SAME_POINT:
             raise ValueError(
                 f"all {len(self)} cameras of the rig stand in one point, {self.centers[0].tolist()}: nothing can be "
-                "triangulated; expected centres (-Rᵀ t, metres) that differ: check that each camera has its own t"
+                "triangulated; expected centres (-Rᵀ t, metres) that differ: check the t of each camera"
             )
 
     def __len__(self) -> int:
@@ -235,7 +237,7 @@ class Rig(Sealed):
 
     @cached_property
     def packed(self) -> Floats:
-        """The cameras for the kernels, (V, 22): fx, skew, cx, fy, cy, R by rows (9), centre (3), distortion (5)."""
+        """Cameras as rows for the kernels, (V, 22): fx, skew, cx, fy, cy, R by rows (9), centre (3), distortion (5)."""
         return np.array(
             [
                 [c.K[0, 0], c.K[0, 1], c.K[0, 2], c.K[1, 1], c.K[1, 2], *c.R.ravel(), *c.center, *c.distortion]
@@ -247,7 +249,7 @@ class Rig(Sealed):
     def F(self) -> Floats:
         """Fundamental matrices, (V, V, 3, 3): ``x_jᵀ F[i, j] x_i = 0``, so ``F[i, j] x_i`` is a line in view j.
 
-        Of undistorted pixels; scaled to unit Frobenius norm; zero where i = j or the centres coincide.
+        They hold for undistorted pixels, have unit Frobenius norm, and are zero where i = j or the centres coincide.
         """
         count = len(self)
         result = np.zeros((count, count, 3, 3))
@@ -263,5 +265,5 @@ class Rig(Sealed):
         return result
 
     def project(self, points: ArrayLike) -> Floats:
-        """Project world points (..., 3) into every view: (V, ..., 2), NaN where not in front."""
+        """Project world points (..., 3) into every view, (V, ..., 2); NaN for points not in front of the camera."""
         return np.stack([camera.project(points) for camera in self.cameras])

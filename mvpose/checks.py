@@ -1,4 +1,4 @@
-"""One way to check an array or a number at the border."""
+"""Validation of arrays and numbers at public interfaces."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ def as_array(
     """Return ``value`` as a read-only array of ``dtype`` and ``shape``, C-contiguous.
 
     Args:
-        value: anything NumPy reads as numbers; ``None`` among floats is NaN.
-        shape: sizes; a string stands for any size and names it in the message ("m").
-        name: what the message calls the array.
-        dtype: the wanted scalar type. Integers must be given as whole numbers: 1.5 is refused, not cut off, and so
-            is a mask.
+        value: any value that NumPy converts to numbers; ``None`` among floats is NaN.
+        shape: expected sizes; a string stands for any size and names it in the message ("m").
+        name: name of the array in messages.
+        dtype: expected scalar type. Integers must be whole numbers: 1.5 is refused, not truncated, and so is a mask.
 
     Raises:
         ValueError: "keypoints must be (m, 17, 2), got (4, 17)".
@@ -31,30 +30,30 @@ def as_array(
         given = np.asarray(value)
         if given.dtype.kind == "O":
             given = given.astype(np.float64)
-        # Always a copy: the caller's later writes must not reach a frozen object.
+        # Always a copy, so that later writes by the caller do not change a frozen object.
         array = given.astype(dtype, order="C") if given.dtype == dtype else _converted(given, np.dtype(dtype))
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name} must be numbers of shape {_written(shape)}: {error}") from None
+        raise ValueError(f"{name} must be numbers of shape {_shape_text(shape)}: {error}") from None
     fits = array.ndim == len(shape) and all(
         isinstance(wanted, str) or got == wanted for wanted, got in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise ValueError(f"{name} must be {_written(shape)}, got {_written(array.shape)}")
+        raise ValueError(f"{name} must be {_shape_text(shape)}, got {_shape_text(array.shape)}")
     array.flags.writeable = False
     return array
 
 
 def seal(*arrays: NDArray) -> None:
-    """Make fresh arrays read-only, so that :func:`as_array` need not copy what nobody can write to."""
+    """Make new arrays read-only, so that :func:`as_array` does not have to copy them."""
     for array in arrays:
         array.setflags(write=False)
 
 
 class Sealed:
-    """A frozen dataclass that pickle and copy make anew by its constructor.
+    """Base of frozen dataclasses that pickle and copy rebuild by their constructor.
 
-    NumPy's arrays come back from either with leave to write: what is cached of them would no longer be true, and numba
-    would compile every kernel once more.
+    NumPy arrays are writeable after pickle or copy. Values cached from them could then become wrong, and numba would
+    compile every kernel again.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -69,30 +68,30 @@ def check_numbers(
     not_negative: Iterable[str] = (),
     limits: Iterable[str] = (),
 ) -> None:
-    """Refuse settings that make no sense, by the names of the owner's fields.
+    """Check the numeric fields of a configuration object.
 
     Args:
-        owner: whose fields they are.
-        what: what the message calls the owner.
-        positive: above 0 and finite.
-        not_negative: 0 or more and finite.
-        limits: above 0; infinite where there is none.
+        owner: object that has the fields.
+        what: name of the object in messages.
+        positive: names of fields that must be above 0 and finite.
+        not_negative: names of fields that must be 0 or more and finite.
+        limits: names of fields that must be above 0; infinity means no limit.
 
     Raises:
         ValueError: "slope of the geometric affinity must be above 0 and finite, got nan".
     """
-    for names, allowed, said in (
+    for names, allowed, requirement in (
         (positive, lambda value: 0.0 < value < np.inf, "above 0 and finite"),
         (not_negative, lambda value: 0.0 <= value < np.inf, "0 or more and finite"),
         (limits, lambda value: value > 0.0, "above 0"),
     ):
         for name in names:
             if not allowed(getattr(owner, name)):
-                raise ValueError(f"{name} of {what} must be {said}, got {getattr(owner, name)}")
+                raise ValueError(f"{name} of {what} must be {requirement}, got {getattr(owner, name)}")
 
 
 def _sealed(value: ArrayLike, shape: tuple[int | str, ...], dtype: type[np.generic]) -> bool:
-    """Whether the value is already what :func:`as_array` makes of it, and shares memory with no other array."""
+    """Return whether the value already is a valid result of :func:`as_array` and shares memory with no other array."""
     if type(value) is not np.ndarray or value.dtype != dtype or isinstance(value.base, np.ndarray):
         return False
     flags = value.flags
@@ -105,7 +104,7 @@ def _sealed(value: ArrayLike, shape: tuple[int | str, ...], dtype: type[np.gener
 
 
 def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:
-    """Return ``value`` as floats of shape (..., size), not copied where it is that already.
+    """Return ``value`` as floats of shape (..., size), without a copy where possible.
 
     Raises:
         ValueError: "points must be (..., 3), got (4, 2)".
@@ -115,7 +114,7 @@ def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must be numbers of shape (..., {size}): {error}") from None
     if not array.ndim or array.shape[-1] != size:
-        raise ValueError(f"{name} must be (..., {size}), got {_written(array.shape)}")
+        raise ValueError(f"{name} must be (..., {size}), got {_shape_text(array.shape)}")
     return array
 
 
@@ -124,7 +123,7 @@ def _converted(given: NDArray, dtype: np.dtype) -> NDArray:
     if kind not in "biuf":
         raise ValueError(f"got values of type {given.dtype}")
     if kind == "b" and whole:
-        raise ValueError("got booleans where whole numbers are expected (of a mask, take np.flatnonzero)")
+        raise ValueError("expected whole numbers, got booleans (convert a mask by np.flatnonzero)")
     with np.errstate(invalid="ignore", over="ignore"):
         array = given.astype(dtype, order="C")
     if whole and (array != given).any():
@@ -132,5 +131,5 @@ def _converted(given: NDArray, dtype: np.dtype) -> NDArray:
     return array
 
 
-def _written(shape: tuple[int | str, ...]) -> str:
+def _shape_text(shape: tuple[int | str, ...]) -> str:
     return "(" + ", ".join(map(str, shape)) + ("," if len(shape) == 1 else "") + ")"

@@ -1,4 +1,4 @@
-"""What a 2D detector says of one frame, in every view."""
+"""Output of a 2D pose detector for one frame, in all views."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from mvpose.checks import Sealed, as_array
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
 
-_FARTHEST = 1e9  # pixels: no image is so large, and squares of these are far from overflow
-_LEAST_SCORE = 1e-6  # no detector is so exact, and products of these are far from underflow
+_FARTHEST = 1e9  # pixels; larger than any image, and the squares are far from overflow
+_LEAST_SCORE = 1e-6  # below the resolution of any detector, and products of such scores are far from underflow
 
 
 @dataclass(frozen=True)
 class Detections(Sealed):
-    """The 2D poses that a detector found in all views of one frame, as flat arrays of m detections.
+    """2D poses detected in all views of one frame, as flat arrays of m detections.
 
-    A keypoint that was not detected has score 0 and NaN coordinates; both are set where either is given, where a
-    coordinate is infinite or farther than 1e9 pixels away, and where the score is NaN or below 1e-6. A detection may
-    have no keypoint at all: it is evidence of nothing.
+    A keypoint that was not detected has score 0 and NaN coordinates. Both are set where either is given, where a
+    coordinate is infinite or beyond 1e9 pixels, and where the score is NaN or below 1e-6. A detection without any
+    keypoint is allowed and ignored by every stage.
 
     Attributes:
         view: index of the camera of each detection, (m,).
@@ -32,11 +32,12 @@ class Detections(Sealed):
         boxes: x, y, width, height in pixels, (m, 4).
         box_scores: confidence of each box, 0 to 1, (m,).
         skeleton: the J joints.
-        descriptors: appearance, (m, D), or None. A row that is not finite throughout becomes NaN: no descriptor.
-        likelihoods: the heat maps that the keypoints were read from, or None.
+        descriptors: appearance descriptors, (m, D), or None. A row with a value that is not finite becomes NaN, which
+            means no descriptor.
+        likelihoods: heat maps from which the keypoints were read, or None.
 
     Raises:
-        ValueError: a wrong shape or skeleton, a view that is no index, scores outside 0..1, a box that is none.
+        ValueError: a wrong shape or skeleton, a negative view, scores outside 0..1, or an invalid box.
     """
 
     view: NDArray[np.int64]
@@ -60,7 +61,7 @@ class Detections(Sealed):
             bad = int(np.flatnonzero(~(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] >= 0).all(axis=1)))[0])
             raise ValueError(
                 f"boxes must be finite x, y, width, height with sizes of at least 0, got {boxes[bad].tolist()} for "
-                f"detection {bad}; corners x0, y0, x1, y1 are x0, y0, x1 - x0, y1 - y0"
+                f"detection {bad}; convert corners x0, y0, x1, y1 to x0, y0, x1 - x0, y1 - y0"
             )
         if not ((box_scores >= 0) & (box_scores <= 1)).all():
             bad = int(np.flatnonzero(~((box_scores >= 0) & (box_scores <= 1)))[0])
@@ -86,19 +87,19 @@ class Detections(Sealed):
 
     @property
     def detected(self) -> NDArray[np.bool_]:
-        """Which keypoints were detected, (m, J)."""
+        """Mask of detected keypoints, (m, J)."""
         return self.scores > 0
 
     @classmethod
     def empty(cls, skeleton: Skeleton = COCO17) -> Self:
-        """No detection in any view."""
+        """Return a frame without detections."""
         return cls.from_keypoints([], np.zeros((0, len(skeleton), 2)), np.zeros((0, len(skeleton))), skeleton=skeleton)
 
     @classmethod
     def from_keypoints(
         cls, view: ArrayLike, keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17
     ) -> Self:
-        """Detections without boxes of their own: the box spans the keypoints, its score is their mean score."""
+        """Create detections with boxes that span the keypoints and have their mean score."""
         view = as_array(view, ("m",), "view", np.int64)
         keypoints, scores = _keypoints(keypoints, scores, len(view), skeleton)
         return cls(view, keypoints, scores, _spanning_boxes(keypoints), _mean_scores(scores), skeleton)
@@ -107,22 +108,22 @@ class Detections(Sealed):
     def from_heatmaps(
         cls, view: ArrayLike, heatmaps: Heatmaps, *, boxes: ArrayLike | None = None, skeleton: Skeleton = COCO17
     ) -> Self:
-        """Detections from heat maps, which they carry along: the strongest mode of each is the keypoint.
+        """Create detections from heat maps; the strongest mode of each map is the keypoint, and the maps are kept.
 
         Args:
             view: camera of each detection, (m,).
-            heatmaps: a map for each of m detections and J joints. The height of its strongest mode, 1 at most, is the
-                score; an empty map is a missing joint.
-            boxes: x, y, width, height in pixels, (m, 4); spans the keypoints where not given.
+            heatmaps: heat map for each of m detections and J joints. The height of its strongest mode, at most 1, is
+                the score; an empty map is a missing joint.
+            boxes: x, y, width, height in pixels, (m, 4); by default the box that spans the keypoints.
             skeleton: the J joints.
 
         Raises:
-            ValueError: as of the class.
+            ValueError: as for the class.
         """
         if not isinstance(heatmaps, Heatmaps):
             raise ValueError(f"heatmaps must be mvpose.heatmaps.Heatmaps, got {type(heatmaps).__name__}")
         view = as_array(view, ("m",), "view", np.int64)
-        _check_likelihoods(heatmaps, (len(view), len(_checked(skeleton))))
+        _check_likelihoods(heatmaps, (len(view), len(_checked_skeleton(skeleton))))
         pixels, heights = heatmaps.modes(1)
         keypoints, scores = pixels[:, :, 0], np.minimum(heights[:, :, 0], 1.0)
         spans = _spanning_boxes(keypoints) if boxes is None else as_array(boxes, (len(view), 4), "boxes")
@@ -130,8 +131,8 @@ class Detections(Sealed):
 
 
 def _keypoints(keypoints: ArrayLike, scores: ArrayLike, count: int, skeleton: Skeleton) -> tuple[Floats, Floats]:
-    """Checked keypoints and scores, missing ones marked in both."""
-    joints = len(_checked(skeleton))
+    """Check keypoints and scores, and mark missing ones in both."""
+    joints = len(_checked_skeleton(skeleton))
     keypoints = as_array(keypoints, ("m", "J", 2), "keypoints")
     if keypoints.shape != (count, joints, 2):
         raise ValueError(
@@ -144,7 +145,8 @@ def _keypoints(keypoints: ArrayLike, scores: ArrayLike, count: int, skeleton: Sk
         detection, joint = (int(index[0]) for index in np.nonzero(outside))
         raise ValueError(
             f"scores must lie in 0..1, got {scores[detection, joint]:.6g} for joint {skeleton.joints[joint]!r} of "
-            f"detection {detection}; clip the heights of heat maps, take the sigmoid of logits, and say missing by 0"
+            f"detection {detection}; clip the heights of heat maps, take the sigmoid of logits, and give 0 for a "
+            "missing joint"
         )
     detected = (scores >= _LEAST_SCORE) & (np.abs(keypoints) < _FARTHEST).all(axis=2)
     keypoints, scores = np.where(detected[:, :, None], keypoints, np.nan), np.where(detected, scores, 0.0)
@@ -152,7 +154,7 @@ def _keypoints(keypoints: ArrayLike, scores: ArrayLike, count: int, skeleton: Sk
     return keypoints, scores
 
 
-def _checked(skeleton: Skeleton) -> Skeleton:
+def _checked_skeleton(skeleton: Skeleton) -> Skeleton:
     if not isinstance(skeleton, Skeleton):
         raise ValueError(f"skeleton must be a Skeleton such as COCO17, got {type(skeleton).__name__}")
     return skeleton
@@ -165,7 +167,7 @@ def _skeleton_hint(skeleton: Skeleton, got: int) -> str:
 
 
 def _spanning_boxes(keypoints: Floats) -> Floats:
-    """Boxes about the keypoints that were found, (m, 4); zeros where none was."""
+    """Return boxes around the detected keypoints, (m, 4); zeros for a detection without any."""
     low = np.where(np.isnan(keypoints), np.inf, keypoints).min(axis=1)
     high = np.where(np.isnan(keypoints), -np.inf, keypoints).max(axis=1)
     with np.errstate(invalid="ignore"):
@@ -174,7 +176,7 @@ def _spanning_boxes(keypoints: Floats) -> Floats:
 
 
 def _mean_scores(scores: Floats) -> Floats:
-    """Mean score of the keypoints that were found, (m,); 0 where none was."""
+    """Return the mean score of the detected keypoints, (m,); 0 for a detection without any."""
     return scores.sum(axis=1) / np.maximum((scores > 0).sum(axis=1), 1)
 
 
@@ -183,6 +185,6 @@ def _check_likelihoods(likelihoods: Heatmaps, shape: tuple[int, ...]) -> None:
         raise ValueError(f"likelihoods must be mvpose.heatmaps.Heatmaps, got {type(likelihoods).__name__}")
     if likelihoods.values.shape[:2] != shape:
         raise ValueError(
-            f"heat maps must be {shape} of maps, a row for each detection and a map for each joint of the skeleton, "
+            f"heat maps must be {shape}, a row for each detection and a map for each joint of the skeleton, "
             f"got {likelihoods.values.shape[:2]}"
         )

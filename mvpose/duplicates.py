@@ -1,6 +1,7 @@
-"""Repeated detections: a detector often reports one person twice in a view, with two nearly equal poses.
+"""Pose non-maximum suppression: removal of detections that repeat a person in a view.
 
-Matching takes at most one detection of a view into a person, so the second set would become a ghost beside its person.
+Detectors often report one person twice in a view, with two nearly equal poses. Matching takes at most one detection
+per view into a person, so the second detections would form a ghost beside the person.
 """
 
 from __future__ import annotations
@@ -13,30 +14,31 @@ from numpy.typing import NDArray
 
 from mvpose.detections import Detections
 
-_BOX_SHARE = 0.53  # of its box that a person fills (Ronchi & Perona, ICCV 2017)
-_FAR = 5.0  # times the median distance from the median keypoint; on a standing person the feet have 2.3
+_BOX_SHARE = 0.53  # fraction of its box that a person fills (Ronchi & Perona, ICCV 2017)
+_FAR = 5.0  # times the median distance from the median keypoint; 2.3 for the feet of a standing person
 
 
 @dataclass(frozen=True)
 class Duplicates:
-    """Pose non-maximum suppression in each view: of poses that say the same, the surest stays.
+    """Pose non-maximum suppression in each view, which keeps the most confident of several similar poses.
 
-    How alike two poses are is their object keypoint similarity (OKS), the mean over the joints that both have of
+    The similarity of two poses is their object keypoint similarity (OKS), the mean over the joints that both have of
     ``exp(-d² / (2 s² (2 sigma)²))``, with d the distance in pixels and s² 0.53 of the area of the box around the
     detected keypoints, averaged over the two (Xiao, Wu & Wei, "Simple baselines", ECCV 2018, who suppress above 0.9).
-    A keypoint far from the others is left out of the box: a single wrong joint must not make everybody alike.
+    A keypoint far from the others is left out of the box, so that a single wrong joint does not make all poses
+    similar.
 
-    Suppression is greedy: the surest detection stays (of equals the first) and takes those that are like it away; then
-    the next of what is left. How sure one is, is its box score times the mean score of all J joints, missing ones as 0
-    (as Xiao et al. rank poses): so a face that is reported once more, each of its few joints sure, is no match for
-    the whole person.
+    Suppression is greedy: the most confident detection is kept (the first of equals) and removes those similar to it,
+    then the next of the remaining ones. Confidence is the box score times the mean score of all J joints, with missing
+    joints as 0 (the ranking of Xiao et al.). So the second report of a face, with few but confident joints, does not
+    outrank the whole person.
 
     Attributes:
-        threshold: OKS above which two poses of one view are one person.
-        least_joints: poses that share fewer detected joints are not compared.
+        threshold: OKS above which two poses of one view show one person.
+        least_joints: least number of shared detected joints; poses that share fewer are not compared.
 
     Raises:
-        ValueError: a threshold outside 0..1, or no joint to compare.
+        ValueError: ``threshold`` outside 0..1, or ``least_joints`` below 1.
     """
 
     threshold: float = 0.9
@@ -49,7 +51,7 @@ class Duplicates:
             raise ValueError(f"least_joints must be at least 1, got {self.least_joints}")
 
     def __call__(self, detections: Detections) -> NDArray[np.bool_]:
-        """Which detections to keep, (m,)."""
+        """Return a mask of the detections to keep, (m,)."""
         return _suppress(
             detections.view,
             detections.keypoints,
@@ -65,22 +67,22 @@ class Duplicates:
 def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):
     m = len(view)
     keep, rival = np.ones(m, np.bool_), np.zeros(m, np.bool_)
-    area = np.full(m, -1.0)  # computed when asked for: hardly any pair needs it
-    box = np.empty(m)  # stray keypoints and all, so never smaller: OKS by it never lower
+    area = np.full(m, -1.0)  # computed on demand, because hardly any pair needs it
+    box = np.empty(m)  # area with stray keypoints, never smaller than ``area``, so it gives an upper bound of the OKS
     for d in range(m):
         box[d] = _box_area(keypoints, scores, d, 0.0, 0.0, np.inf)
     first, second = np.empty(m * m // 2, np.int64), np.empty(m * m // 2, np.int64)
     count = 0
     for a in range(m):
         for b in range(a + 1, m):
-            if view[a] == view[b] and _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
+            if view[a] == view[b] and _similar(a, b, keypoints, scores, variances, box, area, threshold, least):
                 rival[a] = rival[b] = True
                 first[count], second[count] = a, b
                 count += 1
     while count:
         best = m
         for d in range(m):
-            if rival[d] and (best == m or _surer(d, best, scores, box_scores)):
+            if rival[d] and (best == m or _more_confident(d, best, scores, box_scores)):
                 best = d
         if best == m:
             break
@@ -94,7 +96,7 @@ def _suppress(view, keypoints, scores, box_scores, variances, threshold, least):
 
 
 @njit(cache=True)
-def _surer(one, other, scores, box_scores):
+def _more_confident(one, other, scores, box_scores):
     sum_one, sum_other = 0.0, 0.0
     for j in range(scores.shape[1]):
         sum_one += scores[one, j]
@@ -103,8 +105,8 @@ def _surer(one, other, scores, box_scores):
 
 
 @njit(cache=True)
-def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
-    """Whether the OKS of two poses is above the threshold; two joints mostly suffice to say no."""
+def _similar(a, b, keypoints, scores, variances, box, area, threshold, least):
+    """Return whether the OKS of two poses is above the threshold; most pairs are rejected after two joints."""
     joints = len(variances)
     size = box[a] + box[b]
     for stray in (True, False):
@@ -120,7 +122,7 @@ def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
             shared += 1
             dx, dy = keypoints[a, j, 0] - keypoints[b, j, 0], keypoints[a, j, 1] - keypoints[b, j, 1]
             d2, scale = dx * dx + dy * dy, _BOX_SHARE * size * variances[j]  # 2 s², s² of the mean area
-            if d2 >= 40.0 * scale:  # also of an area of 0
+            if d2 >= 40.0 * scale:  # also true for an area of 0
                 lost += 1.0 if d2 > 0.0 else 0.0
             else:
                 lost += 1.0 - np.exp(-d2 / scale)
@@ -133,7 +135,7 @@ def _alike(a, b, keypoints, scores, variances, box, area, threshold, least):
 
 @njit(cache=True)
 def _area(keypoints, scores, d):
-    """Area of the box around the keypoints of a detection, without those that lie far from the others."""
+    """Return the area of the box around the keypoints of a detection, without those far from the others."""
     values = np.empty(scores.shape[1])
     x, y, median = 0.0, 0.0, 0.0
     for axis in range(3):  # x, y, and the greater of the distances in x and y
@@ -142,7 +144,7 @@ def _area(keypoints, scores, d):
             if scores[d, j] > 0.0:
                 u, v = keypoints[d, j, 0], keypoints[d, j, 1]
                 value, at = (u if axis == 0 else v if axis == 1 else max(abs(u - x), abs(v - y))), count
-                while at > 0 and values[at - 1] > value:  # sorted as they come
+                while at > 0 and values[at - 1] > value:  # insertion sort
                     values[at] = values[at - 1]
                     at -= 1
                 values[at] = value
@@ -154,7 +156,7 @@ def _area(keypoints, scores, d):
 
 @njit(cache=True)
 def _box_area(keypoints, scores, d, x, y, reach):
-    """Area of the box around the keypoints of a detection that lie up to ``reach`` from a point in x and in y."""
+    """Return the area of the box around the keypoints that lie within ``reach`` of a point in x and in y."""
     left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
     for j in range(scores.shape[1]):
         u, v = keypoints[d, j, 0], keypoints[d, j, 1]

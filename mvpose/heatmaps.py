@@ -1,6 +1,6 @@
-"""Heat maps: what a pose network says of every joint before it is boiled down to one pixel.
+"""Heat maps: the output of a pose network for every joint, before it is reduced to one keypoint.
 
-A map covers the crop of one detection on a grid of its own: the centre of cell (row, column) is the image pixel
+A map covers the crop of one detection on a grid: the centre of cell (row, column) is the image pixel
 ``origin + stride * (column, row)``.
 """
 
@@ -15,22 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array, as_points
 
-_HIGHEST = 2.0  # peaks of networks trained towards 1 overshoot it, but not twofold
-_LEAST_SHARE = 0.05  # of the peak that a neighbour counts at least: the logarithm of 0 makes no parabola
+_HIGHEST = 2.0  # peaks of networks trained towards 1 exceed it, but not by a factor of 2
+_LEAST_SHARE = 0.05  # lower limit of neighbour over peak, because the logarithm of 0 is not finite
 
 
 @dataclass(frozen=True)
 class Heatmaps(Sealed):
-    """The heat maps of m detections, one for each of J joints.
+    """Heat maps of m detections, one for each of J joints.
 
     Attributes:
-        values: how much a cell looks like the joint, (m, J, h, w), float32, from 0 to about 1 at a sure peak.
+        values: likelihood of the joint in each cell, (m, J, h, w), float32, from 0 to about 1 at a confident peak.
         origin: pixel of the centre of cell (0, 0), x and y, (m, 2).
-        stride: pixels from one cell to the next, in x and in y, (m, 2).
+        stride: pixels between neighbouring cells, in x and y, (m, 2).
 
     Raises:
-        ValueError: a wrong shape, a value that is negative, not finite or far above 1, an origin that is not finite, a
-            stride that is not positive.
+        ValueError: a wrong shape, a value that is negative, not finite or far above 1, an origin that is not finite,
+            or a stride that is not positive.
     """
 
     values: NDArray[np.float32]
@@ -47,7 +47,7 @@ class Heatmaps(Sealed):
         if not (low >= 0 and high <= _HIGHEST):
             raise ValueError(
                 f"heat map values must lie between 0 and a peak of about 1, got {low:.3g} to {high:.3g}; "
-                "clip what is negative or not finite, and divide by the height of a sure peak"
+                "clip values that are negative or not finite, and divide by the height of a confident peak"
             )
         if not np.isfinite(origin).all():
             raise ValueError(f"heat map origin must be finite pixels, got {_first_bad(origin, np.isfinite(origin))}")
@@ -61,12 +61,12 @@ class Heatmaps(Sealed):
         return len(self.values)
 
     def sample(self, pixels: ArrayLike) -> Floats:
-        """Heights at image pixels, between cells by bilinear interpolation.
+        """Return heights at image pixels, by bilinear interpolation between cells.
 
-        Outside its crop a map is 0; it fades to that over one cell.
+        A map is 0 outside its crop, and falls to 0 over one cell at the border.
 
         Args:
-            pixels: points for every map, (m, J, ..., 2); NaN is nowhere.
+            pixels: points for every map, (m, J, ..., 2); the height at NaN is 0.
 
         Returns:
             Heights, (m, J, ...).
@@ -82,24 +82,24 @@ class Heatmaps(Sealed):
         return _sample(self.values, self.origin, self.stride, flat).reshape(pixels.shape[:-1])
 
     def modes(self, most: int) -> tuple[Floats, Floats]:
-        """The local maxima of every map, between cells, strongest first.
+        """Return the local maxima of every map at sub-cell accuracy, strongest first.
 
-        A maximum is a cell, or a plateau of equal ones, whose 3 x 3 neighbours are all lower. Parabolas through the
-        logarithms of it and its neighbours in x and y give its place and height: exact for a Gaussian along the
-        axes with a deviation of 0.6 cells or more. At the border of the map, where a neighbour is unknown, the
-        place is that of the cell. Cells of height 0 are no maxima.
+        A maximum is a cell, or a plateau of equal cells, whose 3 x 3 neighbours are all lower. Parabolas through the
+        logarithms of the cell and its neighbours in x and y give position and height; this is exact for an
+        axis-aligned Gaussian with a standard deviation of 0.6 cells or more. At the border of the map, where a
+        neighbour is unknown, the position is that of the cell. Cells of height 0 are not maxima.
 
         Args:
-            most: how many at most of each map, 1 or more.
+            most: greatest number of maxima per map, at least 1.
 
         Returns:
-            Pixels of the image, (m, J, most, 2), and heights, (m, J, most); NaN and 0 where a map has fewer.
+            Image pixels, (m, J, most, 2), and heights, (m, J, most); NaN and 0 where a map has fewer maxima.
 
         Raises:
             ValueError: ``most`` is below 1.
         """
         if most < 1:
-            raise ValueError(f"most must be at least 1 mode of each map, got {most}")
+            raise ValueError(f"most must be at least 1 mode per map, got {most}")
         return _modes(self.values, self.origin, self.stride, int(most))
 
 
@@ -110,7 +110,7 @@ def _first_bad(values: Floats, good: NDArray[np.bool_]) -> str:
 
 @njit(cache=True)
 def height(values, detection, joint, column, row):
-    """Bilinear interpolation of one map at a place in cells; cells outside are 0. For the kernels."""
+    """Return the bilinear interpolation of one map at a position in cells; cells outside are 0. For the kernels."""
     rows, columns = values.shape[2], values.shape[3]
     if not (-1.0 < column < columns and -1.0 < row < rows):
         return 0.0
@@ -143,15 +143,15 @@ def _sample(values, origin, stride, pixels):
 def _modes(values, origin, stride, most):
     m, joints, rows, columns = values.shape
     pixels, heights = np.full((m, joints, most, 2), np.nan), np.zeros((m, joints, most))
-    cells = np.empty(rows * columns, np.int64)  # of a plateau
-    seen = np.zeros((rows, columns), np.int64)  # which map last looked at this plateau cell
+    cells = np.empty(rows * columns, np.int64)  # cells of a plateau
+    seen = np.zeros((rows, columns), np.int64)  # last map in which this plateau cell was visited
     for d in range(m):
         for j in range(joints):
             stamp = d * joints + j + 1
             for r in range(rows):
                 for c in range(columns):
                     value = values[d, j, r, c]
-                    # Nearly every cell leaves here: empty, or on a slope.
+                    # Nearly every cell is rejected here: it is empty, or on a slope.
                     if value <= 0.0 or (c + 1 < columns and values[d, j, r, c + 1] > value):
                         continue
                     if (c > 0 and values[d, j, r, c - 1] > value) or (r > 0 and values[d, j, r - 1, c] > value):
@@ -180,7 +180,7 @@ def _modes(values, origin, stride, most):
 
 @njit(cache=True)
 def _summit(values, d, j, row, column, seen, stamp, cells):
-    """Fill ``cells`` with the plateau of a cell; its size, or 0 where a neighbour of it is higher."""
+    """Write the plateau of a cell to ``cells`` and return its size, or 0 if a neighbour of the plateau is higher."""
     rows, columns = seen.shape
     level = values[d, j, row, column]
     size, summit = 1, True
@@ -207,10 +207,10 @@ def _summit(values, d, j, row, column, seen, stamp, cells):
 
 @njit(cache=True)
 def _vertex(values, d, j, cell, size, x, y, top):
-    """Add a cell of a maximum to the mean place of its ``size`` cells and to the greatest of their heights.
+    """Add a cell to the mean position of the ``size`` cells of a maximum, and update their greatest height.
 
-    On each axis, a parabola through the logarithms of the cell and its two neighbours tells where between the cells
-    the maximum lies, and by how much it is higher.
+    On each axis, a parabola through the logarithms of the cell and its two neighbours gives the offset of the maximum
+    from the cell and its height.
     """
     rows, columns = values.shape[2], values.shape[3]
     row, column = cell // columns, cell % columns
@@ -221,7 +221,7 @@ def _vertex(values, d, j, cell, size, x, y, top):
         if down <= row < rows - down and right <= column < columns - right:
             low = np.log(max(values[d, j, row - down, column - right] / peak, _LEAST_SHARE))
             high = np.log(max(values[d, j, row + down, column + right] / peak, _LEAST_SHARE))
-            if low + high < 0.0:  # else level: inside a plateau
+            if low + high < 0.0:  # otherwise the cell lies inside a plateau
                 offset = 0.5 * (low - high) / (low + high)
                 rise += 0.25 * (high - low) * offset
         if axis == 0:

@@ -1,6 +1,6 @@
-"""The lens: Brown's distortion of normalised image coordinates and its inverse, as OpenCV writes it.
+"""Brown lens distortion of normalised image coordinates and its inverse, in the convention of OpenCV.
 
-Terms are k1, k2, p1, p2, k3. The kernels take one point, so that every stage can use them inside its own loops.
+The terms are k1, k2, p1, p2, k3. The kernels take one point, so other kernels can call them in their loops.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ import numpy as np
 from numba import njit
 
 _MOST_STEPS = 30
-_TOLERANCE2 = 1e-24  # of the residual squared, in units of the focal length
-_MOST_CAREFUL_STEPS = 250  # as far as 79 degrees from the axis
-_LONGEST_STEP = 0.02  # focal lengths; what folds and unfolds within it can pass for straight
-_LEAST_STRIDE = 1.0 / 64.0  # of Newton's step; where less of it still leads nowhere, the lens ends
+_TOLERANCE2 = 1e-24  # squared residual, in squared focal lengths
+_MOST_DAMPED_STEPS = 250  # reach 79 degrees from the axis
+_LONGEST_STEP = 0.02  # focal lengths; shorter than any fold of a real lens
+_LEAST_STRIDE = 1.0 / 64.0  # fraction of Newton's step; if a shorter step still makes no progress, the lens ends here
 
 
 @njit(cache=True)
 def distort(x, y, terms):
-    """Where the lens images the direction (x, y, 1)."""
+    """Return the normalised image point of the direction (x, y, 1)."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -29,15 +29,15 @@ def distort(x, y, terms):
 
 @njit(cache=True)
 def undistort(u, v, terms):
-    """The direction (x, y, 1) that the lens images at (u, v); NaN where none is.
+    """Return x, y of the direction (x, y, 1) that the lens images at (u, v); NaN if there is none.
 
-    Newton's method from the centre of the image outwards. A polynomial lens folds over beyond some radius: what
-    lies there, or where no direction is imaged at all, is no point of the real lens and gives NaN.
+    Newton's method starts at the centre of the image. A polynomial lens folds over beyond some radius; the result is
+    NaN for a solution beyond the fold and where no direction is imaged at all.
     """
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
     if k1 == 0.0 and k2 == 0.0 and p1 == 0.0 and p2 == 0.0 and k3 == 0.0:
         return u, v
-    # A ray far outside any image: the polynomial would overflow before it said so.
+    # The point is far outside any image, where the polynomial would overflow.
     if not u * u + v * v < 100.0:
         return np.nan, np.nan
     x, y = 0.0, 0.0
@@ -48,8 +48,8 @@ def undistort(u, v, terms):
         if not (determinant > 1e-9 and xx + yy > 0.0):
             break
         if fx * fx + fy * fy < _TOLERANCE2:
-            # Newton may have leapt over a fold to a branch beyond. Between here and the centre there is none if the
-            # slope of the radius stays positive even without the terms that raise it.
+            # Newton's method may have jumped over a fold. There is no fold between this point and the centre if the
+            # slope of the radius stays positive even without the terms that increase it.
             r2 = x * x + y * y
             bend = 3.0 * min(k1, 0.0) + r2 * (5.0 * min(k2, 0.0) + r2 * 7.0 * min(k3, 0.0))
             if 1.0 + r2 * bend > 6.0 * np.sqrt(r2 * (p1 * p1 + p2 * p2)):
@@ -57,16 +57,16 @@ def undistort(u, v, terms):
             break
         x -= (yy * fx - xy * fy) / determinant
         y -= (xx * fy - xy * fx) / determinant
-    return _undistort_carefully(u, v, terms)
+    return _undistort_damped(u, v, terms)
 
 
 @njit(cache=True)
 def _linearised(x, y, terms):
-    """:func:`distort` and its derivatives: of the first by x, of either by the other, of the second by y."""
+    """Return :func:`distort` (u, v) and its derivatives du/dx, du/dy = dv/dx, dv/dy."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3))  # of radial, over x or y
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3))  # derivative of radial by x over x, or by y over y
     return (
         x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
         y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
@@ -77,11 +77,11 @@ def _linearised(x, y, terms):
 
 
 @njit(cache=True)
-def _undistort_carefully(u, v, terms):
-    """Newton's method in short, damped steps that never leave the branch of the lens through the centre."""
+def _undistort_damped(u, v, terms):
+    """Run Newton's method in short, damped steps that stay on the branch of the lens through the centre."""
     x, y = 0.0, 0.0
     fx, fy, xx, xy, yy = _linearised(x, y, terms)
-    for _ in range(_MOST_CAREFUL_STEPS):
+    for _ in range(_MOST_DAMPED_STEPS):
         dx, dy = u - fx, v - fy
         residual2 = dx * dx + dy * dy
         if residual2 < _TOLERANCE2:
@@ -92,9 +92,9 @@ def _undistort_carefully(u, v, terms):
         least = stride * _LEAST_STRIDE
         while True:
             fx, fy, xx, xy, yy = _linearised(x + stride * dx, y + stride * dy, terms)
-            away2 = (u - fx) * (u - fx) + (v - fy) * (v - fy)
-            # Orientation flips where the lens folds.
-            if xx * yy - xy * xy > 1e-9 and xx + yy > 0.0 and away2 < (1.0 - 0.5 * stride) * residual2:
+            next_residual2 = (u - fx) * (u - fx) + (v - fy) * (v - fy)
+            # The determinant changes sign where the lens folds.
+            if xx * yy - xy * xy > 1e-9 and xx + yy > 0.0 and next_residual2 < (1.0 - 0.5 * stride) * residual2:
                 break
             stride *= 0.5
             if stride < least:

@@ -1,4 +1,4 @@
-"""The whole method for one frame: affinity, matching, reconstruction."""
+"""Estimation pipeline for one frame: affinity, matching, reconstruction."""
 
 from __future__ import annotations
 
@@ -22,39 +22,40 @@ from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, Unma
 from mvpose.skeleton import Skeleton
 
 PRESETS: dict[str, str] = {
-    "full": "every cue there is (geometry; appearance where descriptors are given), ADMM matching, 3DPS",
-    "appearance": "as full, with appearance as the only affinity: detections must carry descriptors",
+    "full": "all cues (geometry, and appearance if descriptors are given), ADMM matching, 3DPS",
+    "appearance": "as full, with appearance as the only affinity; detections must carry descriptors",
     "geometry": "as full, with geometry as the only affinity",
-    "hungarian": "as full, with matching of two views at a time: nothing makes the pairs agree",
-    "no-3dps": "as full, with robust triangulation in place of the pictorial structure",
-    "no-matching": "3DPS straight from all detections",
+    "hungarian": "as full, with Hungarian matching of each pair of views, without cycle consistency",
+    "no-3dps": "as full, with robust triangulation instead of 3DPS",
+    "no-matching": "3DPS on all detections at once, without matching",
     "fast": "as full, with matching by clustering and robust triangulation",
 }
 
 NEED_DESCRIPTORS = frozenset({"appearance"})
-"""The presets that have nothing to go by where detections carry no descriptors."""
+"""Presets that require detections with descriptors."""
 
 READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian"})
-"""The presets that make use of heat maps where detections carry them; the others go by keypoints."""
+"""Presets that use heat maps where detections carry them; the others use keypoints only."""
 
 
 class Estimator(Protocol):
-    """Anything that finds the people of a frame."""
+    """Object that estimates the people of a frame."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Find the people of one frame; see :meth:`Pipeline.estimate`."""
+        """Estimate the people of one frame; see :meth:`Pipeline.estimate`."""
         ...
 
 
 @dataclass(frozen=True)
 class Pipeline:
-    """Multi-person 3D pose from the detections of a few calibrated cameras (Dong et al., CVPR 2019).
+    """Multi-person 3D pose estimation from the detections of a few calibrated cameras (Dong et al., CVPR 2019).
 
     Attributes:
-        affinity: how likely two detections are one person.
-        matching: affinities (m, m) and views (m,) to people, over all views at once.
-        reconstruction: everybody's rays, labels (m,) and the skeleton to joints.
-        duplicates: which detections to keep, (m,); the others repeat a surer one of their view.
+        affinity: affinity between detections, that is, the likelihood that two detections show one person.
+        matching: function from affinities (m, m) and views (m,) to people, over all views at once.
+        reconstruction: function from the rays of all detections, labels (m,) and the skeleton to 3D poses.
+        duplicates: function that returns a mask (m,) of the detections to keep; the others repeat a more confident
+            detection of their view.
     """
 
     affinity: Affinity = FusedAffinity()
@@ -64,15 +65,15 @@ class Pipeline:
 
     @staticmethod
     def preset(name: str, *, appearance: AppearanceAffinity | None = None) -> Estimator:
-        """One of the named variants, :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
+        """Return one of the presets in :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
 
         Args:
-            name: of the variant.
-            appearance: what distances of descriptors mean; of a network ``ReId.affinity`` says it. By default what they
-                mean in general.
+            name: name of the preset.
+            appearance: scale of descriptor distances; for a re-ID network it is ``ReId.affinity``. The default is a
+                general scale.
 
         Raises:
-            ValueError: a name that is none of them.
+            ValueError: an unknown name.
         """
         appearance = appearance or AppearanceAffinity()
         full = Pipeline(affinity=FusedAffinity(appearance=appearance))
@@ -86,21 +87,21 @@ class Pipeline:
             "fast": replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation()),
         }
         if name not in variants:
-            raise ValueError(f"no preset {name!r} of the pipeline; there are {', '.join(PRESETS)}")
+            raise ValueError(f"unknown preset {name!r} of the pipeline; expected one of {', '.join(PRESETS)}")
         return variants[name]
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Find the people of one frame.
+        """Estimate the people of one frame.
 
         Args:
-            rig: the cameras, as calibrated.
-            detections: the 2D poses of all views; ``detections.view`` counts the rig's cameras.
+            rig: calibrated cameras.
+            detections: 2D poses of all views; ``detections.view`` indexes the cameras of the rig.
 
         Returns:
-            The people that at least two views agree on, possibly none.
+            The people on whom at least two views agree, possibly none.
 
         Raises:
-            ValueError: detections that name a camera that the rig does not have, or that lack descriptors where
+            ValueError: a detection in a view that the rig does not have, or detections without descriptors where
                 appearance is the only affinity.
         """
         start = time.perf_counter()
@@ -118,21 +119,21 @@ class Pipeline:
 
 @dataclass(frozen=True)
 class UnmatchedPipeline:
-    """The paper's "No matching": pictorial structures say by themselves who is who.
+    """Estimation without matching (the paper's "No matching"): the pictorial structure also groups the detections.
 
     Attributes:
-        reconstruction: everybody's rays and the skeleton to joints and labels.
-        duplicates: as of :class:`Pipeline`.
+        reconstruction: function from the rays of all detections and the skeleton to 3D poses and labels.
+        duplicates: as in :class:`Pipeline`.
     """
 
     reconstruction: Callable[[Rays, Skeleton], tuple[Poses, NDArray[np.int64]]] = UnmatchedPictorialStructure()
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Find the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""
+        """Estimate the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""
         start = time.perf_counter()
         rays = viewing_rays(rig, detections)
-        rays.weights[~self.duplicates(detections)] = 0.0  # who sees nothing belongs to nobody
+        rays.weights[~self.duplicates(detections)] = 0.0  # a detection without keypoints is ignored
         ready = time.perf_counter()
         poses, labels = self.reconstruction(rays, detections.skeleton)
         return _estimate(poses, Matching(labels), start, ready, ready)

@@ -1,7 +1,7 @@
-"""Detections as viewing rays in the world: what every later stage works on.
+"""Viewing rays of detections in the world, the input of every later stage.
 
-A keypoint and its camera say that the joint lies on a half-line. Distances between such rays, and from a point to
-a ray, are in metres whatever the resolution, focal length or lens, so one set of scales serves every rig.
+A keypoint and its camera define a half-line on which the joint lies. Distances between such rays, and from a point to
+a ray, are in metres for any resolution, focal length and lens, so one set of scales serves every rig.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
 from mvpose.lens import undistort
 
-_MODES = 3  # of a heat map that are looked at: a joint, its mirror image, and a neighbour's
+_MODES = 3  # modes read per heat map: the joint, its left-right counterpart, and the joint of a neighbour
 
 
 @dataclass(frozen=True, slots=True)
 class Modes:
-    """Where the heat maps of m detections are high, as rays, and the maps themselves, to be sampled from the world.
+    """Modes of the heat maps of m detections as rays, and the maps with the cameras needed to sample them.
 
     Attributes:
         directions: unit vectors to the modes of each map, strongest first, (m, J, K, 3); zeros where there are fewer.
         weights: heights of the modes, at most 1, (m, J, K); 0 where there are fewer.
-        values: the maps, (m, J, h, w).
-        grid: origin and stride of each detection's maps, x and y, pixels, (m, 4).
-        cameras: that saw each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22).
+        values: heat maps, (m, J, h, w).
+        grid: origin and stride of the maps of each detection, x and y, pixels, (m, 4).
+        cameras: camera of each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22).
     """
 
     directions: Floats
@@ -42,15 +42,15 @@ class Modes:
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """The viewing rays of m detections of J joints.
+    """Viewing rays of m detections with J joints.
 
     Attributes:
         view: camera of each detection, (m,).
         origins: optical centres, (m, 3), metres.
         directions: unit vectors, (m, J, 3); zeros where the keypoint is missing.
         weights: scores of the keypoints, (m, J); 0 where missing.
-        pixel: angle that one pixel spans at the image centre, (m,), radians.
-        modes: what the detections' heat maps say, or None.
+        pixel: angle of one pixel at the image centre, (m,), radians.
+        modes: modes of the heat maps, or None.
     """
 
     view: NDArray[np.int64]
@@ -64,7 +64,7 @@ class Rays:
         return len(self.view)
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Rays:
-        """Some of the detections: a mask (m,), or their indices in a new order."""
+        """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
         modes = self.modes and Modes(*(getattr(self.modes, field.name)[which] for field in fields(self.modes)))
         return Rays(
             self.view[which],
@@ -77,13 +77,12 @@ class Rays:
 
 
 def viewing_rays(rig: Rig, detections: Detections) -> Rays:
-    """Turn keypoints into viewing rays, lens distortion undone.
+    """Convert keypoints to viewing rays, with lens distortion removed.
 
-    A keypoint that no direction is imaged at (far outside the picture of a distorting lens) is missing.
+    A keypoint at which the lens images no direction (far outside the picture of a distorting lens) is missing.
 
     Raises:
-        ValueError: something that is no rig or no detections, or a detection that names a view which the rig does not
-            have.
+        ValueError: an argument of another type, or a detection in a view that the rig does not have.
     """
     for value, kind in ((rig, Rig), (detections, Detections)):
         if not isinstance(value, kind):
@@ -105,7 +104,7 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
 def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
     view = detections.view
     pixels, heights = maps.modes(_MODES)
-    heights = np.where(detections.detected[..., None], heights, 0.0)  # a joint said to be missing is, whatever its map
+    heights = np.where(detections.detected[..., None], heights, 0.0)  # a missing keypoint overrides its heat map
     m, joints = heights.shape[:2]
     flat = pixels.reshape(m, joints * _MODES, 2), np.minimum(heights, 1.0).reshape(m, joints * _MODES)
     _, directions, weights, _, _ = _viewing_rays(rig.packed, view, *flat)
@@ -120,7 +119,7 @@ def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
 
 @njit(cache=True)
 def _viewing_rays(cameras, view, keypoints, scores):
-    """The rays, and the greatest view; a view that there is no camera for sees nothing."""
+    """Return the fields of :class:`Rays` and the greatest view; detections in a view without a camera have no rays."""
     m, joints = scores.shape
     last = -1
     origins, directions = np.empty((m, 3)), np.zeros((m, joints, 3))
@@ -143,10 +142,10 @@ def _viewing_rays(cameras, view, keypoints, scores):
             v = (keypoints[d, j, 1] - cy) / fy
             u = (keypoints[d, j, 0] - cx - skew * v) / fx
             x, y = undistort(u, v, lens) if bent else (u, v)
-            if not abs(x) + abs(y) < 1e6:  # also false of NaN: across the line of sight, not on the image plane
+            if not abs(x) + abs(y) < 1e6:  # NaN, or a ray parallel to the image plane
                 continue
             scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
-            for r in range(3):  # R transposed, times (x, y, 1)
+            for r in range(3):  # transposed R times (x, y, 1)
                 directions[d, j, r] = (camera[5 + r] * x + camera[8 + r] * y + camera[11 + r]) * scale
             weights[d, j] = scores[d, j]
     return origins, directions, weights, pixel, last

@@ -1,6 +1,6 @@
-"""Skeletons: joint names, the kinematic tree, mirror pairs, OKS sigmas; and mappings between them.
+"""Skeletons (joint names, kinematic tree, mirror pairs, OKS sigmas) and mappings between them.
 
-World axes are z up wherever a mapping needs to know (the published head mappings of Shelf do).
+Mappings that depend on the vertical (the published head mappings of Shelf) assume that z is up in the world.
 """
 
 from __future__ import annotations
@@ -20,14 +20,18 @@ HeadMapping = Literal["voxelpose", "2019"]
 
 @dataclass(frozen=True)
 class Skeleton:
-    """A set of joints and the tree that joins them.
+    """Set of joints with a kinematic tree.
 
     Attributes:
-        name: how files and messages call it.
-        joints: joint names, J of them.
-        parents: index of each joint's parent in the tree, -1 for the root, (J,); parents may come later.
-        mirror: index of each joint's left-right counterpart, itself on the midline, (J,).
+        name: name of the skeleton in files and messages.
+        joints: names of the J joints.
+        parents: index of each joint's parent in the tree, -1 for the root, (J,); a parent may come after its child.
+        mirror: index of each joint's left-right counterpart, or of the joint itself on the midline, (J,).
         sigmas: OKS standard deviations, (J,), as fractions of the square root of the person's area.
+
+    Raises:
+        ValueError: repeated or no joint names, a field of another length, parents that do not form one tree, mirror
+            indices that are not pairs, or a sigma that is not positive.
     """
 
     name: str
@@ -41,22 +45,24 @@ class Skeleton:
             object.__setattr__(self, key, tuple(getattr(self, key)))
         count, skeleton = len(self.joints), f"skeleton {self.name!r}"
         if not count or len(set(self.joints)) != count:
-            raise ValueError(f"{skeleton}: joints must be different names, one or more, got {self.joints}")
+            raise ValueError(f"{skeleton}: joints must be one or more different names, got {self.joints}")
         for key in ("parents", "mirror", "sigmas"):
             if len(getattr(self, key)) != count:
                 raise ValueError(f"{skeleton}: {key} must have {count} entries, got {len(getattr(self, key))}")
         if self.parents.count(-1) != 1 or not all(-1 <= parent < count for parent in self.parents):
-            raise ValueError(f"{skeleton}: parents must name one root (-1) and joints below {count}")
+            raise ValueError(
+                f"{skeleton}: parents must have one root (-1) and joint indices below {count}, got {self.parents}"
+            )
         reached = {self.parents.index(-1)}
         for _ in range(count):
             reached |= {joint for joint, parent in enumerate(self.parents) if parent in reached}
         if len(reached) != count:
-            raise ValueError(f"{skeleton}: parents do not form one tree")
+            raise ValueError(f"{skeleton}: parents must form one tree, got {self.parents}, which has a cycle")
         for joint, other in enumerate(self.mirror):
             if not 0 <= other < count or self.mirror[other] != joint:
                 raise ValueError(
-                    f"{skeleton}: mirror must name pairs, each the other's, and itself on the midline; "
-                    f"{self.joints[joint]!r} ({joint}) has {other}"
+                    f"{skeleton}: mirror must hold pairs of joints that refer to each other, or the joint itself on "
+                    f"the midline; {self.joints[joint]!r} ({joint}) has {other}"
                 )
         if not all(0 < sigma < np.inf for sigma in self.sigmas):
             raise ValueError(f"{skeleton}: sigmas must be positive, got {self.sigmas}")
@@ -65,27 +71,31 @@ class Skeleton:
         return len(self.joints)
 
     def __hash__(self) -> int:
-        return hash(self.name)  # what depends on a skeleton alone is cached by it, and asked for in every frame
+        return hash(self.name)  # fast, because values that depend on the skeleton are looked up by it in every frame
 
     @property
     def edges(self) -> tuple[tuple[int, int], ...]:
-        """The bones of the tree as (parent, child), J - 1 of them."""
+        """The J - 1 bones of the tree as (parent, child)."""
         return tuple((parent, child) for child, parent in enumerate(self.parents) if parent >= 0)
 
     @cached_property
     def parts(self) -> tuple[str, ...]:
-        """What each joint is of the body, whichever its side: the names without ``left_`` and ``right_``, (J,)."""
+        """Joint names without the side (``left_``, ``right_``), (J,)."""
         return tuple(joint.removeprefix("left_").removeprefix("right_") for joint in self.joints)
 
     @cached_property
     def variances(self) -> Floats:
-        """What OKS divides squared distances by, ``(2 sigma)²``, (J,), as fractions of the person's area."""
+        """OKS variances ``(2 sigma)²``, (J,), as fractions of the person's area."""
         variances = (2.0 * np.array(self.sigmas)) ** 2
         variances.flags.writeable = False
         return variances
 
     def index(self, joint: str) -> int:
-        """Index of a joint by its name; a ValueError lists the names."""
+        """Return the index of a joint by name.
+
+        Raises:
+            ValueError: an unknown name.
+        """
         if joint not in self.joints:
             raise ValueError(f"skeleton {self.name!r} has no joint {joint!r}; it has {', '.join(self.joints)}")
         return self.joints.index(joint)
@@ -99,8 +109,8 @@ COCO17 = Skeleton(
         "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip",
         "left_knee", "right_knee", "left_ankle", "right_ankle",
     ),
-    # Rooted at the left shoulder: the torso is the best seen part, and every edge is a bone with a length
-    # of its own. The face hangs on the ears' side through the nose, which nods little against a shoulder.
+    # The root is the left shoulder, because the torso is seen best and every edge is then a bone of nearly constant
+    # length. The face is attached through the nose, whose distance from the shoulder changes little with nodding.
     parents=(5, 0, 0, 1, 2, -1, 5, 5, 6, 7, 8, 5, 6, 11, 12, 13, 14),
     mirror=(0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15),
     sigmas=(.026, .025, .025, .035, .035, .079, .079, .072, .072, .062, .062, .107, .107, .087, .087, .089, .089),
@@ -127,23 +137,23 @@ PANOPTIC19 = Skeleton(
     ),
     parents=(-1, 0, 0, 0, 3, 4, 2, 6, 7, 0, 9, 10, 2, 12, 13, 1, 15, 1, 17),
     mirror=(0, 1, 2, 9, 10, 11, 12, 13, 14, 3, 4, 5, 6, 7, 8, 17, 18, 15, 16),
-    # COCO's; the neck as the shoulders and the middle of the hips as the hips.
+    # Sigmas of COCO, with the neck as the shoulders and the mid-hip as the hips.
     sigmas=(
         .079, .026, .107, .079, .072, .062, .107, .087, .089,
         .079, .072, .062, .107, .087, .089, .025, .035, .025, .035,
     ),
-)  # the order of the CMU Panoptic dataset's joints19: BodyCenter is mid_hip
+)  # joints19 order of the CMU Panoptic dataset; its BodyCenter is mid_hip
 
 _LIMBS_COCO17_TO_SHELF14 = (16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9)
 # fmt: on
 
 
 def coco17_to_shelf14(joints: ArrayLike, *, head: HeadMapping = "voxelpose") -> Floats:
-    """Map COCO-17 joints in the world, (..., 17, 3) with z up, to the 14 of Shelf and Campus, (..., 14, 3).
+    """Map COCO-17 joints in the world, (..., 17, 3) with z up, to the 14 joints of Shelf and Campus, (..., 14, 3).
 
-    The two head joints do not exist in COCO; they are built from shoulders, nose and ears. ``head`` names the
-    published rule: ``"2019"`` (the code released with the paper) or ``"voxelpose"`` (its evaluation, which
-    later methods use). The choice moves the Shelf average by about 0.9 points of PCP. NaN stays NaN.
+    COCO does not have the two head joints; they are computed from shoulders, nose and ears. ``head`` selects the
+    published rule: ``"2019"`` (the code released with the paper) or ``"voxelpose"`` (the evaluation of VoxelPose,
+    which later methods use). The choice changes the Shelf average by about 0.9 points of PCP. NaN stays NaN.
 
     Raises:
         ValueError: a wrong shape or an unknown rule.

@@ -1,4 +1,4 @@
-"""BLAS on one thread: the matrices of a frame are small, so threads would only fight over them."""
+"""Limit of BLAS to one thread, because threading small matrices costs more than it gains."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from threadpoolctl import ThreadpoolController
 
 
 def one_thread() -> AbstractContextManager:
-    """Run linear algebra within on the calling thread; costs about 15 microseconds."""
+    """Return a context manager that keeps linear algebra on the calling thread; costs about 15 microseconds."""
     return _limit
 
 
 class _Limit:
-    """The limit of the process, for libraries know of no other: the first who enters sets it, the last lifts it.
+    """Reference-counted thread limit of the process: the first entry sets it, the last exit lifts it.
 
-    Were each to lift what it set, one of two threads would take the other's limit for the number it must restore.
+    BLAS libraries have one limit per process. If each of two threads restored the number that it found, one of them
+    would restore the limit set by the other.
     """
 
     def __init__(self) -> None:
@@ -44,6 +45,6 @@ _limit = _Limit()
 
 @cache
 def _controller() -> ThreadpoolController:
-    from scipy.linalg import lapack  # noqa: F401 - the controller sees only libraries that are loaded
+    from scipy.linalg import lapack  # noqa: F401 - the controller finds only libraries that are loaded
 
     return ThreadpoolController()
