@@ -1,1 +1,1 @@
-"""The simulated 2D detector: from the truth in the pictures to noisy detections, and the truth about those."""
+"""Simulated 2D detector: ground truth in pictures to noisy detections, with the truth about each detection."""

@@ -1,4 +1,4 @@
-"""Things that come and go by themselves: when each is born and how long it lasts."""
+"""M/M/∞ birth-death process for false positives: when each one appears and how long it lasts."""
 
 from __future__ import annotations
 
@@ -11,127 +11,128 @@ import numpy as np
 from scipy.special import pdtr
 
 from mvpose.arrays import Floats, Integers
-from simharness.detector.correlation import Chances, Key
+from simharness.detector.draws import Key, KeyedDraws
 from simharness.types.random_streams import stream
 
-_LAYER = 0.25  # alive at once, on average: births are drawn in layers of so many, as many as the rate needs
-_COUNTS = np.arange(20)  # births of a layer in a frame; more have a chance of 1e-29
+_LAYER = 0.25  # mean number alive at once in a layer: as many layers are drawn as the rate needs
+_COUNTS = np.arange(20)  # births of a layer in a frame; more have a probability of 1e-29
 
 
 @dataclass(frozen=True)
-class Lives:
-    """Births and deaths: n things that are there from one frame to another.
+class BirthDeathProcess:
+    """Births and deaths of n individuals, each present from one frame to another.
 
-    Of every layer as many are alive in each frame, the first among them, as a Poisson number says, and of those each
-    lives on by itself for an exponential time. That is the queue M/M/∞ at the frames' times, and with no life at all
-    independent frames. Rates are reached by leaving out: what is there at a rate is there at a higher one.
+    Individuals come in layers. In every frame the number alive in a layer is Poisson distributed, the first frame
+    included, and each of them lives on for an independent exponential time: the queue M/M/∞ at the times of the
+    frames; with a life of zero, independent frames. Lower rates are reached by thinning: an individual that is present
+    at a rate is present at every higher rate.
 
     Attributes:
-        chances: the sequence and its seed.
-        key: names the things; draws about them go by it.
-        life: mean seconds; 0: each is there in one frame.
-        most: the highest rate to be drawn, mean number at a time.
+        draws: draws of the sequence.
+        key: name of the process; all its streams begin with it.
+        life: mean life, seconds; 0: each individual is present in one frame.
+        max_rate: highest rate that is drawn, mean number alive at once.
     """
 
-    chances: Chances
+    draws: KeyedDraws
     key: tuple[Key, ...]
     life: float
-    most: float
+    max_rate: float
 
     @property
     def born(self) -> Integers:
-        """The frame in which each is there for the first time, (n,)."""
+        """First frame of each individual, (n,)."""
         return np.concatenate([np.zeros(0, int), *self._births])
 
     @cached_property
     def last(self) -> Integers:
-        """The frame in which each is there for the last time, (n,)."""
-        more = self.life / self.chances.step
-        lasting = np.minimum(more * self._drawn("life", (), np.random.Generator.standard_exponential), 1e9)
-        return np.minimum(self.born + lasting.astype(int), len(self.chances.time) - 1)
+        """Last frame of each individual, (n,)."""
+        frames = self.life / self.draws.step
+        lasting = np.minimum(frames * self._drawn("life", (), np.random.Generator.standard_exponential), 1e9)
+        return np.minimum(self.born + lasting.astype(int), len(self.draws.time) - 1)
 
     @cached_property
-    def mark(self) -> Floats:
-        """Above which rate each is there, (n,)."""
+    def rate_threshold(self) -> Floats:
+        """Rate above which each individual is present, (n,)."""
         layer = np.repeat(np.arange(len(self._births)), [len(births) for births in self._births])
         return _LAYER * (layer + self.uniform("mark"))
 
     @cached_property
-    def number(self) -> Integers:
-        """A number for each, (n,), that goes with it whatever else is drawn."""
+    def offset(self) -> Integers:
+        """Offset of each individual in blocks of noise (:func:`frame_noise`), (n,), at any rate the same."""
         return np.concatenate([np.zeros(0, int), *(np.arange(len(b)) + 5 * k for k, b in enumerate(self._births))])
 
     @cached_property
-    def name(self) -> Integers:
-        """A number for each, (n,), that no other thing has, of this key or another; whatever else is drawn.
+    def identifier(self) -> Integers:
+        """Unique number of each individual, (n,), across keys and at any rate the same.
 
-        Of 53 random bits: among a million things two share one with a chance of 1 in 18000.
+        It has 53 random bits: among a million individuals two share one with a probability of 1 in 18000.
         """
         return (2.0**53 * self.uniform("name")).astype(np.int64)
 
     def normal(self, purpose: str, *shape: int) -> Floats:
-        """Standard normal draws about each, (n, ...)."""
+        """Draw standard normal numbers for each individual, (n, *shape)."""
         return self._drawn(purpose, shape, np.random.Generator.standard_normal)
 
     def uniform(self, purpose: str, *shape: int) -> Floats:
-        """Uniform draws about each, (n, ...)."""
+        """Draw uniform numbers for each individual, (n, *shape)."""
         return self._drawn(purpose, shape, np.random.Generator.random)
 
     @cached_property
     def _births(self) -> list[Integers]:
-        """Of each layer the frames of birth, rising."""
-        frames = np.arange(len(self.chances.time))
-        mean = _LAYER * (-np.expm1(-self.chances.step / self.life) if self.life else 1.0)
+        """Frames of birth in each layer, in rising order."""
+        frames = np.arange(len(self.draws.time))
+        mean = _LAYER * (-np.expm1(-self.draws.step / self.life) if self.life else 1.0)
         later, first = pdtr(_COUNTS, mean), pdtr(_COUNTS, _LAYER)
         births = []
-        for layer in range(int(np.ceil(self.most / _LAYER))):
-            draws = self._stream("births", layer).random(len(frames))
-            count = np.searchsorted(later, draws)
-            count[:1] = np.searchsorted(first, draws[:1])
+        for layer in range(int(np.ceil(self.max_rate / _LAYER))):
+            uniform = self._stream("births", layer).random(len(frames))
+            count = np.searchsorted(later, uniform)
+            count[:1] = np.searchsorted(first, uniform[:1])
             births.append(np.repeat(frames, count))
         return births
 
     def _drawn(
         self, purpose: str, shape: tuple[int, ...], draw: Callable[[np.random.Generator, tuple[int, ...]], Floats]
     ) -> Floats:
-        draws = [draw(self._stream(purpose, k), (len(births), *shape)) for k, births in enumerate(self._births)]
-        return np.concatenate([np.zeros((0, *shape)), *draws])
+        parts = [draw(self._stream(purpose, k), (len(births), *shape)) for k, births in enumerate(self._births)]
+        return np.concatenate([np.zeros((0, *shape)), *parts])
 
     def _stream(self, purpose: str, layer: int) -> np.random.Generator:
-        return stream(self.chances.seed, "detector", *self.key, purpose, layer)
+        return stream(self.draws.seed, "detector", *self.key, purpose, layer)
 
 
-def alive(born: Integers, last: Integers) -> tuple[Integers, Integers]:
-    """All (r,) pairs of a thing and a frame in which it is there: its index, and the frame."""
+def frames_alive(born: Integers, last: Integers) -> tuple[Integers, Integers]:
+    """Return all r pairs of an individual and a frame in which it is alive: its index (r,) and the frame (r,)."""
     count = last - born + 1
-    thing = np.repeat(np.arange(len(born)), count)
-    return thing, born[thing] + np.arange(len(thing)) - np.repeat(np.cumsum(count) - count, count)
+    individual = np.repeat(np.arange(len(born)), count)
+    return individual, born[individual] + np.arange(len(individual)) - np.repeat(np.cumsum(count) - count, count)
 
 
-def anew(chances: Chances, *key: Key, number: Integers, frame: Integers, size: int) -> Floats:
-    """Standard normal numbers for the joints of things, new in every frame, (r, 17, size).
+def frame_noise(draws: KeyedDraws, *key: Key, offset: Integers, frame: Integers, size: int) -> Floats:
+    """Return standard normal noise for the joints of individuals, independent in every frame, (r, 17, size).
 
-    A block of the frames serves all things: each begins at another of its joints.
+    One block of the sequence serves all individuals: each begins at another joint of it.
 
     Args:
-        chances: of the sequence.
-        key: names the draws.
-        number: of the things, (r,).
-        frame: in which they are there, (r,).
-        size: of numbers for each joint.
+        draws: draws of the sequence.
+        key: name of the noise.
+        offset: joint of the block at which each individual begins, (r,).
+        frame: frame of each row, (r,).
+        size: numbers for each joint.
     """
-    block = chances.normal(*key, "anew", shape=(17, size))
-    return block[frame[:, None], (np.arange(17) + number[:, None]) % 17]
+    block = draws.normal(*key, "anew", shape=(17, size))
+    return block[frame[:, None], (np.arange(17) + offset[:, None]) % 17]
 
 
-def slots(born: Integers, last: Integers) -> Integers:
-    """A slot for each, (n,), for as long as it lasts: the first that is free."""
+def assign_slots(born: Integers, last: Integers) -> Integers:
+    """Return a slot for each individual, (n,), that it keeps while it lives: the first that is free at its birth."""
     taken: list[tuple[int, int]] = []
     free: list[int] = []
     result = np.zeros(len(born), int)
-    for thing in np.argsort(born, kind="stable").tolist():
-        while taken and taken[0][0] < born[thing]:
+    for individual in np.argsort(born, kind="stable").tolist():
+        while taken and taken[0][0] < born[individual]:
             heapq.heappush(free, heapq.heappop(taken)[1])
-        result[thing] = heapq.heappop(free) if free else len(taken)
-        heapq.heappush(taken, (int(last[thing]), int(result[thing])))
+        result[individual] = heapq.heappop(free) if free else len(taken)
+        heapq.heappush(taken, (int(last[individual]), int(result[individual])))
     return result

@@ -1,8 +1,8 @@
-"""Whom the detector finds, and in which boxes: people missed, two in one box, one in two, people found twice.
+"""Errors of boxes: people missed, two people merged, one person split, people detected twice, noise of boxes.
 
-What goes wrong is drawn in this order, each among the people whom those before left: missed, merged, split, found
-twice. Each has streams of its own, so a dial turned up changes no other draw. All of it lasts ``life`` seconds on
-average; the noise of boxes and of their scores forgets in that time.
+The errors are drawn in the order missed, merged, split, duplicated, each among the people that the errors before it
+left. Each has separate streams, so raising one parameter changes no other draw. Errors last ``life`` seconds on
+average, which is also the correlation time of the noise of boxes and of their scores.
 """
 
 from __future__ import annotations
@@ -18,82 +18,90 @@ from mvpose import COCO17
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE, overlaps
-from simharness.detector.correlation import LIMBS, Chances, Key, logistic
-from simharness.detector.detection_block import Found, Origin
+from simharness.detector.detection_block import DetectionBlock, Origin
+from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
+from simharness.detector.steps import Context, Stage, step
 from simharness.scenario.sections.detector import Boxes
 from simharness.types.truth import KeypointError
-from simharness.types.views import Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import Views, Visibility
 
-UPPER = LIMBS < 2
-"""The joints of the upper half of somebody who is found in two, (17,): face and arms. The others are the lower half."""
+UPPER_BODY = LIMB_OF_JOINT < 2
+"""Joints of the upper half of a split person, (17,): face and arms. The others are the lower half."""
 
-AGAIN = 0.2
-"""From a keypoint to the same found again: deviation in x and in y, in units of OKS sigma x sqrt(area). So little that
-its error is still of the same class, up to rare ones at the border of theirs, and labels are kept."""
+DUPLICATE_SCATTER = 0.2
+"""Deviation of a duplicate's keypoints from the first ones in x and in y, in units of OKS sigma x sqrt(area). It is so
+small that error classes change only rarely, near their borders, and the labels are kept."""
 
-PALER = 0.8
-"""What multiplies the scores of somebody who is found again."""
+DUPLICATE_SCORE = 0.8
+"""Factor of the scores of a duplicate."""
 
-_INWARD = 0.45  # of a box's size that a side may move: none turns inside out
+_INWARD = 0.45  # most that a side may move, as a share of the box's size, so that no box turns inside out
 _JOINTS = np.arange(len(COCO17))
 
 
-def in_boxes(people: Found, views: Views, rig: Rig, config: Boxes, chances: Chances) -> Found:
-    """Find people in boxes.
+@step("people", stage=Stage.PEOPLE, sections=("boxes",))
+def detect_people(block: DetectionBlock, context: Context) -> DetectionBlock:
+    """Detect people in boxes, with the errors of boxes."""
+    return apply_box_errors(block, context.views, context.rig, context.config.boxes, context.draws)
+
+
+def apply_box_errors(
+    people: DetectionBlock, views: Views, rig: Rig, config: Boxes, draws: KeyedDraws
+) -> DetectionBlock:
+    """Return the detections of people in boxes.
 
     Args:
-        people: everyone's keypoints, person p in slot p, ``there`` where any is reported. Their boxes do not count yet.
-        views: the truth in the pictures.
-        rig: the cameras, for the sizes of their images.
-        config: what goes wrong how often.
-        chances: the draws.
+        people: everyone's keypoints, person p in slot p, ``present`` where any is reported; its boxes are ignored.
+        views: ground truth in the pictures.
+        rig: cameras, for the sizes of their images.
+        config: rates and noise of the errors.
+        draws: draws of the sequence.
 
     Returns:
-        The P slots: merged people in that of the one who gives most joints, of split ones the upper half. Where anybody
-        is split or found twice, P more: the lower half, or the person again.
+        The P slots: merged people in the slot of the person who gives most joints, of split people the upper half.
+        Where anyone is split or duplicated, P more slots: the lower half, or the person again.
     """
-    finder = _Finder(views, rig, config, chances)
+    errors = _BoxErrors(views, rig, config, draws)
     visible = views.visibility == Visibility.VISIBLE
-    found = people.there & (visible.sum(axis=-1) >= config.least_visible)
-    found &= ~finder.happens("missed", config.missed, shared=config.missed_views)
-    merged = finder.merged(found)
+    found = people.present & (visible.sum(axis=-1) >= config.least_visible)
+    found &= ~errors.occurs("missed", config.missed, shared=config.missed_views)
+    merged = errors.merged(found)
     left = found.copy()
-    for pair, together in merged.items():
-        left[..., pair] &= ~together[..., None]
-    split = left & finder.happens("split", config.split)
-    twice = left & ~split & finder.happens("duplicates", config.duplicates)
+    for pair, merge_here in merged.items():
+        left[..., pair] &= ~merge_here[..., None]
+    split = left & errors.occurs("split", config.split)
+    duplicated = left & ~split & errors.occurs("duplicates", config.duplicates)
 
-    rounds = 2 if (split | twice).any() else 1  # of the P slots
-    blocks = {field.name: np.concatenate([getattr(people, field.name)] * rounds, axis=2) for field in fields(Found)}
-    blocks["there"] = np.concatenate([found, split | twice][:rounds], axis=2)
-    second = np.where(split, Origin.LOWER, Origin.AGAIN).astype(np.int8)
+    rounds = 2 if (split | duplicated).any() else 1  # how many times P slots
+    blocks = {field.name: np.concatenate([getattr(people, field.name)] * rounds, axis=2) for field in fields(people)}
+    blocks["present"] = np.concatenate([found, split | duplicated][:rounds], axis=2)
+    second = np.where(split, Origin.LOWER_HALF, Origin.DUPLICATE).astype(np.int8)
     blocks["origin"] = np.concatenate([people.origin, second][:rounds], axis=2)
     boxes, share = (np.concatenate([each] * rounds, axis=2) for each in (views.boxes, visible.mean(axis=-1)))
-    result = Found(**blocks)
+    result = DetectionBlock(**blocks)
     t, v, p = np.nonzero(split)
-    for half, slot in (UPPER, p), (~UPPER, p + found.shape[2]):
-        _leave(result, half, (t, v, slot))
-        boxes[t, v, slot] = _of_part(views.boxes[t, v, p], views.pixels[t, v, p], half)
+    for half, slot in (UPPER_BODY, p), (~UPPER_BODY, p + found.shape[2]):
+        _keep_joints(result, half, (t, v, slot))
+        boxes[t, v, slot] = _box_of_part(views.boxes[t, v, p], views.pixels[t, v, p], half)
         share[t, v, slot] = (visible[t, v, p] & half).mean(axis=-1)
-    result = replace(result, boxes=finder.jittered(boxes), box_scores=finder.scored(share))
-    for pair, together in merged.items():
-        _merge(result, pair, together, finder.limbs(pair)[together])
-    if twice.any():
-        finder.perturb(result, twice)
-    return replace(result, there=result.there & (result.scores > 0).any(axis=-1))
+    result = replace(result, boxes=errors.jittered(boxes), box_scores=errors.scored(share))
+    for pair, merge_here in merged.items():
+        _merge(result, pair, merge_here, errors.limbs(pair)[merge_here])
+    if duplicated.any():
+        errors.perturb(result, duplicated)
+    return replace(result, present=result.present & (result.scores > 0).any(axis=-1))
 
 
-class _Finder:
-    """The draws about boxes, and what depends on them alone."""
+class _BoxErrors:
+    """Draws of the errors of boxes, and everything that depends on these draws only."""
 
-    def __init__(self, views: Views, rig: Rig, config: Boxes, chances: Chances) -> None:
-        self._views, self._config, self._chances = views, config, chances
+    def __init__(self, views: Views, rig: Rig, config: Boxes, draws: KeyedDraws) -> None:
+        self._views, self._config, self._draws = views, config, draws
         self._shape = views.boxes.shape[:3]
         self._image = np.array([camera.size for camera in rig], float).reshape(-1, 1, 2)
 
-    def happens(self, what: str, share: float, *, shared: float = 0.0) -> Bools:
-        """To whom it happens in which picture, (T, V, P)."""
+    def occurs(self, what: str, share: float, *, shared: float = 0.0) -> Bools:
+        """Draw which people an error takes in which pictures, (T, V, P)."""
         result = np.zeros(self._shape, bool)
         if share > 0:
             for person in range(self._shape[2]):
@@ -101,9 +109,10 @@ class _Finder:
         return result
 
     def merged(self, found: Bools) -> dict[tuple[int, int], Bools]:
-        """Which pairs become one in which pictures, (T, V).
+        """Return which pairs of people merge in which pictures, (T, V) by pair.
 
-        Somebody who could merge with two does so with the one of the lower draw, whatever the dial: more only adds.
+        A person who could merge with two others merges with the one of the lower draw, at any rate: a higher rate only
+        adds mergers.
         """
         share = self._config.merged
         if share == 0:
@@ -116,26 +125,27 @@ class _Finder:
         ]
         if not pairs:
             return {}
-        draws = np.stack([self._state("merged", *pair) for pair in pairs], axis=-1)
+        states = np.stack([self._state("merged", *pair) for pair in pairs], axis=-1)
         one, other = np.array(pairs).T
-        willing = (near[..., one, other] & (draws < ndtri(share))).reshape(-1, len(pairs))
-        free, picture = found.reshape(-1, self._shape[2]).copy(), np.arange(len(willing))
-        merged = np.zeros_like(willing)
-        for pair in draws.reshape(willing.shape).argsort(axis=-1).T:  # of each picture the pair of the next higher draw
+        possible = (near[..., one, other] & (states < ndtri(share))).reshape(-1, len(pairs))
+        free, picture = found.reshape(-1, self._shape[2]).copy(), np.arange(len(possible))
+        merged = np.zeros_like(possible)
+        # In every picture the pairs are taken in rising order of their draws.
+        for pair in states.reshape(possible.shape).argsort(axis=-1).T:
             a, b = one[pair], other[pair]
-            together = willing[picture, pair] & free[picture, a] & free[picture, b]
-            free[picture[together], a[together]] = free[picture[together], b[together]] = False
-            merged[picture, pair] = together
-        by_pair = np.moveaxis(merged.reshape(draws.shape), -1, 0)
-        return {pair: together for pair, together in zip(pairs, by_pair, strict=True) if together.any()}
+            merge_here = possible[picture, pair] & free[picture, a] & free[picture, b]
+            free[picture[merge_here], a[merge_here]] = free[picture[merge_here], b[merge_here]] = False
+            merged[picture, pair] = merge_here
+        by_pair = np.moveaxis(merged.reshape(states.shape), -1, 0)
+        return {pair: merge_here for pair, merge_here in zip(pairs, by_pair, strict=True) if merge_here.any()}
 
     def limbs(self, pair: tuple[int, int]) -> Bools:
-        """Which joints of a merged pair are the first one's, (T, V, J): the face, the arms, the legs as a whole."""
+        """Draw which joints of a merged pair are the first person's, (T, V, J): face, arms and legs as a whole."""
         life = self._config.life
-        return self._chances.joint_states("boxes", "limbs", *pair, life=life, limb=1.0) < 0
+        return self._draws.joint_states("boxes", "limbs", *pair, life=life, limb=1.0) < 0
 
     def jittered(self, boxes: Floats) -> Floats:
-        """Boxes (T, V, S, 4) with noise on every side, within the image."""
+        """Return boxes (T, V, S, 4) with noise on every side, within the image."""
         if self._config.jitter == 0:
             return boxes
         low, size = boxes[..., :2], boxes[..., 2:]
@@ -145,53 +155,54 @@ class _Finder:
         return np.concatenate([corner, opposite - corner], axis=-1)
 
     def scored(self, share: Floats) -> Floats:
-        """Scores of boxes (T, V, S) that show some share of the joints of a whole person."""
+        """Return the scores of boxes, (T, V, S), that show a share (T, V, S) of the joints of a whole person."""
         deviation = self._config.deviation
         noise = deviation * self._noise("score", share.shape[2:]) if deviation else 0.0
         return logistic(self._config.score * share, noise)
 
-    def perturb(self, people: Found, twice: Bools) -> None:
-        """Make those who are found again (T, V, P), in the later P slots, differ from the first time, in place."""
-        t, v, p = np.nonzero(twice)
+    def perturb(self, people: DetectionBlock, duplicated: Bools) -> None:
+        """Add noise to the duplicates of people (T, V, P), in the later P slots, in place."""
+        t, v, p = np.nonzero(duplicated)
         slot = (t, v, p + self._shape[2])
-        size = self._views.boxes[twice][:, 2:]
+        size = self._views.boxes[duplicated][:, 2:]
         unit = np.sqrt(BOX_SHARE * size.prod(axis=-1))[:, None] * np.asarray(COCO17.sigmas)
         before = people.keypoints[slot]
-        noise = self._noise("again", (self._shape[2], len(COCO17), 2))[twice]
-        after = before + AGAIN * unit[..., None] * noise
+        noise = self._noise("again", (self._shape[2], len(COCO17), 2))[duplicated]
+        after = before + DUPLICATE_SCATTER * unit[..., None] * noise
         inside = ((after >= -0.5) & (after < self._image[v] - 0.5)).all(axis=-1, keepdims=True)
         people.keypoints[slot] = np.where(inside, after, before)
-        people.scores[slot] *= PALER
-        people.box_scores[slot] *= PALER
+        people.scores[slot] *= DUPLICATE_SCORE
+        people.box_scores[slot] *= DUPLICATE_SCORE
 
     def _state(self, *key: Key, shared: float = 0.0) -> Floats:
-        return self._chances.states("boxes", *key, life=self._config.life, shared=shared)
+        return self._draws.states("boxes", *key, life=self._config.life, shared=shared)
 
     def _noise(self, what: str, shape: tuple[int, ...]) -> Floats:
-        """Standard normal numbers (T, V, S, ...) for the S slots of every view, the first of ``shape`` (S, ...)."""
+        """Draw standard normal numbers (T, V, S, ...) for the S slots of every view; ``shape`` is (S, ...)."""
         people = self._shape[2]
         result = np.empty((*self._shape[:2], *shape))
         for view in range(self._shape[1]):
             for slot in range(shape[0]):
                 key = ("boxes", what, "again" if slot >= people else "first", view, slot % people)
-                result[:, view, slot] = self._chances.wandering(*key, shape=shape[1:], life=self._config.life)
+                result[:, view, slot] = self._draws.autoregressive(*key, shape=shape[1:], life=self._config.life)
         return result
 
 
-def _leave(people: Found, part: Bools, slots: tuple[NDArray[np.int64], ...]) -> None:
-    """Leave only some of the joints (J,) to the people in some slots, in place."""
+def _keep_joints(people: DetectionBlock, part: Bools, slots: tuple[NDArray[np.int64], ...]) -> None:
+    """Keep only some of the joints (J,) of the people in some slots, in place."""
     gone = (*(index[:, None] for index in slots), np.flatnonzero(~part))
     people.keypoints[gone] = people.rivals[gone] = np.nan
     people.scores[gone] = 0.0
+    people.guessed[gone] = False
     people.error[gone] = KeypointError.ABSENT
 
 
-def _of_part(boxes: Floats, pixels: Floats, part: Bools) -> Floats:
-    """Boxes (n, 4) of some of the joints: on each side as far beyond them as the whole box is beyond all joints.
+def _box_of_part(boxes: Floats, pixels: Floats, part: Bools) -> Floats:
+    """Return boxes (n, 4) of some of the joints, with the same margins as the whole boxes have around all joints.
 
     Args:
-        boxes: of the whole person, (n, 4).
-        pixels: of the joints, (n, J, 2); NaN behind the camera.
+        boxes: boxes of whole people, (n, 4).
+        pixels: positions of their joints, (n, J, 2); NaN behind the camera.
         part: which joints, (J,).
     """
     low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
@@ -202,20 +213,22 @@ def _of_part(boxes: Floats, pixels: Floats, part: Bools) -> Floats:
     return np.concatenate([low + inset, np.maximum(boxes[:, 2:] - inset - outset, 0.0)], axis=1)
 
 
-def _merge(people: Found, pair: tuple[int, int], together: Bools, firsts: Bools) -> None:
-    """Make one detection of two people, in place, in the slot of the one who gives most joints.
+def _merge(people: DetectionBlock, pair: tuple[int, int], merge_here: Bools, firsts: Bools) -> None:
+    """Merge two people into one detection, in place, in the slot of the person who gives most joints.
 
-    What the other one gives is a swap; where both compete for a joint, the one not taken is the rival.
+    Joints of the other person are swaps; the position of a joint that is not taken is its rival.
 
     Args:
-        people: in boxes of their own.
-        pair: who.
-        together: in which pictures, (T, V), n of them.
-        firsts: which joints are those of the first of the pair, (n, J).
+        people: people in separate boxes.
+        pair: indices of the two people.
+        merge_here: in which pictures they merge, (T, V), n of them.
+        firsts: which joints are those of the first person, (n, J).
     """
-    t, v = np.nonzero(together)
+    t, v = np.nonzero(merge_here)
     row = np.arange(len(t))
-    keypoints, scores, error = (getattr(people, key)[t, v][:, list(pair)] for key in ("keypoints", "scores", "error"))
+    keypoints, scores, error, guessed = (
+        getattr(people, key)[t, v][:, list(pair)] for key in ("keypoints", "scores", "error", "guessed")
+    )
     source = np.where(firsts, 0, 1)
     reported = scores[row[:, None], source, _JOINTS] > 0
     owner = np.where((reported & firsts).sum(axis=1) >= (reported & ~firsts).sum(axis=1), 0, 1)
@@ -226,8 +239,9 @@ def _merge(people: Found, pair: tuple[int, int], together: Bools, firsts: Bools)
     people.rivals[t, v, slot] = np.where(reported[..., None], keypoints[row[:, None], 1 - source, _JOINTS], np.nan)
     people.scores[t, v, slot] = scores[row[:, None], source, _JOINTS]
     people.error[t, v, slot] = np.where(swapped, KeypointError.SWAP, error[row[:, None], source, _JOINTS])
-    boxes, sureness = people.boxes[t, v][:, list(pair)], people.box_scores[t, v][:, list(pair)]
+    people.guessed[t, v, slot] = guessed[row[:, None], source, _JOINTS]
+    boxes, box_scores = people.boxes[t, v][:, list(pair)], people.box_scores[t, v][:, list(pair)]
     low, high = boxes[..., :2].min(axis=1), (boxes[..., :2] + boxes[..., 2:]).max(axis=1)
     people.boxes[t, v, slot] = np.concatenate([low, high - low], axis=1)
-    people.box_scores[t, v, slot] = sureness.max(axis=1)
-    people.there[t, v, other] = False
+    people.box_scores[t, v, slot] = box_scores.max(axis=1)
+    people.present[t, v, other] = False

@@ -1,16 +1,16 @@
-"""Descriptors without pictures: drawn so that their distances are what a re-ID network's are.
+"""Model of the descriptors of a re-ID network: drawn descriptors have the distances that the network's have.
 
 A descriptor is a unit vector in the direction of
 
-    who (as alike as the scene's people are)  +  from where (what front, side and back show)  +  noise
+    identity (similar as far as the people of the scene look alike)  +  bearing (front, side or back)  +  noise
 
-Seen from bearings that are t apart, a person's signals have the cosine a + b cos t + c cos 2t, a + b + c = 1: what b
-stands for differs most between front and back, what c stands for between either and the sides, as outlines do. All
-three are positive, so there are vectors like that for any set of bearings.
+Seen from bearings that are t apart, the signals of a person have the cosine a + b cos t + c cos 2t, a + b + c = 1: the
+part b differs most between front and back, the part c between either of them and the sides, as outlines do. All three
+are positive, so such vectors exist for any set of bearings.
 
-How much of each there is, and in how many dimensions, follows from the distances that were measured when the network
-was trained and that its card states: of one person and of two, by the angle between the bearings from which the two
-crops see their people, by how much of the person is hidden, and by the ``look_alike`` dial.
+The shares of these parts and the number of dimensions are fitted to distances that were measured when the network was
+trained and that its card states: distances of one person and of two people, by the angle between the bearings of the
+two crops, by the share of hidden joints, and by the parameter ``look_alike``.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from mvpose.networks.session import check_content
 from simharness.types.random_streams import stream
 
 _FEWEST, _MOST = 6, 256  # dimensions
-_PARTS = 5  # of a person's signal: one for who it is, two for each wave of the bearing
+_PARTS = 5  # of a person's signal: one for the identity, two for each harmonic of the bearing
 
 
 @dataclass(frozen=True)
-class Look:
-    """What descriptors are made of, at one value of the dial.
+class DescriptorShares:
+    """Composition of descriptors at one value of ``look_alike``.
 
     Attributes:
-        who: share of a clear crop's variance that says who it is; the rest says from where it is seen.
-        facing: share of that rest that tells front from back; what is left tells both from the sides.
-        alike: how much of who they are the people of a scene have in common.
-        alike_sides: the same of what their sides look like.
-        noise: how much noise there is, beside that at other values of the dial.
+        identity: share of the variance of a clear crop that identifies the person; the rest depends on the bearing.
+        facing: share of that rest that distinguishes front from back; the remainder distinguishes both from the sides.
+        alike: share of the identity that the people of a scene have in common.
+        alike_sides: share of the bearing part that they have in common.
+        noise: factor of the noise, relative to the first value of ``look_alike``.
     """
 
-    who: float
+    identity: float
     facing: float
     alike: float
     alike_sides: float
@@ -55,178 +55,182 @@ class Look:
 
 @dataclass(frozen=True)
 class DescriptorModel:
-    """The distances of one network.
+    """Fitted model of the descriptors of one network.
 
     Attributes:
-        dimensions: of the descriptors that are drawn: as many as spread distances as much as the network's.
-        dials: values of ``look_alike`` at which it was measured, ascending, (d,).
-        looks: what was found at each.
-        covers: shares of hidden joints, ascending, (h,).
-        noise: mean variance of the noise there at the first dial, in units of a clear crop's variance, (h,).
-        uneven: how that differs from crop to crop: deviation of its logarithm.
-        common: share of the noise's variance that all crops have in common, as what hides people looks alike: hidden
-            crops of two people are as near as clear ones, though less of either is seen.
+        dimensions: dimensions of drawn descriptors, such that distances spread as the network's do.
+        look_alike: values of ``look_alike`` at which the network was measured, ascending, (d,).
+        shares: composition of descriptors at each of them, (d,).
+        hidden: shares of hidden joints, ascending, (h,).
+        noise: mean variance of the noise at these shares and the first ``look_alike``, in units of a clear crop's
+            variance, (h,).
+        uneven: standard deviation of the logarithm of that variance from crop to crop.
+        common: share of the noise's variance that all crops have in common, because occluders look alike: hidden crops
+            of two people are as near as clear ones, though less of either person is seen.
     """
 
     dimensions: int
-    dials: tuple[float, ...]
-    looks: tuple[Look, ...]
-    covers: tuple[float, ...]
+    look_alike: tuple[float, ...]
+    shares: tuple[DescriptorShares, ...]
+    hidden: tuple[float, ...]
     noise: tuple[float, ...]
     uneven: float
     common: float
 
     @classmethod
     def of_network(cls, model: Path) -> Self:
-        """The model of a network, from the card beside its file.
+        """Return the model of a network, fitted to the card beside its file.
 
         Raises:
-            ValueError: there is no card, it states no distances, or it is that of another network.
+            ValueError: there is no card, it states no distances, or it belongs to another network.
         """
         path = model.with_suffix(".json")
-        if model.is_file():  # distances can be drawn without the network, but not with another's card
+        if model.is_file():  # the file may be missing, but the card must not be another network's
             check_content(model)
         try:
             card = json.loads(path.read_text(encoding="utf-8"))
             return cls.fitted(card["distances"])
         except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise ValueError(
-                f"{path}: no card with the distances of {model.name} ({error}); they are measured by "
-                "python -m tools.reid. For a network without them take descriptors from pictures"
+                f"{path}: expected a card with the distances of {model.name}, got none ({error}); measure them with "
+                'python -m tools.reid, or set appearance.source = "pictures"'
             ) from None
 
     @classmethod
     def fitted(cls, distances: Mapping[str, Any]) -> Self:
-        """Fit the model to measured distances: ``distances`` of a card (:mod:`tools.reid.metrics`).
+        """Return the model fitted to measured distances: ``distances`` of a card (:mod:`tools.reid.metrics`).
 
-        Least squares over the mean cosines of all bins, each weighed by its pairs' share in its kind, and over how the
-        cosines of one person's pairs spread.
+        Least squares over the mean cosines of all bins, each weighted by its share of the pairs of its kind, and over
+        the standard deviations of the cosines of one person's pairs.
         """
         edges = np.array(distances["hidden_share_of_the_joints_of_the_worse_crop"])
         turns = _waves(np.deg2rad(distances["view_difference_degrees"]))
-        measured = {float(dial): kinds for dial, kinds in distances["look_alike"].items()}
-        dials = sorted(measured)
-        covers = len(edges) - 1
-        better = _better(measured, covers)
+        measured = {float(level): kinds for level, kinds in distances["look_alike"].items()}
+        levels = sorted(measured)
+        bins = len(edges) - 1
+        better = _better(measured, bins)
         cells = [
-            (d, kind == "same", v, h, bin_["cosine"], bin_["pairs"] / measured[dial][kind]["all"]["pairs"])
-            for d, dial in enumerate(dials)
+            (d, kind == "same", v, h, bin_["cosine"], bin_["pairs"] / measured[level][kind]["all"]["pairs"])
+            for d, level in enumerate(levels)
             for kind in ("same", "other")
-            for v, row in enumerate(measured[dial][kind]["bins"])
+            for v, row in enumerate(measured[level][kind]["bins"])
             for h, bin_ in enumerate(row)
             if bin_["pairs"]
         ]
         d, same, v, h, cosine, weight = (np.array(column) for column in zip(*cells, strict=True))
         same, turn = same.astype(bool), turns[v]
-        # Two people's cosines spread as those of random directions do: that tells in how many dimensions they live.
-        strangers = measured[dials[0]]["other"]["all"]
-        free = (1 - strangers["cosine"] ** 2) / _cosine_deviation(strangers, distances["quantiles"])
+        # Cosines of two people spread as those of random directions: their spread determines the number of dimensions.
+        others = measured[levels[0]]["other"]["all"]
+        free = (1 - others["cosine"] ** 2) / _cosine_deviation(others, distances["quantiles"])
         dimensions = int(np.clip(round(free**2), _FEWEST, _MOST))
-        spread = np.array([_cosine_deviation(measured[dial]["same"]["all"], distances["quantiles"]) for dial in dials])
+        spread = np.array(
+            [_cosine_deviation(measured[level]["same"]["all"], distances["quantiles"]) for level in levels]
+        )
 
-        def parts(x: Floats) -> tuple[Floats, Floats, Floats, float, float]:
-            shares = (1 / (1 + np.exp(-x[: 4 * len(dials)]))).reshape(4, -1)
-            louder = np.exp(np.append(0.0, x[4 * len(dials) : 5 * len(dials) - 1]))
-            noise = np.cumsum(np.exp(x[5 * len(dials) - 1 : -2]))
+        def unpack(x: Floats) -> tuple[Floats, Floats, Floats, float, float]:
+            shares = (1 / (1 + np.exp(-x[: 4 * len(levels)]))).reshape(4, -1)
+            louder = np.exp(np.append(0.0, x[4 * len(levels) : 5 * len(levels) - 1]))
+            noise = np.cumsum(np.exp(x[5 * len(levels) - 1 : -2]))
             return shares, louder, noise, float(abs(x[-2])), float(1 / (1 + np.exp(-x[-1])))
 
         def misfit(x: Floats) -> Floats:
-            (who, facing, alike, sides), louder, noise, uneven, common = parts(x)
-            turned = (1 - who[d]) * (facing[d] * turn[:, 0] + (1 - facing[d]) * turn[:, 1])
-            signal = np.where(same, 1.0, alike[d]) * who[d] + np.where(same, 1.0, sides[d]) * turned
+            (identity, facing, alike, sides), louder, noise, uneven, common = unpack(x)
+            turned = (1 - identity[d]) * (facing[d] * turn[:, 0] + (1 - facing[d]) * turn[:, 1])
+            signal = np.where(same, 1.0, alike[d]) * identity[d] + np.where(same, 1.0, sides[d]) * turned
             once, twice, lost = _kept(louder[:, None] * noise, uneven)
             kept = signal * once[d, h] * (once @ better)[d, h]
             mean = kept + common * lost[d, h] * (lost @ better)[d, h]
-            # The law of total variance: within bins that of unlike noise and of few dimensions, and between them.
+            # Law of total variance: within bins from uneven noise and few dimensions, and between bins.
             variance = signal**2 * (twice[d, h] * (twice @ better)[d, h]) - kept**2 + (1 - mean**2) ** 2 / dimensions
-            share = weight * same / len(dials)
-            total = np.array([(share * (d == k)).sum() for k in range(len(dials))])
-            center = np.array([(share * (d == k) * mean).sum() for k in range(len(dials))]) / total
-            second = np.array([(share * (d == k) * (variance + mean**2)).sum() for k in range(len(dials))]) / total
+            share = weight * same / len(levels)
+            total = np.array([(share * (d == k)).sum() for k in range(len(levels))])
+            center = np.array([(share * (d == k) * mean).sum() for k in range(len(levels))]) / total
+            second = np.array([(share * (d == k) * (variance + mean**2)).sum() for k in range(len(levels))]) / total
             return np.concatenate([np.sqrt(weight) * (mean - cosine), np.sqrt(second - center**2) - spread])
 
-        none, up = np.zeros(len(dials)), np.linspace(-2, 2, len(dials))
+        none, up = np.zeros(len(levels)), np.linspace(-2, 2, len(levels))
         start = np.concatenate([none + 1.5, none, up, none])
-        start = np.concatenate([start, np.zeros(len(dials) - 1), np.log(np.full(covers, 0.1)), [0.5, -3.0]])
-        shares, louder, noise, uneven, common = parts(least_squares(misfit, start).x)
-        looks = tuple(Look(*map(float, each)) for each in zip(*shares, louder, strict=True))
+        start = np.concatenate([start, np.zeros(len(levels) - 1), np.log(np.full(bins, 0.1)), [0.5, -3.0]])
+        shares, louder, noise, uneven, common = unpack(least_squares(misfit, start).x)
+        composition = tuple(DescriptorShares(*map(float, each)) for each in zip(*shares, louder, strict=True))
         middles = tuple(map(float, _middles(edges)))
-        return cls(dimensions, tuple(dials), looks, middles, tuple(map(float, noise)), uneven, common)
+        return cls(dimensions, tuple(levels), composition, middles, tuple(map(float, noise)), uneven, common)
 
-    def look(self, look_alike: ArrayLike) -> Floats:
-        """The numbers of a :class:`Look`, in their order, at values of the dial (...), interpolated, (..., 5)."""
-        table = np.array([astuple(look) for look in self.looks])
-        dial = np.asarray(look_alike, float)
-        return np.stack([np.interp(dial, self.dials, column) for column in table.T], axis=-1)
+    def shares_at(self, look_alike: ArrayLike) -> Floats:
+        """Return the fields of :class:`DescriptorShares`, interpolated at values (...) of ``look_alike``, (..., 5)."""
+        table = np.array([astuple(each) for each in self.shares])
+        level = np.asarray(look_alike, float)
+        return np.stack([np.interp(level, self.look_alike, column) for column in table.T], axis=-1)
 
     def draw(
         self,
-        who: Sequence[tuple[str | int, ...]],
+        identity: Sequence[tuple[str | int, ...]],
         *,
         bearing: ArrayLike,
         hidden: ArrayLike,
         noise: ArrayLike,
-        unease: ArrayLike,
+        noise_level: ArrayLike,
         look_alike: ArrayLike,
         seed: int,
     ) -> Floats:
         """Draw descriptors of n crops.
 
         Args:
-            who: whom each crop shows, a key of streams, (n,); equal keys are one person.
-            bearing: from where, radians about the person's vertical, (n,).
-            hidden: share of the joints hidden, (n,).
-            noise: each crop's own, standard normal, (n, D).
-            unease: how unusually much noise each crop has, standard normal, (n,).
-            look_alike: the dial of each crop's person, (n,), or of all.
-            seed: of the scenario.
+            identity: key of the person or object that each crop shows, (n,); equal keys are one identity.
+            bearing: bearing of the camera from the person, radians about the vertical, (n,).
+            hidden: share of hidden joints, (n,).
+            noise: noise of each crop, standard normal, (n, D).
+            noise_level: how strong the noise of each crop is, standard normal, (n,).
+            look_alike: how alike the crop's person is dressed to the others, (n,), or one value for all.
+            seed: seed of the scenario.
 
         Returns:
             Unit vectors, (n, D).
         """
-        size, count = self.dimensions, len(who)
+        size, count = self.dimensions, len(identity)
         bearing, hidden = np.asarray(bearing, float), np.asarray(hidden, float)
-        shares = self.look(np.broadcast_to(np.asarray(look_alike, float), count))
-        is_who, facing, alike, alike_sides, louder = shares.T
-        everyone, keys = _drawn(seed, ("all",), size), dict.fromkeys(who)
+        shares = self.shares_at(np.broadcast_to(np.asarray(look_alike, float), count))
+        of_identity, facing, alike, alike_sides, louder = shares.T
+        everyone, keys = _drawn(seed, ("all",), size), dict.fromkeys(identity)
         drawn = np.array([_drawn(seed, key, size) for key in keys]).reshape(-1, _PARTS, size)
         place = {key: k for k, key in enumerate(keys)}
-        own = drawn[np.array([place[key] for key in who], int)]
+        individual = drawn[np.array([place[key] for key in identity], int)]
         shared = np.stack([alike, *[alike_sides] * (_PARTS - 1)], axis=-1)[..., None]
-        people = np.sqrt(shared) * everyone + np.sqrt(1 - shared) * own
+        people = np.sqrt(shared) * everyone + np.sqrt(1 - shared) * individual
         direction = [np.ones(count), *(wave(k * bearing) for k in (1, 2) for wave in (np.cos, np.sin))]
-        back, side = (1 - is_who) * facing, (1 - is_who) * (1 - facing)
-        amount = np.stack(direction, axis=-1) * np.sqrt(np.stack([is_who, back, back, side, side], axis=-1))
-        spoilt = louder * np.interp(hidden, self.covers, self.noise)
-        spoilt = spoilt * _unevenly(np.asarray(unease, float), self.uneven)
-        strength = np.sqrt(spoilt / size)[:, None]
-        signal = np.einsum("nk,nkd->nd", amount, people)  # of unit length but for what chance adds in few dimensions
-        cover = stream(seed, "descriptor", "cover").standard_normal(size)
-        spoiling = np.sqrt(self.common) * cover + np.sqrt(1 - self.common) * np.asarray(noise, float)
-        return _unit(_unit(signal) + strength * spoiling)
+        back, side = (1 - of_identity) * facing, (1 - of_identity) * (1 - facing)
+        amount = np.stack(direction, axis=-1) * np.sqrt(np.stack([of_identity, back, back, side, side], axis=-1))
+        variance = louder * np.interp(hidden, self.hidden, self.noise)
+        variance = variance * _unevenly(np.asarray(noise_level, float), self.uneven)
+        strength = np.sqrt(variance / size)[:, None]
+        signal = np.einsum("nk,nkd->nd", amount, people)  # of unit length except for chance in few dimensions
+        common = stream(seed, "descriptor", "cover").standard_normal(size)
+        noise_vector = np.sqrt(self.common) * common + np.sqrt(1 - self.common) * np.asarray(noise, float)
+        return _unit(_unit(signal) + strength * noise_vector)
 
 
 def _drawn(seed: int, key: tuple[str | int, ...], size: int) -> Floats:
-    """Who it is, and how that looks by cos t, sin t, cos 2t and sin 2t: vectors of about unit length, (5, D)."""
+    """Return the vectors of an identity and of cos t, sin t, cos 2t and sin 2t, of about unit length, (5, D)."""
     return stream(seed, "descriptor", *key).standard_normal((_PARTS, size)) / np.sqrt(size)
 
 
 def _waves(edges: Floats) -> Floats:
-    """Means of cos t and cos 2t between edges (b + 1,), (b, 2)."""
+    """Return the means of cos t and cos 2t between edges (b + 1,), (b, 2)."""
     return np.stack([np.diff(np.sin(k * edges)) / (k * np.diff(edges)) for k in (1, 2)], axis=-1)
 
 
 def _unit(vectors: Floats) -> Floats:
+    """Return vectors (n, D) scaled to unit length."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _unevenly(normal: Floats, uneven: float) -> Floats:
-    """Factors about a mean of 1, log-normal, of standard normal numbers."""
+    """Return log-normal factors of mean 1 from standard normal numbers."""
     return np.exp(uneven * normal - 0.5 * uneven**2)
 
 
 def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats, Floats]:
-    """Of a unit vector with noise of variances (...): mean length and square of the signal, mean length of noise."""
+    """Return mean and mean square of the signal and the mean length of the noise, for noise variances (...)."""
     nodes, weights = hermegauss(15)
     variance = noise[..., None] * _unevenly(nodes, uneven)
     weights = weights / weights.sum()
@@ -234,23 +238,25 @@ def _kept(noise: Floats, uneven: float) -> tuple[Floats, Floats, Floats]:
     return np.sqrt(kept) @ weights, kept @ weights, np.sqrt(1 - kept) @ weights
 
 
-def _better(measured: Mapping[float, Any], covers: int) -> Floats:
-    """Where the better of two crops is, whose worse one is in some bin of hidden shares: columns add up to 1, (h, h).
+def _better(measured: Mapping[float, Any], bins: int) -> Floats:
+    """Return the distribution of the better crop over bins of hidden shares, given the worse one, (h, h).
 
-    As if both crops of a pair were hidden independently: then the worse one's distribution is the square of either's.
+    Columns sum to 1. Both crops of a pair are assumed to be hidden independently: then the distribution of the worse
+    one is the square of that of a single crop.
     """
     rows = [row for kinds in measured.values() for kind in ("same", "other") for row in kinds[kind]["bins"]]
     pairs = np.array([[bin_["pairs"] for bin_ in row] for row in rows], float).sum(axis=0)
     single = np.diff(np.sqrt(np.cumsum(pairs) / pairs.sum()), prepend=0.0)
-    chances = np.triu(np.broadcast_to(single[:, None], (covers, covers)), 1) * 2 + np.diag(single)
-    return np.asarray(chances / np.maximum(chances.sum(axis=0), 1e-9))
+    probability = np.triu(np.broadcast_to(single[:, None], (bins, bins)), 1) * 2 + np.diag(single)
+    return np.asarray(probability / np.maximum(probability.sum(axis=0), 1e-9))
 
 
 def _middles(edges: Floats) -> Floats:
+    """Return the middles of the bins between edges (b + 1,), (b,)."""
     return 0.5 * (edges[1:] + edges[:-1])
 
 
 def _cosine_deviation(summary: Mapping[str, Any], quantiles: Sequence[float]) -> float:
-    """Deviation of the cosines whose distances have the quantiles of a summary."""
+    """Return the standard deviation of cosines whose distances have the quantiles of a summary."""
     ranks = (np.arange(1000) + 0.5) / 1000
     return float(np.std(1 - np.interp(ranks, quantiles, summary["quantiles"]) ** 2 / 2))

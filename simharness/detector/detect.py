@@ -1,9 +1,10 @@
-"""The simulated 2D detector: what is in the pictures, seen with the errors of a real one.
+"""Simulated 2D detector: the truth in the pictures to the detections of every frame.
 
-    keypoints -> scores -> boxes -> people found; beside them phantoms and decoys -> what arrives -> frames
+    perfect detections -> keypoints -> scores -> people -> false positives -> crops -> delivery -> frames
 
-Every part makes or changes blocks of detections (:class:`Found`) of the whole sequence; every dial draws from a stream
-of its own before anything is masked. So turning one changes no other draw.
+Every error is a registered step (:mod:`simharness.detector.steps`) that changes the block of detections of the whole
+sequence. Every parameter draws from separate random streams before anything is masked, so changing one parameter
+changes no other draw.
 """
 
 from __future__ import annotations
@@ -15,19 +16,12 @@ import numpy as np
 
 from mvpose import COCO17, Detections
 from mvpose.camera import Rig
-from simharness.detector.bias import shifts
-from simharness.detector.boxes import in_boxes
-from simharness.detector.conditions import Conditions
-from simharness.detector.correlation import Chances
-from simharness.detector.decoys import decoy_hits
-from simharness.detector.detection_block import Found, Origin
-from simharness.detector.drawn_descriptors import Describer, Looks
-from simharness.detector.heatmaps import Peaks, in_crops
-from simharness.detector.keypoints import find_keypoints
-from simharness.detector.phantoms import phantoms
-from simharness.detector.picture_delivery import delivered
-from simharness.detector.scores import score_keypoints
-from simharness.scenario.sections.detector import Bias, Detector
+from simharness.detector.descriptors import DescriptorSampler, DescriptorSettings
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.heatmaps import Peaks
+from simharness.detector.steps import Context, registered_steps
+from simharness.scenario.sections.detector import Detector
 from simharness.types.sequence import Sequence
 from simharness.types.truth import Truth
 from simharness.types.views import Views
@@ -35,12 +29,12 @@ from simharness.types.views import Views
 
 @dataclass(frozen=True)
 class Detected:
-    """What the detector says of one frame, and the truth about it.
+    """Detections of one frame and the truth about them.
 
     Attributes:
-        detections: ordered by view and then by falling box score, as detectors give them.
+        detections: ordered by view, then by falling box score, as detectors report them.
         truth: the truth about them.
-        peaks: what their heat maps are made of; None without heat maps.
+        peaks: parameters of their heat maps; None without heat maps.
     """
 
     detections: Detections
@@ -49,83 +43,61 @@ class Detected:
 
 
 def detect(
-    sequence: Sequence, views: Views, rig: Rig, config: Detector, *, seed: int, looks: Looks | None = None
+    sequence: Sequence,
+    views: Views,
+    rig: Rig,
+    config: Detector,
+    *,
+    seed: int,
+    descriptors: DescriptorSettings | None = None,
 ) -> list[Detected]:
     """Detect the people of every frame in every view.
 
-    A repeated picture gives the detections of the frame that it was taken in.
+    A repeated picture gives the detections of the frame in which it was taken.
 
     Args:
-        sequence: where everyone is, T frames.
-        views: the same in the V pictures.
-        rig: the cameras that take the pictures, not what is believed of them.
-        config: how the detector errs.
-        seed: of the scenario.
-        looks: how descriptors are drawn; None: detections carry none.
+        sequence: ground truth in space, T frames.
+        views: ground truth in the V pictures of every frame.
+        rig: true rig, which takes the pictures (not the believed rig).
+        config: parameters of the detector.
+        seed: seed of the scenario.
+        descriptors: how descriptors are drawn; None: detections without descriptors.
+
+    Returns:
+        One :class:`Detected` for each frame, (T,).
     """
-    chances = Chances(seed, sequence.time, len(rig))
-    parts = [
-        find_people(sequence, views, rig, config, chances),
-        phantoms(views, rig, config.phantoms, chances),
-        decoy_hits(views, rig, config.decoys, chances),
-    ]
-    found = Found.joined([part for part in parts if part.there.shape[2]] or parts[:1])
-    if config.heatmaps.size != "none":
-        found = in_crops(found)
-    found = delivered(found, views.source)
-    describe = None
-    if looks is not None:
-        describe = Describer(sequence, views, rig, looks, chances, life=config.correlation.scatter_life)
-    return _frames(found, sequence, views, config, describe)
+    context = Context(sequence, views, rig, config, KeyedDraws(seed, sequence.time, len(rig)))
+    block = DetectionBlock.of_people(views)
+    for each in registered_steps():
+        block = each.apply(block, context)
+    sampler = None
+    if descriptors is not None:
+        life = config.correlation.scatter_life
+        sampler = DescriptorSampler(sequence, views, rig, descriptors, context.draws, life=life)
+    return _frames(block, context, sampler)
 
 
-def find_people(sequence: Sequence, views: Views, rig: Rig, config: Detector, chances: Chances) -> Found:
-    """The detections that show real people."""
-    conditions = Conditions.of(views)
-    shift = None if config.bias == Bias() else shifts(sequence.joints, config.bias, rig)
-    keypoints = find_keypoints(
-        views, conditions, sequence, rig, config.keypoints, config.correlation, chances, shift=shift
-    )
-    scores = score_keypoints(keypoints, conditions, config.scores, config.correlation, chances)
-    shape = scores.shape[:3]
-    number = np.broadcast_to(np.arange(shape[2]), shape)
-    people = Found(
-        there=np.any(scores > 0, axis=-1),
-        keypoints=keypoints.pixels,
-        scores=scores,
-        boxes=views.boxes,
-        box_scores=np.ones(shape),
-        person=number,
-        origin=np.full(shape, Origin.PERSON, np.int8),
-        number=number,
-        error=keypoints.error,
-        rivals=keypoints.rivals,
-    )
-    return in_boxes(people, views, rig, config.boxes, chances)
-
-
-def _frames(
-    found: Found, sequence: Sequence, views: Views, config: Detector, describe: Describer | None
-) -> list[Detected]:
-    """Blocks to frames."""
-    frame, view, slot = np.nonzero(found.there)
-    order = np.lexsort((slot, -found.box_scores[frame, view, slot], view, frame))
+def _frames(block: DetectionBlock, context: Context, sampler: DescriptorSampler | None) -> list[Detected]:
+    """Return the detections of a block frame by frame."""
+    sequence, views, config = context.sequence, context.views, context.config
+    frame, view, slot = np.nonzero(block.present)
+    order = np.lexsort((slot, -block.box_scores[frame, view, slot], view, frame))
     where = frame, view, slot = frame[order], view[order], slot[order]
-    chosen = {
-        key: getattr(found, key)[where]
+    columns = {
+        key: getattr(block, key)[where]
         for key in ("keypoints", "scores", "boxes", "box_scores", "person", "error", "rivals")
     }
-    descriptors = None if describe is None else describe(frame, view, found.origin[where], found.number[where])
-    heat = config.heatmaps.size != "none"
+    descriptors = None if sampler is None else sampler(frame, view, block.origin[where], block.number[where])
+    has_heatmaps = config.heatmaps.size != "none"
     result = []
     for t, (start, end) in enumerate(itertools.pairwise(np.searchsorted(frame, np.arange(len(sequence) + 1)))):
-        mine = {key: values[start:end] for key, values in chosen.items()}
+        rows = {key: values[start:end] for key, values in columns.items()}
         detections = Detections(
             view[start:end],
-            mine["keypoints"],
-            mine["scores"],
-            mine["boxes"],
-            mine["box_scores"],
+            rows["keypoints"],
+            rows["scores"],
+            rows["boxes"],
+            rows["box_scores"],
             COCO17,
             None if descriptors is None else descriptors[start:end],
         )
@@ -134,9 +106,9 @@ def _frames(
             pixels=views.pixels[t],
             visibility=views.visibility[t],
             boxes=views.boxes[t],
-            person=mine["person"],
-            error=mine["error"],
+            person=rows["person"],
+            error=rows["error"],
         )
-        peaks = Peaks(detections.boxes, detections.keypoints, detections.scores, mine["rivals"], config.heatmaps)
-        result.append(Detected(detections, truth, peaks if heat else None))
+        peaks = Peaks(detections.boxes, detections.keypoints, detections.scores, rows["rivals"], config.heatmaps)
+        result.append(Detected(detections, truth, peaks if has_heatmaps else None))
     return result

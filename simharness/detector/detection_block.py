@@ -1,4 +1,4 @@
-"""What a detector finds in all pictures, as blocks: each part of the detector makes one, or changes one."""
+"""Detections of a whole sequence as one block of arrays: every step of the detector takes one and returns one."""
 
 from __future__ import annotations
 
@@ -10,45 +10,48 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from simharness.types.truth import KeypointError
+from simharness.types.views import Views, Visibility
 
 
 class Origin(IntEnum):
-    """What a detection comes from: with a number (:attr:`Found.number`) it names who or what is detected."""
+    """Source of a detection; with :attr:`DetectionBlock.number` it names the person or object that is detected."""
 
     PERSON = 0
-    """A person by number, or of one found in two the upper half, or of two in one who gives most."""
-    AGAIN = 1
-    """The same person once more."""
-    LOWER = 2
-    """The lower half of a person who is found in two."""
+    """A person; of a split person the upper half, of merged people the one who gives most joints."""
+    DUPLICATE = 1
+    """A second detection of a person."""
+    LOWER_HALF = 2
+    """The lower half of a split person."""
     PHANTOM = 3
-    """A phantom: its number is drawn with it, and it has the same in all views that show it."""
+    """A phantom. Its number is drawn with it and is the same in all views that show it."""
     DECOY = 4
-    """A decoy by number among the lookalikes."""
+    """A decoy, by its index among the lookalikes."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """Detections in the pictures that V cameras take in T frames: S slots a picture, of which some are filled.
+class DetectionBlock:
+    """Detections in the pictures that V cameras take in T frames, in S slots of each picture.
 
-    What stands in a slot that is not filled means nothing.
+    Values in a slot that holds no detection have no meaning.
 
     Attributes:
-        there: which slots are filled, (T, V, S).
+        present: which slots hold a detection, (T, V, S).
         keypoints: pixels, (T, V, S, J, 2); NaN where a joint is not reported.
-        scores: of keypoints, 0 to 1, (T, V, S, J); 0 where a joint is not reported.
+        scores: scores of keypoints, 0 to 1, (T, V, S, J); 0 where a joint is not reported.
         boxes: x, y, width, height in pixels, (T, V, S, 4).
         box_scores: 0 to 1, (T, V, S).
-        person: whom it shows, (T, V, S); -1 for nobody.
+        person: index of the person that the detection shows, (T, V, S); -1 of a false positive.
         origin: :class:`Origin`, (T, V, S).
-        number: which one of its origin, (T, V, S): the same however many others there are, unlike its slot.
+        number: number among the detections of this origin, (T, V, S); unlike the slot, it does not depend on how many
+            other detections there are.
         error: :class:`KeypointError`, (T, V, S, J).
-        rivals: where a second peak competes in the heat map, pixels, (T, V, S, J, 2), NaN where none does.
+        guessed: which keypoints are guesses of hidden joints, (T, V, S, J).
+        rivals: position of a second peak in the heat map, pixels, (T, V, S, J, 2); NaN where there is none.
     """
 
-    there: NDArray[np.bool_]
+    present: Bools
     keypoints: Floats
     scores: Floats
     boxes: Floats
@@ -57,14 +60,39 @@ class Found:
     origin: NDArray[np.int8]
     number: Integers
     error: NDArray[np.int8]
+    guessed: Bools
     rivals: Floats
 
     @classmethod
-    def nothing(cls, frames: int, views: int, slots: int, joints: int = 17) -> Self:
-        """Empty slots, of phantoms."""
+    def of_people(cls, views: Views) -> Self:
+        """Return the detections of a perfect detector: person p in slot p, every joint in the image at its true place.
+
+        Args:
+            views: ground truth in the pictures.
+        """
+        seen = views.visibility != Visibility.OUTSIDE
+        shape = seen.shape[:3]
+        number = np.broadcast_to(np.arange(shape[2]), shape)
+        return cls(
+            present=seen.any(axis=-1),
+            keypoints=np.where(seen[..., None], views.pixels, np.nan),
+            scores=seen.astype(float),
+            boxes=views.boxes,
+            box_scores=np.ones(shape),
+            person=number,
+            origin=np.full(shape, Origin.PERSON, np.int8),
+            number=number,
+            error=np.where(seen, np.int8(KeypointError.GOOD), np.int8(KeypointError.ABSENT)),
+            guessed=np.zeros(seen.shape, bool),
+            rivals=np.full((*seen.shape, 2), np.nan),
+        )
+
+    @classmethod
+    def empty(cls, frames: int, views: int, slots: int, joints: int = 17) -> Self:
+        """Return slots without detections, with the origin, person and error class of phantoms."""
         shape = (frames, views, slots)
         return cls(
-            there=np.zeros(shape, bool),
+            present=np.zeros(shape, bool),
             keypoints=np.full((*shape, joints, 2), np.nan),
             scores=np.zeros((*shape, joints)),
             boxes=np.zeros((*shape, 4)),
@@ -73,15 +101,17 @@ class Found:
             origin=np.full(shape, Origin.PHANTOM, np.int8),
             number=np.full(shape, -1),
             error=np.full((*shape, joints), KeypointError.MISS, np.int8),
+            guessed=np.zeros((*shape, joints), bool),
             rivals=np.full((*shape, joints, 2), np.nan),
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """All of several in one, their slots one after the other."""
-        if len(parts) == 1:
-            return parts[0]
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """Return one block with the slots of all parts, in their order; at least one part is needed."""
+        filled = [part for part in parts if part.present.shape[2]] or parts[:1]
+        if len(filled) == 1:
+            return filled[0]
         fields: dict[str, Any] = {
-            key: np.concatenate([getattr(part, key) for part in parts], axis=2) for key in cls.__dataclass_fields__
+            key: np.concatenate([getattr(part, key) for part in filled], axis=2) for key in cls.__dataclass_fields__
         }
         return cls(**fields)

@@ -1,4 +1,4 @@
-"""How a detector reports people who are not there: what false detections of every kind have in common."""
+"""False positives of every kind: their scores, their boxes and their place in a block of detections."""
 
 from __future__ import annotations
 
@@ -7,45 +7,45 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
-from simharness.detector.correlation import logistic
-from simharness.detector.detection_block import Found, Origin
+from simharness.detector.detection_block import DetectionBlock, Origin
+from simharness.detector.draws import logistic
 
-LEAST = 6
-"""Joints in a picture that a detector takes for a person, at least."""
+MIN_JOINTS = 6
+"""Fewest joints in a picture that a detector takes for a person."""
 
-_TOGETHER = np.sqrt(0.5)  # half the variance of scores is a detection's as long as it lasts, half each joint's
+_COMMON = np.sqrt(0.5)  # half the variance of scores lasts as long as the detection, half is drawn for each joint
 
 
-def sureness(usual: float, deviation: float, together: Floats, apart: Floats) -> Floats:
-    """Scores about a usual one.
+def keypoint_scores(usual: float, deviation: float, common: Floats, separate: Floats) -> Floats:
+    """Return keypoint scores about a usual score, (..., J).
 
     Args:
-        usual: score.
-        deviation: on the logit scale.
-        together: standard normal numbers of detections, (...).
-        apart: of their joints, (..., J).
-
-    Returns:
-        (..., J).
+        usual: usual score.
+        deviation: standard deviation on the logit scale.
+        common: standard normal numbers of the detections, (...).
+        separate: standard normal numbers of their joints, (..., J).
     """
-    return logistic(usual, deviation * _TOGETHER * (together[..., None] + apart))
+    return logistic(usual, deviation * _COMMON * (common[..., None] + separate))
 
 
-def box_about(points: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest coordinates, (..., 2) each, of those of points (..., J, 2) that are numbers; NaN of none."""
-    there = np.isfinite(points)
-    low, high = np.where(there, points, np.inf).min(axis=-2), np.where(there, points, -np.inf).max(axis=-2)
+def bounding_box(points: Floats) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest coordinates, (..., 2) each, of the finite points of (..., J, 2).
+
+    Both are NaN where no point is finite.
+    """
+    known = np.isfinite(points)
+    low, high = np.where(known, points, np.inf).min(axis=-2), np.where(known, points, -np.inf).max(axis=-2)
     some = low <= high
     return np.where(some, low, np.nan), np.where(some, high, np.nan)
 
 
 def inside(rig: Rig, view: Integers, keypoints: Floats) -> NDArray[np.bool_]:
-    """Which keypoints (r, J, 2) in pictures of views (r,) lie on the image, (r, J)."""
+    """Return which keypoints (r, J, 2) in the pictures of views (r,) lie on the image, (r, J)."""
     size = np.array([camera.size for camera in rig], float)[view][:, None]
     return np.all((keypoints >= -0.5) & (keypoints < size - 0.5), axis=-1)
 
 
-def reported(
+def false_positive_block(
     rig: Rig,
     frames: int,
     where: tuple[Integers, Integers, Integers],
@@ -54,29 +54,29 @@ def reported(
     *,
     origin: Origin,
     number: Integers,
-) -> Found:
-    """Put false detections where they belong.
+) -> DetectionBlock:
+    """Return a block with r false positives.
 
-    What lies off the image is absent; a box spans the others and is as sure as they are on average.
+    Keypoints off the image are absent; the box spans the others, and its score is the mean of theirs.
 
     Args:
-        rig: for the images' sizes.
+        rig: cameras, for the sizes of their images.
         frames: T.
-        where: frame, view and slot of each, (r,).
+        where: frame, view and slot of each detection, (r,) each.
         keypoints: pixels, (r, J, 2), NaN where absent.
-        scores: (r, J).
-        origin: of all.
-        number: of each among those of this origin, (r,).
+        scores: scores of the keypoints, (r, J).
+        origin: origin of all of them.
+        number: number of each among the detections of this origin, (r,).
     """
     _, view, slot = where
-    found = Found.nothing(frames, len(rig), int(slot.max(initial=-1)) + 1)
+    block = DetectionBlock.empty(frames, len(rig), int(slot.max(initial=-1)) + 1)
     seen = inside(rig, view, keypoints) & (scores > 0)
     keypoints, scores = np.where(seen[..., None], keypoints, np.nan), np.where(seen, scores, 0.0)
-    low, high = box_about(keypoints)
+    low, high = bounding_box(keypoints)
     count = seen.sum(axis=-1)
-    found.there[where] = count > 0
-    found.keypoints[where], found.scores[where] = keypoints, scores
-    found.origin[where], found.number[where] = origin, number
-    found.boxes[where] = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=-1), 0.0)
-    found.box_scores[where] = scores.sum(axis=-1) / np.maximum(count, 1)
-    return found
+    block.present[where] = count > 0
+    block.keypoints[where], block.scores[where] = keypoints, scores
+    block.origin[where], block.number[where] = origin, number
+    block.boxes[where] = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=-1), 0.0)
+    block.box_scores[where] = scores.sum(axis=-1) / np.maximum(count, 1)
+    return block

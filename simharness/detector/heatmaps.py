@@ -1,9 +1,10 @@
-"""The heat maps that detections would have been read from, made when they are asked for.
+"""Heat maps from which the detections would have been read, drawn on request.
 
-A top-down head looks at a crop about the box of a person, and says for every joint how much each cell of a grid looks
-like it: a Gaussian about the keypoint, as high as its score. A network that is trained with the squared error towards
-such Gaussians learns their mean over what the joint could be: where it is right with probability p, its maps have a
-peak of p, and where one other place competes one of 1 - p there. So has a joint with a rival here.
+A top-down head sees a crop around the box of a person and gives for every joint and every cell of a grid how likely the
+joint is there: a Gaussian about the keypoint, as high as its score. A network that is trained with the squared error
+towards such Gaussians learns their mean over the possible positions of the joint: where it is right with probability
+p, its map has a peak of height p, and a peak of height 1 - p at the one other place that competes. Joints with a rival
+have these two peaks here.
 """
 
 from __future__ import annotations
@@ -16,31 +17,32 @@ from numba import njit
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import seal
 from mvpose.heatmaps import Heatmaps
-from simharness.detector.detection_block import Found
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.steps import Context, Stage, step
 from simharness.scenario.sections.detector import HeatmapHead
 from simharness.types.truth import KeypointError
 
 ASPECT = 3 / 4
-"""Width of a crop over its height: that of the maps."""
+"""Width of a crop over its height, as of the maps."""
 
 PADDING = 1.25
-"""Size of a crop over that of the box in it (Xiao, Wu & Wei, "Simple baselines", ECCV 2018, and most heads since)."""
+"""Size of a crop over the size of its box (Xiao, Wu & Wei, "Simple baselines", ECCV 2018, and most heads since)."""
 
-_APART = 3.0  # widths from which a rival has a peak of its own; a nearer one is one with the keypoint's
-_FAINT = 0.5  # of a peak's height that the floor has at most
-_TILT = 0.1  # of its height the floor loses away from the peak: a level one takes long to search for modes
+_MIN_DISTANCE = 3.0  # widths from which a rival has a separate peak; a nearer one merges with the first
+_FAINT = 0.5  # highest floor, as a share of the peak's height
+_TILT = 0.1  # share of its height that the floor loses away from the peak: modes of a level floor are slow to search
 
 
 @dataclass(frozen=True)
 class Peaks:
-    """What the heat maps of one frame's m detections are made of: a few numbers a joint.
+    """Parameters of the heat maps of m detections of one frame: a few numbers for each joint.
 
     Attributes:
         boxes: x, y, width, height in pixels, (m, 4).
         keypoints: pixels, (m, J, 2); NaN where a joint is not reported.
-        scores: of keypoints, 0 to 1, (m, J); 0 where not reported.
-        rivals: where another place competes, pixels, (m, J, 2); NaN where none does.
-        config: the head.
+        scores: scores of keypoints, 0 to 1, (m, J); 0 where not reported.
+        rivals: positions of second peaks, pixels, (m, J, 2); NaN where there is none.
+        config: parameters of the head.
     """
 
     boxes: Floats
@@ -50,12 +52,12 @@ class Peaks:
     config: HeatmapHead
 
     def heatmaps(self) -> Heatmaps:
-        """Draw the maps: the strongest modes are the keypoints, as high as the scores; the second ones are the rivals.
+        """Draw the maps: the strongest modes are the keypoints, as high as their scores; the second are the rivals.
 
-        A rival is as high as 1 - score, at most ``config.rivals`` of the score: a sure joint has none. Elsewhere a map
-        is about ``config.floor`` high, but lower than half its peak and the cells around it. The map of a joint that is
-        not reported, or not in the crop, is 0 throughout: a floor alone would have a highest cell, and a keypoint would
-        be read from it.
+        A rival has the height 1 - score, at most ``config.rivals`` times the score: a joint of score 1 has none.
+        Elsewhere the height of a map is about ``config.floor``, but less than half its peak and less than the cells
+        around the peak. The map of a joint that is not reported, or not in the crop, is 0 everywhere: a floor alone
+        would have a highest cell, from which a keypoint would be read.
 
         Raises:
             ValueError: the head is "none".
@@ -68,10 +70,10 @@ class Peaks:
         origin = corner + 0.5 * stride
         cells, rivals = ((each - origin[:, None]) / stride[:, None] for each in (self.keypoints, self.rivals))
         heights = np.where(_inside(self.keypoints, corner, size), self.scores, 0.0)
-        apart = np.linalg.norm(rivals - cells, axis=-1) >= _APART * self.config.width
+        separate = np.linalg.norm(rivals - cells, axis=-1) >= _MIN_DISTANCE * self.config.width
         rest = np.minimum(1 - heights, self.config.rivals * heights)
-        second = np.where(apart & _inside(self.rivals, corner, size), rest, 0.0)
-        # The cells around the highest one say where between cells the peak is: they are 1.5 and 0.5 away at most.
+        second = np.where(separate & _inside(self.rivals, corner, size), rest, 0.0)
+        # The cells around the highest one locate the peak between cells; they are at most 1.5 and 0.5 cells away.
         beside = np.exp(-0.5 * (1.5**2 + 0.5**2) / self.config.width**2)
         floor = np.minimum(self.config.floor, min(_FAINT, beside) * heights)
         values = np.zeros((*heights.shape, rows, columns), np.float32)
@@ -80,25 +82,32 @@ class Peaks:
         return Heatmaps(values, origin, stride)
 
 
-def in_crops(found: Found) -> Found:
-    """What a head reports that sees its crop alone: keypoints outside it are absent."""
-    corner, size = _crops(found.boxes)
-    out = np.isfinite(found.keypoints[..., 0]) & ~_inside(found.keypoints, corner, size)
+@step("crops", stage=Stage.DETECTIONS, sections=("heatmaps",))
+def limit_to_crops(block: DetectionBlock, context: Context) -> DetectionBlock:
+    """Drop keypoints outside the crops where keypoints are read from heat maps."""
+    return block if context.config.heatmaps.size == "none" else drop_outside_crops(block)
+
+
+def drop_outside_crops(block: DetectionBlock) -> DetectionBlock:
+    """Return the block without keypoints outside the crop of their box: a top-down head sees only its crop."""
+    corner, size = _crops(block.boxes)
+    out = np.isfinite(block.keypoints[..., 0]) & ~_inside(block.keypoints, corner, size)
     if not out.any():
-        return found
-    scores = np.where(out, 0.0, found.scores)
+        return block
+    scores = np.where(out, 0.0, block.scores)
     return replace(
-        found,
-        there=found.there & (scores > 0).any(axis=-1),
-        keypoints=np.where(out[..., None], np.nan, found.keypoints),
+        block,
+        present=block.present & (scores > 0).any(axis=-1),
+        keypoints=np.where(out[..., None], np.nan, block.keypoints),
         scores=scores,
-        error=np.where(out, np.int8(KeypointError.ABSENT), found.error),
-        rivals=np.where(out[..., None], np.nan, found.rivals),
+        error=np.where(out, np.int8(KeypointError.ABSENT), block.error),
+        guessed=block.guessed & ~out,
+        rivals=np.where(out[..., None], np.nan, block.rivals),
     )
 
 
 def _crops(boxes: Floats) -> tuple[Floats, Floats]:
-    """Upper left corners and sizes of the crops of boxes (..., 4), pixels, (..., 2) each."""
+    """Return the upper left corners and the sizes of the crops of boxes (..., 4), pixels, (..., 2) each."""
     center, size = boxes[..., :2] + 0.5 * boxes[..., 2:], boxes[..., 2:]
     height = PADDING * np.maximum(np.maximum(size[..., 1], size[..., 0] / ASPECT), 1.0)
     crop = np.stack([ASPECT * height, height], axis=-1)
@@ -106,16 +115,16 @@ def _crops(boxes: Floats) -> tuple[Floats, Floats]:
 
 
 def _inside(points: Floats, corner: Floats, size: Floats) -> Bools:
-    """Which points (..., J, 2) are in the crops, (..., J)."""
+    """Return which points (..., J, 2) are in the crops, (..., J)."""
     low = corner[..., None, :]
     return np.all((points >= low) & (points <= low + size[..., None, :]), axis=-1)
 
 
 @njit(cache=True)
 def _draw(cells, heights, rivals, second, floors, width, values):
-    """Draw maps (m, J, h, w) that are all 0: the higher of floor and peaks, these at columns and rows (m, J, 2).
+    """Fill zero maps (m, J, h, w) with the higher of floor and peaks; peaks at columns and rows (m, J, 2).
 
-    A bell is the product of one across and one down, and the floor the sum of a slope across and one down.
+    A peak is the product of a horizontal and a vertical bell, the floor the sum of a horizontal and a vertical slope.
     """
     m, joints, h, w = values.shape
     bell, slope = np.empty(w, np.float32), np.empty(w, np.float32)
@@ -145,5 +154,6 @@ def _draw(cells, heights, rivals, second, floors, width, values):
 
 @njit(cache=True)
 def _bell(center, width, bell):
+    """Fill ``bell`` with a Gaussian of height 1 about ``center``, in cells."""
     for c in range(len(bell)):
         bell[c] = np.exp(-0.5 * ((c - center) / width) ** 2)

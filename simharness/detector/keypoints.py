@@ -1,16 +1,17 @@
-"""Where the keypoints of everyone are found, and what is wrong with them.
+"""Positions of keypoints and their errors.
 
-Every joint that is in the picture has at most one error: not reported (drop), found at the same joint of a neighbour
-(swap), at its left-right counterpart (inversion), far off (miss), somewhat off (jitter); otherwise it is good. Each is
-drawn from a stream of its own, in that order, each among the joints that those before left: so a dial turned up takes
-joints and changes no other. A joint that somebody or something hides may be guessed from the pose of the rest.
+Every joint in the picture has at most one error: not reported (drop), at the same joint of a neighbour (swap), at its
+left-right counterpart (inversion), far off (miss), slightly off (jitter); otherwise it is good. Each error has a
+separate stream. They are drawn in that order, each among the joints that the errors before it left: raising one
+parameter takes more joints and changes no other joint. A joint hidden by another person or an object may be guessed
+from the pose of the rest.
 
 Classes and distances: Ronchi & Perona, "Benchmarking and error diagnosis in multi-instance pose estimation", ICCV 2017.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,39 +20,67 @@ from scipy.special import ndtr, ndtri
 from mvpose import COCO17
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Rig
-from simharness.detector.classes import MIRROR, PAIRED
-from simharness.detector.conditions import HIDDEN, OUTSIDE, OWN, VISIBLE, Conditions
-from simharness.detector.correlation import Chances
+from simharness.detector.bias import pixel_offsets
+from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE, Conditions
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.error_classes import MIRROR, PAIRED
+from simharness.detector.steps import Context, Stage, step
 from simharness.detector.view_geometry import image_axes
-from simharness.scenario.sections.detector import Correlation, Keypoints
+from simharness.scenario.sections.detector import Bias, Correlation, Keypoints
 from simharness.types.sequence import Sequence
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
 from simharness.types.views import Views
 
-_SMALL = 64.0  # pixels, sqrt(area) of a person from which on `small` makes it harder
-_HARDEST = 4.0  # times as many errors that smallness makes at most
+_SMALL = 64.0  # pixels, sqrt(area) of a person below which `small` raises the rates of errors
+_HARDEST = 4.0  # largest factor by which small size raises them
 
 _PARENT = np.array([parent if parent >= 0 else COCO17.mirror[joint] for joint, parent in enumerate(COCO17.parents)])
-# A guessed joint hangs from its neighbour in the skeleton: right bone, wrong way. Degrees and logarithm of length.
+# A guessed joint keeps its parent in the skeleton; the bone gets a wrong direction (radians) and length (logarithm).
 _GUESS_TURN, _GUESS_LENGTH = np.deg2rad(35.0), 0.25
 
 
 @dataclass(frozen=True)
 class Keypoints2D:
-    """The keypoints of everyone in every picture.
+    """Keypoints of everyone in every picture.
 
     Attributes:
-        pixels: (T, V, P, J, 2); NaN where not reported.
+        pixels: positions, (T, V, P, J, 2); NaN where not reported.
         error: :class:`KeypointError`, (T, V, P, J): an inversion or a swap where one was drawn and led away from the
             joint, else by the distance.
-        guessed: which were guessed, (T, V, P, J).
-        rivals: where a second peak competes, (T, V, P, J, 2); NaN where none does.
+        guessed: which keypoints are guesses of hidden joints, (T, V, P, J).
+        rivals: positions of second peaks, (T, V, P, J, 2); NaN where there is none.
     """
 
     pixels: Floats
     error: NDArray[np.int8]
     guessed: Bools
     rivals: Floats
+
+
+@step("keypoints", stage=Stage.KEYPOINTS, sections=("keypoints", "bias", "correlation"))
+def set_keypoints(block: DetectionBlock, context: Context) -> DetectionBlock:
+    """Move every person's keypoints to where the detector finds them."""
+    config, rig = context.config, context.rig
+    offset = None if config.bias == Bias() else pixel_offsets(context.sequence.joints, config.bias, rig)
+    found = find_keypoints(
+        context.views,
+        context.conditions,
+        context.sequence,
+        rig,
+        config.keypoints,
+        config.correlation,
+        context.draws,
+        offset=offset,
+    )
+    return replace(
+        block,
+        present=np.any(found.error != KeypointError.ABSENT, axis=-1),
+        keypoints=found.pixels,
+        error=found.error,
+        guessed=found.guessed,
+        rivals=found.rivals,
+    )
 
 
 def find_keypoints(
@@ -61,34 +90,34 @@ def find_keypoints(
     rig: Rig,
     config: Keypoints,
     correlation: Correlation,
-    chances: Chances,
+    draws: KeyedDraws,
     *,
-    shift: Floats | None = None,
+    offset: Floats | None = None,
 ) -> Keypoints2D:
-    """Find the keypoints of everyone.
+    """Return the keypoints of everyone as the detector finds them.
 
     Args:
-        views: the truth in the pictures.
-        conditions: what makes it hard.
-        sequence: where everyone is, which says from where a camera sees them.
-        rig: the cameras.
-        config: how often which error.
-        correlation: what errors have to do with each other.
-        chances: the draws.
-        shift: of the detector's joints from anatomy's, (T, V, P, J, 2) pixels.
+        views: ground truth in the pictures.
+        conditions: viewing conditions.
+        sequence: ground truth in space, for the directions from which cameras see people.
+        rig: true rig.
+        config: rates of the errors.
+        correlation: correlation of the errors in time, across views and within limbs.
+        draws: draws of the sequence.
+        offset: offset of the detector's joints from the anatomical ones, (T, V, P, J, 2) pixels; None: no offset.
     """
-    target = views.pixels if shift is None else views.pixels + shift
+    target = views.pixels if offset is None else views.pixels + offset
     axes = image_axes(sequence.joints.mean(axis=2), rig)
-    finder = _Finder(target, views.boxes, conditions, axes, config, correlation, chances)
-    parts = [finder.find(person) for person in range(target.shape[2])]
+    errors = _KeypointErrors(target, views.boxes, conditions, axes, config, correlation, draws)
+    parts = [errors.find(person) for person in range(target.shape[2])]
     if not parts:
         empty = target.copy()
         return Keypoints2D(empty, np.zeros(target.shape[:4], np.int8), np.zeros(target.shape[:4], bool), empty)
     return Keypoints2D(*(np.stack(each, axis=2) for each in zip(*parts, strict=True)))
 
 
-class _Finder:
-    """Finds one person after the other; what of the settings is a table is looked up once."""
+class _KeypointErrors:
+    """Draws the keypoints of one person after the other; tables of parameters by joint are made once."""
 
     def __init__(
         self,
@@ -98,10 +127,10 @@ class _Finder:
         axes: Floats,
         config: Keypoints,
         correlation: Correlation,
-        chances: Chances,
+        draws: KeyedDraws,
     ) -> None:
         self._target, self._boxes, self._conditions, self._axes = target, boxes, conditions, axes
-        self._config, self._correlation, self._chances = config, correlation, chances
+        self._config, self._correlation, self._draws = config, correlation, draws
         self._every = np.arange(len(COCO17))
         drop = (config.drop.visible, config.drop.self_occluded, config.drop.occluded)
         self._drop = np.array([shares.by_joint() for shares in drop])
@@ -113,16 +142,20 @@ class _Finder:
         self._swap = np.array([shares.by_joint() for shares in (config.swap, config.swap_crowded or config.swap)])
 
     def find(self, person: int) -> tuple[Floats, NDArray[np.int8], Bools, Floats]:
-        """Pixels (T, V, J, 2), errors, which are guessed (T, V, J), and rivals of one person."""
+        """Return pixels (T, V, J, 2), errors, guesses (T, V, J each) and rivals (T, V, J, 2) of one person."""
         config, conditions = self._config, self._conditions
-        true, unit, seen = self._target[:, :, person], conditions.unit[:, :, person], conditions.seen[:, :, person]
+        true, unit, occlusion = (
+            self._target[:, :, person],
+            conditions.unit[:, :, person],
+            conditions.occlusion[:, :, person],
+        )
         scatter = unit[..., None] * self._offsets(person)
         found = true + scatter
 
         harder = self._harder(person)
-        jitter = self._happens("jitter", person, config.quality * self._jitter * harder)
+        jitter = self._occurs("jitter", person, config.quality * self._jitter * harder)
         some = np.digitize(-conditions.valid[:, :, person], [-10, -5])  # more than 10 valid joints, 6 to 10, fewer
-        miss = self._happens("miss", person, config.quality * self._miss[some] * harder)
+        miss = self._occurs("miss", person, config.quality * self._miss[some] * harder)
         off = jitter | miss
         if off.any():
             direction, far = self._places(person, off)
@@ -132,14 +165,14 @@ class _Finder:
                 GOOD_BELOW + (MISS_FROM - GOOD_BELOW) * far,
             )
             found[off] = true[off] + (unit[off] * reach)[:, None] * direction
-            stray = miss & self._happens("stray", person, config.stray)
+            stray = miss & self._occurs("stray", person, config.stray)
             if stray.any():
                 found[stray] = self._anywhere(person)[stray]
 
-        guessed = (seen == HIDDEN) & self._happens("guess", person, config.hallucinate)
+        guessed = (occlusion == OCCLUDED) & self._occurs("guess", person, config.hallucinate)
         if guessed.any():
             found[guessed] = self._guesses(person)[guessed]
-        inverted = self._happens("inversion", person, config.quality * self._inversion)
+        inverted = self._occurs("inversion", person, config.quality * self._inversion)
         other = true[:, :, MIRROR]
         inverted &= np.isfinite(other[..., 0])
         swapped, neighbour = self._swaps(person)
@@ -149,62 +182,64 @@ class _Finder:
             found = np.where(moved[..., None], place + scatter, found)
         error = self._labels(found, person, inverted, swapped)
         guessed &= ~moved
-        outside = seen == OUTSIDE
-        gone = outside | self._happens("drop", person, self._drop[np.where(outside, VISIBLE, seen), self._every])
+        outside = occlusion == OUTSIDE
+        gone = outside | self._occurs("drop", person, self._drop[np.where(outside, VISIBLE, occlusion), self._every])
         error[gone] = KeypointError.ABSENT
         found = np.where(gone[..., None], np.nan, found)
-        return found, error, guessed & ~gone, self._rivals(true + scatter, other + scatter, error, seen)
+        return found, error, guessed & ~gone, self._rivals(true + scatter, other + scatter, error, occlusion)
 
-    def _happens(self, what: str, person: int, share: Floats | float) -> Bools:
-        """Which joints (T, V, J) an error takes, of which ``share`` is the chance."""
+    def _occurs(self, what: str, person: int, share: Floats | float) -> Bools:
+        """Draw which joints (T, V, J) an error takes with probability ``share``."""
         share = np.minimum(share, 1.0)
         most = share.max(initial=0.0)
         if most == 0.0:
-            return np.zeros(self._conditions.seen[:, :, person].shape, bool)
+            return np.zeros(self._conditions.occlusion[:, :, person].shape, bool)
         state = self._state(what, person, shared=True)
-        happens = state < ndtri(most)
-        if share.ndim and share.min() < most:  # quantiles are dear: only where it matters
-            where = np.nonzero(happens)
-            happens[where] = state[where] < ndtri(np.broadcast_to(share, state.shape)[where])
-        return happens
+        occurs = state < ndtri(most)
+        if share.ndim and share.min() < most:  # quantiles are expensive: only where needed
+            where = np.nonzero(occurs)
+            occurs[where] = state[where] < ndtri(np.broadcast_to(share, state.shape)[where])
+        return occurs
 
     def _state(self, what: str, person: int, *, shared: bool) -> Floats:
-        tie = self._correlation
-        return self._chances.joint_states(
+        correlation = self._correlation
+        return self._draws.joint_states(
             what,
             person,
             lives=("lives", person),
-            life=tie.life,
-            shared=tie.views if shared else 0.0,
-            limb=tie.limb if shared else 0.0,
+            life=correlation.life,
+            shared=correlation.views if shared else 0.0,
+            limb=correlation.limb if shared else 0.0,
         )
 
     def _harder(self, person: int) -> Floats:
-        """What multiplies the shares of jitter and miss, (T, V, J)."""
+        """Return the factors of the rates of jitter and miss, (T, V, J)."""
         config, conditions = self._config, self._conditions
-        by_seen = np.ones(4)
-        by_seen[[OWN, HIDDEN]] = config.self_occluded, config.occluded
-        harder = by_seen[conditions.seen[:, :, person]]
+        by_occlusion = np.ones(4)
+        by_occlusion[[SELF_OCCLUDED, OCCLUDED]] = config.self_occluded, config.occluded
+        harder = by_occlusion[conditions.occlusion[:, :, person]]
         size = np.sqrt(np.maximum(conditions.area[:, :, person], 1.0))
         small = np.clip((_SMALL / size) ** config.small, 1.0, _HARDEST) if config.small else np.ones(size.shape)
         return harder * np.where(conditions.cut[:, :, person], config.truncated * small, small)[..., None]
 
     def _offsets(self, person: int) -> Floats:
-        """Scatter of good keypoints, (T, V, J, 2) units: Gaussian, cut off where they would not be good any more."""
-        tie, chances = self._correlation, self._chances
-        frames, views, joints = self._conditions.seen[:, :, person].shape
+        """Return the scatter of good keypoints, (T, V, J, 2) units: Gaussian, truncated where the class good ends."""
+        correlation, draws = self._correlation, self._draws
+        frames, views, joints = self._conditions.occlusion[:, :, person].shape
         if not self._scatter.any():
             return np.zeros((frames, views, joints, 2))
         normal = np.zeros((frames, views, joints, 2))
-        if tie.scatter_views < 1:
+        if correlation.scatter_views < 1:
             for view in range(views):
-                own = chances.wandering("scatter", person, "view", view, shape=(joints, 2), life=tie.scatter_life)
-                normal[:, view] = np.sqrt(1 - tie.scatter_views) * own
-        if tie.scatter_views > 0:
-            space = chances.wandering("scatter", person, "all", shape=(joints, 3), life=tie.scatter_life)
+                separate = draws.autoregressive(
+                    "scatter", person, "view", view, shape=(joints, 2), life=correlation.scatter_life
+                )
+                normal[:, view] = np.sqrt(1 - correlation.scatter_views) * separate
+        if correlation.scatter_views > 0:
+            space = draws.autoregressive("scatter", person, "all", shape=(joints, 3), life=correlation.scatter_life)
             axes = np.swapaxes(self._axes[:, :, person], -1, -2)
-            normal += np.sqrt(tie.scatter_views) * (space[:, None] @ axes)
-        # The radius keeps its rank when its distribution is cut: radius² / 2 is exponential.
+            normal += np.sqrt(correlation.scatter_views) * (space[:, None] @ axes)
+        # The radius keeps its rank when its distribution is truncated: radius² / 2 is exponential.
         square = (normal**2).sum(axis=-1)
         sigma = np.maximum(self._scatter, 1e-9)
         whole = -np.expm1(-0.5 * (GOOD_BELOW / sigma) ** 2)
@@ -212,18 +247,18 @@ class _Finder:
         return normal * np.divide(radius, np.sqrt(square), out=np.zeros_like(square), where=square > 0)[..., None]
 
     def _places(self, person: int, off: Bools) -> tuple[Floats, Floats]:
-        """Where n joints go that are ``off``: directions (n, 2), and how far between least and most, (n,) 0 to 1."""
+        """Return directions (n, 2) and relative distances (n,), 0 to 1, of the n joints that are ``off``."""
         turn = 2 * np.pi * ndtr(self._state("direction", person, shared=False)[off])
         return np.stack([np.cos(turn), np.sin(turn)], axis=-1), ndtr(self._state("distance", person, shared=False)[off])
 
     def _anywhere(self, person: int) -> Floats:
-        """Places on the person's box, (T, V, J, 2)."""
+        """Return random places on the person's box, (T, V, J, 2)."""
         box = self._boxes[:, :, person, None]
         across, down = (ndtr(self._state(what, person, shared=False)) for what in ("across", "down"))
         return box[..., :2] + np.stack([across, down], axis=-1) * box[..., 2:]
 
     def _guesses(self, person: int) -> Floats:
-        """Where one would guess the joints, from those that they hang on, (T, V, J, 2)."""
+        """Return guesses of the joints from their parents in the skeleton, (T, V, J, 2)."""
         true = self._target[:, :, person]
         bone = true - true[:, :, _PARENT]
         turn = _GUESS_TURN * self._state("guess turn", person, shared=False)
@@ -233,19 +268,19 @@ class _Finder:
         return true[:, :, _PARENT] + np.stack(turned, axis=-1)
 
     def _swaps(self, person: int) -> tuple[Bools, Floats]:
-        """Which joints (T, V, J) go to somebody else's, and where those are, (T, V, J, 2)."""
+        """Return which joints (T, V, J) are swapped, and the joints of the neighbour, (T, V, J, 2)."""
         conditions = self._conditions
         neighbour = conditions.neighbour[:, :, person]
         frame, view = np.indices(neighbour.shape)
-        theirs = self._target[frame, view, neighbour]
-        shown = conditions.seen[frame, view, neighbour] != OUTSIDE
+        of_neighbour = self._target[frame, view, neighbour]
+        shown = conditions.occlusion[frame, view, neighbour] != OUTSIDE
         crowded = conditions.crowded[:, :, person].astype(int)
         share = self._config.quality * self._swap[crowded]
         possible = shown & (neighbour >= 0)[..., None]
-        return possible & self._happens("swap", person, np.where(possible, share, 0.0)), theirs
+        return possible & self._occurs("swap", person, np.where(possible, share, 0.0)), of_neighbour
 
     def _labels(self, found: Floats, person: int, inverted: Bools, swapped: Bools) -> NDArray[np.int8]:
-        """The classes: by distance, but what is far off may be an inversion or a swap."""
+        """Return the error classes: by distance, with the drawn inversions and swaps among the misses."""
         unit = np.maximum(self._conditions.unit[:, :, person], 1e-9)
         away = found - self._target[:, :, person]
         with np.errstate(invalid="ignore"):
@@ -257,15 +292,15 @@ class _Finder:
         return np.where(swapped & far, KeypointError.SWAP, error).astype(np.int8)
 
     @staticmethod
-    def _rivals(true: Floats, other: Floats, error: NDArray[np.int8], seen: NDArray[np.int8]) -> Floats:
-        """Second peaks (T, V, J, 2): the true place of what is found elsewhere, the counterpart of what is not seen.
+    def _rivals(true: Floats, other: Floats, error: NDArray[np.int8], occlusion: NDArray[np.int8]) -> Floats:
+        """Return second peaks (T, V, J, 2): the true place of a displaced joint, the counterpart of a hidden joint.
 
         Args:
-            true: the joints' own places, as far off as a good keypoint would be: a peak is no better, (T, V, J, 2).
-            other: those of their left-right counterparts, likewise.
-            error: what is wrong with the keypoints, (T, V, J).
-            seen: how the joints are seen, (T, V, J).
+            true: true places with the scatter of good keypoints, because a peak is not more exact, (T, V, J, 2).
+            other: places of their left-right counterparts, with the same scatter, (T, V, J, 2).
+            error: error classes, (T, V, J).
+            occlusion: occlusion classes of the joints, (T, V, J).
         """
         elsewhere = (error == KeypointError.INVERSION) | (error == KeypointError.SWAP) | (error == KeypointError.MISS)
-        unsure = ~elsewhere & (error != KeypointError.ABSENT) & (seen != VISIBLE) & PAIRED
+        unsure = ~elsewhere & (error != KeypointError.ABSENT) & (occlusion != VISIBLE) & PAIRED
         return np.where(elsewhere[..., None], true, np.where(unsure[..., None], other, np.nan))

@@ -1,4 +1,4 @@
-"""Networks in the place of the simulated detector: keypoints and descriptors that are read off rendered pictures."""
+"""Networks in place of the simulated detector: keypoints and descriptors read from rendered pictures."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from mvpose.networks import PoseHead, ReId
 from mvpose.networks.crops import Images
-from simharness.detector.classes import classify
 from simharness.detector.conditions import oks_units
 from simharness.detector.detect import Detected
+from simharness.detector.error_classes import classify
 
 
 def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detected:
-    """The same boxes, with their descriptors and the keypoints that a pose head reads; their classes are by distance.
+    """Return the same boxes and descriptors with the keypoints that a pose head reads, classified by distance.
 
     Args:
         head: a top-down head for COCO-17.
-        detected: one frame: of the simulated detections all but the boxes and their descriptors is replaced.
-        images: of each view (h, w, 3) uint8, or None where none arrives.
+        detected: simulated detections of one frame; everything except the boxes and their descriptors is replaced.
+        images: picture of each view, (h, w, 3) uint8, or None where none arrives.
     """
     boxes = detected.detections
     read = head.detect(images, boxes.view, boxes.boxes, box_scores=boxes.box_scores)
@@ -33,5 +33,5 @@ def read_keypoints(head: PoseHead, detected: Detected, images: Images) -> Detect
 
 
 def read_descriptors(network: ReId, detected: Detected, images: Images) -> Detected:
-    """The same detections with the descriptors that a re-ID network reads in their boxes."""
+    """Return the same detections with the descriptors that a re-ID network reads in their boxes."""
     return replace(detected, detections=network.describe(detected.detections, images))

@@ -1,6 +1,6 @@
-"""People who were never there: upright postures in space, from a handful of normal numbers each.
+"""Postures of phantoms: upright people in space, each from a few standard normal numbers.
 
-Nothing of them needs to be exact: they are what a detector takes shadows and coats for. Lengths are shares of stature
+They stand for what a detector sees in shadows and coats, so they need not be exact. Lengths are shares of stature
 (Drillis & Contini, Body segment parameters, 1966).
 """
 
@@ -11,23 +11,23 @@ from scipy.special import ndtr
 
 from mvpose.arrays import Floats
 
-DRAWS = 20
-"""Normal numbers that make one posture."""
+NORMALS = 20
+"""Number of standard normal numbers that determine one posture."""
 
-_SEATED = 0.15  # share of those who half sit
+_SEATED = 0.15  # share of half-seated postures
 _THIGH, _SHANK, _ANKLE = 0.245, 0.246, 0.039
 _UPPER_ARM, _FOREARM, _TRUNK = 0.186, 0.146, 0.288
-_HIP, _SHOULDER = 0.050, 0.115  # half the distance of the two joints' centres
-# The face from the middle of the shoulders, of one who looks ahead along x: nose, eyes, ears.
+_HIP, _SHOULDER = 0.050, 0.115  # half the distance between the centres of the two joints
+# Nose, eyes and ears relative to the middle of the shoulders, of a person who looks along x.
 _FACE = np.array(
     [(0.062, 0.0, 0.100), (0.052, 0.018, 0.118), (0.052, -0.018, 0.118), (0.0, 0.043, 0.110), (0.0, -0.043, 0.110)]
 )
 
 
 def postures(normals: Floats) -> Floats:
-    """COCO-17 joints (n, 17, 3), metres, from standard normal numbers (n, DRAWS).
+    """Return COCO-17 joints (n, 17, 3), metres, from standard normal numbers (n, NORMALS).
 
-    They stand on z = 0 around the origin and face along x: upright or half seated, arms hanging, bent or raised.
+    The people stand on z = 0 at the origin and face along x: upright or half seated, arms hanging, bent or raised.
     """
     stature = np.clip(1.70 + 0.10 * normals[:, 0], 1.45, 1.95)
     seated = (ndtr(normals[:, 1]) < _SEATED)[:, None]
@@ -38,8 +38,8 @@ def postures(normals: Floats) -> Floats:
     flexed = np.where(seated, 1.2, 0.10) + 0.15 * legs[..., 0]
     bent = np.where(seated, 1.3, 0.08) + 0.15 * np.abs(legs[..., 1])
     abducted = 0.06 + 0.05 * np.abs(legs[..., 2])
-    knees = hips + _THIGH * _hanging(flexed, side * abducted)
-    ankles = knees + _SHANK * _hanging(flexed - bent, side * abducted)
+    knees = hips + _THIGH * _limb_directions(flexed, side * abducted)
+    ankles = knees + _SHANK * _limb_directions(flexed - bent, side * abducted)
 
     pitch = 0.05 + 0.08 * normals[:, 2] + 0.1 * seated[:, 0]
     roll = 0.05 * normals[:, 3]
@@ -47,47 +47,53 @@ def postures(normals: Floats) -> Floats:
     shoulders = chest[:, None] + _points(0.0, _SHOULDER * side, 0.0, shape=arms.shape[:2])
     raised = 0.1 + 0.45 * arms[..., 0]
     apart = 0.12 + 0.25 * np.abs(arms[..., 1])
-    elbows = shoulders + _UPPER_ARM * _hanging(raised, side * apart)
+    elbows = shoulders + _UPPER_ARM * _limb_directions(raised, side * apart)
     folded = np.minimum(0.25 + 0.6 * np.abs(arms[..., 2]), 2.3)
-    wrists = elbows + _FOREARM * _hanging(raised + folded, side * apart * 0.5)
+    wrists = elbows + _FOREARM * _limb_directions(raised + folded, side * apart * 0.5)
 
-    face = chest[:, None] + _nodded(turned(np.broadcast_to(_FACE, (len(normals), 5, 3)), 0.35 * normals[:, 4]), normals)
+    face = rotate_about_z(np.broadcast_to(_FACE, (len(normals), 5, 3)), 0.35 * normals[:, 4])
+    face = chest[:, None] + _nod(face, normals)
     joints = np.concatenate([face, shoulders, elbows, wrists, hips, knees, ankles], axis=1)
     joints[..., 2] += _ANKLE - ankles[..., 2].min(axis=1, keepdims=True)
     return joints * stature[:, None, None]
 
 
-def turned(points: Floats, yaw: Floats) -> Floats:
-    """Points (n, k, 3) turned about the z axis by yaw (n,), radians."""
+def rotate_about_z(points: Floats, yaw: Floats) -> Floats:
+    """Rotate points (n, k, 3) about the z axis by yaw (n,), radians."""
     c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     x, y, z = np.moveaxis(points, -1, 0)
     return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
 
 
-def seen_from(points: Floats, yaw: Floats, tilt: Floats) -> Floats:
-    """Points (n, k, 3) as a far camera shows them, (n, k, 2), x to the right and y down, in boxes of height 1 about 0.
+def project_upright(points: Floats, yaw: Floats, tilt: Floats) -> Floats:
+    """Project points (n, k, 3) orthographically, x to the right and y down, into boxes of height 1 centred at 0.
 
     Args:
-        points: who faces along x.
-        yaw: by how much each is turned away from the camera, (n,), radians.
-        tilt: by how much the camera looks down, (n,), radians.
+        points: people who face along x.
+        yaw: rotation of each person away from the camera, (n,), radians.
+        tilt: angle by which the camera looks down, (n,), radians.
+
+    Returns:
+        Points in the picture, (n, k, 2), in units of the height of the box.
     """
-    x, y, z = np.moveaxis(turned(points, yaw), -1, 0)
+    x, y, z = np.moveaxis(rotate_about_z(points, yaw), -1, 0)
     flat = np.stack([y, x * np.sin(tilt)[:, None] - z * np.cos(tilt)[:, None]], axis=-1)
     low, high = flat.min(axis=1, keepdims=True), flat.max(axis=1, keepdims=True)
     return (flat - (low + high) / 2) / (high - low)[..., 1:]
 
 
-def _nodded(face: Floats, normals: Floats) -> Floats:
+def _nod(face: Floats, normals: Floats) -> Floats:
+    """Return faces (n, 5, 3) pitched by the angles that the normal numbers (n, NORMALS) determine."""
     c, s = np.cos(0.12 * normals[:, 5])[:, None], np.sin(0.12 * normals[:, 5])[:, None]
     x, y, z = np.moveaxis(face, -1, 0)
     return np.stack([c * x - s * z, y, s * x + c * z], axis=-1)
 
 
-def _hanging(forward: Floats, outward: Floats) -> Floats:
-    """Unit vectors (n, 2, 3) of limbs: down, turned forward and then outward by angles (n, 2)."""
+def _limb_directions(forward: Floats, outward: Floats) -> Floats:
+    """Return unit vectors (n, 2, 3) of limbs that point down, rotated forward and then outward by angles (n, 2)."""
     return np.stack([np.sin(forward) * np.cos(outward), np.sin(outward), -np.cos(forward) * np.cos(outward)], axis=-1)
 
 
 def _points(x: float, y: Floats, z: float, *, shape: tuple[int, int]) -> Floats:
+    """Return points (*shape, 3) with the coordinates x, y and z; ``y`` has one value for each side of the body."""
     return np.stack(np.broadcast_arrays(np.full(shape, x), y, z), axis=-1)

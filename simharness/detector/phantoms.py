@@ -1,8 +1,8 @@
-"""Phantoms: detections of people who are not there.
+"""Phantoms: detections that show no person.
 
-Three kinds. Some stand in the room, where shadows and reflections make something like a person, and are seen alike from
-all sides: figures in space, projected into every view that contains them. The others are in one picture alone: poses
-by themselves, or made of parts of the real people in it.
+There are three kinds. Figures stand in the room, where shadows and reflections resemble a person, and are seen alike
+from all sides: they are projected into every view that contains them. The others are in one picture only: separate
+poses, or poses made of parts of the real people in that picture.
 """
 
 from __future__ import annotations
@@ -12,200 +12,241 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
-from simharness.capture.rendering.optics import appear
-from simharness.detector.birth_death import Lives, alive, anew, slots
-from simharness.detector.correlation import Chances
-from simharness.detector.detection_block import Found, Origin
-from simharness.detector.false_positives import LEAST, box_about, reported, sureness
-from simharness.detector.phantom_poses import DRAWS, postures, seen_from, turned
+from simharness.capture.rendering.lens import project_to_image
+from simharness.detector.birth_death import BirthDeathProcess, assign_slots, frame_noise, frames_alive
+from simharness.detector.detection_block import DetectionBlock, Origin
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
+from simharness.detector.phantom_poses import NORMALS, postures, project_upright, rotate_about_z
+from simharness.detector.steps import Context, Stage, step
 from simharness.scenario.sections.detector import Phantoms
-from simharness.types.views import Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import Views, Visibility
 
-_JITTER, _JITTER_SPACE = 0.004, 0.004  # how still they sit: as a share of the pose's height, and metres
-_HEIGHTS = 0.25, 0.75  # of poses, as shares of the image's
-_TILT = 0.5  # radians, the most that cameras seem to look down
+_JITTER, _JITTER_SPACE = 0.004, 0.004  # motion of phantoms: as a share of the pose's height, and in metres
+_HEIGHTS = 0.25, 0.75  # heights of poses, as shares of the image's height
+_TILT = 0.5  # radians, the largest angle by which cameras appear to look down
 _WIDTH = 0.36  # least width of a box over its height, where joints lie anywhere in it
-_BOX = np.array([0.6, 0.6, 1.75])  # metres, the same in space
-_REACH, _FARTHEST = 0.6, 6.0  # of the cameras' distance from what they look at, and metres: where figures stand
-_TRIES = 6  # places for a figure that at least two views contain, each nearer to the middle
+_BOX = np.array([0.6, 0.6, 1.75])  # metres, the same box in space
+_REACH, _FARTHEST = 0.6, 6.0  # radius where figures stand: share of the cameras' distance from the centre, and metres
+_TRIES = 6  # places tried for a figure until at least two views contain it, each nearer to the centre
 _LOWER = np.arange(11, 17)  # hips and legs
 
 
-def phantoms(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Found:
+@step("phantoms", stage=Stage.FALSE_POSITIVES, sections=("phantoms",))
+def add_phantoms(block: DetectionBlock, context: Context) -> DetectionBlock:
+    """Append the phantoms."""
+    drawn = draw_phantoms(context.views, context.rig, context.config.phantoms, context.draws)
+    return DetectionBlock.concatenate([block, drawn])
+
+
+def draw_phantoms(views: Views, rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
     """Draw the phantoms of all pictures.
 
-    Their mean number in a view and frame, over all views, is ``config.rate``, of which ``config.views`` are figures in
-    space. The number of those in one picture alone is Poisson distributed. More of a rate adds phantoms and changes
-    none; each keeps its slot and its number, which a figure has in all views alike.
+    Their mean number in a view and frame, over all views, is ``config.rate``; a share ``config.views`` of them are
+    figures in space. The number of phantoms in one picture only is Poisson distributed. A higher rate adds phantoms
+    and changes none: each keeps its slot and its number. A figure has the same number in all views.
 
-    Figures are projected by ``rig`` into the pictures: where cameras drift away from it, they stand a little beside
-    where they would.
+    Figures are projected by ``rig``: where cameras drift from it, the figures stand slightly beside their place.
 
     Args:
-        views: the truth in the pictures, T frames of V cameras.
-        rig: the cameras that take the pictures.
-        config: the dials.
-        chances: of the sequence.
+        views: ground truth in the pictures, T frames of V cameras.
+        rig: true rig, which takes the pictures.
+        config: parameters of phantoms.
+        draws: draws of the sequence.
     """
     frames = len(views)
     if config.rate == 0.0:
-        return Found.nothing(frames, len(rig), 0)
-    return Found.joined([_standing(rig, config, chances), _alone(views, rig, config, chances)])
+        return DetectionBlock.empty(frames, len(rig), 0)
+    return DetectionBlock.concatenate([_figures(rig, config, draws), _single_view(views, rig, config, draws)])
 
 
-def _reported(
+def _block(
     rig: Rig, frames: int, rows: list[tuple[Integers, ...]], keypoints: list[Floats], scores: list[Floats]
-) -> Found:
-    """Phantoms of all views, from each view's frames, views, slots, numbers, keypoints and scores."""
+) -> DetectionBlock:
+    """Return the phantoms of all views, from the frames, views, slots, numbers, keypoints and scores of each view."""
     frame, view, slot, number = (np.concatenate(column) for column in zip(*rows, strict=True))
-    poses, sure = np.concatenate(keypoints), np.concatenate(scores)
-    return reported(rig, frames, (frame, view, slot), poses, sure, origin=Origin.PHANTOM, number=number)
+    where = (frame, view, slot)
+    return false_positive_block(
+        rig, frames, where, np.concatenate(keypoints), np.concatenate(scores), origin=Origin.PHANTOM, number=number
+    )
 
 
 # ---- Figures in space.
 
 
-def _standing(rig: Rig, config: Phantoms, chances: Chances) -> Found:
-    """Those that stand in the room.
+def _figures(rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
+    """Draw the figures in the room.
 
-    A figure that c of V views contain counts c times. So those are left out, by chance, that many views contain: one is
-    kept with a chance that falls with 1 / c, and the mean number in a view is as asked whatever the rig.
+    A figure that c of V views contain counts c times. Therefore figures are kept with a probability proportional to
+    1 / c, so that the mean number in a view is the configured rate for every rig.
     """
     rate = config.rate * config.views * len(rig)
-    lives = Lives(chances, ("phantoms", "room"), config.life, most=rate)
-    possible = np.flatnonzero(lives.mark < rate)
-    figures = postures(lives.normal("posture", DRAWS)[possible])
-    figures = turned(figures, 2 * np.pi * lives.uniform("heading")[possible])
-    anywhere = (lives.uniform("anywhere", 17, 3)[possible] - [0.5, 0.5, 0.0]) * _BOX
-    plausible = lives.uniform("plausible")[possible] < config.plausible
+    process = BirthDeathProcess(draws, ("phantoms", "room"), config.life, max_rate=rate)
+    possible = np.flatnonzero(process.rate_threshold < rate)
+    figures = postures(process.normal("posture", NORMALS)[possible])
+    figures = rotate_about_z(figures, 2 * np.pi * process.uniform("heading")[possible])
+    anywhere = (process.uniform("anywhere", 17, 3)[possible] - [0.5, 0.5, 0.0]) * _BOX
+    plausible = process.uniform("plausible")[possible] < config.plausible
     figures = np.where(plausible[:, None, None], figures, anywhere)
-    figures, contained = _placed(rig, figures, lives.uniform("place", _TRIES, 2)[possible])
+    figures, contained = _placed(rig, figures, process.uniform("place", _TRIES, 2)[possible])
     count = contained.sum(axis=1)
-    kept = lives.mark[possible] * count < rate
+    kept = process.rate_threshold[possible] * count < rate
     kept &= count > 0
-    thing = possible[kept]
+    individual = possible[kept]
 
-    event, frame = alive(lives.born[thing], lives.last[thing])
-    number = lives.number[thing[event]]
-    joints = figures[kept][event] + _JITTER_SPACE * anew(chances, *lives.key, number=number, frame=frame, size=3)
-    slot, together = slots(lives.born[thing], lives.last[thing]), lives.normal("score")[thing]
+    row, frame = frames_alive(process.born[individual], process.last[individual])
+    offset = process.offset[individual[row]]
+    noise = frame_noise(draws, *process.key, offset=offset, frame=frame, size=3)
+    joints = figures[kept][row] + _JITTER_SPACE * noise
+    slot = assign_slots(process.born[individual], process.last[individual])
+    common = process.normal("score")[individual]
     rows: list[tuple[Integers, ...]] = []
     keypoints, scores = [], []
     for view, camera in enumerate(rig):
-        mine = contained[kept][event, view]
-        rows.append((frame[mine], np.full(mine.sum(), view), slot[event[mine]], lives.name[thing[event[mine]]]))
-        keypoints.append(appear(camera, joints[mine]))
-        apart = anew(chances, *lives.key, "score", view, number=number[mine], frame=frame[mine], size=1)
-        scores.append(sureness(config.score, config.deviation, together[event[mine]], apart[..., 0]))
-    return _reported(rig, len(chances.time), rows, keypoints, scores)
+        seen = contained[kept][row, view]
+        number = process.identifier[individual[row[seen]]]
+        rows.append((frame[seen], np.full(seen.sum(), view), slot[row[seen]], number))
+        keypoints.append(project_to_image(camera, joints[seen]))
+        separate = frame_noise(draws, *process.key, "score", view, offset=offset[seen], frame=frame[seen], size=1)
+        scores.append(keypoint_scores(config.score, config.deviation, common[row[seen]], separate[..., 0]))
+    return _block(rig, len(draws.time), rows, keypoints, scores)
 
 
-def _placed(rig: Rig, figures: Floats, draws: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Put figures (n, 17, 3) where cameras look, by draws (n, tries, 2), and say which views (n, V) contain each."""
-    middle, reach = focus(rig)
+def _placed(rig: Rig, figures: Floats, uniform: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Place figures (n, 17, 3) where the cameras look.
+
+    Args:
+        rig: the V cameras.
+        figures: joints relative to the place, (n, 17, 3) metres.
+        uniform: uniform draws for radius and angle of every try, (n, tries, 2).
+
+    Returns:
+        The placed figures (n, 17, 3), and which views contain each, (n, V).
+    """
+    center, reach = viewed_area(rig)
     placed, contained = figures.copy(), np.zeros((len(figures), len(rig)), bool)
     left = np.arange(len(figures))
     for k in range(_TRIES):
-        radius = reach * (1 - k / _TRIES) * np.sqrt(draws[left, k, 0])
-        angle = 2 * np.pi * draws[left, k, 1]
-        place = middle + np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+        radius = reach * (1 - k / _TRIES) * np.sqrt(uniform[left, k, 0])
+        angle = 2 * np.pi * uniform[left, k, 1]
+        place = center + np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
         placed[left] = figures[left] + np.pad(place, ((0, 0), (0, 1)))[:, None]
         for view, camera in enumerate(rig):
-            contained[left, view] = camera.inside(appear(camera, placed[left])).sum(axis=-1) >= LEAST
+            contained[left, view] = camera.inside(project_to_image(camera, placed[left])).sum(axis=-1) >= MIN_JOINTS
         left = left[contained[left].sum(axis=1) < 2]
     return placed, contained
 
 
-def focus(rig: Rig) -> tuple[Floats, float]:
-    """What the cameras look at: the point (2,) on the floor nearest to their axes, and how far about it they see, m.
+def viewed_area(rig: Rig) -> tuple[Floats, float]:
+    """Return the centre (2,) and the radius, metres, of the floor area that the cameras look at.
 
-    Where the axes are parallel, a point ahead of them.
+    The centre is the point nearest to the optical axes; where these are parallel, a point ahead of the cameras.
     """
     axes = np.stack([camera.R[2] for camera in rig])
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]  # of a vector, what is at right angles to an axis
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]  # projection to the plane perpendicular to an axis
     ahead = (rig.centers + 4.0 * axes).mean(axis=0)
     weight = 1e-3
     point = np.linalg.solve(
         across.sum(axis=0) + weight * np.eye(3), (across @ rig.centers[:, :, None]).sum(axis=0)[:, 0] + weight * ahead
     )
-    away = float(np.median(np.linalg.norm(rig.centers - point, axis=1)))
-    return point[:2], min(_REACH * away, _FARTHEST)
+    distance = float(np.median(np.linalg.norm(rig.centers - point, axis=1)))
+    return point[:2], min(_REACH * distance, _FARTHEST)
 
 
-# ---- Those in one picture alone.
+# ---- Phantoms in one picture only.
 
 
-def _alone(views: Views, rig: Rig, config: Phantoms, chances: Chances) -> Found:
-    """Those of every view by itself."""
+def _single_view(views: Views, rig: Rig, config: Phantoms, draws: KeyedDraws) -> DetectionBlock:
+    """Draw the phantoms of each view, independently of the other views."""
     rate = config.rate * (1 - config.views)
     rows: list[tuple[Integers, ...]] = []
     keypoints, scores = [], []
     for view in range(len(rig)):
-        lives = Lives(chances, ("phantoms", "view", view), config.life, most=rate)
-        thing = np.flatnonzero(lives.mark < rate)
-        event, frame = alive(lives.born[thing], lives.last[thing])
-        noise = anew(chances, *lives.key, number=lives.number[thing[event]], frame=frame, size=3)
-        poses = _poses(lives, thing, rig[view].size, config.plausible)[event]
+        process = BirthDeathProcess(draws, ("phantoms", "view", view), config.life, max_rate=rate)
+        individual = np.flatnonzero(process.rate_threshold < rate)
+        row, frame = frames_alive(process.born[individual], process.last[individual])
+        offset = process.offset[individual[row]]
+        noise = frame_noise(draws, *process.key, offset=offset, frame=frame, size=3)
+        poses = _poses(process, individual, rig[view].size, config.plausible)[row]
         if config.parts > 0:
-            made = lives.uniform("parts")[thing][event] < config.parts
-            poses[made] = _of_parts(views, view, lives, thing[event[made]], frame[made], poses[made])
-        low, high = box_about(poses)
+            made = process.uniform("parts")[individual][row] < config.parts
+            poses[made] = _poses_of_parts(views, view, process, individual[row[made]], frame[made], poses[made])
+        low, high = bounding_box(poses)
         keypoints.append(poses + _JITTER * (high - low)[:, None, 1:] * noise[..., :2])
-        scores.append(sureness(config.score, config.deviation, lives.normal("score")[thing][event], noise[..., 2]))
-        slot = slots(lives.born[thing], lives.last[thing])
-        rows.append((frame, np.full(len(frame), view), slot[event], lives.name[thing[event]]))
-    return _reported(rig, len(views), rows, keypoints, scores)
+        common = process.normal("score")[individual][row]
+        scores.append(keypoint_scores(config.score, config.deviation, common, noise[..., 2]))
+        slot = assign_slots(process.born[individual], process.last[individual])
+        rows.append((frame, np.full(len(frame), view), slot[row], process.identifier[individual[row]]))
+    return _block(rig, len(views), rows, keypoints, scores)
 
 
-def _poses(lives: Lives, thing: Integers, size: tuple[int, int], plausible: float) -> Floats:
-    """Poses by themselves, (n, 17, 2) pixels: upright people, or joints anywhere in their boxes.
+def _poses(process: BirthDeathProcess, individual: Integers, size: tuple[int, int], plausible: float) -> Floats:
+    """Return separate poses, (n, 17, 2) pixels: upright people, or joints anywhere in their boxes.
 
-    At most a quarter of a box's width and height is beyond the image's border, so there is always something to be seen.
+    At most a quarter of a box's width and height is beyond the border of the image, so part of it is always visible.
+
+    Args:
+        process: births and deaths of the phantoms of the view.
+        individual: indices of the n individuals.
+        size: width and height of the image, pixels.
+        plausible: share of upright people.
     """
-    heading, tilt, height = lives.uniform("view", 3)[thing].T
-    poses = seen_from(postures(lives.normal("posture", DRAWS)[thing]), 2 * np.pi * heading, _TILT * tilt)
+    heading, tilt, height = process.uniform("view", 3)[individual].T
+    normals = process.normal("posture", NORMALS)[individual]
+    poses = project_upright(postures(normals), 2 * np.pi * heading, _TILT * tilt)
     width = np.maximum(np.ptp(poses[..., 0], axis=1), _WIDTH)
     box = np.stack([width, np.ones(len(width))], axis=-1)
-    anywhere = (lives.uniform("anywhere", 17, 2)[thing] - 0.5) * box[:, None]
-    upright = lives.uniform("plausible")[thing] < plausible
+    anywhere = (process.uniform("anywhere", 17, 2)[individual] - 0.5) * box[:, None]
+    upright = process.uniform("plausible")[individual] < plausible
     scale = (_HEIGHTS[0] + (_HEIGHTS[1] - _HEIGHTS[0]) * height) * size[1]
     margin = 0.25 * scale[:, None] * box
-    place = margin + lives.uniform("place", 2)[thing] * (np.array(size) - 2 * margin)
+    place = margin + process.uniform("place", 2)[individual] * (np.array(size) - 2 * margin)
     return place[:, None] + scale[:, None, None] * np.where(upright[:, None, None], poses, anywhere)
 
 
-def _of_parts(views: Views, view: int, lives: Lives, thing: Integers, frame: Integers, otherwise: Floats) -> Floats:
-    """Poses (r, 17, 2) made of parts of the people in pictures; ``otherwise`` where too little of anybody is there.
+def _poses_of_parts(
+    views: Views, view: int, process: BirthDeathProcess, individual: Integers, frame: Integers, default: Floats
+) -> Floats:
+    """Return poses (r, 17, 2) made of parts of the people in the pictures; they move along with these people.
 
-    The head, trunk and arms of one, and the legs of whoever is nearest, if that is within the height of a person;
-    otherwise the same one's legs, displaced and scaled. They go along with the people.
+    Head, trunk and arms are those of one person. The legs are those of the nearest other person within the height of
+    a person, else the same person's legs, displaced and scaled.
+
+    Args:
+        views: ground truth in the pictures.
+        view: the view.
+        process: births and deaths of the phantoms of the view.
+        individual: individual of each row, (r,).
+        frame: frame of each row, (r,).
+        default: poses where too little of every person is in the picture, (r, 17, 2).
     """
     people = views.pixels.shape[2]
-    if not people or not len(thing):
-        return otherwise
-    priority = np.stack([lives.uniform(f"donor{person}") for person in range(people)], axis=-1)[thing]
-    moved = lives.normal("displaced", 3)[thing]
+    if not people or not len(individual):
+        return default
+    priority = np.stack([process.uniform(f"donor{person}") for person in range(people)], axis=-1)[individual]
+    moved = process.normal("displaced", 3)[individual]
     seen = views.visibility[frame, view] != Visibility.OUTSIDE  # (r, P, 17)
     points = np.where(seen[..., None], views.pixels[frame, view], np.nan)
     boxes = views.boxes[frame, view]
-    present = seen.sum(axis=-1) >= LEAST
-    row = np.arange(len(thing))
-    donor = np.where(present, priority, np.inf).argmin(axis=-1)
+    usable = seen.sum(axis=-1) >= MIN_JOINTS
+    row = np.arange(len(individual))
+    donor = np.where(usable, priority, np.inf).argmin(axis=-1)
     size = boxes[row, donor, 2:]
 
-    apart = np.linalg.norm(boxes[..., :2] + boxes[..., 2:] / 2 - (boxes[row, donor, :2] + size / 2)[:, None], axis=-1)
-    apart = np.where(present & (np.arange(people) != donor[:, None]), apart, np.inf)
-    other = apart.argmin(axis=-1)
-    near = apart[row, other] < np.maximum(size[:, 1], boxes[row, other, 3])
+    centers = boxes[..., :2] + boxes[..., 2:] / 2
+    distance = np.linalg.norm(centers - (boxes[row, donor, :2] + size / 2)[:, None], axis=-1)
+    distance = np.where(usable & (np.arange(people) != donor[:, None]), distance, np.inf)
+    other = distance.argmin(axis=-1)
+    near = distance[row, other] < np.maximum(size[:, 1], boxes[row, other, 3])
 
     poses = points[row, donor]
-    own = poses[:, _LOWER]
-    middle = own[:, :2].mean(axis=1, keepdims=True)
-    legs = middle + np.exp(0.15 * moved[:, :1, None]) * (own - middle) + (0.2 * moved[:, 1:] * size)[:, None]
+    lower = poses[:, _LOWER]
+    middle = lower[:, :2].mean(axis=1, keepdims=True)
+    legs = middle + np.exp(0.15 * moved[:, :1, None]) * (lower - middle) + (0.2 * moved[:, 1:] * size)[:, None]
     poses[:, _LOWER] = np.where(near[:, None, None], points[row, other][:, _LOWER], legs)
-    return np.where(present.any(axis=-1)[:, None, None] & _enough(poses), poses, otherwise)
+    return np.where(usable.any(axis=-1)[:, None, None] & _enough_joints(poses), poses, default)
 
 
-def _enough(poses: Floats) -> NDArray[np.bool_]:
-    return (np.isfinite(poses).all(axis=-1).sum(axis=-1) >= LEAST)[:, None, None]
+def _enough_joints(poses: Floats) -> NDArray[np.bool_]:
+    """Return which poses (r, 17, 2) have enough finite joints to be detected, (r, 1, 1)."""
+    return (np.isfinite(poses).all(axis=-1).sum(axis=-1) >= MIN_JOINTS)[:, None, None]

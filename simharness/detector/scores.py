@@ -1,48 +1,81 @@
-"""Scores of keypoints: they follow the error that was drawn, but not always: misses may be sure, hits unsure.
+"""Scores of keypoints: they follow the drawn errors, but misses may be overconfident and good keypoints unsure.
 
-So detectors' scores behave (Ronchi & Perona, ICCV 2017).
+Scores of real detectors behave so (Ronchi & Perona, ICCV 2017).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import VISIBLE, Conditions
-from simharness.detector.correlation import Chances, logistic
-from simharness.detector.keypoints import Keypoints2D
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.draws import KeyedDraws, logistic
+from simharness.detector.steps import Context, Stage, step
 from simharness.scenario.sections.detector import Correlation, Scores
 from simharness.types.truth import KeypointError
 
-LEAST = 0.02
-"""The least score of a joint that is reported."""
+MIN_SCORE = 0.02
+"""Lowest score of a joint that is reported."""
+
+
+@step("scores", stage=Stage.SCORES, sections=("scores", "correlation"))
+def set_scores(block: DetectionBlock, context: Context) -> DetectionBlock:
+    """Give every keypoint its score; a person without a scored keypoint is not detected."""
+    scores = score_keypoints(
+        block.error,
+        block.guessed,
+        context.conditions,
+        context.config.scores,
+        context.config.correlation,
+        context.draws,
+    )
+    return replace(block, present=np.any(scores > 0, axis=-1), scores=scores)
 
 
 def score_keypoints(
-    found: Keypoints2D, conditions: Conditions, config: Scores, correlation: Correlation, chances: Chances
+    error: NDArray[np.int8],
+    guessed: Bools,
+    conditions: Conditions,
+    config: Scores,
+    correlation: Correlation,
+    draws: KeyedDraws,
 ) -> Floats:
-    """Scores of everyone's keypoints, (T, V, P, J); 0 where not reported."""
-    error = found.error
+    """Return the scores of everyone's keypoints, (T, V, P, J); 0 where not reported.
+
+    Args:
+        error: :class:`KeypointError` of each keypoint, (T, V, P, J).
+        guessed: which keypoints are guesses of hidden joints, (T, V, P, J).
+        conditions: viewing conditions.
+        config: usual scores and their spread.
+        correlation: correlation of the draws in time.
+        draws: draws of the sequence.
+    """
     usual = np.zeros(len(KeypointError))
     for kind in KeypointError:
         usual[kind] = getattr(config, kind.name.lower(), 0.0)
     score = usual[error]
     _, views, people, joints = error.shape
-    doubtful = (error == KeypointError.MISS) | found.guessed
-    for share, purpose, of, like in (
+    doubtful = (error == KeypointError.MISS) | guessed
+    for share, purpose, candidates, scored_as in (
         (config.overconfident, "overconfident", doubtful, KeypointError.GOOD),
         (config.underconfident, "underconfident", error == KeypointError.GOOD, KeypointError.MISS),
     ):
         if share > 0:
             for person in range(people):
-                state = chances.joint_states(purpose, person, lives=("lives", person), life=correlation.life)
-                score[:, :, person][of[:, :, person] & (state < ndtri(share))] = usual[like]
-    score = score * np.where(conditions.seen == VISIBLE, 1.0, config.hidden) * np.array(config.joint.by_joint())
+                state = draws.joint_states(purpose, person, lives=("lives", person), life=correlation.life)
+                taken = candidates[:, :, person] & (state < ndtri(share))
+                score[:, :, person][taken] = usual[scored_as]
+    factor = np.where(conditions.occlusion == VISIBLE, 1.0, config.hidden)
+    score = score * factor * np.array(config.joint.by_joint())
     score = np.minimum(score, 1.0)
     if config.deviation > 0:
         for person in range(people):
             for view in range(views):
-                spread = chances.wandering("score", person, view, shape=(joints,), life=correlation.scatter_life)
+                spread = draws.autoregressive("score", person, view, shape=(joints,), life=correlation.scatter_life)
                 score[:, view, person] = logistic(score[:, view, person], config.deviation * spread)
-    return np.where(error == KeypointError.ABSENT, 0.0, np.maximum(score, LEAST))
+    return np.where(error == KeypointError.ABSENT, 0.0, np.maximum(score, MIN_SCORE))

@@ -1,4 +1,4 @@
-"""From where and how well cameras see people."""
+"""Geometry of people in views: image axes in space, bearings, and shares of hidden joints."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from numpy.typing import ArrayLike, NDArray
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from simharness.detector.bias import body_axes
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 _HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
 
 
 def image_axes(centers: Floats, rig: Rig) -> Floats:
-    """Right and down in the pictures of V cameras, at right angles to the way to people's centers (T, P, 3).
+    """Return right and down in the pictures of V cameras, perpendicular to the direction to people's centers.
+
+    Args:
+        centers: positions of people, (T, P, 3) metres.
+        rig: the V cameras.
 
     Returns:
         Unit vectors in the world, (T, V, P, 2, 3).
@@ -30,7 +34,7 @@ def image_axes(centers: Floats, rig: Rig) -> Floats:
 
 
 def bearings(joints: ArrayLike, rig: Rig) -> Floats:
-    """From where V cameras see people (T, P, 17, 3), radians from straight ahead, to the left, (T, V, P)."""
+    """Return the bearings of V cameras from people (T, P, 17, 3), radians to the left of straight ahead, (T, V, P)."""
     joints = np.asarray(joints, float)
     forward = body_axes(joints)[..., 0, :2]
     hips = joints[..., 11:13, :2].mean(axis=-2)
@@ -42,5 +46,5 @@ def bearings(joints: ArrayLike, rig: Rig) -> Floats:
 
 
 def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
-    """Share of the joints (..., J) that something else hides or the border cuts off, (...)."""
+    """Return the share of joints (..., J) that other people or objects hide or the border cuts off, (...)."""
     return np.isin(visibility, _HIDDEN).mean(axis=-1)

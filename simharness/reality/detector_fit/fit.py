@@ -9,7 +9,7 @@ from pathlib import Path
 from simharness.reality.detector_fit.measure import RESAMPLES, Measurement, measure
 from simharness.reality.detector_fit.profile import NAME, as_toml, settings
 from simharness.reality.detector_fit.sample import Sample
-from simharness.reality.detector_fit.twin import film_twin
+from simharness.reality.detector_fit.shelf_twin import film_twin
 from simharness.scenario.sections.detector import Detector
 
 DIALS = ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms")

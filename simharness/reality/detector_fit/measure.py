@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from simharness.reality.detector_fit.counting import SCORED, Sums, count
-from simharness.reality.detector_fit.figures import figures
-from simharness.reality.detector_fit.judging import CLASSES, judge
+from simharness.reality.detector_fit.frame_sums import SCORED, Sums, count
+from simharness.reality.detector_fit.joint_labels import CLASSES, judge
+from simharness.reality.detector_fit.parameters import figures
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector import KINDS
 from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 
-from simharness.reality.detector_fit.figures import LIMB_KINDS
 from simharness.reality.detector_fit.measure import Measurement
+from simharness.reality.detector_fit.parameters import LIMB_KINDS
 from simharness.scenario.sections.detector import KINDS
 
 _COLORS = ("#3b82c4", "#d9643a")

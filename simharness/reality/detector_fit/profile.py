@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from simharness.reality.detector_fit.figures import LIMB_KINDS
 from simharness.reality.detector_fit.measure import Figure, Measurement
+from simharness.reality.detector_fit.parameters import LIMB_KINDS
 from simharness.scenario.sections.detector import KINDS, Detector
 
 NAME = "openpose-shelf"

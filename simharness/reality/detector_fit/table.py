@@ -8,8 +8,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from simharness.reality.detector_fit.counting import TERCILES
 from simharness.reality.detector_fit.fit import agreement
+from simharness.reality.detector_fit.frame_sums import TERCILES
 from simharness.reality.detector_fit.measure import Figure, Measurement
 from simharness.scenario.sections.detector import KINDS
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Camera, Rig
-from simharness.detector.bias import body_axes, offsets, shifts
+from simharness.detector.bias import body_axes, pixel_offsets, world_offsets
 from simharness.scenario.sections.detector import Bias
 from simharness.world.humans.body import make_body
 from simharness.world.humans.shape import Shape
@@ -26,8 +26,8 @@ def test_axes_of_a_standing_person(standing):
 def test_offsets_turn_with_the_body_and_are_mirrored(standing):
     bias = Bias(hips=(0.01, 0.02, 0.03), nose=(0.0, 0.01, 0.0))
     turn = Rotation.from_rotvec([0.3, -0.5, 1.1]).as_matrix()
-    at_rest = offsets(standing, bias)
-    np.testing.assert_allclose(offsets(standing @ turn.T + [3, 1, 0], bias), at_rest @ turn.T, atol=1e-12)
+    at_rest = world_offsets(standing, bias)
+    np.testing.assert_allclose(world_offsets(standing @ turn.T + [3, 1, 0], bias), at_rest @ turn.T, atol=1e-12)
     left, right = (at_rest[COCO17.index(f"{side}_hip")] @ body_axes(standing).T for side in ("left", "right"))
     np.testing.assert_allclose(left, [0.01, 0.02, 0.03], atol=1e-12)
     np.testing.assert_allclose(right, [0.01, -0.02, 0.03], atol=1e-12)
@@ -43,9 +43,9 @@ def test_shifts_are_those_of_the_moved_joints(standing):
     ])  # fmt: skip
     joints = np.stack([standing, standing + [0.2, 0.1, 0.0]])[None]
     bias = Bias(knees=(0.0, 0.0, 0.05))
-    pixels = shifts(joints, bias, rig)
+    pixels = pixel_offsets(joints, bias, rig)
     assert pixels.shape == (1, 2, 2, 17, 2)
     for view, camera in enumerate(rig):
-        expected = camera.project(joints[0, 1] + offsets(joints[0, 1], bias)) - camera.project(joints[0, 1])
+        expected = camera.project(joints[0, 1] + world_offsets(joints[0, 1], bias)) - camera.project(joints[0, 1])
         np.testing.assert_allclose(pixels[0, view, 1], expected)
     assert (np.abs(pixels).max(axis=(0, 1, 2, 4)) > 1).nonzero()[0].tolist() == [13, 14]

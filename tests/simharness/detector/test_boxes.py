@@ -6,14 +6,13 @@ from scipy.stats import binom
 
 from mvpose import COCO17, Camera, Detections, Rig
 from mvpose.duplicates import Duplicates
-from simharness.detector.boxes import AGAIN, PALER, UPPER, in_boxes
+from simharness.detector.boxes import DUPLICATE_SCATTER, DUPLICATE_SCORE, UPPER_BODY, apply_box_errors
 from simharness.detector.conditions import BOX_SHARE, overlaps
-from simharness.detector.correlation import LIMBS, Chances
-from simharness.detector.detection_block import Found
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws
 from simharness.scenario.sections.detector import Boxes
 from simharness.types.truth import KeypointError
-from simharness.types.views import Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import Views, Visibility
 
 IMAGE = (1600, 700)
 SIZE = np.array([120.0, 300.0])
@@ -39,8 +38,8 @@ def crowd(frames=400, views=3, people=2, *, apart=200.0):
     seen = np.full((*shape, 17), Visibility.VISIBLE)
     truth = Views(pixels, seen, boxes, np.zeros(shape, int), source)
     found = replace(
-        Found.nothing(frames, views, people),
-        there=np.ones(shape, bool),
+        DetectionBlock.empty(frames, views, people),
+        present=np.ones(shape, bool),
         keypoints=pixels.copy(),
         scores=np.full((*shape, 17), 0.9),
         person=np.broadcast_to(np.arange(people), shape),
@@ -51,8 +50,8 @@ def crowd(frames=400, views=3, people=2, *, apart=200.0):
 
 def find(world, *, seed=5, **dials):
     people, views, rig = world
-    chances = Chances(seed, STEP * np.arange(len(views)), len(rig))
-    return in_boxes(people, views, rig, Boxes(**dials), chances)
+    draws = KeyedDraws(seed, STEP * np.arange(len(views)), len(rig))
+    return apply_box_errors(people, views, rig, Boxes(**dials), draws)
 
 
 def within(events, trials, chance):
@@ -62,25 +61,25 @@ def within(events, trials, chance):
 
 def tell(found, people):
     """What happened to everyone, (T, V, P) each: found at all; alone and whole, in halves, twice; merged, as owner."""
-    first, second = found.there[:, :, :people], np.zeros_like(found.there[:, :, :people])
-    if found.there.shape[2] > people:
-        second = found.there[:, :, people:]
+    first, second = found.present[:, :, :people], np.zeros_like(found.present[:, :, :people])
+    if found.present.shape[2] > people:
+        second = found.present[:, :, people:]
     absent = (found.error[:, :, :people] == KeypointError.ABSENT).any(axis=-1)
     swap = (found.error[:, :, :people] == KeypointError.SWAP).any(axis=-1)
     return first, first & second & absent, first & second & ~absent, first & swap
 
 
 def equal(a, b, where=...):
-    for field in fields(Found):
+    for field in fields(DetectionBlock):
         np.testing.assert_array_equal(getattr(a, field.name)[where], getattr(b, field.name)[where], field.name)
 
 
 def same(part, whole, where):
     """Whether all that is found in some pictures or slots is what is found there in the whole."""
-    np.testing.assert_array_equal(part.there, whole.there[where])
-    assert part.there.any()
-    for field in fields(Found):
-        mine, theirs = getattr(part, field.name)[part.there], getattr(whole, field.name)[where][part.there]
+    np.testing.assert_array_equal(part.present, whole.present[where])
+    assert part.present.any()
+    for field in fields(DetectionBlock):
+        mine, theirs = getattr(part, field.name)[part.present], getattr(whole, field.name)[where][part.present]
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, err_msg=field.name)
 
 
@@ -90,7 +89,7 @@ class TestNothingGoesWrong:
         views.visibility.flags.writeable = True
         views.visibility[..., :5] = Visibility.SELF_OCCLUDED
         found = find((people, views, rig), life=0.5)
-        share = np.full(people.there.shape, 12 / 17)
+        share = np.full(people.present.shape, 12 / 17)
         equal(found, replace(people, boxes=views.boxes, box_scores=share))
 
     def test_a_score_is_that_of_a_whole_visible_person(self):
@@ -105,20 +104,20 @@ class TestNothingGoesWrong:
         equal(world[0], again[0])
 
     def test_nobody_is_found_in_no_crowd(self):
-        assert find(crowd(people=0), **ALL).there.shape == (400, 3, 0)
+        assert find(crowd(people=0), **ALL).present.shape == (400, 3, 0)
 
 
 class TestWho:
     def test_people_are_missed_at_the_asked_rate(self):
-        there = find(crowd(2000), missed=0.15).there
+        there = find(crowd(2000), missed=0.15).present
         assert within((~there).sum(), there.size, 0.15)
-        assert not find(crowd(20), missed=1.0).there.any()
+        assert not find(crowd(20), missed=1.0).present.any()
 
     def test_a_miss_may_be_shared_by_all_views(self):
-        alike = find(crowd(2000), missed=0.3, missed_views=1.0).there
+        alike = find(crowd(2000), missed=0.3, missed_views=1.0).present
         assert (alike == alike[:, :1]).all()
         assert within((~alike[:, 0]).sum(), alike[:, 0].size, 0.3)
-        some, none = (find(crowd(2000), missed=0.3, missed_views=share).there for share in (0.5, 0.0))
+        some, none = (find(crowd(2000), missed=0.3, missed_views=share).present for share in (0.5, 0.0))
         both = [np.mean(~each[:, 0] & ~each[:, 1]) for each in (some, none)]
         assert both[0] > 0.13  # 0.157 by the bivariate normal; 0.09 of independent ones
         assert within(round(both[1] * 4000), 4000, 0.09)
@@ -128,18 +127,18 @@ class TestWho:
         views.visibility.flags.writeable = True
         views.visibility[:, :, 0, :13] = Visibility.OCCLUDED_BY_CLUTTER
         for least, found in ((4, True), (5, False)):
-            there = find((people, views, rig), least_visible=least).there
+            there = find((people, views, rig), least_visible=least).present
             assert (there[..., 0] == found).all()
             assert there[..., 1].all()
-        people.there[:, 1, 1] = False
-        there = find((people, views, rig)).there
+        people.present[:, 1, 1] = False
+        there = find((people, views, rig)).present
         assert not there[:, 1, 1].any()
         assert there[:, [0, 2], 1].all()
 
     @pytest.mark.parametrize("life", [0.1, 0.6])
     def test_who_is_missed_is_missed_for_a_while(self, life):
         """Drawn anew with probability 1 - exp(-step / life), and again a miss with its chance: geometric runs."""
-        missed = ~find(crowd(20_000, 2, 2), missed=0.3, life=life).there
+        missed = ~find(crowd(20_000, 2, 2), missed=0.3, life=life).present
         assert missed.mean() == pytest.approx(0.3, abs=0.03)
         ends = missed[:-1] & ~missed[1:]
         mean = missed[:-1].sum() / ends.sum() * STEP
@@ -163,7 +162,7 @@ class TestBoxes:
         views.boxes[:, :, 0, 0] = -0.5
         views.boxes[:, :, 1, 1] = IMAGE[1] - 0.5 - SIZE[1]
         found = find((people, views, rig), **{**ALL, "jitter": 0.5, "missed": 0.0})
-        boxes = found.boxes[found.there]
+        boxes = found.boxes[found.present]
         low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
         assert (low >= -0.5).all()
         assert (high <= np.array(IMAGE) - 0.5 + 1e-9).all()
@@ -184,17 +183,17 @@ class TestTwice:
         again = np.s_[:, :, 2:]
         assert (found.person[again] == np.arange(2)).all()
         assert (found.error[again][twice] == KeypointError.GOOD).all()
-        np.testing.assert_allclose(found.scores[again][twice], PALER * 0.9)
-        np.testing.assert_allclose(found.box_scores[again][twice], PALER)
+        np.testing.assert_allclose(found.scores[again][twice], DUPLICATE_SCORE * 0.9)
+        np.testing.assert_allclose(found.box_scores[again][twice], DUPLICATE_SCORE)
         unit = np.sqrt(BOX_SHARE * SIZE.prod()) * np.array(COCO17.sigmas)[:, None]
         off = (found.keypoints[again][twice] - world[1].pixels[twice]) / unit
-        np.testing.assert_allclose(off.std(axis=0), AGAIN, rtol=0.15)  # 900 draws
+        np.testing.assert_allclose(off.std(axis=0), DUPLICATE_SCATTER, rtol=0.15)  # 900 draws
 
     def test_the_method_can_tell_that_it_is_the_same_person(self):
         found = find(crowd(100), duplicates=0.5, jitter=0.05)
         kept = total = 0
         for frame in range(100):
-            view, slot = np.nonzero(found.there[frame])
+            view, slot = np.nonzero(found.present[frame])
             row = (frame, view, slot)
             once = Duplicates()(
                 Detections(view, found.keypoints[row], found.scores[row], found.boxes[row], found.box_scores[row])
@@ -205,7 +204,7 @@ class TestTwice:
 
     def test_again_they_have_a_box_of_their_own(self):
         found = find(crowd(300), duplicates=0.5, jitter=0.05)
-        both = found.there[:, :, 2:]
+        both = found.present[:, :, 2:]
         noise = [found.boxes[:, :, s][both] for s in (slice(0, 2), slice(2, 4))]
         size = noise[0][:, 2:] / SIZE, noise[1][:, 2:] / SIZE
         assert abs(np.corrcoef(size[0][:, 0], size[1][:, 0])[0, 1]) < 0.2
@@ -227,10 +226,10 @@ class TestSplit:
         assert first.all()
         assert not (twice | merged).any()
         upper, lower = found.keypoints[:, :, :2][split], found.keypoints[:, :, 2:][split]
-        assert np.isfinite(upper[:, UPPER]).all()
-        assert np.isnan(upper[:, ~UPPER]).all()
+        assert np.isfinite(upper[:, UPPER_BODY]).all()
+        assert np.isnan(upper[:, ~UPPER_BODY]).all()
         np.testing.assert_array_equal(np.where(np.isnan(upper), lower, upper), world[1].pixels[split])
-        for half, joints in ((np.s_[:, :, :2], UPPER), (np.s_[:, :, 2:], ~UPPER)):
+        for half, joints in ((np.s_[:, :, :2], UPPER_BODY), (np.s_[:, :, 2:], ~UPPER_BODY)):
             assert ((found.scores[half][split] > 0) == joints).all()
             assert ((found.error[half][split] == KeypointError.ABSENT) == ~joints).all()
             assert (found.person[half] == np.arange(2)).all()
@@ -253,7 +252,7 @@ class TestSplit:
         # 10 % of the box is above the nose, 5 % below the ankles: so far each half's box goes beyond its joints.
         np.testing.assert_allclose(upper[..., [1, 3]], np.broadcast_to([200, 200 + 0.45 * 300], (200, 3, 2, 2)))
         np.testing.assert_allclose(lower[..., [1, 3]], np.broadcast_to([200 + 0.40 * 300, 500], (200, 3, 2, 2)))
-        for half, joints in ((upper, UPPER), (lower, ~UPPER)):
+        for half, joints in ((upper, UPPER_BODY), (lower, ~UPPER_BODY)):
             points = views.pixels[..., joints, :]
             assert (points >= half[..., None, :2]).all()
             assert (points <= half[..., None, 2:]).all()
@@ -265,11 +264,11 @@ class TestSplit:
             (people.scores, 0.0),
             (people.error, KeypointError.ABSENT),
         ):
-            values[:, :, :, ~UPPER] = nothing
-        pixels = np.where((LIMBS == 2)[:, None], np.nan, views.pixels)  # behind the camera
+            values[:, :, :, ~UPPER_BODY] = nothing
+        pixels = np.where((LIMB_OF_JOINT == 2)[:, None], np.nan, views.pixels)  # behind the camera
         found = find((people, replace(views, pixels=pixels), rig), split=1.0)
-        assert found.there[:, :, :2].all()
-        assert not found.there[:, :, 2:].any()
+        assert found.present[:, :, :2].all()
+        assert not found.present[:, :, 2:].any()
         assert np.isfinite(found.boxes).all()
 
 
@@ -279,18 +278,18 @@ class TestMerged:
         near = overlaps(world[1].boxes)[..., 0, 1] > 0.6
         assert 0.1 < near.mean() < 0.9
         found = find(world, merged=0.3, merged_overlap=0.6)
-        one = found.there.sum(axis=-1) == 1
+        one = found.present.sum(axis=-1) == 1
         assert within(one.sum(), near.sum(), 0.3)
         assert not one[~near].any()
-        assert (found.there.any(axis=-1)).all()
-        assert find(crowd(apart=200.0), merged=1.0).there.all()
+        assert (found.present.any(axis=-1)).all()
+        assert find(crowd(apart=200.0), merged=1.0).present.all()
 
     def test_limbs_are_those_of_one_of_the_two(self):
         world = crowd(1500, apart=5.0)
         world[0].error[:, :, 1, 3] = KeypointError.JITTER
         found = find(world, merged=0.4)
-        merged = found.there.sum(axis=-1) == 1
-        slot = found.there[merged].argmax(axis=-1)
+        merged = found.present.sum(axis=-1) == 1
+        slot = found.present[merged].argmax(axis=-1)
         row = np.arange(len(slot))
         mine, other = (world[1].pixels[merged][row, each] for each in (slot, 1 - slot))
         keypoints, error = found.keypoints[merged][row, slot], found.error[merged][row, slot]
@@ -301,7 +300,7 @@ class TestMerged:
         assert (own.sum(axis=-1) > 17 / 2).all()
         np.testing.assert_array_equal(found.rivals[merged][row, slot], np.where(own[..., None], other, mine))
         for limb in range(3):
-            joints = own[:, limb == LIMBS]
+            joints = own[:, limb == LIMB_OF_JOINT]
             assert (joints == joints[:, :1]).all()
             firsts = joints[:, 0] == (slot == 0)  # of the first of the pair
             assert within(firsts.sum(), len(firsts), 0.5)
@@ -313,9 +312,9 @@ class TestMerged:
         people, views, rig = crowd(300, apart=30.0)
         found = find((people, views, rig), merged=1.0, merged_overlap=0.4, jitter=0.05, score=0.9)
         alone = find((people, views, rig), jitter=0.05, score=0.9)
-        merged = found.there.sum(axis=-1) == 1
+        merged = found.present.sum(axis=-1) == 1
         assert merged.sum() > 100
-        slot = found.there[merged].argmax(axis=-1)
+        slot = found.present[merged].argmax(axis=-1)
         boxes, both = found.boxes[merged][np.arange(len(slot)), slot], alone.boxes[merged]
         low, high = both[..., :2].min(axis=1), (both[..., :2] + both[..., 2:]).max(axis=1)
         np.testing.assert_allclose(boxes, np.hstack([low, high - low]))
@@ -326,19 +325,19 @@ class TestMerged:
         few, many = (find(world, merged=share, merged_overlap=0.3) for share in (0.15, 0.6))
         lost = []
         for found in (few, many):
-            taken = ~found.there
-            owner = (found.keypoints != world[1].pixels).any(axis=(-1, -2)) & found.there
+            taken = ~found.present
+            owner = (found.keypoints != world[1].pixels).any(axis=(-1, -2)) & found.present
             assert (taken.sum(axis=-1) <= 2).all()  # of five, at most two pairs
             assert (owner.sum(axis=-1) <= taken.sum(axis=-1)).all()
             lost.append(taken)
         assert (lost[0] <= lost[1]).all()
         assert 0 < lost[0].sum() < 0.6 * lost[1].sum()
         everyone = find(world, merged=1.0, merged_overlap=0.3)
-        assert (everyone.there.sum(axis=-1) == 3).mean() > 0.95  # 5 people, all near: two pairs and one
+        assert (everyone.present.sum(axis=-1) == 3).mean() > 0.95  # 5 people, all near: two pairs and one
 
     def test_a_merger_lasts(self):
         found = find(crowd(4000, 2, apart=2.0), merged=0.5, life=0.4)
-        one = found.there.sum(axis=-1) == 1
+        one = found.present.sum(axis=-1) == 1
         assert one.mean() == pytest.approx(0.5, abs=0.08)
         ends = one[:-1] & ~one[1:]
         assert one[:-1].sum() / ends.sum() * STEP == pytest.approx(STEP / (-np.expm1(-STEP / 0.4) * 0.5), rel=0.15)
@@ -349,9 +348,9 @@ class TestDials:
         world = crowd(2000, people=3, apart=10.0)
         dials = {"missed": 0.2, "merged": 0.3, "split": 0.25, "duplicates": 0.4}
         found = find(world, **dials)
-        there = find(world, missed=0.2).there
+        there = find(world, missed=0.2).present
         paired = find(world, missed=0.2, merged=0.3)
-        left = there & paired.there & (paired.error != KeypointError.SWAP).all(axis=-1)
+        left = there & paired.present & (paired.error != KeypointError.SWAP).all(axis=-1)
         whole = (paired.keypoints == world[1].pixels).all(axis=(-1, -2)) & np.isnan(paired.rivals).all(axis=(-1, -2))
         left &= whole
         _, split, twice, _ = tell(found, 3)
@@ -364,7 +363,7 @@ class TestDials:
     @pytest.mark.parametrize("dial", ["missed", "split", "duplicates"])
     def test_more_only_adds(self, dial):
         low, high = (find(crowd(), life=0.1, **{dial: share}) for share in (0.1, 0.4))
-        events = [~each.there[:, :, :2] if dial == "missed" else each.there[:, :, 2:] for each in (low, high)]
+        events = [~each.present[:, :, :2] if dial == "missed" else each.present[:, :, 2:] for each in (low, high)]
         assert (events[0] <= events[1]).all()
         assert 0 < events[0].sum() < events[1].sum()
 
@@ -376,7 +375,7 @@ class TestDials:
         """Whoever is found the same way before and after is found with the same numbers, but for the dial's own."""
         world = crowd(300, people=3, apart=15.0)
         before, after = find(world, life=0.2, **ALL), find(world, life=0.2, **{**ALL, dial: value})
-        same = before.there & after.there & (before.error == after.error).all(axis=-1)
+        same = before.present & after.present & (before.error == after.error).all(axis=-1)
         same &= (before.scores == after.scores).all(axis=-1)
         with_same = np.isclose(before.rivals, after.rivals, atol=0, rtol=0, equal_nan=True)
         same &= with_same.all(axis=(-1, -2))
@@ -387,9 +386,9 @@ class TestDials:
         for key, own in (("boxes", "jitter"), ("box_scores", "deviation")):
             a, b = getattr(before, key)[single], getattr(after, key)[single]
             assert (a == b).all() == (dial != own)
-        kept = find(world, life=0.2, missed=0.2, missed_views=0.5).there
+        kept = find(world, life=0.2, missed=0.2, missed_views=0.5).present
         if dial != "missed":
-            assert not (after.there[:, :, :3] & ~kept).any()
+            assert not (after.present[:, :, :3] & ~kept).any()
 
     def test_one_more_frame_or_view_changes_nothing_of_the_others(self):
         dials = {**ALL, "life": 0.2}
@@ -401,4 +400,4 @@ class TestDials:
         dials = {**ALL, "life": 0.2}
         few, many = (find(crowd(200, 3, people), **dials) for people in (2, 3))
         same(few, many, np.s_[:, :, [0, 1, 3, 4]])
-        assert few.there[:, :, 2:].any()
+        assert few.present[:, :, 2:].any()

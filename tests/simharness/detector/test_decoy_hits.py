@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.correlation import Chances
-from simharness.detector.decoys import decoy_hits
-from simharness.detector.false_positives import LEAST
+from simharness.detector.decoys import draw_decoy_hits
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.false_positives import MIN_JOINTS
 from simharness.scenario.sections.detector import DecoyHits
 from simharness.types.truth import KeypointError
 from simharness.types.views import LookalikeViews, Views
@@ -46,8 +46,8 @@ def filmed(frames=300, visible=None, names=NAMES) -> Views:
 
 def drawn(pictures=None, /, *, seed=2, **dials):
     pictures = filmed() if pictures is None else pictures
-    chances = Chances(seed, STEP * np.arange(len(pictures)), len(RIG))
-    return decoy_hits(pictures, RIG, DecoyHits(**dials), chances)
+    draws = KeyedDraws(seed, STEP * np.arange(len(pictures)), len(RIG))
+    return draw_decoy_hits(pictures, RIG, DecoyHits(**dials), draws)
 
 
 def within(count, trials, chance):
@@ -58,50 +58,50 @@ def within(count, trials, chance):
 def off(found, pictures):
     """How far keypoints are from the decoy's own, (T, V, D), pixels on average; NaN where there is no hit."""
     apart = np.linalg.norm(found.keypoints - pictures.lookalikes.pixels, axis=-1)
-    return np.where(found.there, apart.mean(axis=-1), np.nan)
+    return np.where(found.present, apart.mean(axis=-1), np.nan)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("views", [0.0, 0.6])
 def test_the_share_of_decoys_taken_is_the_asked_one(share, views):
     found = drawn(filmed(2000), share=share, views=views)
-    assert found.there.shape == (2000, 3, 2)
-    assert within(found.there[:, 0].sum(), 4000, share)  # of one view, whatever the others share
-    assert within(found.there[:, 2].sum(), 4000, share)
+    assert found.present.shape == (2000, 3, 2)
+    assert within(found.present[:, 0].sum(), 4000, share)  # of one view, whatever the others share
+    assert within(found.present[:, 2].sum(), 4000, share)
 
 
 def test_the_share_is_the_same_with_a_life():
-    hits = np.mean([drawn(filmed(200), share=0.3, life=0.5, seed=seed).there[::50].mean() for seed in range(100)])
+    hits = np.mean([drawn(filmed(200), share=0.3, life=0.5, seed=seed).present[::50].mean() for seed in range(100)])
     assert abs(hits - 0.3) < 5 * np.sqrt(0.21 / (100 * 4 * 6))
 
 
 def test_zero_means_none_and_without_decoys_there_is_nothing():
-    assert drawn(share=0.0).there.shape == (300, 3, 0)
-    assert drawn(filmed(names=()), share=1.0).there.shape == (300, 3, 0)
+    assert drawn(share=0.0).present.shape == (300, 3, 0)
+    assert drawn(filmed(names=()), share=1.0).present.shape == (300, 3, 0)
 
 
 @pytest.mark.parametrize("dials", [{}, {"life": 0.5, "views": 0.5, "consistent": 0.5}])
 def test_more_only_adds(dials):
     few, many = drawn(share=0.2, **dials), drawn(share=0.6, **dials)
-    assert 0 < few.there.sum() < many.there.sum()
-    assert not (few.there & ~many.there).any()
-    np.testing.assert_array_equal(few.keypoints[few.there], many.keypoints[few.there])
-    np.testing.assert_array_equal(few.scores[few.there], many.scores[few.there])
+    assert 0 < few.present.sum() < many.present.sum()
+    assert not (few.present & ~many.present).any()
+    np.testing.assert_array_equal(few.keypoints[few.present], many.keypoints[few.present])
+    np.testing.assert_array_equal(few.scores[few.present], many.scores[few.present])
 
 
 def test_hits_last():
     life = 1.0
-    there = drawn(filmed(4000), share=0.5, life=life).there
+    there = drawn(filmed(4000), share=0.5, life=life).present
     taken = there[:-1].sum()
     kept = (there[1:] & there[:-1]).sum()
     stays = np.exp(-STEP / life) + 0.5 * (1 - np.exp(-STEP / life))  # lives on, or is drawn anew and taken again
     assert abs(kept / taken - stays) < 5 * np.sqrt(stays * (1 - stays) / (taken / 3))  # views change together
-    alone = drawn(filmed(4000), share=0.5).there
+    alone = drawn(filmed(4000), share=0.5).present
     assert abs((alone[1:] & alone[:-1]).sum() / alone[:-1].sum() - 0.5) < 0.05
 
 
 def test_views_agree_as_much_as_they_share():
-    together, alone = (drawn(filmed(1000), share=0.4, views=views).there for views in (1.0, 0.0))
+    together, alone = (drawn(filmed(1000), share=0.4, views=views).present for views in (1.0, 0.0))
     assert (together == together[:, :1]).all()
     assert together.any()
     assert abs((alone[:, 0] & alone[:, 1]).mean() - 0.16) < 0.05
@@ -109,11 +109,11 @@ def test_views_agree_as_much_as_they_share():
 
 def test_what_is_hardly_seen_is_never_taken():
     visible = np.zeros((300, 3, 2, 17), bool)
-    visible[:, :, 0, : LEAST - 1] = True
-    visible[:, :, 1, :LEAST] = True
+    visible[:, :, 0, : MIN_JOINTS - 1] = True
+    visible[:, :, 1, :MIN_JOINTS] = True
     found = drawn(filmed(visible=visible), share=1.0)
-    assert not found.there[..., 0].any()
-    assert found.there[..., 1].all()
+    assert not found.present[..., 0].any()
+    assert found.present[..., 1].all()
     np.testing.assert_array_equal(found.scores[..., 1, :] > 0, visible[..., 1, :])
     np.testing.assert_array_equal(np.isfinite(found.keypoints[..., 1, :, 0]), visible[..., 1, :])
 
@@ -122,7 +122,7 @@ def test_a_consistent_hit_has_the_things_own_keypoints():
     pictures = filmed()
     found = drawn(pictures, share=0.7)
     assert 0 < np.nanmax(off(found, pictures)) < 5
-    apart = (found.keypoints - pictures.lookalikes.pixels)[found.there]
+    apart = (found.keypoints - pictures.lookalikes.pixels)[found.present]
     assert abs(apart.mean()) < 0.1
 
 
@@ -130,14 +130,14 @@ def test_a_consistent_hit_has_the_things_own_keypoints():
 def test_the_share_of_consistent_hits_is_the_asked_one(consistent):
     pictures = filmed(1000)
     found = drawn(pictures, share=0.5, consistent=consistent)
-    own = off(found, pictures)[found.there] < 5
+    own = off(found, pictures)[found.present] < 5
     assert within(own.sum(), own.size, consistent)
 
 
 def test_an_inconsistent_hit_keeps_its_pose_and_views_have_their_own():
     pictures = filmed(1000)
     found = drawn(pictures, share=1.0, consistent=0.0, life=2.0)
-    assert found.there.all()
+    assert found.present.all()
     pose = (found.keypoints - found.boxes[..., None, :2]) / found.boxes[..., None, 2:]
     np.testing.assert_allclose(np.nanmin(pose, axis=-2), 0, atol=1e-9)
     changes = np.abs(np.diff(pose, axis=0)).max(axis=(-1, -2)) > 1e-6
@@ -152,41 +152,43 @@ def test_an_inconsistent_hit_keeps_its_pose_and_views_have_their_own():
 
 def test_what_is_reported_holds_together():
     found = drawn(share=0.6, life=0.4, consistent=0.5)
-    seen = found.scores[found.there] > 0
-    keypoints, boxes = found.keypoints[found.there], found.boxes[found.there]
+    seen = found.scores[found.present] > 0
+    keypoints, boxes = found.keypoints[found.present], found.boxes[found.present]
     np.testing.assert_array_equal(np.isfinite(keypoints).all(axis=-1), seen)
     assert RIG[0].inside(keypoints[seen]).all()
     np.testing.assert_allclose(np.nanmin(keypoints, axis=1), boxes[:, :2])
     np.testing.assert_allclose(np.nanmax(keypoints, axis=1), boxes[:, :2] + boxes[:, 2:])
-    np.testing.assert_allclose(found.box_scores[found.there], found.scores[found.there].sum(axis=1) / seen.sum(axis=1))
+    np.testing.assert_allclose(
+        found.box_scores[found.present], found.scores[found.present].sum(axis=1) / seen.sum(axis=1)
+    )
     assert (found.person == -1).all()
     assert (found.error == KeypointError.MISS).all()
 
 
 def test_scores_spread_as_asked_on_the_logit_scale():
     scores = drawn(filmed(2000), share=0.8, score=0.6, deviation=0.5)
-    scores = scores.scores[scores.there & (scores.scores > 0).all(axis=-1)]
+    scores = scores.scores[scores.present & (scores.scores > 0).all(axis=-1)]
     logit = np.log(scores / (1 - scores))
     assert abs(logit.mean() - np.log(0.6 / 0.4)) < 5 * 0.5 / np.sqrt(len(logit))
     assert logit.std() == pytest.approx(0.5, abs=5 * 0.5 / np.sqrt(len(logit)))
     exact = drawn(share=0.8, score=0.6, deviation=0.0)
-    np.testing.assert_allclose(exact.scores[exact.there], np.where(exact.scores[exact.there] > 0, 0.6, 0.0))
+    np.testing.assert_allclose(exact.scores[exact.present], np.where(exact.scores[exact.present] > 0, 0.6, 0.0))
 
 
 @pytest.mark.parametrize("dial", [{"score": 0.3}, {"deviation": 0.1}])
 def test_scores_move_no_keypoint_and_take_no_other_decoy(dial):
     base, other = drawn(share=0.5, consistent=0.5), drawn(share=0.5, consistent=0.5, **dial)
-    np.testing.assert_array_equal(base.there, other.there)
+    np.testing.assert_array_equal(base.present, other.present)
     np.testing.assert_array_equal(base.keypoints, other.keypoints)
 
 
 def test_consistency_moves_only_those_that_it_takes():
     pictures = filmed()
     none, some = drawn(pictures, share=0.5, consistent=0.2), drawn(pictures, share=0.5, consistent=0.6)
-    np.testing.assert_array_equal(none.there, some.there)
+    np.testing.assert_array_equal(none.present, some.present)
     np.testing.assert_array_equal(none.scores, some.scores)
-    own = [off(found, pictures)[found.there] < 5 for found in (none, some)]
-    same = (none.keypoints[none.there] == some.keypoints[none.there]).all(axis=(-1, -2))
+    own = [off(found, pictures)[found.present] < 5 for found in (none, some)]
+    same = (none.keypoints[none.present] == some.keypoints[none.present]).all(axis=(-1, -2))
     np.testing.assert_array_equal(~same, own[1] & ~own[0])
 
 
@@ -199,5 +201,5 @@ def test_a_decoy_more_changes_nothing_of_the_others():
         lookalikes=LookalikeViews(NAMES[1:], lookalikes.pixels[:, :, 1:], lookalikes.visible[:, :, 1:]),
     )
     both, one = drawn(pictures, **dials), drawn(alone, **dials)
-    np.testing.assert_array_equal(both.there[..., 1:], one.there)
+    np.testing.assert_array_equal(both.present[..., 1:], one.present)
     np.testing.assert_array_equal(both.keypoints[..., 1:, :, :], one.keypoints)

@@ -10,12 +10,11 @@ from worlds import world
 
 from mvpose.networks.reid import DEFAULT
 from simharness.detector.descriptor_model import DescriptorModel
+from simharness.detector.descriptors import DescriptorSettings
 from simharness.detector.detect import detect
-from simharness.detector.drawn_descriptors import Looks
 from simharness.detector.view_geometry import bearings, hidden_shares
 from simharness.scenario.sections.detector import Detector
-from simharness.types.views import LookalikeViews
-from simharness.types.visibility import Visibility
+from simharness.types.views import LookalikeViews, Visibility
 
 PEOPLE, VIEWS = 12, 5
 
@@ -33,17 +32,17 @@ def model():
 def groups(model, dial, hidden, *, seeds=60):
     """Distances of pairs of crops of one moment: of one person, and of two; everybody is seen in all views."""
     rng = np.random.default_rng(0)
-    who = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
-    same = np.arange(len(who))[:, None] // VIEWS == np.arange(len(who)) // VIEWS
+    identity = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
+    same = np.arange(len(identity))[:, None] // VIEWS == np.arange(len(identity)) // VIEWS
     pair = np.triu(np.ones(same.shape, bool), 1)
     one, two = [], []
     for seed in range(seeds):
         drawn = model.draw(
-            who,
-            bearing=rng.uniform(-np.pi, np.pi, len(who)),
-            hidden=hidden(rng, len(who)),
-            noise=rng.standard_normal((len(who), model.dimensions)),
-            unease=rng.standard_normal(len(who)),
+            identity,
+            bearing=rng.uniform(-np.pi, np.pi, len(identity)),
+            hidden=hidden(rng, len(identity)),
+            noise=rng.standard_normal((len(identity), model.dimensions)),
+            noise_level=rng.standard_normal(len(identity)),
             look_alike=dial,
             seed=seed,
         )
@@ -97,15 +96,21 @@ def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, car
     """In every bin that the network's pairs fill: within 0.05, and the standard error of what was measured."""
     turns, covers = card["view_difference_degrees"], card["hidden_share_of_the_joints_of_the_worse_crop"]
     hidden, rng = as_measured(card, "same"), np.random.default_rng(0)
-    who = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
-    same = np.arange(len(who))[:, None] // VIEWS == np.arange(len(who)) // VIEWS
+    identity = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
+    same = np.arange(len(identity))[:, None] // VIEWS == np.arange(len(identity)) // VIEWS
     once = np.triu(np.ones(same.shape, bool), 1)
     total, count = np.zeros((2, 2, len(turns) - 1, len(covers) - 1))
     for seed in range(200):
-        bearing, cover = rng.uniform(-np.pi, np.pi, len(who)), hidden(rng, len(who))
-        noise, unease = rng.standard_normal((len(who), model.dimensions)), rng.standard_normal(len(who))
+        bearing, cover = rng.uniform(-np.pi, np.pi, len(identity)), hidden(rng, len(identity))
+        noise, noise_level = rng.standard_normal((len(identity), model.dimensions)), rng.standard_normal(len(identity))
         drawn = model.draw(
-            who, bearing=bearing, hidden=cover, noise=noise, unease=unease, look_alike=float(dial), seed=seed
+            identity,
+            bearing=bearing,
+            hidden=cover,
+            noise=noise,
+            noise_level=noise_level,
+            look_alike=float(dial),
+            seed=seed,
         )
         distance = np.linalg.norm(drawn[:, None] - drawn, axis=-1)
         turn = np.degrees(np.arccos(np.cos(bearing[:, None] - bearing)))
@@ -130,7 +135,7 @@ def apart(model, turn, *, pairs):
         bearing=np.where(np.arange(count) % 2, turn, 0.0),
         hidden=np.zeros(count),
         noise=rng.standard_normal((count, model.dimensions)),
-        unease=rng.standard_normal(count),
+        noise_level=rng.standard_normal(count),
         look_alike=0.0,
         seed=2,
     )
@@ -187,8 +192,8 @@ class TestInDetections:
     def described(model, *, look_alike=0.0, alike=0, people=4, frames=40, **sections):
         where = with_decoys(world(frames=frames, people=people))
         config = Detector.model_validate(sections)
-        looks = Looks(model, look_alike, alike)
-        return detect(where.sequence, where.views, where.rig, config, seed=3, looks=looks)
+        settings = DescriptorSettings(model, look_alike, alike)
+        return detect(where.sequence, where.views, where.rig, config, seed=3, descriptors=settings)
 
     def test_people_are_like_themselves_and_phantoms_like_nobody(self, model):
         frames = self.described(model, phantoms={"rate": 1.0, "life": 1.0})
@@ -304,14 +309,14 @@ class TestInDetections:
 
 def test_a_network_without_measured_distances_is_refused(tmp_path):
     (tmp_path / "other.onnx").write_bytes(b"x")
-    with pytest.raises(ValueError, match=r"other\.json: no card with the distances of other\.onnx"):
+    with pytest.raises(ValueError, match=r"other\.json: expected a card with the distances of other\.onnx"):
         DescriptorModel.of_network(tmp_path / "other.onnx")
 
 
 @pytest.mark.parametrize("content", ["[1]", "{}", '{"distances": 3}', "no JSON"])
 def test_a_card_that_states_no_distances_is_said(tmp_path, content):
     (tmp_path / "other.json").write_text(content)
-    with pytest.raises(ValueError, match=r"other\.json: no card with the distances of other\.onnx"):
+    with pytest.raises(ValueError, match=r"other\.json: expected a card with the distances of other\.onnx"):
         DescriptorModel.of_network(tmp_path / "other.onnx")
 
 

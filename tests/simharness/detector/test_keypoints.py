@@ -7,20 +7,20 @@ from worlds import within, world
 
 from mvpose import COCO17
 from simharness.detector.conditions import BOX_SHARE, Conditions, overlaps
-from simharness.detector.correlation import Chances
+from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
 from simharness.scenario.sections.detector import Correlation, Keypoints
 from simharness.types.truth import GOOD_BELOW, MISS_FROM, KeypointError
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 MIRROR = np.array(COCO17.mirror)
 
 
 def find(where, *, seed=3, correlation=None, **dials):
     config = Keypoints.model_validate(dials)
-    chances = Chances(seed, where.sequence.time, len(where.rig))
+    draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     tie = Correlation.model_validate(correlation or {})
-    return find_keypoints(where.views, Conditions.of(where.views), where.sequence, where.rig, config, tie, chances)
+    return find_keypoints(where.views, Conditions.of(where.views), where.sequence, where.rig, config, tie, draws)
 
 
 def units(where, found):

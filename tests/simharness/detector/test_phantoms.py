@@ -9,15 +9,14 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
-from simharness.detector.birth_death import Lives, alive, slots
-from simharness.detector.correlation import Chances
-from simharness.detector.phantom_poses import DRAWS, postures, seen_from
-from simharness.detector.phantoms import focus, phantoms
+from simharness.detector.birth_death import BirthDeathProcess, assign_slots, frames_alive
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.phantom_poses import NORMALS, postures, project_upright
+from simharness.detector.phantoms import draw_phantoms, viewed_area
 from simharness.scenario.sections.detector import Phantoms
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.truth import KeypointError
-from simharness.types.views import Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import Views, Visibility
 from simharness.world.rigs.layouts import build_rig
 
 STEP = 0.1  # seconds
@@ -47,13 +46,13 @@ def filmed(frames=400, views=4, people=2, seed=0) -> Views:
 def drawn(rig=None, pictures=None, /, *, seed=3, **dials):
     rig = rig or ring()
     pictures = filmed(views=len(rig)) if pictures is None else pictures
-    chances = Chances(seed, STEP * np.arange(len(pictures)), len(rig))
-    return phantoms(pictures, rig, Phantoms(**dials), chances)
+    draws = KeyedDraws(seed, STEP * np.arange(len(pictures)), len(rig))
+    return draw_phantoms(pictures, rig, Phantoms(**dials), draws)
 
 
 def poses(found, frames=None) -> set[tuple[int, int, bytes]]:
     """Where and when each one is, whatever its slot."""
-    places = np.argwhere(found.there[:frames]).tolist()
+    places = np.argwhere(found.present[:frames]).tolist()
     return {(t, v, found.keypoints[t, v, s].tobytes()) for t, v, s in places}
 
 
@@ -82,12 +81,12 @@ class TestRates:
         found = drawn(rig, filmed(frames), rate=rate, **dials)
         expected = rate * frames * len(rig)
         clump = (1 + 2 * dials.get("life", 0.0) / STEP) * (1 + dials.get("views", 0.0) * (len(rig) - 1))
-        assert abs(found.there.sum() - expected) < 4.5 * np.sqrt(clump * expected)
+        assert abs(found.present.sum() - expected) < 4.5 * np.sqrt(clump * expected)
 
     def test_the_number_in_a_picture_is_poisson_distributed_from_the_first_frame_on(self):
         rig, rate = ring(8), 0.8
         views = filmed(30, 8)
-        counts = np.stack([drawn(rig, views, rate=rate, life=2.0, seed=seed).there.sum(axis=2) for seed in range(60)])
+        counts = np.stack([drawn(rig, views, rate=rate, life=2.0, seed=seed).present.sum(axis=2) for seed in range(60)])
         for frame in (0, 29):
             now = counts[:, frame]
             assert abs(now.mean() - rate) < 5 * np.sqrt(rate / now.size)
@@ -98,14 +97,14 @@ class TestRates:
     def test_the_share_that_stands_in_the_room_is_the_asked_one(self):
         """In one picture alone means alone: with the same seed, without the room, what is left."""
         rig, views = ring(), filmed(1500)
-        both = drawn(rig, views, rate=1.0, views=0.4).there.sum()
-        alone = drawn(rig, views, rate=0.6).there.sum()
+        both = drawn(rig, views, rate=1.0, views=0.4).present.sum()
+        alone = drawn(rig, views, rate=0.6).present.sum()
         share = (both - alone) / both
         assert abs(share - 0.4) < 0.05
 
     def test_zero_means_none(self):
         found = drawn(rate=0.0, life=1.0, views=0.5, parts=0.5)
-        assert found.there.shape == (400, 4, 0)
+        assert found.present.shape == (400, 4, 0)
 
     def test_more_only_adds(self):
         for dials in MIXTURES:
@@ -116,11 +115,11 @@ class TestRates:
     def test_a_rig_whose_axes_are_parallel(self):
         rig = Rig([Camera(np.diag([800.0, 800, 1]), np.eye(3), [0.5 * v, 0, 5], size=(800, 600)) for v in range(3)])
         found = drawn(rig, filmed(1000, 3), rate=0.5, views=1.0)
-        assert np.isfinite(focus(rig)[0]).all()
-        assert abs(found.there.sum() - 1500) < 5 * np.sqrt(3 * 1500)
+        assert np.isfinite(viewed_area(rig)[0]).all()
+        assert abs(found.present.sum() - 1500) < 5 * np.sqrt(3 * 1500)
 
     def test_a_single_frame(self):
-        counts = [drawn(ring(), filmed(1), rate=2.0, life=1.0, views=0.2, seed=s).there.sum() for s in range(100)]
+        counts = [drawn(ring(), filmed(1), rate=2.0, life=1.0, views=0.2, seed=s).present.sum() for s in range(100)]
         assert abs(np.mean(counts) - 8.0) < 5 * np.sqrt(8.0 * 2 / 100)
 
 
@@ -129,8 +128,8 @@ class TestLives:
     def test_a_slot_holds_one_at_a_time_and_there_are_no_more_than_needed(self, spans):
         born = np.array([b for b, _ in spans])
         last = born + [n for _, n in spans]
-        slot = slots(born, last)
-        thing, frame = alive(born, last)
+        slot = assign_slots(born, last)
+        thing, frame = frames_alive(born, last)
         assert len(set(zip(slot[thing].tolist(), frame.tolist(), strict=True))) == len(thing)
         assert slot.max() + 1 == np.bincount(frame).max()
         for k in range(len(born)):
@@ -139,7 +138,7 @@ class TestLives:
     @pytest.mark.parametrize("life", [0.0, 0.05, 0.5, 3.0])
     def test_lives_are_as_long_as_asked(self, life):
         """At the frames' times an exponential life is geometric: it lasts another frame with exp(-step / life)."""
-        lives = Lives(Chances(1, STEP * np.arange(4000), 1), ("test",), life, most=2.0)
+        lives = BirthDeathProcess(KeyedDraws(1, STEP * np.arange(4000), 1), ("test",), life, max_rate=2.0)
         early = lives.born < 3500
         frames = (lives.last - lives.born + 1)[early]
         kept = np.exp(-STEP / life) if life else 0.0
@@ -148,7 +147,7 @@ class TestLives:
     def test_phantoms_sit_still_while_they_live(self):
         life = 0.8
         found = drawn(ring(), filmed(1500), rate=0.5, life=life)
-        before, after = found.there[:-1], found.there[1:]
+        before, after = found.present[:-1], found.present[1:]
         apart = np.linalg.norm(found.keypoints[1:] - found.keypoints[:-1], axis=-1)
         height = np.where(before, found.boxes[:-1, ..., 3], 1.0)
         same = before & after & (np.nan_to_num(apart).max(axis=-1) < 0.05 * height)
@@ -158,7 +157,7 @@ class TestLives:
 
     def test_without_a_life_every_frame_has_its_own(self):
         found = drawn(rate=1.0)
-        both = found.there[:-1] & found.there[1:]
+        both = found.present[:-1] & found.present[1:]
         apart = np.linalg.norm(found.keypoints[1:] - found.keypoints[:-1], axis=-1)
         assert np.nanmin(np.nanmedian(apart[both], axis=-1)) > 2.0
 
@@ -166,7 +165,7 @@ class TestLives:
 def ray_gaps(rig, found):
     """How far rays (metres) pass by the nearest point to all rays of the same slot, frame and joint."""
     gaps = []
-    for t, s in np.ndindex(found.there.shape[0], found.there.shape[2]):
+    for t, s in np.ndindex(found.present.shape[0], found.present.shape[2]):
         for joint in range(0, 17, 4):
             seen = np.flatnonzero(found.scores[t, :, s, joint] > 0)
             if len(seen) < 2:
@@ -199,27 +198,27 @@ class TestInTheRoom:
         rig = ring(5)
         found = drawn(rig, filmed(200, 5), rate=0.5, views=1.0)
         checked = 0
-        for t, s in zip(*np.nonzero(found.there.sum(axis=1) >= 2), strict=True):
-            one, two = np.flatnonzero(found.there[t, :, s])[:2]
+        for t, s in zip(*np.nonzero(found.present.sum(axis=1) >= 2), strict=True):
+            one, two = np.flatnonzero(found.present[t, :, s])[:2]
             joints = [j for j in range(17) if (found.scores[t, [one, two], s, j] > 0).all()]
             points = np.array([meet(rig, (one, two), found.keypoints[t, [one, two], s, j]) for j in joints])
             for view in range(5):
                 inside = rig[view].inside(rig[view].project(points))
                 np.testing.assert_array_equal(
-                    inside[: len(joints)] & found.there[t, view, s], found.scores[t, view, s, joints] > 0
+                    inside[: len(joints)] & found.present[t, view, s], found.scores[t, view, s, joints] > 0
                 )
                 if inside.sum() >= 7:  # of the 6 that make a figure one may lie at the very border
-                    assert found.there[t, view, s]
+                    assert found.present[t, view, s]
                     checked += 1
         assert checked > 100
 
     def test_they_stand_where_the_cameras_look(self):
         rig = ring()
-        middle, reach = focus(rig)
+        middle, reach = viewed_area(rig)
         np.testing.assert_allclose(middle, 0.0, atol=0.05)
         found = drawn(rig, filmed(300), rate=0.5, views=1.0)
         ankles = []
-        for t, s in zip(*np.nonzero(found.there.sum(axis=1) >= 2), strict=True):
+        for t, s in zip(*np.nonzero(found.present.sum(axis=1) >= 2), strict=True):
             views = np.flatnonzero(found.scores[t, :, s, 15] > 0)[:2]
             if len(views) == 2:
                 ankles.append(meet(rig, views, found.keypoints[t, views, s, 15]))
@@ -232,9 +231,9 @@ class TestInTheRoom:
     def test_a_view_more_leaves_those_in_one_picture_alone(self):
         four = drawn(ring(4), rate=0.5)
         three = drawn(Rig(ring(4).cameras[:3]), rate=0.5)
-        first = three.there.shape[2]
-        np.testing.assert_array_equal(four.there[:, :3, :first], three.there)
-        np.testing.assert_array_equal(four.keypoints[:, :3, :first][three.there], three.keypoints[three.there])
+        first = three.present.shape[2]
+        np.testing.assert_array_equal(four.present[:, :3, :first], three.present)
+        np.testing.assert_array_equal(four.keypoints[:, :3, :first][three.present], three.keypoints[three.present])
 
 
 def meet(rig, views, pixels):
@@ -247,7 +246,7 @@ def lent(found, views):
     """Which phantoms have the upper body of somebody real, (T, V, S), within their jitter."""
     upper = found.keypoints[..., None, :11, :] - views.pixels[:, :, None, :, :11]
     off = np.linalg.norm(upper, axis=-1).max(axis=-1).min(axis=-1)
-    return found.there & (off < 0.04 * 300)
+    return found.present & (off < 0.04 * 300)
 
 
 class TestNumbers:
@@ -258,7 +257,7 @@ class TestNumbers:
     @staticmethod
     def numbers(found):
         """The number of each by where and when it is."""
-        places = np.argwhere(found.there).tolist()
+        places = np.argwhere(found.present).tolist()
         return {(t, v, found.keypoints[t, v, s].tobytes()): int(found.number[t, v, s]) for t, v, s in places}
 
     def test_more_phantoms_change_no_number(self):
@@ -270,12 +269,12 @@ class TestNumbers:
         found = drawn(ring(), rate=1.5, life=0.5, views=1.0)
         alone = drawn(ring(), rate=1.5, life=0.5)
         for each in (found, alone):
-            for t, v in np.argwhere(each.there.sum(axis=-1) > 1):
-                mine = each.number[t, v][each.there[t, v]]
+            for t, v in np.argwhere(each.present.sum(axis=-1) > 1):
+                mine = each.number[t, v][each.present[t, v]]
                 assert len(np.unique(mine)) == len(mine)
-        shared = np.where(found.there, found.number, -1)
+        shared = np.where(found.present, found.number, -1)
         assert all(len(np.unique(slot[slot >= 0])) <= 1 for slot in shared.swapaxes(1, 2).reshape(-1, 4))
-        views = [np.unique(np.where(alone.there, alone.number, -1)[:, v]) for v in range(4)]
+        views = [np.unique(np.where(alone.present, alone.number, -1)[:, v]) for v in range(4)]
         assert len(np.unique(np.concatenate(views))) == sum(len(each) - 1 for each in views) + 1
 
 
@@ -283,7 +282,7 @@ class TestParts:
     def test_the_share_made_of_parts_is_the_asked_one(self):
         views = filmed(1000)
         found = drawn(ring(), views, rate=0.5, parts=0.3)
-        assert within(lent(found, views).sum(), found.there.sum(), 0.3)
+        assert within(lent(found, views).sum(), found.present.sum(), 0.3)
         assert lent(drawn(ring(), views, rate=0.5), views).sum() == 0
 
     def test_the_legs_are_the_neighbours(self):
@@ -291,7 +290,7 @@ class TestParts:
         found = drawn(ring(), views, rate=0.5, parts=1.0)
         legs = found.keypoints[..., None, 11:, :] - views.pixels[:, :, None, :, 11:]
         upper = found.keypoints[..., None, :11, :] - views.pixels[:, :, None, :, :11]
-        off = np.stack([np.linalg.norm(part, axis=-1).max(axis=-1) for part in (upper, legs)])[:, found.there]
+        off = np.stack([np.linalg.norm(part, axis=-1).max(axis=-1) for part in (upper, legs)])[:, found.present]
         assert (off.min(axis=-1) < 12).all()
         first, second = off.argmin(axis=-1)
         assert (first != second).all()
@@ -300,7 +299,7 @@ class TestParts:
     def test_who_is_alone_gives_the_legs_too_displaced(self):
         views = filmed(400, people=1)
         found = drawn(ring(), views, rate=0.5, parts=1.0)
-        at = np.nonzero(found.there)
+        at = np.nonzero(found.present)
         legs = found.keypoints[at][:, 11:] - views.pixels[at[0], at[1], 0, 11:]
         assert lent(found, views)[at].all()
         shift = np.linalg.norm(np.nanmean(legs, axis=1), axis=-1)
@@ -315,29 +314,29 @@ class TestParts:
     def test_where_nobody_is_they_have_poses_of_their_own_at_the_same_rate(self):
         empty = filmed(1000, people=0)
         found, plain = (drawn(ring(), empty, rate=0.5, parts=parts) for parts in (1.0, 0.0))
-        assert found.there.sum() > 1500
+        assert found.present.sum() > 1500
         assert poses(found) == poses(plain)
 
     def test_they_go_along_with_the_people(self):
         views = filmed(400)
         found = drawn(ring(), views, rate=0.5, parts=1.0, life=1.0)
-        assert lent(found, views)[found.there].all()
+        assert lent(found, views)[found.present].all()
 
     def test_one_person_more_changes_only_those_made_of_that_one(self):
         three = filmed(400, people=3)
         keys = ("pixels", "visibility", "boxes", "area_visible")
         two = Views(*(getattr(three, key)[:, :, :2] for key in keys), three.source)
         more, fewer = (drawn(ring(), views, rate=0.5, parts=1.0) for views in (three, two))
-        np.testing.assert_array_equal(more.there, fewer.there)
+        np.testing.assert_array_equal(more.present, fewer.present)
         upper = [np.nan_to_num(found.keypoints[..., :11, :]) for found in (more, fewer)]
         same = (np.abs(upper[0] - upper[1]) < 12).all(axis=(-1, -2))  # jitter goes by the height, legs and all
-        changed = more.there & ~same
-        assert within(changed.sum(), more.there.sum(), 1 / 3)
+        changed = more.present & ~same
+        assert within(changed.sum(), more.present.sum(), 1 / 3)
 
 
 class TestPoses:
     def test_postures_stand_on_the_floor_and_have_two_sides_alike(self):
-        joints = postures(np.random.default_rng(0).standard_normal((3000, DRAWS)))
+        joints = postures(np.random.default_rng(0).standard_normal((3000, NORMALS)))
         length = lambda a, b: np.linalg.norm(joints[:, a] - joints[:, b], axis=-1)  # noqa: E731
         for left, right in (((5, 7), (6, 8)), ((7, 9), (8, 10)), ((11, 13), (12, 14)), ((13, 15), (14, 16))):
             np.testing.assert_allclose(length(*left), length(*right))
@@ -353,8 +352,8 @@ class TestPoses:
 
     def test_views_of_postures_fill_boxes_of_height_one(self):
         rng = np.random.default_rng(0)
-        joints = postures(rng.standard_normal((500, DRAWS)))
-        flat = seen_from(joints, rng.uniform(0, 6.3, 500), rng.uniform(0, 0.5, 500))
+        joints = postures(rng.standard_normal((500, NORMALS)))
+        flat = project_upright(joints, rng.uniform(0, 6.3, 500), rng.uniform(0, 0.5, 500))
         np.testing.assert_allclose(flat[..., 1].min(axis=1), -0.5)
         np.testing.assert_allclose(flat[..., 1].max(axis=1), 0.5)
         np.testing.assert_allclose(flat[..., 0].min(axis=1), -flat[..., 0].max(axis=1), atol=1e-12)
@@ -390,7 +389,7 @@ class TestReports:
     def test_what_is_reported_holds_together(self):
         rig = ring()
         found = drawn(rig, rate=1.0, life=0.3, views=0.3, parts=0.3, plausible=0.7)
-        t, v, s = np.nonzero(found.there)
+        t, v, s = np.nonzero(found.present)
         assert len(t) > 1000
         keypoints, scores = found.keypoints[t, v, s], found.scores[t, v, s]
         seen = scores > 0
@@ -408,13 +407,13 @@ class TestReports:
     @pytest.mark.parametrize("room", [0.0, 1.0])
     def test_scores_spread_as_asked_on_the_logit_scale(self, room):
         found = drawn(ring(), filmed(2000), rate=0.5, views=room, score=0.3, deviation=0.8)
-        scores = found.scores[found.there & (found.scores > 0).all(axis=-1)]
+        scores = found.scores[found.present & (found.scores > 0).all(axis=-1)]
         logit = np.log(scores / (1 - scores))
         many = np.sqrt(len(logit))
         assert abs(logit.mean() - np.log(0.3 / 0.7)) < 5 * 0.8 / many
         assert logit.std() == pytest.approx(0.8, abs=5 * 0.8 / many)
         exact = drawn(rate=0.5, score=0.3, deviation=0.0)
-        np.testing.assert_allclose(exact.scores[exact.there & (exact.scores > 0).all(axis=-1)], 0.3)
+        np.testing.assert_allclose(exact.scores[exact.present & (exact.scores > 0).all(axis=-1)], 0.3)
 
     @pytest.mark.parametrize("dial", [{"score": 0.8}, {"deviation": 0.1}])
     def test_scores_move_no_keypoint(self, dial):

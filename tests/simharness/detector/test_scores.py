@@ -4,12 +4,12 @@ from worlds import within, world
 
 from mvpose import COCO17
 from simharness.detector.conditions import Conditions
-from simharness.detector.correlation import Chances
+from simharness.detector.draws import KeyedDraws
 from simharness.detector.keypoints import find_keypoints
-from simharness.detector.scores import LEAST, score_keypoints
+from simharness.detector.scores import MIN_SCORE, score_keypoints
 from simharness.scenario.sections.detector import KINDS, Correlation, Keypoints, Scores
 from simharness.types.truth import KeypointError
-from simharness.types.visibility import Visibility
+from simharness.types.views import Visibility
 
 USUAL = {"good": 0.9, "jitter": 0.7, "miss": 0.4, "inversion": 0.6, "swap": 0.5}
 
@@ -25,11 +25,11 @@ def scored(where=None, *, seed=1, dials=None, **config):
         "drop": {"visible": 0.1},
     }
     conditions, tie = Conditions.of(where.views), Correlation()
-    chances = Chances(seed, where.sequence.time, len(where.rig))
+    draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     found = find_keypoints(
-        where.views, conditions, where.sequence, where.rig, Keypoints.model_validate(dials), tie, chances
+        where.views, conditions, where.sequence, where.rig, Keypoints.model_validate(dials), tie, draws
     )
-    return found, score_keypoints(found, conditions, Scores.model_validate(config), tie, chances)
+    return found, score_keypoints(found.error, found.guessed, conditions, Scores.model_validate(config), tie, draws)
 
 
 def test_by_default_every_keypoint_is_sure():
@@ -92,6 +92,6 @@ def test_hidden_joints_and_kinds_of_joints_have_factors():
 def test_scores_stay_in_range_and_what_is_reported_has_one():
     found, scores = scored(**USUAL, deviation=5.0, overconfident=0.3, underconfident=0.3)
     reported = found.error != KeypointError.ABSENT
-    assert (scores[reported] >= LEAST).all()
+    assert (scores[reported] >= MIN_SCORE).all()
     assert scores.max() <= 1
     assert (scores[~reported] == 0).all()

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import Camera, Detections, Pipeline, Rig
-from simharness.detector.detection_block import Found
-from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, in_crops
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.heatmaps import ASPECT, PADDING, Peaks, drop_outside_crops
 from simharness.scenario.sections.detector import HeatmapHead
 from simharness.types.truth import KeypointError
 
@@ -119,19 +119,19 @@ class TestAbsent:
         read = Detections.from_heatmaps(np.zeros(8, int), made.heatmaps())
         assert (read.detected == inside).all()
 
-        found = Found.nothing(2, 2, 2)
-        found.there[:] = True
+        found = DetectionBlock.empty(2, 2, 2)
+        found.present[:] = True
         found.keypoints[:], found.scores[:] = made.keypoints.reshape(2, 2, 2, 17, 2), 0.5
         found.boxes[:] = made.boxes.reshape(2, 2, 2, 4)
         found.keypoints[0, 0, 0], inside[0] = 1e4, False
-        cut = in_crops(found)
+        cut = drop_outside_crops(found)
         inside = inside.reshape(2, 2, 2, 17)
         assert ((cut.scores > 0) == inside).all()
         assert (np.isfinite(cut.keypoints[..., 0]) == inside).all()
         assert ((cut.error == KeypointError.ABSENT) == ~inside).all()
-        assert (cut.there == inside.any(axis=-1)).all()
-        assert not cut.there[0, 0, 0]
-        assert found.there.all()
+        assert (cut.present == inside.any(axis=-1)).all()
+        assert not cut.present[0, 0, 0]
+        assert found.present.all()
 
     def test_without_a_head_there_are_no_maps(self):
         with pytest.raises(ValueError, match=r'detector\.heatmaps\.size must be "64x48" or "96x72"'):

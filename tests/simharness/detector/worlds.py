@@ -8,8 +8,7 @@ from scipy.stats import binom
 from mvpose import Camera, Rig
 from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
-from simharness.types.views import Views
-from simharness.types.visibility import Visibility
+from simharness.types.views import Views, Visibility
 
 RATE = 10.0  # Hz
 

@@ -1,6 +1,6 @@
 import pytest
 
-from simharness.reality.detector_fit.twin import Twin, film_twin
+from simharness.reality.detector_fit.shelf_twin import Twin, film_twin
 
 
 @pytest.fixture(scope="session")

@@ -4,10 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17
-from simharness.detector.bias import shifts
-from simharness.detector.classes import MIRROR, by_chance, classify
+from simharness.detector.bias import pixel_offsets
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
+from simharness.detector.error_classes import MIRROR, classify, opposite_hits
 from simharness.scenario.sections.detector import Detector
 from simharness.types.truth import KeypointError
 
@@ -66,9 +66,9 @@ def test_misses_that_go_all_ways_fall_on_a_place_as_often_as_opposite_to_it():
     turn, far = rng.uniform(0, 2 * np.pi, (n, 17)), rng.uniform(2.35, 4.29, (n, 17))
     keypoints = np.stack([far * np.cos(turn), far * np.sin(turn)], axis=-1)
     error = classify(keypoints, target, np.ones((n, 17)), other=place)
-    taken, chance = (error == SWAP).sum(), by_chance(keypoints, target, place, np.ones((n, 17))).sum()
+    taken, chance = (error == SWAP).sum(), opposite_hits(keypoints, target, place, np.ones((n, 17))).sum()
     assert taken > 10000
-    assert not by_chance(keypoints, target, place, np.ones((n, 17)))[error == SWAP].any()
+    assert not opposite_hits(keypoints, target, place, np.ones((n, 17)))[error == SWAP].any()
     assert abs(int(taken) - int(chance)) < 5 * np.sqrt(taken + chance)
 
 
@@ -82,7 +82,7 @@ def test_drawn_labels_and_distances_agree(twin, seed):
         }
     )
     views, conditions = twin.views, Conditions.of(twin.views)
-    target = views.pixels + shifts(twin.sequence.joints, config.bias, twin.rig)
+    target = views.pixels + pixel_offsets(twin.sequence.joints, config.bias, twin.rig)
     agree: list[bool] = []
     kinds = set()
     found = detect(twin.sequence, views, twin.rig, config, seed=seed)

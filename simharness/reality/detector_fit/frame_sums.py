@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import HIDDEN, OWN, VISIBLE
-from simharness.detector.correlation import LIMBS as LIMB_OF
-from simharness.reality.detector_fit.dependence import grid, together
-from simharness.reality.detector_fit.judging import CLASSES, Judged
+from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
+from simharness.detector.draws import LIMB_OF_JOINT
+from simharness.reality.detector_fit.joint_labels import CLASSES, Judged
 from simharness.reality.detector_fit.sample import LIMBS
+from simharness.reality.detector_fit.tetrachoric import grid, together
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Keypoints
 from simharness.types.truth import MISS_FROM, KeypointError
 
@@ -27,7 +27,7 @@ LOGITS = np.linspace(-5.0, 5.0, 101)
 SCORED = ("good", "jitter", "miss", "inversion", "swap", "unknown")
 """The classes that have histograms of scores: those of KeypointError, and those of joints whose truth is unknown."""
 
-SIGHTS = (VISIBLE, OWN, HIDDEN)
+SIGHTS = (VISIBLE, SELF_OCCLUDED, OCCLUDED)
 
 TERCILES = ("small", "medium", "large")
 
@@ -75,10 +75,10 @@ def _shares(judged: Judged) -> Sums:
     n = {key: _by_sight(judged.risk[key], judged) for key in CLASSES}
     k = {key: _by_sight(judged.taken[key], judged) for key in CLASSES}
     for key, chance in judged.chance.items():
-        by_chance = _by_sight(chance, judged)
-        k[key] -= by_chance
-        n["miss"] += by_chance
-        k["miss"] += by_chance
+        opposite_hits = _by_sight(chance, judged)
+        k[key] -= opposite_hits
+        n["miss"] += opposite_hits
+        k["miss"] += opposite_hits
     return {f"n.{key}": n[key] for key in CLASSES} | {f"k.{key}": k[key] for key in CLASSES}
 
 
@@ -173,7 +173,7 @@ def _together(judged: Judged) -> Sums:
     frames, states = len(judged.seen), len(SIGHTS) * len(KINDS)
     state = judged.seen * len(KINDS) + np.array(KIND_OF_JOINT)  # how a joint is seen, and its kind
     member = state[..., None] == np.arange(states)  # (T, V, P, 17, 27)
-    limbs = np.array([limb == LIMB_OF for limb in range(LIMB_OF.max() + 1)])
+    limbs = np.array([limb == LIMB_OF_JOINT for limb in range(LIMB_OF_JOINT.max() + 1)])
     one, other = np.triu_indices(states)
     same = one == other
     result = {"views.k": np.zeros(frames), "limb.k": np.zeros(frames)}

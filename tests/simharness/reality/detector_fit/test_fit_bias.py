@@ -1,8 +1,8 @@
 import numpy as np
 
-from simharness.detector.bias import offsets
+from simharness.detector.bias import world_offsets
 from simharness.detector.conditions import oks_units
-from simharness.reality.detector_fit.offsets import Linear, fit_offsets, moved
+from simharness.reality.detector_fit.bias_fit import Linear, fit_offsets, moved
 from simharness.reality.detector_fit.sizes import boxes
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Bias
 
@@ -12,14 +12,14 @@ EXPECTED = np.array([getattr(BIAS, kind) for kind in KINDS])
 
 def seen(twin):
     joints = twin.sequence.joints[::10]
-    biased = joints + offsets(joints, BIAS)
+    biased = joints + world_offsets(joints, BIAS)
     keypoints = np.stack([camera.project(biased) for camera in twin.rig], axis=1)
     return joints, keypoints, oks_units(boxes(joints, twin.rig))
 
 
 def test_moved_is_what_the_detector_does(twin):
     joints = twin.sequence.joints[:5]
-    np.testing.assert_allclose(moved(joints, EXPECTED), joints + offsets(joints, BIAS), atol=1e-12)
+    np.testing.assert_allclose(moved(joints, EXPECTED), joints + world_offsets(joints, BIAS), atol=1e-12)
 
 
 def test_offsets_are_found_without_noise(twin):

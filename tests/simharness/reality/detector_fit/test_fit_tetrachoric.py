@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
-from simharness.reality.detector_fit.dependence import correlation, grid, life, together
+from simharness.reality.detector_fit.tetrachoric import correlation, grid, life, together
 
 
 @pytest.mark.parametrize(("p", "q"), [(0.5, 0.5), (0.1, 0.1), (0.02, 0.3), (0.9, 0.6)])

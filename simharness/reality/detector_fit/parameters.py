@@ -10,12 +10,12 @@ import numpy as np
 from scipy.special import expit, logit, ndtr
 
 from mvpose.arrays import Floats
-from simharness.detector.conditions import HIDDEN, OWN
-from simharness.reality.detector_fit.counting import LOGITS, SCORED, TERCILES, Sums, lags
-from simharness.reality.detector_fit.dependence import correlation, life, together
-from simharness.reality.detector_fit.judging import CLASSES
-from simharness.reality.detector_fit.offsets import solve
-from simharness.reality.detector_fit.sight import CONFUSION
+from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED
+from simharness.reality.detector_fit.bias_fit import solve
+from simharness.reality.detector_fit.frame_sums import LOGITS, SCORED, TERCILES, Sums, lags
+from simharness.reality.detector_fit.joint_labels import CLASSES
+from simharness.reality.detector_fit.occlusion import CONFUSION
+from simharness.reality.detector_fit.tetrachoric import correlation, life, together
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
 from simharness.types.truth import GOOD_BELOW
 
@@ -32,7 +32,7 @@ def figures(sums: Sums, *, step: float) -> dict[str, Floats]:
     """All figures, by key; each (R,).
 
     Args:
-        sums: of :func:`simharness.reality.detector_fit.counting.count`, over the frames of R resamples.
+        sums: of :func:`simharness.reality.detector_fit.frame_sums.count`, over the frames of R resamples.
         step: seconds from one frame to the next.
     """
     result: dict[str, Floats] = {}
@@ -105,7 +105,7 @@ def _harder(n: dict[str, Floats], k: dict[str, Floats], share: dict[str, Floats]
     for key in ("miss", "jitter"):
         mean = np.einsum("rc,rck->rk", np.where(np.isfinite(factor), factor, 1.0), truly[key]) / truly[key].sum(axis=1)
         _spread(result, f"keypoints.{key}", share[key] / mean)
-    return result | {"keypoints.self_occluded": factor[:, OWN], "keypoints.occluded": factor[:, HIDDEN]}
+    return result | {"keypoints.self_occluded": factor[:, SELF_OCCLUDED], "keypoints.occluded": factor[:, OCCLUDED]}
 
 
 def _sigma(square: Floats) -> Floats:

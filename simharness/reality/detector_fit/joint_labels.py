@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats
-from simharness.detector.classes import MIRROR, apart, by_chance, classify
-from simharness.detector.conditions import MEETS, OUTSIDE, VISIBLE, oks_units, overlaps
+from simharness.detector.conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
+from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
 from simharness.detector.view_geometry import image_axes
 from simharness.reality.detector_fit import sizes
 from simharness.reality.detector_fit.association import Association, associate
-from simharness.reality.detector_fit.offsets import Linear, fit_offsets, moved
+from simharness.reality.detector_fit.bias_fit import Linear, fit_offsets, moved
+from simharness.reality.detector_fit.occlusion import seen, with_face
 from simharness.reality.detector_fit.sample import LIMBS, Sample
-from simharness.reality.detector_fit.sight import seen, with_face
 from simharness.types.truth import KeypointError
 
 CLASSES = ("drop", "swap", "inversion", "miss", "jitter")
@@ -36,7 +36,7 @@ class Judged:
         boxes: of the people, (T, V, P, 4).
         unit: OKS sigma x sqrt(area), (T, V, P, 17) pixels.
         target: where the detector means the joints to be, (T, V, P, 17, 2) pixels; NaN where unknown.
-        seen: how each joint is seen, as far as skeletons tell, (T, V, P, 17): VISIBLE, OWN or HIDDEN.
+        seen: how each joint is seen, as far as skeletons tell, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED.
         wanted: who should be found, (T, V, P): known people of whom half the limb joints are in the picture.
         error: :class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where no truth is known.
         risk: of each of CLASSES, which joints it could have taken, (T, V, P, 17).
@@ -89,15 +89,15 @@ def judge(sample: Sample) -> Judged:
     miss, jitter = error == KeypointError.MISS, error == KeypointError.JITTER
     risk = {
         "drop": found,
-        "swap": judged & apart(neighbour, target, unit),
-        "inversion": judged & ~swap & apart(mirrored, target, unit),
+        "swap": judged & distinguishable(neighbour, target, unit),
+        "inversion": judged & ~swap & distinguishable(mirrored, target, unit),
         "miss": judged & ~swap & ~inversion,
         "jitter": judged & ~swap & ~inversion & ~miss,
     }
     taken = {"drop": found & ~reported, "swap": swap, "inversion": inversion, "miss": miss, "jitter": jitter}
     chance = {
-        "swap": miss & by_chance(keypoints, target, neighbour, unit),
-        "inversion": miss & by_chance(keypoints, target, mirrored, unit),
+        "swap": miss & opposite_hits(keypoints, target, neighbour, unit),
+        "inversion": miss & opposite_hits(keypoints, target, mirrored, unit),
     }
     with np.errstate(invalid="ignore", divide="ignore"):
         residual = np.where(judged[..., None], (keypoints - target) / unit[..., None], np.nan)
@@ -134,4 +134,4 @@ def _neighbours(boxes: Floats, target: Floats, strangers: Floats, rig: Rig) -> F
         return np.full(target.shape, np.nan)
     nearest = overlap.argmax(axis=-1)[..., None, None]
     chosen = np.take_along_axis(everyone, nearest, axis=2)
-    return np.where((overlap.max(axis=-1) > MEETS)[..., None, None], chosen, np.nan)
+    return np.where((overlap.max(axis=-1) > OVERLAP_MIN)[..., None, None], chosen, np.nan)

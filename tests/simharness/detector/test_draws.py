@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtri
 from scipy.stats import kstest
 
-from simharness.detector.correlation import LIMBS, Chances, logistic
+from simharness.detector.draws import LIMB_OF_JOINT, KeyedDraws, logistic
 
 TIME = np.arange(4000) / 10.0
 
@@ -14,7 +14,7 @@ TIME = np.arange(4000) / 10.0
 @pytest.mark.parametrize("shared", [0.0, 0.4, 1.0])
 def test_whatever_is_shared_or_lasts_an_event_comes_as_often_as_asked(life, shared):
     states = np.concatenate(
-        [Chances(seed, TIME[:400], 3).states("x", life=life, shared=shared)[::10] for seed in range(60)]
+        [KeyedDraws(seed, TIME[:400], 3).states("x", life=life, shared=shared)[::10] for seed in range(60)]
     )
     for chance in (0.05, 0.3):
         # Draws that last or are shared are fewer: the bound is for the independent ones among them.
@@ -25,16 +25,16 @@ def test_whatever_is_shared_or_lasts_an_event_comes_as_often_as_asked(life, shar
 
 @pytest.mark.parametrize("shared", [0.0, 0.3, 0.7, 1.0])
 def test_views_share_what_is_asked(shared):
-    states = Chances(1, TIME, 2).joint_states("x", 0, shared=shared)
+    states = KeyedDraws(1, TIME, 2).joint_states("x", 0, shared=shared)
     assert np.corrcoef(states[:, 0].ravel(), states[:, 1].ravel())[0, 1] == pytest.approx(shared, abs=0.015)
     assert states.std() == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("limb", [0.0, 0.5, 1.0])
 def test_joints_share_what_is_asked_with_their_limb_alone(limb):
-    states = Chances(2, TIME, 1).joint_states("x", 0, limb=limb)[:, 0]
+    states = KeyedDraws(2, TIME, 1).joint_states("x", 0, limb=limb)[:, 0]
     correlation = np.corrcoef(states.T)
-    same = LIMBS[:, None] == LIMBS
+    same = LIMB_OF_JOINT[:, None] == LIMB_OF_JOINT
     np.fill_diagonal(correlation, np.nan)
     np.testing.assert_allclose(np.nanmean(correlation[same]), limb, atol=0.02)
     np.testing.assert_allclose(np.nanmean(correlation[~same]), 0.0, atol=0.02)
@@ -42,16 +42,16 @@ def test_joints_share_what_is_asked_with_their_limb_alone(limb):
 
 @pytest.mark.parametrize("life", [0.3, 1.0, 4.0])
 def test_states_live_as_long_as_asked(life):
-    states = np.stack([Chances(seed, TIME, 1).states("x", life=life)[:, 0] for seed in range(5)])
+    states = np.stack([KeyedDraws(seed, TIME, 1).states("x", life=life)[:, 0] for seed in range(5)])
     changes = (np.diff(states, axis=1) != 0).mean()
     # Observed ten times a second, a life of mean L is seen to end with chance 1 - exp(-0.1 / L).
     assert changes == pytest.approx(-np.expm1(-0.1 / life), rel=0.1)
 
 
 def test_states_with_the_same_lives_change_together_and_others_do_not():
-    chances = Chances(3, TIME, 2)
-    one, two = (chances.joint_states(name, lives=("joint",), life=1.0) for name in "ab")
-    other = chances.joint_states("a", life=1.0)
+    draws = KeyedDraws(3, TIME, 2)
+    one, two = (draws.joint_states(name, lives=("joint",), life=1.0) for name in "ab")
+    other = draws.joint_states("a", life=1.0)
     changed = np.diff(one, axis=0) != 0
     np.testing.assert_array_equal(changed, np.diff(two, axis=0) != 0)
     assert (changed[:, 0] == changed[:, 1]).all()
@@ -59,7 +59,7 @@ def test_states_with_the_same_lives_change_together_and_others_do_not():
 
 
 def test_what_wanders_forgets_in_its_life():
-    values = Chances(4, TIME, 1).wandering("x", shape=(40,), life=0.8)
+    values = KeyedDraws(4, TIME, 1).autoregressive("x", shape=(40,), life=0.8)
     assert values.std() == pytest.approx(1.0, abs=0.05)
     for lag in (1, 5, 10):
         seen = (values[lag:] * values[:-lag]).mean()
@@ -68,19 +68,19 @@ def test_what_wanders_forgets_in_its_life():
 
 
 def test_a_longer_sequence_begins_like_a_shorter_one_and_more_views_change_none():
-    short, long = (Chances(5, TIME[:n], views) for n, views in ((50, 2), (90, 4)))
+    short, long = (KeyedDraws(5, TIME[:n], views) for n, views in ((50, 2), (90, 4)))
     for draw in (
-        lambda chances: chances.joint_states("x", 0, life=0.5, shared=0.3, limb=0.2)[:, :2],
-        lambda chances: chances.wandering("y", shape=(3,), life=0.5),
-        lambda chances: chances.uniform("z", shape=(2,)),
+        lambda draws: draws.joint_states("x", 0, life=0.5, shared=0.3, limb=0.2)[:, :2],
+        lambda draws: draws.autoregressive("y", shape=(3,), life=0.5),
+        lambda draws: draws.uniform("z", shape=(2,)),
     ):
         np.testing.assert_array_equal(draw(short), draw(long)[:50])
 
 
 def test_one_frame_is_enough():
-    one = Chances(6, TIME[:1], 2)
+    one = KeyedDraws(6, TIME[:1], 2)
     assert one.states("x", life=1.0).shape == (1, 2)
-    assert one.wandering("x", life=1.0).shape == (1,)
+    assert one.autoregressive("x", life=1.0).shape == (1,)
 
 
 @given(st.floats(0.0, 1.0), st.floats(-30, 30))

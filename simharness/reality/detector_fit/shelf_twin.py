@@ -9,20 +9,19 @@ from numpy.typing import NDArray
 
 from mvpose import Rig
 from simharness.capture.film import film
-from simharness.capture.ray_visibility import RayEye
+from simharness.capture.ray_visibility import RayObserver
 from simharness.detector.conditions import OUTSIDE, Conditions
 from simharness.detector.detect import detect
-from simharness.reality.detector_fit.judging import judge
+from simharness.reality.detector_fit.joint_labels import judge
 from simharness.reality.detector_fit.sample import SHELF_RATE, Sample, of_simulation
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
-from simharness.world.rigs.faults import shoot
+from simharness.world.rigs.faults import schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
-from simharness.world.scene.playback import Playback
-from simharness.world.scene.simulation import simulate
+from simharness.world.scene.playback import Playback, simulate
 
 
 @dataclass(frozen=True)
@@ -75,20 +74,20 @@ def film_twin(*, seconds: float = 12.0, seed: int = 0, shelves: int = 0) -> Twin
     )
     rig = build_rig(scenario.cameras, seed=seed, room=None)
     scene = build(scenario, rig)
-    shots = shoot(rig, scenario.faults, scene.time, seed=seed)
+    exposures = schedule_exposures(rig, scenario.faults, scene.time, seed=seed)
     playback = Playback(scene)
-    return Twin(simulate(scene), film(playback, shots, RayEye(playback)), rig)
+    return Twin(simulate(scene), film(playback, exposures, RayObserver(playback)), rig)
 
 
 def confusion(twin: Twin, sample: Sample) -> NDArray[np.int64]:
-    """How often joints that skeletons tell to be VISIBLE, OWN or HIDDEN truly are, (9, 3, 3): ``sight.CONFUSION``.
+    """How often joints that skeletons tell to be VISIBLE, SELF_OCCLUDED or OCCLUDED truly are, (9, 3, 3): ``sight.CONFUSION``.
 
     Args:
         twin: what truly happened.
         sample: what a detector found of it.
     """
     judged = judge(sample)
-    truly = Conditions.of(twin.views).seen
+    truly = Conditions.of(twin.views).occlusion
     counted = judged.risk["drop"] & (truly != OUTSIDE)
     kind = np.broadcast_to(np.array(KIND_OF_JOINT), counted.shape)
     result = np.zeros((len(KINDS), 3, 3), np.int64)

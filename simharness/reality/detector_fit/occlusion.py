@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mvpose import COCO17, Rig
 from mvpose.arrays import Floats
 from simharness.detector.bias import body_axes
-from simharness.detector.conditions import HIDDEN, OUTSIDE, OWN, VISIBLE
+from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE
 from simharness.reality.detector_fit.sizes import head
 
 CONFUSION = np.array(
@@ -29,7 +29,7 @@ CONFUSION = np.array(
         [[0.84, 0.13, 0.03], [0.14, 0.83, 0.03], [0.01, 0.00, 0.99]],  # ankles
     ]
 )
-"""What joints truly are that skeletons tell to be VISIBLE, OWN and HIDDEN, (9, 3, 3): rows of shares by what they tell.
+"""What joints truly are that skeletons tell to be VISIBLE, SELF_OCCLUDED and OCCLUDED, (9, 3, 3): rows of shares by what they tell.
 Counted on simulated, dressed people on the rig of Shelf (:func:`twin.confusion`, seeds 10, 11, 14 and 15).
 """
 
@@ -84,7 +84,7 @@ def with_face(reference: Floats, consensus: Floats) -> tuple[Floats, Floats]:
 
 
 def seen(joints: Floats, looks: Floats, strangers: Floats, rig: Rig) -> NDArray[np.int8]:
-    """How each joint is seen, (T, V, P, 17): VISIBLE, OWN, HIDDEN or OUTSIDE; OUTSIDE where it is unknown.
+    """How each joint is seen, (T, V, P, 17): VISIBLE, SELF_OCCLUDED, OCCLUDED or OUTSIDE; OUTSIDE where it is unknown.
 
     Args:
         joints: of the known people, with the face, (T, P, 17, 3) metres; NaN where unknown.
@@ -118,13 +118,13 @@ def seen(joints: Floats, looks: Floats, strangers: Floats, rig: Rig) -> NDArray[
             hides[:, own, :5] &= ~_OF_HEAD  # which has a rule of its own
             hidden = hides.any(axis=-1)
             theirs = label[now]
-            theirs[hidden & own[:, None] & (theirs == VISIBLE)] = OWN
-            theirs[hidden & ~own[:, None]] = HIDDEN
+            theirs[hidden & own[:, None] & (theirs == VISIBLE)] = SELF_OCCLUDED
+            theirs[hidden & ~own[:, None]] = OCCLUDED
             label[now] = theirs
         ray = camera.center - joints[..., :5, :]
         away = (looks * ray).sum(axis=-1) < _TURNED_AWAY * np.linalg.norm(ray, axis=-1)
         face = label[..., :5]
-        face[away & (face == VISIBLE)] = OWN
+        face[away & (face == VISIBLE)] = SELF_OCCLUDED
         label[~camera.inside(pixels)] = OUTSIDE
     return result
 

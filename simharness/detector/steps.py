@@ -1,0 +1,177 @@
+"""Registry of detector errors: the ordered steps that turn perfect detections into those of a real detector.
+
+:func:`simharness.detector.detect.detect` begins with the perfect detections of all people
+(:meth:`DetectionBlock.of_people`) and runs every registered step on them, ordered by :class:`Stage` and within a stage
+by :data:`MODULES`.
+
+How to add an error, for example keypoints that are rounded to whole pixels:
+
+1. Parameters: a model in ``simharness/scenario/sections/detector.py`` and one field of ``Detector`` with it. The
+   default of every parameter means that the error does not occur::
+
+       class Quantisation(Section):
+           pixels: Amount = Field(0.0, description="px, grid that keypoints are rounded to; 0: not rounded")
+
+       class Detector(Section):
+           quantisation: Quantisation = Quantisation()
+
+2. The step: one new file, ``simharness/detector/quantisation.py``::
+
+       @step("quantisation", stage=Stage.DETECTIONS, sections=("quantisation",))
+       def quantise(block: DetectionBlock, context: Context) -> DetectionBlock:
+           grid = context.config.quantisation.pixels
+           if grid == 0:
+               return block
+           return replace(block, keypoints=grid * np.round(block.keypoints / grid))
+
+3. The registration: the name of that file in :data:`MODULES`, one line.
+
+Rules for a step:
+
+- It changes no array of the block that it gets, and returns a new block (``dataclasses.replace``).
+- It keeps the fields consistent: where a keypoint is not reported, its coordinates are NaN, its score 0 and its error
+  class ABSENT; a slot without a reported keypoint is not ``present``; where a keypoint moves far, ``error`` follows
+  (:func:`simharness.detector.error_classes.classify`). Appended slots go behind the others
+  (:meth:`DetectionBlock.concatenate`).
+- Random numbers come from ``context.draws``, under a key that begins with the name of the step, and never from
+  another generator. Draw the whole block first and mask it afterwards, so that the draws depend on nothing but the key
+  and the shape of the sequence. Then a parameter at zero changes nothing, and a parameter that is raised adds errors
+  and changes no other draw: two runs that differ in one parameter are paired.
+- Keys of existing draws never change, not even to follow a renamed function: a new key is another detector.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+from mvpose.camera import Rig
+from simharness.detector.conditions import Conditions
+from simharness.detector.detection_block import DetectionBlock
+from simharness.detector.draws import KeyedDraws
+from simharness.scenario.sections.detector import Detector
+from simharness.types.sequence import Sequence
+from simharness.types.views import Views
+
+MODULES = (
+    "keypoints",
+    "scores",
+    "boxes",
+    "phantoms",
+    "decoys",
+    "heatmaps",
+    "delivery",
+)
+"""Modules of ``simharness.detector`` that register steps, in the order in which steps of one stage run."""
+
+
+class Stage(IntEnum):
+    """Stage of detection in which a step runs; what the block holds before it."""
+
+    KEYPOINTS = 1
+    """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1."""
+    SCORES = 2
+    """Scores of keypoints. One slot for each person, keypoints with their errors."""
+    PEOPLE = 3
+    """Which people are detected, and their boxes. One slot for each person, with all keypoints and scores."""
+    FALSE_POSITIVES = 4
+    """Detections that show no person, in appended slots. The slots of people are complete."""
+    DETECTIONS = 5
+    """Errors that people and false positives have in common. All slots are complete."""
+    DELIVERY = 6
+    """Which picture arrives in which frame. The block is by the frame in which a picture was taken."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """Everything that a step may read: the truth, the cameras, the parameters and the random draws.
+
+    Attributes:
+        sequence: ground truth in space, T frames of P people.
+        views: ground truth in the pictures of V cameras.
+        rig: true rig, which takes the pictures.
+        config: all parameters of the detector.
+        draws: keyed random draws.
+    """
+
+    sequence: Sequence
+    views: Views
+    rig: Rig
+    config: Detector
+    draws: KeyedDraws
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Viewing conditions of everyone in the pictures."""
+        return Conditions.of(self.views)
+
+
+StepFunction = Callable[[DetectionBlock, Context], DetectionBlock]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One registered error of the detector.
+
+    Attributes:
+        name: unique name.
+        stage: when it runs.
+        sections: sections of ``[detector]`` that it reads.
+        apply: the function itself.
+    """
+
+    name: str
+    stage: Stage
+    sections: tuple[str, ...]
+    apply: StepFunction
+
+
+REGISTRY: dict[str, Step] = {}
+"""Registered steps by name; complete after :func:`registered_steps`."""
+
+
+def step(name: str, *, stage: Stage, sections: tuple[str, ...] = ()) -> Callable[[StepFunction], StepFunction]:
+    """Register the decorated function as a step of the detector.
+
+    Args:
+        name: unique name of the step.
+        stage: when it runs.
+        sections: sections of ``[detector]`` that it reads.
+
+    Raises:
+        ValueError: the name is taken, or a section is no field of :class:`Detector`.
+    """
+    if name in REGISTRY:
+        raise ValueError(f"detector step {name!r} is registered twice; choose another name")
+    for section in sections:
+        if section not in Detector.model_fields:
+            near = difflib.get_close_matches(section, Detector.model_fields, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(
+                f"detector step {name!r}: expected sections of [detector] ({', '.join(Detector.model_fields)}), "
+                f"got {section!r}{hint}"
+            )
+
+    def register(function: StepFunction) -> StepFunction:
+        REGISTRY[name] = Step(name, stage, sections, function)
+        return function
+
+    return register
+
+
+def registered_steps() -> tuple[Step, ...]:
+    """Return all steps in the order in which they run: by stage, then by :data:`MODULES`, others last.
+
+    The order does not depend on which module is imported first.
+    """
+    order = [importlib.import_module(f"simharness.detector.{module}").__name__ for module in MODULES]
+
+    def place(each: Step) -> tuple[int, int]:
+        module = each.apply.__module__
+        return each.stage, order.index(module) if module in order else len(order)
+
+    return tuple(sorted(REGISTRY.values(), key=place))
