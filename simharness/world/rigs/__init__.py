@@ -1,1 +1,1 @@
-"""Rigs of cameras: layouts, published rigs and calibration files, and what goes wrong with them."""
+"""Camera rigs: layouts, published rigs, lenses, faults and exposure schedules."""

@@ -1,4 +1,4 @@
-"""Where the cameras of a layout stand."""
+"""Camera positions of the layouts."""
 
 from __future__ import annotations
 
@@ -9,48 +9,49 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.scenario.sections.scenario import Cameras
 
-_FROM_WALLS = 0.25  # metres: cameras in the corners of a room
-_GOLDEN = 180.0 * (3.0 - np.sqrt(5.0))  # degrees: turns of it never gather on one side
-_LOWEST = 1.0 / 3.0  # of a dome's height: people stand beneath
+_WALL_DISTANCE = 0.25  # metres: cameras in the corners of a room
+_GOLDEN = 180.0 * (3.0 - np.sqrt(5.0))  # degrees: the golden angle spreads bearings evenly
+_LOWEST = 1.0 / 3.0  # lowest cameras of a dome, as a share of its height: people stand below
 
 
-def places(cameras: Cameras, *, room: tuple[float, float, float] | None = None) -> Floats:
-    """Where the cameras of a layout stand, before any jitter.
+def camera_positions(cameras: Cameras, *, room: tuple[float, float, float] | None = None) -> Floats:
+    """Return the positions of the cameras of a layout, without jitter.
 
-    Bearings run counter-clockwise from the x axis as seen from above; ``start`` is the first.
+    Bearings are counter-clockwise from the x axis as seen from above; ``start`` is the first one.
 
     - ring: camera k at the bearing ``start + 360 k / count``, ``radius`` from the z axis;
-    - arc: evenly from ``start`` to ``start + spread`` on the same circle, both ends included;
-    - line: ``spacing`` apart, across the bearing ``start`` at ``radius``, from right to left as seen from the z axis;
-    - corners: of the room, 0.25 m from its walls, or of the square of half side ``radius`` where there is no room;
-      after four the middles of the walls, then the quarters, and so on;
-    - dome: on the half ellipsoid that stands on the floor at ``radius`` and is ``height`` high, evenly by area from a
-      third of the height to the top, each a golden angle from the one below (or at ``heights``);
-    - pairs: two by two, ``spacing`` apart, side by side on a ring as camera k of which each pair stands;
+    - arc: evenly spaced from ``start`` to ``start + spread`` on the same circle, both ends included;
+    - line: ``spacing`` apart, perpendicular to the bearing ``start`` at distance ``radius``, from right to left as seen
+      from the z axis;
+    - corners: corners of the room, 0.25 m from its walls, or of the square of half side ``radius`` without a room;
+      after four cameras the middles of the walls, then the quarters, and so on;
+    - dome: on the half ellipsoid on the floor with radius ``radius`` and height ``height``, evenly by area from a third
+      of the height to the top, each rotated by the golden angle from the one below (or at ``heights``);
+    - pairs: two cameras side by side, ``spacing`` apart, at each position of a ring;
     - free: ``positions``.
 
     Args:
-        cameras: the section of the scenario.
-        room: its x, y, z, metres; None: no walls.
+        cameras: camera section of the scenario.
+        room: size x, y, z of the room, metres; None without walls.
 
     Returns:
-        (n, 3) metres.
+        Positions, (n, 3), metres.
 
     Raises:
-        ValueError: numbers that make no such layout, naming the key.
+        ValueError: values that do not give such a layout; the message names the key.
     """
     if cameras.layout == "free":
         if not cameras.positions:
-            raise ValueError("cameras.layout = 'free' needs cameras.positions: one [x, y, z] for every camera, metres")
+            raise ValueError("cameras.layout = 'free' needs cameras.positions: one [x, y, z] in metres per camera")
         return np.array(cameras.positions)
     count = cameras.count
     if count < 2:
-        raise ValueError(f"cameras.count = {count}: a rig needs at least 2 cameras to triangulate, got {count}")
+        raise ValueError(f"cameras.count = {count}: expected at least 2, because triangulation needs 2 cameras")
     if cameras.layout == "dome":
         return _dome(cameras)
     if cameras.layout == "corners":
         half = np.array([cameras.radius, cameras.radius] if room is None else room[:2])
-        flat = _corners(count, half if room is None else half / 2 - _FROM_WALLS)
+        flat = _corners(count, half if room is None else half / 2 - _WALL_DISTANCE)
     else:
         flat = _FLAT[cameras.layout](cameras)
     return np.column_stack([flat, _heights(cameras)])
@@ -61,7 +62,7 @@ def _heights(cameras: Cameras) -> Floats:
 
 
 def _at(bearings: Floats, radius: float | Floats) -> Floats:
-    """Points (n, 2) at bearings (n,), degrees."""
+    """Return points (n, 2) at bearings (n,), degrees."""
     angles = np.radians(bearings)
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles)])
 
@@ -73,7 +74,8 @@ def _ring(cameras: Cameras) -> Floats:
 def _arc(cameras: Cameras) -> Floats:
     if cameras.spread == 360.0:
         raise ValueError(
-            "cameras.spread = 360 puts the last camera of the arc on the first: take cameras.layout = 'ring', or less"
+            "cameras.spread = 360 puts the last camera of the arc on the first: use cameras.layout = 'ring' or a "
+            "smaller cameras.spread"
         )
     return _at(cameras.start + cameras.spread * np.arange(cameras.count) / (cameras.count - 1), cameras.radius)
 
@@ -98,9 +100,9 @@ _FLAT: dict[str, Callable[[Cameras], Floats]] = {"ring": _ring, "arc": _arc, "li
 
 
 def _corners(count: int, half: Floats) -> Floats:
-    """Around a rectangle of half sides (2,): its corners, then the middles of its sides, then the quarters, ..."""
+    """Return points on a rectangle of half sides (2,): corners, then middles of the sides, then quarters, ..."""
     if (half <= 0).any():
-        raise ValueError(f"room.size leaves no corners {_FROM_WALLS:g} m from the walls for cameras.layout = 'corners'")
+        raise ValueError(f"room.size is too small for cameras.layout = 'corners', {_WALL_DISTANCE:g} m from the walls")
     corners = half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
     shares, steps = [0.0], 2
     while 4 * len(shares) < count:
@@ -113,11 +115,11 @@ def _corners(count: int, half: Floats) -> Floats:
 def _dome(cameras: Cameras) -> Floats:
     top, count = cameras.height, cameras.count
     if top <= 0:
-        raise ValueError(f"cameras.height = {top:g} leaves a dome no height: expected metres above the floor")
+        raise ValueError(f"cameras.height = {top:g}: a dome needs a height above 0 m")
     if cameras.heights and max(cameras.heights) > top:
         raise ValueError(
-            f"cameras.heights reaches {max(cameras.heights):g} m, above the top of the dome: take cameras.height at "
-            "least that"
+            f"cameras.heights reaches {max(cameras.heights):g} m, above the top of the dome at cameras.height = "
+            f"{top:g} m: use a larger cameras.height"
         )
     z = _heights(cameras) if cameras.heights else top * (_LOWEST + (1 - _LOWEST) * np.arange(count) / (count - 1))
     radius = cameras.radius * np.sqrt(np.maximum(1.0 - (z / top) ** 2, 0.0))

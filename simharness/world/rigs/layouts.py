@@ -1,4 +1,4 @@
-"""Camera layouts: from the section of a scenario to a calibrated rig."""
+"""Rig of a scenario: from its camera section to calibrated cameras."""
 
 from __future__ import annotations
 
@@ -11,38 +11,39 @@ from mvpose.camera import Camera, Rig
 from simharness.formats.calibration.registry import read_calibration
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.random_streams import stream
-from simharness.world.rigs.camera_positions import places
+from simharness.world.rigs.camera_positions import camera_positions
 from simharness.world.rigs.lenses import check_lens, intrinsics
 from simharness.world.rigs.presets import preset_rig
 
-_STEEPEST = 1e-6  # sine of the angle to the vertical below which a camera has no upright roll
-_SAME = 1e-9  # metres
-_NO_TURN = 1e-6  # of a rotation matrix' elements
+_STEEPEST = 1e-6  # sine of the angle to the vertical below which the upright roll is undefined
+_SAME = 1e-9  # metres: closer points are the same
+_NO_TURN = 1e-6  # largest deviation of a rotation matrix from the identity
 
 
 def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, float] | None = None) -> Rig:
-    """Place the cameras of a scenario.
+    """Build the rig of a scenario.
 
-    :func:`simharness.world.rigs.camera_positions.places` says where those of a layout stand. They are upright, have square pixels
-    and look at ``aim``; ``jitter`` and ``aim_jitter`` draw how far off each stands and looks, from streams of that
-    camera. Presets and calibrations in files are taken as they are.
+    The cameras of a layout stand at the positions of
+    :func:`simharness.world.rigs.camera_positions.camera_positions`, are upright, have square pixels and look at
+    ``aim``; ``jitter`` and ``aim_jitter`` are standard deviations of errors of position and aim, drawn from a separate
+    stream for each camera. Presets and calibration files are used unchanged.
 
     Args:
-        cameras: the section of the scenario.
-        seed: of the scenario.
-        room: its x, y, z, metres, for cameras in its corners; None: it has no walls.
+        cameras: camera section of the scenario.
+        seed: seed of the scenario.
+        room: size x, y, z of the room in metres, for cameras in its corners; None without walls.
 
     Returns:
         The rig; the cameras of a layout are named "cam0", "cam1", ...
 
     Raises:
-        ValueError: numbers that make no layout, a camera that stands in what it looks at, a lens that folds over
-            within the picture, a file that cannot be read, names that the rig has not; the message names the key.
+        ValueError: values that do not give a layout, a camera at the point that it looks at, a lens that folds over
+            inside the picture, a file that cannot be read, or unknown camera names; the message names the key.
     """
     if "layout" not in cameras.model_fields_set:
         for key, layout in (("preset", "preset"), ("file", "file"), ("positions", "free")):
             if getattr(cameras, key):
-                raise ValueError(f"cameras.{key} is given, but no layout: add cameras.layout = {layout!r}")
+                raise ValueError(f"cameras.{key} is given without a layout: add cameras.layout = {layout!r}")
     if cameras.layout == "preset":
         if cameras.preset is None:
             raise ValueError("cameras.layout = 'preset' needs cameras.preset: the name of a published rig")
@@ -61,12 +62,12 @@ def build_rig(cameras: Cameras, *, seed: int = 0, room: tuple[float, float, floa
 
 
 def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | None) -> Rig:
-    centers = places(cameras, room=room)
+    centers = camera_positions(cameras, room=room)
     aims = np.array(cameras.aims if cameras.layout == "free" and cameras.aims else [cameras.aim] * len(centers))
     if len(aims) != len(centers):
         raise ValueError(
             f"cameras.aims has {len(aims)} points and cameras.positions {len(centers)}; expected one aim for every "
-            "camera, or none where all look at cameras.aim"
+            "camera, or none if all look at cameras.aim"
         )
     for k in range(len(centers)):
         centers[k] += cameras.jitter * stream(seed, "cameras", "position", k).standard_normal(3)
@@ -83,20 +84,22 @@ def _laid_out(cameras: Cameras, seed: int, room: tuple[float, float, float] | No
 
 def _from_file(cameras: Cameras) -> Rig:
     if not cameras.file:
-        raise ValueError("cameras.layout = 'file' needs cameras.file: a calibration, relative to the scenario's folder")
+        raise ValueError(
+            "cameras.layout = 'file' needs cameras.file: a calibration file, relative to the folder of the scenario"
+        )
     rig = read_calibration(cameras.file, size=cameras.size, only=cameras.only)
     for camera in rig:
         if np.abs(camera.R - np.eye(3)).max() < _NO_TURN and np.abs(camera.t).max() < _SAME:
-            # The world is that camera's, as a stereo calibration leaves it: it hangs where a ring's first one would.
+            # The world frame is that of one camera, as after stereo calibration: it is placed as camera 0 of a ring.
             bearing = np.radians(cameras.start)
             center = (cameras.radius * np.cos(bearing), cameras.radius * np.sin(bearing), cameras.height)
-            return carried(rig, camera, to=look_at(center, cameras.aim, K=camera.K, size=camera.size))
+            return aligned(rig, camera, to=look_at(center, cameras.aim, K=camera.K, size=camera.size))
     return rig
 
 
-def carried(rig: Rig, camera: Camera, *, to: Camera) -> Rig:
-    """The rig moved as a whole so that ``camera``, one of it, stands and looks as ``to`` does."""
-    turn = camera.R.T @ to.R  # from the new world to the old
+def aligned(rig: Rig, camera: Camera, *, to: Camera) -> Rig:
+    """Return the rig moved as a whole such that its ``camera`` has the pose of ``to``."""
+    turn = camera.R.T @ to.R  # from the new world frame to the old one
     shift = camera.R.T @ (to.t - camera.t)
     return Rig([replace(each, R=each.R @ turn, t=each.R @ shift + each.t) for each in rig])
 
@@ -112,25 +115,25 @@ def look_at(
 ) -> Camera:
     """Return the upright camera at ``center`` that looks at ``aim``: image y is down, the horizon is level.
 
-    A camera straight above or below its aim has no horizon: its image x is the world's.
+    For a camera exactly above or below its aim, image x is the world x axis.
 
     Args:
-        center: where the camera stands, (3,), metres.
-        aim: the point on its optical axis, (3,), metres.
+        center: position of the camera, (3,), metres.
+        aim: point on its optical axis, (3,), metres.
         K: intrinsics, (3, 3).
         size: width and height in pixels.
         distortion: k1 k2 p1 p2 k3, (5,); none by default.
-        name: the camera's name.
+        name: name of the camera.
 
     Raises:
-        ValueError: the camera stands in the point.
+        ValueError: position and aim are the same point.
     """
     center, aim = np.asarray(center, float), np.asarray(aim, float)
     forward = aim - center
     distance = float(np.linalg.norm(forward))
     if distance <= _SAME:
         raise ValueError(
-            f"camera {name!r} at {center.tolist()} stands in the point that it looks at: move cameras.aim or the camera"
+            f"camera {name!r} at {center.tolist()} is at the point that it looks at: move cameras.aim or the camera"
         )
     forward /= distance
     right = np.cross(forward, [0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Lenses of simulated cameras: intrinsics from a field of view, and whether a polynomial lens can be simulated."""
+"""Lenses of simulated cameras: intrinsics from a field of view, and validity of a distortion polynomial."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 
-_SAMPLES = 33  # of a picture each way, its edges included
+_SAMPLES = 33  # samples of a picture in each direction, edges included
 
 
 def intrinsics(fov: float, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Intrinsics (3, 3) of a lens with square pixels, its axis in the middle of the image.
+    """Return the intrinsics (3, 3) of a lens with square pixels and its axis in the middle of the image.
 
     Args:
-        fov: horizontal field of view, degrees, from the outer edge of the first pixel to that of the last; before
-            distortion.
+        fov: horizontal field of view before distortion, degrees, from the outer edge of the first pixel to the outer
+            edge of the last.
         size: width and height in pixels.
     """
     width, height = size
@@ -26,12 +26,12 @@ def intrinsics(fov: float, size: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def check_lens(camera: Camera) -> None:
-    """Check that the lens images one direction at every point of the picture.
+    """Check that every point of the picture images exactly one direction.
 
-    Brown's polynomial folds over beyond some angle, and a barrel lens images nothing farther out than that.
+    Brown's polynomial folds over beyond some angle, and a barrel lens images nothing beyond it.
 
     Raises:
-        ValueError: the picture reaches beyond the fold.
+        ValueError: the picture extends beyond the fold.
     """
     if not camera.distortion.any():
         return
@@ -40,10 +40,10 @@ def check_lens(camera: Camera) -> None:
     pixels = np.stack([u.ravel(), v.ravel()], axis=1)
     folded = ~np.isfinite(camera.undistort(pixels)).all(axis=1)
     if folded.any():
-        away = np.linalg.norm(pixels - camera.K[:2, 2], axis=1)
+        radius = np.linalg.norm(pixels - camera.K[:2, 2], axis=1)
         terms = ", ".join(f"{term:g}" for term in camera.distortion)
         raise ValueError(
-            f"camera {camera.name!r}: its lens, k1 k2 p1 p2 k3 = {terms}, folds over {away[folded].min():.0f} pixels "
-            f"from its axis, inside of the picture, which reaches {away.max():.0f}; expected one direction for every "
-            "pixel: take smaller terms or a narrower field of view, or calibrate with points in the corners"
+            f"camera {camera.name!r}: its lens, k1 k2 p1 p2 k3 = {terms}, folds over {radius[folded].min():.0f} pixels "
+            f"from its axis, inside the picture, which extends to {radius.max():.0f} pixels; expected one direction "
+            "for every pixel: use smaller terms or a narrower field of view, or calibrate with points in the corners"
         )

@@ -1,9 +1,9 @@
 """Published rigs: Campus, Shelf, and the sets of Panoptic HD cameras that papers use.
 
-The numbers are data of the package, one file a rig, rounded to what matters (half a pixel in the picture) and
-in our frame: metres, z up, the floor at z = 0, the middle of the captured space at the origin. Of each camera: focal
-lengths, principal point and image size in pixels, distortion k1 k2 p1 p2 k3 (none where it is absent), its position in
-metres, and the rotation world to camera as a Rodrigues vector, radians.
+The calibrations are package data, one file per rig, rounded to a precision of half a pixel in the picture, in the
+frame of this project: metres, z up, floor at z = 0, centre of the captured space at the origin. For each camera: focal
+lengths, principal point and image size in pixels, distortion k1 k2 p1 p2 k3 (none if absent), position in metres, and
+rotation from world to camera as a Rodrigues vector in radians.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 from mvpose.camera import Camera, Rig
 from simharness.formats.calibration.selection import select
 
-# HD cameras of the Panoptic Studio. CMU0 to CMU4: the rigs between which methods are transferred; the others are CMU0
-# with fewer and more cameras, each set a beginning of the next.
+# HD cameras of the Panoptic Studio. cmu0 to cmu4: the rigs used to test transfer of methods between rigs; the others
+# are cmu0 with fewer or more cameras, each set a prefix of the next.
 _PANOPTIC = {
     "panoptic": tuple(range(31)),
     "cmu0": (3, 6, 12, 13, 23),
@@ -37,14 +37,14 @@ PRESETS = ("campus", "shelf", *_PANOPTIC)
 
 
 def preset_rig(name: str, *, only: Sequence[str] = ()) -> Rig:
-    """A published rig.
+    """Return a published rig.
 
     Args:
         name: one of ``PRESETS``.
-        only: names of the cameras to take, in this order; empty: all. Panoptic's are "00_00" to "00_30".
+        only: names of the cameras to use, in this order; all if empty. Those of Panoptic are "00_00" to "00_30".
 
     Raises:
-        ValueError: no such rig, or no such camera in it.
+        ValueError: unknown rig or camera.
     """
     if name not in PRESETS:
         raise ValueError(f"cameras.preset = {name!r} is no published rig; expected one of {', '.join(PRESETS)}")

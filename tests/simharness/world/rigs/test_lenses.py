@@ -38,5 +38,7 @@ def test_a_lens_that_folds_within_the_picture_is_refused():
     narrow = np.degrees(2 * np.arctan(fold * 0.99 * 800 / 1000))  # the corner is 5/4 as far out as the side
     check_lens(camera(-0.37, 0.0, 0.0, 0.0, 0.0, fov=narrow))
     wide = np.degrees(2 * np.arctan(fold * 1.05 * 800 / 1000))
-    with pytest.raises(ValueError, match=r"camera 'a': its lens, .*, folds over .* which reaches 500; expected"):
+    with pytest.raises(
+        ValueError, match=r"camera 'a': its lens, .*, folds over .* which extends to 500 pixels; expected"
+    ):
         check_lens(camera(-0.37, 0.0, 0.0, 0.0, 0.0, fov=wide))

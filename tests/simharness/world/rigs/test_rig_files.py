@@ -7,7 +7,7 @@ from simharness.formats.calibration.file_storage import write_storage
 from simharness.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras
-from simharness.world.rigs.layouts import build_rig, carried, look_at
+from simharness.world.rigs.layouts import aligned, build_rig, look_at
 
 RIG = build_rig(Cameras(count=3, size=(640, 480), distortion=(-0.1, 0.01, 0.001, 0.002, 0.0)))
 FORMATS = {
@@ -111,7 +111,7 @@ def test_a_stereo_pair_hangs_where_the_first_camera_of_a_ring_would(tmp_path, na
 
 def test_carrying_a_rig_keeps_its_cameras_to_each_other():
     first = look_at((1, 2, 3), (0, 0, 1), K=RIG[0].K, size=(640, 480))
-    moved = carried(RIG, RIG[0], to=first)
+    moved = aligned(RIG, RIG[0], to=first)
     np.testing.assert_allclose(moved[0].center, (1, 2, 3), atol=1e-12)
     np.testing.assert_allclose(moved[0].R, first.R, atol=1e-12)
     for one, two in zip(RIG, moved, strict=True):
