@@ -1,1 +1,1 @@
-"""The page of a study: curves, breaking points, failures, worst frames."""
+"""Report and digest of a study: curves, breaking points, failures and worst frames."""

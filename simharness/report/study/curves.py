@@ -1,4 +1,4 @@
-"""How scores go with what a study sweeps, and where they break."""
+"""Robustness curves of a study: scores against its factors, and their breaking points."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from simharness.study.result_folder import Results
 
 @dataclass(frozen=True)
 class Factor:
-    """One swept key, and the trials that say what it does.
+    """A swept key with its trials.
 
     Attributes:
-        key: dotted.
-        values: that were tried: ascending where they are numbers, else in the order of the study.
-        numeric: whether they are numbers.
-        rows: of the study's trials: of a grid all, of a sweep one at a time those that vary this key and the base.
+        key: dotted key of the scenario.
+        values: swept values: ascending where they are numbers, else in the order of the study.
+        numeric: whether the values are numbers.
+        rows: trials of the study: all of a grid; of a one-at-a-time sweep, those that vary this key, and the base.
         along: keys that change together with this one.
-        over: what else differs among the trials of one value, so that a score is the mean over it: other keys of a
-            grid, and ``case`` where those of several are together; with the values of each.
+        over: other keys that vary among the trials of one value, with their values: a score is the mean over them.
+            These are the other factors of a grid, and ``case`` where several cases are pooled.
     """
 
     key: str
@@ -37,7 +37,7 @@ class Factor:
     over: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     def table(self, variant: str, score: str) -> Floats:
-        """A variant's score by seed and value, (n, k): the mean over everything else that varies; NaN where none."""
+        """Return the score of a variant by seed and value, (n, k): means over the other keys, NaN without data."""
         rows = self.rows.filter(pl.col("variant") == variant)
         seeds = {seed: row for row, seed in enumerate(rows["seed"].unique().sort())}
         columns = {value: column for column, value in enumerate(self.values)}
@@ -49,27 +49,27 @@ class Factor:
         return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0)
 
     def line(self, variant: str, score: str) -> list[Interval]:
-        """A variant's mean score at each value, with its interval over seeds."""
+        """Return the mean score of a variant at each value, with its interval over seeds."""
         return [mean_interval(column) for column in self.table(variant, score).T]
 
 
 def cases_of(results: Results) -> tuple[str, ...]:
-    """The names of a study's cases, in its order; none where it has no cases."""
+    """Return the names of a study's cases in the order of the study; empty without cases."""
     return tuple(case for case in dict.fromkeys(results.trials["case"]) if case)
 
 
 def factors(results: Results, case: str | None = None) -> list[Factor]:
-    """What a study sweeps, in its order.
+    """Return the factors of a study, in the order of the study.
 
-    Keys that change together are one factor, of the first. Those of which only one value has finished are left out.
+    Keys that change together are one factor, under the first key. Keys with only one finished value are left out.
 
     Args:
         results: the study.
-        case: whose trials count; None: those of all cases together, of which every score is then the mean.
+        case: case to take the trials from; None pools all cases, and scores are means over them.
     """
     trials = results.trials if case is None else results.trials.filter(pl.col("case") == case)
     keys = list(results.info["factors"])
-    found: list[Factor] = []
+    swept: list[Factor] = []
     taken: set[str] = set()
     for key in keys:
         rows = trials
@@ -81,24 +81,24 @@ def factors(results: Results, case: str | None = None) -> list[Factor]:
         along = tuple(other for other in keys if other != key and _together(rows, key, other))
         taken.update(along)
         numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-        found.append(Factor(key, tuple(sorted(values) if numeric else values), numeric, rows, along))
+        swept.append(Factor(key, tuple(sorted(values) if numeric else values), numeric, rows, along))
     pooled = {"case": cases_of(results)} if case is None and len(cases_of(results)) > 1 else {}
-    grid_of = {} if results.info["one_at_a_time"] else {each.key: each.values for each in found}
-    return [replace(each, over={**_without(grid_of, each.key), **pooled}) for each in found]
+    grid_of = {} if results.info["one_at_a_time"] else {each.key: each.values for each in swept}
+    return [replace(each, over={**_without(grid_of, each.key), **pooled}) for each in swept]
 
 
 def factors_by_case(results: Results) -> dict[str, list[Factor]]:
-    """What a study sweeps, of every case by itself; of a study without cases one list, of ``""``."""
+    """Return the factors of each case separately; the factors of a study without cases are under ``""``."""
     return {case: factors(results, case) for case in cases_of(results) or ("",)}
 
 
 def panels(by_case: Mapping[str, Sequence[Factor]]) -> dict[str, dict[str, Factor]]:
-    """The factors of :func:`factors_by_case` by key and then by case: what stands beside each other."""
-    found: dict[str, dict[str, Factor]] = {}
+    """Return the factors of :func:`factors_by_case` by key and then by case: the panels of one row of plots."""
+    by_key: dict[str, dict[str, Factor]] = {}
     for case, swept in by_case.items():
         for factor in swept:
-            found.setdefault(factor.key, {})[case] = factor
-    return found
+            by_key.setdefault(factor.key, {})[case] = factor
+    return by_key
 
 
 def _without(values: Mapping[str, tuple[Any, ...]], key: str) -> dict[str, tuple[Any, ...]]:
@@ -106,13 +106,13 @@ def _without(values: Mapping[str, tuple[Any, ...]], key: str) -> dict[str, tuple
 
 
 def _together(rows: pl.DataFrame, key: str, other: str) -> bool:
-    """Whether two keys change together: to each value of one belongs one of the other."""
+    """Return whether two keys change together: each value of one always goes with the same value of the other."""
     pairs = set(zip(rows[key], rows[other], strict=True))
     return len(pairs) == len({one for one, _ in pairs}) == len({two for _, two in pairs})
 
 
 def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | None:
-    """A variant's mean score at every combination of two factors, (k1, k2); None where not all were tried."""
+    """Return the mean score of a variant at every combination of two factors, (k1, k2); None for an incomplete grid."""
     rows = first.rows.filter(pl.col("variant") == variant)
     cells: dict[tuple[Any, Any], list[float]] = {}
     for one, other, number in zip(rows[first.key], rows[second.key], rows[score], strict=True):
@@ -126,16 +126,16 @@ def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | No
 
 @dataclass(frozen=True)
 class Breaking:
-    """Where one variant breaks along one factor.
+    """Breaking point of one variant along one factor.
 
     Attributes:
-        factor: the key.
-        variant: of the method.
-        score: that falls.
-        threshold: on it is still good.
-        rising: whether the score gets worse as the factor grows; if not, as it shrinks.
-        point: where; its ends are ascending values of the factor.
-        tried: the lowest and the highest value.
+        factor: key of the factor.
+        variant: name of the variant.
+        score: key of the score.
+        threshold: last value of the score that is still good.
+        rising: whether the score gets worse as the factor grows; else it gets worse as the factor shrinks.
+        point: value of the factor at the threshold; the ends of its interval are ascending.
+        tried: lowest and highest value of the factor.
     """
 
     factor: str
@@ -148,13 +148,13 @@ class Breaking:
 
 
 def breaking(factor: Factor, variants: Sequence[str], score: str, threshold: float) -> list[Breaking]:
-    """Where each variant's score passes its threshold along a factor of numbers.
+    """Return the value of a numeric factor at which each variant's score passes the threshold.
 
-    A factor may do harm as it grows (clutter) or as it shrinks (cameras): whichever end is worse says which. Variants
-    without the score are left out.
+    A factor may do harm as it grows (clutter) or as it shrinks (cameras); the end with the worse score decides.
+    Variants without the score are left out.
     """
     better = SCORES[score].better
-    found = []
+    points = []
     for variant in variants:
         table = factor.table(variant, score)
         if not np.isfinite(table).any():
@@ -169,5 +169,5 @@ def breaking(factor: Factor, variants: Sequence[str], score: str, threshold: flo
             flipped = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
             point = BreakingPoint(flipped[0], flipped[1], flipped[2], mirrored.why)
         tried = (float(values[0]), float(values[-1]))
-        found.append(Breaking(factor.key, variant, score, threshold, rising, point, tried))
-    return found
+        points.append(Breaking(factor.key, variant, score, threshold, rising, point, tried))
+    return points

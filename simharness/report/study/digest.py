@@ -1,7 +1,7 @@
-"""What is kept of a study beside the code: its numbers with where they come from, a table to read, and its curves.
+"""Digest of a study, to be committed with the code: its numbers with their provenance, a table and the curves.
 
-The tables and the page of a study are large and can be made again; a digest is small, in text, and says with what
-command, seeds, code and libraries it was made.
+The result tables and the page of a study are large and can be made again. A digest is small, in text form, and records
+the command, the seeds, the code and the libraries.
 """
 
 from __future__ import annotations
@@ -27,49 +27,49 @@ from simharness.study.result_folder import Results
 from simharness.trial.provenance import PROVENANCE
 
 SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
-"""The scores of a digest."""
+"""Scores of a digest."""
 
-_CURVES = (("pcp", "map"), ("recall", "ghosts"))  # as they stand in the picture
-_ACROSS = 3  # panels of cases beside each other
+_CURVES = (("pcp", "map"), ("recall", "ghosts"))  # two scores in each row of the picture
+_MAX_COLUMNS = 3  # panels of cases in a row
 _STAGES = ("affinity", "matching", "reconstruction")
 
 
 def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, float] = THRESHOLDS) -> None:
-    """Write ``digest.json``, ``table.md`` and, of a study that sweeps something, ``curves.svg`` into a folder.
+    """Write ``digest.json``, ``table.md`` and, for a study with factors, ``curves.svg`` into a folder.
 
     Args:
-        results: a study, all of whose trials finished.
-        folder: appears whole, in the place of an older digest.
-        thresholds: as of :func:`simharness.report.study.page.render_study`.
+        results: a study whose trials all finished.
+        folder: replaced as a whole where it holds an older digest.
+        thresholds: as in :func:`simharness.report.study.page.render_study`.
 
     Raises:
         ValueError: trials failed, or the folder holds something else.
     """
     if results.info["failed"]:
         raise ValueError(
-            f"{results.folder}: {len(results.info['failed'])} trials failed, and a digest of the others would not say "
-            "so; run the study again"
+            f"{results.folder}: {len(results.info['failed'])} trials failed, and a digest would leave them out; run "
+            "the study again"
         )
     if folder.exists() and not (folder / "digest.json").is_file():
-        raise ValueError(f"{folder} is there and holds no digest: name another folder")
-    told = digest(results, thresholds=thresholds)
+        raise ValueError(f"{folder} exists and holds no digest; name another folder")
+    numbers = digest(results, thresholds=thresholds)
     with appearing(folder) as partial:
-        text = json.dumps(told, indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False)
         (partial / "digest.json").write_text(text + "\n", encoding="utf-8")
-        (partial / "table.md").write_text(markdown(told), encoding="utf-8")
-        if told["factors"]:
+        (partial / "table.md").write_text(markdown(numbers), encoding="utf-8")
+        if numbers["factors"]:
             (partial / "curves.svg").write_text(curves(results, thresholds=thresholds), encoding="utf-8")
 
 
 def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> dict[str, Any]:
-    """The numbers of a study, JSON-ready; means with the ends of their 95 % intervals over seeds.
+    """Return the numbers of a study, JSON-ready; means come with the ends of their 95 % intervals over seeds.
 
-    Beside the keys of :data:`simharness.trial.provenance.PROVENANCE`, of which ``seconds`` are those of all trials, one
-    after the other: ``means`` of the variants and, where there are
-    any, of ``cases`` by name; ``factors`` with the scores at every value and with what these are means over;
-    ``breaking`` points; ``by_case``, of a study with cases, the factors and breaking points of each by itself, where
-    those above are of the means over all cases; ``failures`` as
-    :func:`simharness.report.study.failure_rates.failure_rates` has them; ``time_ms`` of each stage.
+    Returns:
+        The keys of :data:`simharness.trial.provenance.PROVENANCE`, where ``seconds`` is the sum over all trials, and:
+        ``means`` by variant, and ``cases`` with such means by case; ``factors`` with the scores at every value, and
+        with the keys that these are means over; ``breaking`` points; ``by_case`` with factors and breaking points of
+        each case separately, while the ones above pool all cases; ``failures``, see
+        :func:`simharness.report.study.failure_rates.failure_rates`; ``time_ms`` of each stage.
     """
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
@@ -78,7 +78,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         "name": info["name"],
         "description": info["description"],
         **{key: info[key] for key in PROVENANCE},
-        "seconds": round(float(trials["seconds"].sum()), 1),  # those of the run leave out trials that were there before
+        "seconds": round(float(trials["seconds"].sum()), 1),  # the run's time leaves out trials of earlier runs
         "trials": info["trials"],
         "one_at_a_time": info["one_at_a_time"],
         "means": _means(trials, names),
@@ -91,9 +91,9 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
 
 
 def curves(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) -> str:
-    """The curves of a study, a picture of its own (SVG): for every factor PCP, mAP, recall and ghosts.
+    """Return the curves of a study as one SVG file: PCP, mAP, recall and ghosts against every factor.
 
-    Of a study with cases every score has a row, or rows, of a panel for each case, on one scale.
+    In a study with cases every score has its own rows, with a panel for each case, all on one scale.
     """
     names = results.info["variants"]
 
@@ -127,14 +127,14 @@ def curves(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
 
 
 def _in_rows(drawn: Sequence[str]) -> list[list[str]]:
-    """Plots in as few rows as there must be, about as many in each."""
-    count = -(-len(drawn) // _ACROSS)
+    """Return plots in as few rows as possible, about as many in each."""
+    count = -(-len(drawn) // _MAX_COLUMNS)
     across = -(-len(drawn) // count)
     return [list(drawn[start : start + across]) for start in range(0, len(drawn), across)]
 
 
 def _notes(factor: Factor) -> list[str]:
-    """What is said below the axis of a factor: what goes with it, and what a mean is over."""
+    """Return the notes below the axis of a factor: keys that change with it, and keys that means are over."""
     along = (
         f"together with {', '.join(factor.along)}" if len(factor.along) < 3 else f"and {len(factor.along)} other keys"
     )
@@ -142,7 +142,7 @@ def _notes(factor: Factor) -> list[str]:
 
 
 def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[str, float]) -> dict[str, Any]:
-    """Factors with their scores, and where these break."""
+    """Return factors with their scores, and the breaking points."""
     return {
         "factors": [_factor(factor, names) for factor in swept],
         "breaking": [
@@ -188,14 +188,14 @@ def _factor(factor: Factor, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _ends(interval: Interval) -> list[float | None] | None:
-    """Mean, low and high; None without any, and None for ends that there are not."""
+    """Return mean, low and high; None without data, and None for ends that do not exist."""
     if not interval.n:
         return None
     return [round(end, 4) if math.isfinite(end) else None for end in (interval.mean, interval.low, interval.high)]
 
 
-def _times(mine: pl.DataFrame) -> dict[str, float]:
-    """Means over trials of the medians over frames."""
+def _times(trials: pl.DataFrame) -> dict[str, float]:
+    """Return the time of each stage, ms: means over trials of the medians over frames."""
     columns = {**{stage: f"time_{stage}_ms" for stage in _STAGES}, "total": "time_ms"}
-    means = {stage: mine[column].mean() for stage, column in columns.items()}
+    means = {stage: trials[column].mean() for stage, column in columns.items()}
     return {stage: round(float(mean), 3) for stage, mean in means.items() if isinstance(mean, int | float)}

@@ -1,4 +1,4 @@
-"""How often a variant fails, by kind and by the stage that owns it, with intervals over seeds."""
+"""Failure rates of a variant by kind and by the stage to blame, with intervals over seeds."""
 
 from __future__ import annotations
 
@@ -11,49 +11,52 @@ from mvpose.arrays import Floats
 from simharness.statistics.bootstrap import block_weights, interval, resampled
 from simharness.study.result_folder import Results
 
+NOT_BLAMED = "not determined"
+"""Stage of a failure whose stage to blame was not determined."""
+
 Ends = list[float | None]
 
 _RESAMPLES = 2000
 
 
 def failure_rates(results: Results, variant: str) -> dict[str, Any]:
-    """Failures of a variant, JSON-ready.
+    """Return the failure rates of a variant, JSON-ready.
 
     Returns:
-        ``kinds`` and ``stages``: failures in 100 frames by kind and by stage ("not looked into" where nobody asked).
-        ``matching_alone``: the share of those looked into, percent, that true matching of the real detections mends;
-        None where it was asked of none. ``intervals``: the same keys, with the ends of the 95 % interval over seeds in
-        the place of a number; ends are None of one seed.
+        ``kinds`` and ``stages``: failures per 100 frames by kind and by stage (:data:`NOT_BLAMED` for failures whose
+        stage was not determined). ``matching_alone``: share of the blamed failures, percent, that the true matching of
+        the real detections repairs; None where no failure was blamed. ``intervals``: the same keys, each with the two
+        ends of the 95 % interval over seeds; the ends are None for a single seed.
     """
     seed_of = results.trials.select("trial", "seed").unique()
     seeds = sorted(seed_of["seed"].unique())
-    mine = results.failures.filter(pl.col("variant") == variant).join(seed_of, on="trial")
+    failures = results.failures.filter(pl.col("variant") == variant).join(seed_of, on="trial")
     frames = _by_seed(results.frames.filter(pl.col("variant") == variant).join(seed_of, on="trial"), seeds)
-    told: dict[str, Any] = {}
+    rates: dict[str, Any] = {}
     ends: dict[str, Any] = {}
     for column in ("kind", "stage"):
-        classes = mine.with_columns(pl.col(column).fill_null("not looked into"))
+        classes = failures.with_columns(pl.col(column).fill_null(NOT_BLAMED))
         counts = {
             str(key): _by_seed(classes.filter(pl.col(column) == key), seeds) for key in sorted(set(classes[column]))
         }
         whole = max(1.0, float(frames.sum()))
-        told[f"{column}s"] = {key: round(100 * float(count.sum()) / whole, 3) for key, count in counts.items()}
+        rates[f"{column}s"] = {key: round(100 * float(count.sum()) / whole, 3) for key, count in counts.items()}
         ends[f"{column}s"] = {key: _ends(count, frames) for key, count in counts.items()}
-    asked = mine.filter(pl.col("matching_alone").is_not_null())
-    known, mended = _by_seed(asked, seeds), _by_seed(asked.filter(pl.col("matching_alone")), seeds)
-    told["matching_alone"] = round(100 * float(mended.sum()) / float(known.sum()), 1) if known.any() else None
-    ends["matching_alone"] = _ends(mended, known) if known.any() else None
-    return {**told, "intervals": ends}
+    blamed = failures.filter(pl.col("matching_alone").is_not_null())
+    known, repaired = _by_seed(blamed, seeds), _by_seed(blamed.filter(pl.col("matching_alone")), seeds)
+    rates["matching_alone"] = round(100 * float(repaired.sum()) / float(known.sum()), 1) if known.any() else None
+    ends["matching_alone"] = _ends(repaired, known) if known.any() else None
+    return {**rates, "intervals": ends}
 
 
 def _by_seed(rows: pl.DataFrame, seeds: list[int]) -> Floats:
-    """How many rows each seed has, (n,)."""
+    """Return the number of rows of each seed, (n,)."""
     counts = dict(rows["seed"].value_counts().iter_rows())
     return np.array([counts.get(seed, 0) for seed in seeds], float)
 
 
 def _ends(count: Floats, of: Floats) -> Ends:
-    """The interval of 100 count / of, both (n,) over seeds, by resampling seeds; resamples of nothing are left out."""
+    """Return the interval of 100 count / of, both (n,) over seeds, from resampled seeds with of > 0."""
     if len(count) < 2:
         return [None, None]
     weights = block_weights(np.arange(len(count)), resamples=_RESAMPLES)

@@ -1,4 +1,4 @@
-"""The page of a study that a person reads: one HTML file with everything in it."""
+"""Report of a study as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, breaking, factors_by_case, grid, panels
 from simharness.report.study.worst_frames import Shown, show, worst_frames
 from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
 from simharness.scoring.catalogue import SCORES
 from simharness.study.result_folder import Results
 
 THRESHOLDS: Mapping[str, float] = {"pcp": 90.0, "precision": 90.0}
-"""The scores that must not pass a value, where nobody says otherwise: PCP does not see ghosts, precision does."""
+"""Default thresholds of the breaking points. Ghosts do not lower PCP; they lower precision."""
 
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")
-"""The scores that have robustness curves."""
+"""Scores with robustness curves."""
 
 _STAGES = ("affinity", "matching", "reconstruction")
-_MOST_ERRORS = 20  # of failed trials that are told one by one
+_MAX_ERRORS = 20  # failed trials in the list on the page
 
 
 def write_report(
@@ -37,24 +38,23 @@ def write_report(
     thresholds: Mapping[str, float] = THRESHOLDS,
     progress: Callable[[int], None] = lambda frames: None,
 ) -> Path:
-    """Write the page of a study; the trials of its worst frames are run again for the pictures.
+    """Write the page of a study. The trials of its worst frames are run again for the pictures.
 
     Args:
         results: the study.
-        out: the file; by default ``report.html`` in the study's folder. It appears when it is whole.
+        out: path of the page; by default ``report.html`` in the folder of the study. It is written in one step.
         thresholds: see :func:`render_study`.
-        progress: told of each of the worst frames.
+        progress: called with 1 after each of the worst frames.
 
     Returns:
-        The file.
+        Path of the page.
 
     Raises:
-        ValueError: a score that does not exist, a trial that cannot be built any more, or a place that cannot be
-            written to.
+        ValueError: a score does not exist, a trial cannot be built any more, or the page cannot be written.
     """
     out = results.folder / "report.html" if out is None else out
     check_thresholds(thresholds)
-    if not out.parent.is_dir():  # better known before the work
+    if not out.parent.is_dir():  # checked before the long work
         raise ValueError(f"{out}: cannot be written: there is no folder {out.parent}")
     shown = [picture for picture, _ in show(results, worst_frames(results), progress=progress)]
     page = render_study(results, shown=shown, thresholds=thresholds)
@@ -66,19 +66,23 @@ def write_report(
 
 
 def check_thresholds(thresholds: Mapping[str, float]) -> None:
-    """Refuse thresholds of scores that do not exist: a ValueError names those that do."""
+    """Check that the scores of thresholds exist.
+
+    Raises:
+        ValueError: a score does not exist; the message lists all scores.
+    """
     for score in thresholds:
         if score not in SCORES:
-            raise ValueError(f"--threshold {score}: there is no such score; there are {', '.join(SCORES)}")
+            raise ValueError(f"--threshold {score}: no such score; expected one of {', '.join(SCORES)}")
 
 
 def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: Mapping[str, float] = THRESHOLDS) -> str:
-    """Make the page of a study.
+    """Return the page of a study.
 
     Args:
         results: the study.
-        shown: its worst frames.
-        thresholds: for each of these scores the values of every numeric factor at which it passes them are told.
+        shown: worst frames of the study.
+        thresholds: thresholds by score; the page has the breaking points of every numeric factor for each of them.
 
     Returns:
         A self-contained HTML document.
@@ -94,7 +98,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         variants=variants,
         seeds=seeds,
         failed=info["failed"],
-        most_errors=_MOST_ERRORS,
+        max_errors=_MAX_ERRORS,
         columns=tables.COLUMNS,
         headline=tables.headline(trials, variants),
         compared=tables.compared(trials, variants) if len(variants) > 1 and seeds > 1 else {},
@@ -108,7 +112,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         ],
         factors=len(panels(swept)),
         heats=_heats(swept, variants, one_at_a_time=info["one_at_a_time"]),
-        threshold_told=any(score in thresholds for score in CURVES),
+        threshold_drawn=any(score in thresholds for score in CURVES),
         breaking=_breaking(swept, variants, thresholds),
         failures=_failures(results, variants),
         shown=shown,
@@ -139,7 +143,7 @@ def _facts(results: Results) -> list[tuple[str, str]]:
             ("detector", _join("a pose head" if s.detector.onnx else s.detector.name for s in scenarios)),
         ]
     kept = f", {info['kept']} kept" if info["kept"] else ""
-    return [*facts, ("took", f"{_duration(info['seconds'])}{kept}"), ("version", f"{info['code']}")]
+    return [*facts, ("time", f"{duration(info['seconds'])}{kept}"), ("version", f"{info['code']}")]
 
 
 def _rig(cameras: Cameras) -> str | int:
@@ -149,7 +153,7 @@ def _rig(cameras: Cameras) -> str | int:
 
 
 def _join(values: Any) -> str:
-    """Different values, the numbers among them as their span."""
+    """Return the distinct values as text: numbers as their range, and up to three words."""
     different = list(dict.fromkeys(values))
     numbers = [value for value in different if isinstance(value, int)]
     words = [value for value in different if not isinstance(value, int)]
@@ -160,17 +164,11 @@ def _span(numbers: Sequence[int]) -> str:
     return f"{min(numbers)}" if min(numbers) == max(numbers) else f"{min(numbers)} to {max(numbers)}"
 
 
-def _duration(seconds: float) -> str:
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
-
-
 def _curves(
     index: int, by_case: Mapping[str, Factor], variants: Sequence[str], thresholds: Mapping[str, float]
 ) -> list[dict[str, Any]]:
-    """The plots of a factor, of each case on one scale, and the numbers in them, by score."""
-    told: list[dict[str, Any]] = [
+    """Return the plots of a factor and their numbers by score, for each case; all cases have one scale."""
+    curves: list[dict[str, Any]] = [
         {
             "key": factor.key,
             "case": case,
@@ -185,7 +183,7 @@ def _curves(
         info = SCORES[score]
         lines = {case: {each: factor.line(each, score) for each in variants} for case, factor in by_case.items()}
         every = [line for each in lines.values() for line in each.values()]
-        for each, (case, factor) in zip(told, by_case.items(), strict=True):
+        for each, (case, factor) in zip(curves, by_case.items(), strict=True):
             svg = plots.curve(
                 "-".join(filter(None, ("curve", str(index), score, case))),
                 factor=factor.key,
@@ -201,13 +199,13 @@ def _curves(
                 (plots.short(value), [tables.cell(lines[case][variant][row], info) for variant in variants])
                 for row, value in enumerate(factor.values)
             ]
-    return told
+    return curves
 
 
 def _heats(
     swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], *, one_at_a_time: bool
 ) -> list[dict[str, Any]]:
-    """A grid of two factors as heat maps by score, of the first two variants in each case; nothing of other studies."""
+    """Return heat maps by score for a grid of two factors, for the first two variants in each case; else nothing."""
     if one_at_a_time or not swept or any(len(factors) != 2 for factors in swept.values()):
         return []
     shown = [(case, down, along, variant) for case, (down, along) in swept.items() for variant in variants[:2]]
@@ -238,62 +236,63 @@ def _heats(
 def _breaking(
     swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], thresholds: Mapping[str, float]
 ) -> list[dict[str, Any]]:
-    """Where every variant breaks: by factor a row for each case and score."""
-    told = []
+    """Return the table of breaking points: for each factor, a row for each case and score."""
+    tables_by_factor = []
     for key, by_case in panels(swept).items():
         rows = []
         for case, factor in by_case.items():
             for score, threshold in thresholds.items() if factor.numeric else ():
                 info = SCORES[score]
-                found = {each.variant: each for each in breaking(factor, variants, score, threshold)}
+                points = {each.variant: each for each in breaking(factor, variants, score, threshold)}
                 past = "under" if info.better == "higher" else "over"
                 rows.append(
                     {
                         "case": case,
                         "broken": f"{info.title} {past} {threshold:g}{f' {info.unit}' if info.unit else ''}",
-                        "cells": [tables.breaking_cell(found.get(variant)) for variant in variants],
+                        "cells": [tables.breaking_cell(points.get(variant)) for variant in variants],
                     }
                 )
         if rows:
-            told.append({"factor": key, "rows": rows})
-    return told
+            tables_by_factor.append({"factor": key, "rows": rows})
+    return tables_by_factor
 
 
 def _failures(results: Results, variants: Sequence[str]) -> dict[str, Any]:
-    """The plots of failures, and the table of kinds by stage for the first variant; nothing where nothing failed."""
+    """Return the plots of failures, and the table of kinds by stage for the first variant; empty without failures."""
     failures = results.failures
     if not len(failures):
         return {}
     frames = dict(results.frames["variant"].value_counts().iter_rows())
-    kinds = tables.failure_amounts(failures, frames, variants, "kind")
-    stages = tables.failure_amounts(failures, frames, variants, "stage")
-    alone = tables.failure_amounts(failures.filter(pl.col("matching_alone")), frames, variants, "stage")
+    kinds = tables.failures_per_100_frames(failures, frames, variants, "kind")
+    stages = tables.failures_per_100_frames(failures, frames, variants, "stage")
+    alone = tables.failures_per_100_frames(failures.filter(pl.col("matching_alone")), frames, variants, "stage")
     main = failures.filter(pl.col("variant") == variants[0])
-    asked = [stage for stage in plots.BLAME_COLORS if stage in set(main["stage"])]
+    blamed = [stage for stage in plots.BLAME_COLORS if stage in set(main["stage"])]
     rows = []
     for kind in plots.KIND_COLORS:
-        mine = main.filter(pl.col("kind") == kind)
-        if len(mine):
-            rows.append((kind.replace("_", " "), len(mine), [len(mine.filter(pl.col("stage") == s)) for s in asked]))
+        of_kind = main.filter(pl.col("kind") == kind)
+        if len(of_kind):
+            counts = [len(of_kind.filter(pl.col("stage") == stage)) for stage in blamed]
+            rows.append((kind.replace("_", " "), len(of_kind), counts))
     return {
         "kinds": Markup(plots.failure_bars("failure-kinds", amounts=kinds, colors=plots.KIND_COLORS)),
         "stages": Markup(
             plots.failure_bars("failure-stages", amounts=stages, colors=plots.BLAME_COLORS, hatched=alone)
         ),
-        "asked": asked,
-        "foreign": "method" in set(failures["stage"]),
+        "blamed": blamed,
+        "user_defined": "method" in set(failures["stage"]),
         "rows": rows,
         "total": len(failures),
     }
 
 
 def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:
-    """The plots of time, and quantiles of a frame's time for each variant."""
+    """Return the plots of running time, and quantiles of the time per frame for each variant."""
     stages: dict[str, dict[str, float]] = {}
     spread, rows = {}, []
     for variant in variants:
-        mine = results.trials.filter(pl.col("variant") == variant)
-        means = {stage: mine[f"time_{stage}_ms"].mean() for stage in _STAGES} | {"total": mine["time_ms"].mean()}
+        trials = results.trials.filter(pl.col("variant") == variant)
+        means = {stage: trials[f"time_{stage}_ms"].mean() for stage in _STAGES} | {"total": trials["time_ms"].mean()}
         stages[variant] = {stage: float(value) for stage, value in means.items() if isinstance(value, int | float)}
         times = results.frames.filter(pl.col("variant") == variant)["time_ms"].drop_nulls()
         spread[variant] = times.to_numpy()
@@ -307,7 +306,7 @@ def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:
 
 
 def _machine(machine: Any) -> str:
-    """What is known of a machine, one line."""
+    """Return the description of a machine in one line."""
     if isinstance(machine, Mapping):
         return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in machine.items())
     return str(machine)

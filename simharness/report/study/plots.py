@@ -1,4 +1,4 @@
-"""The plots of a study."""
+"""Plots of a study, as SVG."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from matplotlib.ticker import FuncFormatter
 from mvpose.arrays import Floats
 from simharness.report.figures.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.report.study.factor_names import axis_label
+from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.comparison import Interval
 
@@ -32,12 +33,12 @@ BLAME_COLORS: Mapping[str, Color] = {
 }
 _SPARE = "#8b93a1"
 
-_SIZE = (4.5, 3.0)  # inches of 72 px: a phone's width
-_WIDE_RANGE = 30.0  # numbers that differ by this factor are better told apart on a logarithmic axis
-_MOST_LISTED = 6  # values of a key, in a line about what a mean is over
-_LINE, _LINE_HEIGHT = 62, 0.15  # letters below an axis; inches
-_LETTER = 0.025  # of the axis: the width of a label's letter, and between two labels
-_DARK = 0.55  # luma of a cell under which its number is written in white
+_SIZE = (4.5, 3.0)  # inches of 72 px: the width of a phone
+_WIDE_RANGE = 30.0  # from this ratio of the largest value to the smallest on, the axis is logarithmic
+_MAX_LISTED = 6  # values of a key in a note on a mean
+_LINE, _LINE_HEIGHT = 62, 0.15  # letters in a line below an axis, and its height in inches
+_LETTER = 0.025  # width of a letter of a label, and gap between two labels, as a share of the axis
+_DARK = 0.55  # luma of a cell below which its number is white
 
 
 def curve(
@@ -53,19 +54,19 @@ def curve(
     notes: Sequence[str] = (),
     beside: Sequence[Sequence[Interval]] = (),
 ) -> str:
-    """A score against the values of a factor: a line for each variant, with its interval.
+    """Plot a score against the values of a factor: a line with intervals for each variant.
 
     Args:
-        name: unlike that of any other plot of the page.
-        factor: the key that varies; below the axis stands its name and its unit, too.
-        values: of it, k.
-        numeric: whether they are numbers.
+        name: different from the name of every other plot on the page.
+        factor: swept key; the axis label has its name and unit as well.
+        values: k values of the factor.
+        numeric: whether the values are numbers.
         lines: k means of each variant.
-        score: what is plotted.
-        threshold: where it breaks: a dashed line.
-        title: above the plot.
-        notes: what is said below the axis, wrapped.
-        beside: lines of the plots that this one is compared with: the scale has room for them, too.
+        score: score on the vertical axis.
+        threshold: threshold of a breaking point, drawn as a dashed line.
+        title: heading above the plot.
+        notes: notes below the axis, wrapped.
+        beside: lines of the plots that stand beside this one; the vertical axis has room for them as well.
     """
     label = axis_label(factor) if axis_label(factor).startswith(factor) else f"{axis_label(factor)} ({factor})"
     below = [line for each in (label, *notes) for line in textwrap.wrap(each, _LINE, break_long_words=False)]
@@ -78,7 +79,7 @@ def curve(
         ):
             mean, low, high = (np.array([getattr(each, end) for each in intervals]) for end in ("mean", "low", "high"))
             at = places + apart * (index - (len(lines) - 1) / 2)
-            under = 0.7 * (len(lines) - 1 - index)  # points: so that lines that coincide are all seen
+            under = 0.7 * (len(lines) - 1 - index)  # points: lines that coincide stay visible
             if numeric:
                 axes.fill_between(at, low, high, color=color, alpha=0.16, lw=0, zorder=2)
                 axes.plot(
@@ -100,7 +101,7 @@ def curve(
 
 
 def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
-    """Room for everything that is known; shares end at 100, and what has no upper bound begins at 0."""
+    """Set the limits of the vertical axis: all finite values; shares end at 100, errors and counts begin at 0."""
     ends = [end for line in lines for each in line for end in (each.mean, each.low, each.high)]
     known = np.array([*ends, *([] if threshold is None else [threshold])])
     known = known[np.isfinite(known)]
@@ -130,11 +131,11 @@ def _ticks(axes: Axes, values: Sequence[Any], places: Floats, numeric: bool) -> 
         axes.set_xscale("log")
         axes.minorticks_off()
     across = np.log(places) if axes.get_xscale() == "log" else places
-    axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))  # values that were tried, no others
+    axes.set_xticks(places, _spaced(across, [f"{place:g}" for place in places]))  # only the swept values
 
 
 def _spaced(places: Floats, labels: Sequence[str]) -> list[str]:
-    """Labels at ascending places along an axis, but for those that would run into another: the ends come first."""
+    """Return labels at ascending places along an axis, empty where they would overlap; the ends are always kept."""
     space = np.ptp(places) or 1.0
 
     def near(one: int, other: int) -> bool:
@@ -156,15 +157,15 @@ def heat_map(
     score: ScoreInfo,
     span: tuple[float, float],
 ) -> str:
-    """A score at every combination of two factors.
+    """Plot a score at every combination of two factors as a heat map.
 
     Args:
-        name: unlike that of any other plot of the page.
-        down: the key of a factor and its values, k1.
-        along: another and its values, k2.
-        means: the scores, (k1, k2).
-        score: what is plotted.
-        span: the scores of the first and the last colour: the same for maps beside each other.
+        name: different from the name of every other plot on the page.
+        down: key and k1 values of the factor on the vertical axis.
+        along: key and k2 values of the factor on the horizontal axis.
+        means: mean scores, (k1, k2).
+        score: score that the colours show.
+        span: scores of the first and the last colour; the same for maps that stand beside each other.
     """
     with svg_plot(name, size=(_SIZE[0], max(1.6, 0.9 + 0.38 * len(down[1])))) as (axes, written):
         colors = "viridis" if score.better == "higher" else "viridis_r"
@@ -173,11 +174,11 @@ def heat_map(
         )
         for row, column in np.ndindex(means.shape):
             value = means[row, column]
-            told, ink = "–", INK
+            text, ink = "–", INK
             if np.isfinite(value):
-                told = f"{value:.{score.digits}f}"
+                text = fixed(value, score.digits)
                 ink = "#fbfbfb" if np.dot(mesh.cmap(mesh.norm(value))[:3], (0.299, 0.587, 0.114)) < _DARK else "#14161a"
-            axes.text(column + 0.5, row + 0.5, told, ha="center", va="center", color=ink, fontsize=8.5)
+            axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", color=ink, fontsize=8.5)
         axes.set_xticks(np.arange(means.shape[1]) + 0.5, [short(value) for value in along[1]])
         axes.set_yticks(np.arange(means.shape[0]) + 0.5, [short(value) for value in down[1]])
         beside = textwrap.wrap(axis_label(down[0]), 10 + 5 * len(down[1]), break_long_words=False)
@@ -189,23 +190,23 @@ def heat_map(
 
 
 def short(value: Any) -> str:
-    """A value of a factor as plots and tables write it."""
+    """Return the text of a value of a factor in plots and tables."""
     if value is None:
         return "–"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def mean_over(over: Mapping[str, Sequence[Any]]) -> str:
-    """What a mean is over, in words: keys with their values; nothing where it is over nothing."""
-    said = []
+    """Return a note on the keys and values that a mean is over; empty without keys."""
+    parts = []
     for key, values in over.items():
-        told = ", ".join(map(short, values))
-        if len(values) > _MOST_LISTED:
+        text = ", ".join(map(short, values))
+        if len(values) > _MAX_LISTED:
             numbers = all(isinstance(value, int | float) for value in values)
             ends = f"{short(values[0])} to {short(values[-1])}, " if numbers else ""
-            told = f"({ends}{len(values)} values)"
-        said.append(f"{key} {told}")
-    return f"mean over {' and '.join(said)}" if said else ""
+            text = f"({ends}{len(values)} values)"
+        parts.append(f"{key} {text}")
+    return f"mean over {' and '.join(parts)}" if parts else ""
 
 
 def failure_bars(
@@ -215,13 +216,13 @@ def failure_bars(
     colors: Mapping[str, Color],
     hatched: Mapping[str, Mapping[str, float]] | None = None,
 ) -> str:
-    """Failures by class, a stacked bar for each variant.
+    """Plot failures by class: a stacked bar for each variant.
 
     Args:
-        name: unlike that of any other plot of the page.
-        amounts: failures in 100 frames of each variant by class.
-        colors: of the classes; others are grey.
-        hatched: which part of an amount is drawn hatched.
+        name: different from the name of every other plot on the page.
+        amounts: failures per 100 frames by variant and class.
+        colors: colours of the classes; other classes are grey.
+        hatched: hatched part of each amount.
     """
     classes = list(dict.fromkeys([*colors, *(key for each in amounts.values() for key in each)]))
     classes = [key for key in classes if any(each.get(key) for each in amounts.values())]
@@ -240,7 +241,7 @@ def failure_bars(
             left += width
         for row, end in enumerate(left.tolist()):
             axes.annotate(f"{end:.1f}", (end, row), xytext=(4, 0), textcoords="offset points", va="center")
-        axes.set(xlabel="failures in 100 frames", yticks=rows, yticklabels=list(amounts))
+        axes.set(xlabel="failures per 100 frames", yticks=rows, yticklabels=list(amounts))
         axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.14)
         axes.set_ylim(len(amounts) - 0.5, -0.5)
         axes.tick_params(axis="y", length=0, labelcolor=INK)
@@ -250,14 +251,14 @@ def failure_bars(
 
 
 def time_distribution(times: Mapping[str, Floats]) -> str:
-    """The share of frames that took each variant no longer than so many milliseconds."""
+    """Plot the cumulative distribution of the time per frame for each variant; times (n,) in milliseconds."""
     with svg_plot("time-distribution", size=_SIZE) as (axes, written):
         for (variant, values), color in zip(times.items(), VARIANT_COLORS * max(1, len(times)), strict=False):
             ranked = np.sort(values[np.isfinite(values)])
             if len(ranked):
                 share = 100 * np.arange(1, len(ranked) + 1) / len(ranked)
                 axes.step([ranked[0], *ranked], [0, *share], where="post", color=color, lw=1.7, label=variant, zorder=3)
-        axes.set(xlabel="time of a frame, ms", ylabel="share of frames, %", ylim=(0, 101))
+        axes.set(xlabel="time per frame, ms", ylabel="share of frames, %", ylim=(0, 101))
         if any(len(values) for values in times.values()):
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))

@@ -1,4 +1,4 @@
-"""A trial as a recording for the viewer of rerun (https://rerun.io): truth and estimates in 3D, and in every view."""
+"""Export of a trial for the rerun viewer (https://rerun.io): truth and estimates in 3D and in every view."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 _THICK, _THIN = 0.02, 0.006  # metres, radii of estimated and of true limbs
 _DOT = 3.0  # pixels, radius of a keypoint
-_PICTURE = 0.4  # metres from a camera's centre to where its picture hangs
+_IMAGE_PLANE = 0.4  # metres from a camera's centre to its image plane
 
 
 def write_rerun(replay: Replay, path: Path) -> None:
     """Write a trial as an ``.rrd`` file.
 
-    The world is in metres, z up. ``world/truth/person0`` and so on hold everybody's limbs, ``world/estimates`` those of
-    every estimate in the colour of its person (grey: a ghost); ``world/cameras/NAME`` the cameras as the method
-    believes them, with ``detections`` and ``truth`` in their pixels. The timeline ``time`` counts seconds, ``frame``
-    frames.
+    The world is in metres, z up. ``world/truth/person0`` and so on hold the true limbs, ``world/estimates`` the limbs
+    of every estimate in the colour of its person (grey: a ghost). ``world/cameras/NAME`` are the cameras of the
+    believed rig, with ``detections`` and ``truth`` in their pixels. The timelines are ``time`` in seconds, and
+    ``frame``.
 
     Raises:
-        ValueError: the SDK is not installed, or the file cannot be written.
+        ValueError: the rerun SDK is not installed, or the file cannot be written.
     """
     require_sdk()
     import rerun
@@ -50,13 +50,17 @@ def write_rerun(replay: Replay, path: Path) -> None:
 
 
 def require_sdk() -> None:
-    """Refuse to go on without the SDK: a ValueError says how to install it."""
+    """Check that the rerun SDK is installed.
+
+    Raises:
+        ValueError: the SDK is missing; the message has the command to install it.
+    """
     if importlib.util.find_spec("rerun") is None:
         raise ValueError("--rerun: needs the rerun SDK, which is not installed: pip install -e '.[viewer]'")
 
 
 def _check_writable(path: Path) -> None:
-    """Refuse what the SDK would only complain about in its log."""
+    """Check that a file can be written: the SDK would only log the error."""
     try:
         path.open("wb").close()
     except OSError as error:
@@ -64,7 +68,7 @@ def _check_writable(path: Path) -> None:
 
 
 def _log_still(recording: Any, replay: Replay) -> None:
-    """Cameras and things."""
+    """Log the cameras and the static objects."""
     import rerun
 
     for camera in replay.trial.exposures.believed_rig:
@@ -74,7 +78,7 @@ def _log_still(recording: Any, replay: Replay) -> None:
             image_from_camera=camera.K,
             resolution=camera.size,
             camera_xyz=rerun.ViewCoordinates.RDF,
-            image_plane_distance=_PICTURE,
+            image_plane_distance=_IMAGE_PLANE,
         )
         recording.log(place, pose, eye, static=True)
     for solid in replay.trial.scene.solids:
@@ -100,24 +104,30 @@ def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
         strips += limbs
         colors += [person_color(owner)] * len(limbs)
     recording.log("world/estimates", rerun.LineStrips3D(strips, colors=colors, radii=_THICK))
-    said = np.append(owners, -1)[estimate.matching.labels_of(len(detections))]
+    assigned = np.append(owners, -1)[estimate.matching.labels_of(len(detections))]
     for view, camera in enumerate(replay.trial.exposures.believed_rig):
         place = f"world/cameras/{camera.name}"
-        points, shades = _keypoints(detections.keypoints, np.flatnonzero(detections.view == view), said)
+        points, shades = _keypoints(detections.keypoints, np.flatnonzero(detections.view == view), assigned)
         recording.log(f"{place}/detections", rerun.Points2D(points, colors=shades, radii=_DOT))
         drawn = [limb for pixels in truth.pixels[view] for limb in _limbs(pixels)]
         recording.log(f"{place}/truth", rerun.LineStrips2D(drawn, colors=TRUTH))
 
 
 def _limbs(joints: Floats) -> list[Floats]:
-    """The limbs both of whose ends have a place, (2, D) each."""
+    """Return the limbs whose two joints have a position, (2, D) each."""
     known = np.asarray(np.isfinite(joints).all(axis=1))
     return [joints[[a, b]] for a, b in COCO17_LIMBS if known[a] and known[b]]
 
 
-def _keypoints(keypoints: Floats, mine: NDArray[np.intp], said: NDArray[np.int64]) -> tuple[Floats, list[Color]]:
-    """The keypoints of one view that were detected, (n, 2), and the colours of whom they are taken for."""
-    points = keypoints[mine]
+def _keypoints(keypoints: Floats, indices: NDArray[np.intp], assigned: NDArray[np.int64]) -> tuple[Floats, list[Color]]:
+    """Return the detected keypoints of one view, (n, 2), and the colours of their assigned people.
+
+    Args:
+        keypoints: keypoints of all detections, (m, J, 2) pixels.
+        indices: detections of the view, (k,).
+        assigned: person of each detection, (m,), -1 for none.
+    """
+    points = keypoints[indices]
     detection, joint = np.nonzero(np.isfinite(points).all(axis=-1))
-    taken = np.asarray(said[mine])[detection]
-    return points[detection, joint], [person_color(person) for person in taken.tolist()]
+    people = np.asarray(assigned[indices])[detection]
+    return points[detection, joint], [person_color(person) for person in people.tolist()]

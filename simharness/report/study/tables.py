@@ -1,4 +1,4 @@
-"""The tables of a study: means over scenes with their intervals, variants beside each other."""
+"""Tables of a study: mean scores of the variants with intervals over seeds, and differences between variants."""
 
 from __future__ import annotations
 
@@ -11,24 +11,32 @@ import polars as pl
 
 from simharness.report.run.headline import NOTHING
 from simharness.report.study.curves import Breaking
+from simharness.report.study.failure_rates import NOT_BLAMED
+from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
 from simharness.statistics.comparison import Interval, holm, mean_interval, paired
 
 COLUMNS: tuple[ScoreInfo, ...] = tuple(
     SCORES[key] for key in ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts", "time_ms")
 )
-"""The scores of the headline table."""
+"""Scores of the headline table."""
 
-SURE = 0.05
-"""Adjusted p under which a difference is shown as one."""
+SIGNIFICANT = 0.05
+"""Adjusted p value below which a difference is significant."""
 
-_OF_A_VARIANT = ("variant", "seconds", "scenario")  # columns that say nothing of the setting; scores do not, either
-_OTHER = ", the other variant's"  # no column of a study is called so
+_OF_A_VARIANT = ("variant", "seconds", "scenario")  # columns besides the scores that are not part of the setting
+_OTHER = " of the other variant"  # suffix that no column of a study has
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A number in a table: what it is, and what is said small below it."""
+    """Table cell.
+
+    Attributes:
+        text: the number.
+        small: note in small letters below the number.
+        strong: whether the number is bold.
+    """
 
     text: str
     small: str = ""
@@ -36,48 +44,50 @@ class Cell:
 
 
 def by_seed(rows: pl.DataFrame, score: str) -> dict[int, float]:
-    """A score at each seed: the mean over the settings; seeds to which it does not apply are left out.
+    """Return a score by seed, as the mean over the settings; seeds without the score are left out.
 
-    Settings at one seed have their people in common, so the seed is the scene that intervals are over.
+    The settings of one seed share their people and are not independent, so intervals are over seeds.
     """
     means = rows.group_by("seed").agg(pl.col(score).mean()).drop_nulls(score).sort("seed")
     return dict(zip(means["seed"].to_list(), means[score].to_list(), strict=True))
 
 
 def cell(interval: Interval, score: ScoreInfo) -> Cell:
-    """A mean, its interval small below it."""
+    """Return the cell of a mean, with its interval in small letters."""
     if not interval.n:
         return Cell(NOTHING)
     return Cell(number(interval.mean, score), ends(interval, score))
 
 
 def number(value: float, score: ScoreInfo) -> str:
-    """A value of a score."""
-    return f"{value:.{score.digits}f}" if np.isfinite(value) else NOTHING
+    """Return the text of a value of a score."""
+    return fixed(value, score.digits) if np.isfinite(value) else NOTHING
 
 
 def ends(interval: Interval, score: ScoreInfo) -> str:
-    """The ends of an interval; nothing where there is none."""
+    """Return the text of the ends of an interval; empty without an interval."""
     if not np.isfinite([interval.low, interval.high]).all():
         return ""
-    return f"{interval.low:.{score.digits}f} to {interval.high:.{score.digits}f}"
+    return f"{fixed(interval.low, score.digits)} to {fixed(interval.high, score.digits)}"
 
 
 def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
-    """A row for each variant, a cell for each of :data:`COLUMNS`.
+    """Return the headline table: a row for each variant, a cell for each of :data:`COLUMNS`.
 
-    A mean is over the settings where the score applies to that variant, which need not be those of another one: how
-    two variants differ is what :func:`compared` says, not the difference of their means.
+    A mean is over the settings where the score applies to that variant, and these may differ between variants. So the
+    difference between two variants is the one of :func:`compared`, not the difference of these means.
     """
     rows = {}
     for variant in variants:
-        mine = trials.filter(pl.col("variant") == variant)
-        rows[variant] = [cell(mean_interval(list(by_seed(mine, info.key).values())), info) for info in COLUMNS]
+        trials_of_variant = trials.filter(pl.col("variant") == variant)
+        rows[variant] = [
+            cell(mean_interval(list(by_seed(trials_of_variant, info.key).values())), info) for info in COLUMNS
+        ]
     return rows
 
 
 def every(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
-    """Every score that applies to any variant: a row each, a cell for each variant.
+    """Return the table of all scores that apply to any variant: a row for each score, a cell for each variant.
 
     Means are over the settings where the score applies to that variant, as in :func:`headline`.
     """
@@ -93,66 +103,65 @@ def every(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo
 
 
 def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, list[Cell]]]:
-    """A headline table for each case; none where the study has no cases."""
+    """Return a headline table for each case; empty for a study without cases."""
     names = [name for name in dict.fromkeys(trials["case"]) if name]
     return {name: headline(trials.filter(pl.col("case") == name), variants) for name in names}
 
 
 def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
-    """How each further variant differs from the first: at each seed over the settings where both have the score.
+    """Return the differences of the other variants from the first, paired by seed, over the settings that both have.
 
-    A difference is strong where Holm's adjusted p over all cells is under :data:`SURE`; time is left out, for other
-    work on the machine shifts it.
+    A cell is strong where the p value, adjusted by Holm's method over all cells, is below :data:`SIGNIFICANT`. Time is
+    not tested, because other work on the machine changes it.
     """
-    found: list[tuple[str, ScoreInfo, Any]] = []
+    differences: list[tuple[str, ScoreInfo, Any]] = []
     first, *others = variants
     base = trials.filter(pl.col("variant") == first)
-    where = [column for column in trials.columns if column not in (*SCORES, *_OF_A_VARIANT)]  # setting and seed
+    setting = [column for column in trials.columns if column not in (*SCORES, *_OF_A_VARIANT)]  # with the seed
     for variant in others:
-        mine = trials.filter(pl.col("variant") == variant)
-        pairs = base.join(mine, on=where, suffix=_OTHER, nulls_equal=True, maintain_order="left")
+        other = trials.filter(pl.col("variant") == variant)
+        pairs = base.join(other, on=setting, suffix=_OTHER, nulls_equal=True, maintain_order="left")
         for info in COLUMNS:
             both = pairs.drop_nulls([info.key, f"{info.key}{_OTHER}"])
             before, after = by_seed(both, info.key), by_seed(both, f"{info.key}{_OTHER}")
-            found.append((variant, info, paired(list(before.values()), list(after.values()))))
-    tested = [each for each in found if each[1].key != "time_ms"]
+            differences.append((variant, info, paired(list(before.values()), list(after.values()))))
+    tested = [each for each in differences if each[1].key != "time_ms"]
     adjusted = dict(zip([(each[0], each[1].key) for each in tested], holm([each[2].p for each in tested]), strict=True))
     rows: dict[str, list[Cell]] = {variant: [] for variant in others}
-    for variant, info, pair in found:
+    for variant, info, pair in differences:
         if not pair.n:
             rows[variant].append(Cell(NOTHING))
             continue
         small = ""
         if np.isfinite(pair.low):
             small = f"{_signed(pair.low, info)} to {_signed(pair.high, info)}"
-        sure = adjusted.get((variant, info.key), 1.0) < SURE
-        rows[variant].append(Cell(_signed(pair.difference, info), small, sure))
+        significant = adjusted.get((variant, info.key), 1.0) < SIGNIFICANT
+        rows[variant].append(Cell(_signed(pair.difference, info), small, significant))
     return rows
 
 
 def _signed(value: float, score: ScoreInfo) -> str:
-    """A difference with its sign; none where it rounds to nothing."""
-    written = f"{value:+.{score.digits}f}"
-    return written.replace("-", "−") if float(written) else written[1:]
+    """Return a difference with its sign, as a typographic minus; zero has no sign."""
+    return signed(value, score.digits).replace("-", "−")
 
 
-def breaking_cell(found: Breaking | None) -> Cell:
-    """Where a variant breaks, in words."""
-    if found is None:
+def breaking_cell(breaking: Breaking | None) -> Cell:
+    """Return the cell of a breaking point."""
+    if breaking is None:
         return Cell(NOTHING)
-    low, high = found.tried
-    point = found.point
-    side = "above" if found.rising else "below"
+    low, high = breaking.tried
+    point = breaking.point
+    side = "above" if breaking.rising else "below"
     small = ""
     if point.low is not None or point.high is not None:
         least = f"{_short(low)} or less" if point.low is None else _short(point.low)
         most = f"{_short(high)} or more" if point.high is None else _short(point.high)
         small = f"{least} to {most}"
     if point.why == "never":
-        return Cell(f"not from {_short(low)} to {_short(high)}", small)
+        return Cell(f"not between {_short(low)} and {_short(high)}", small)
     if point.why == "at once":
-        return Cell(f"already at {_short(low if found.rising else high)}", small)
-    assert point.value is not None  # where it crosses
+        return Cell(f"already at {_short(low if breaking.rising else high)}", small)
+    assert point.value is not None  # the score crosses the threshold
     return Cell(f"{side} {_short(point.value)}", small, strong=True)
 
 
@@ -160,20 +169,20 @@ def _short(value: float) -> str:
     return f"{value:.3g}"
 
 
-def failure_amounts(
+def failures_per_100_frames(
     failures: pl.DataFrame, frames: Mapping[str, int], variants: Sequence[str], column: str
 ) -> dict[str, dict[str, float]]:
-    """Failures of each variant in 100 frames, by a column of the table of failures.
+    """Return the failures per 100 frames of each variant, by a column of the table of failures.
 
     Args:
-        failures: of the study.
-        frames: judged, of each variant.
-        variants: in order.
-        column: ``kind`` or ``stage``; null is "not looked into".
+        failures: table of failures of the study.
+        frames: scored frames of each variant.
+        variants: variants in the order of the result.
+        column: ``kind`` or ``stage``; null becomes :data:`simharness.report.study.failure_rates.NOT_BLAMED`.
     """
-    amounts: dict[str, dict[str, float]] = {}
+    rates: dict[str, dict[str, float]] = {}
     for variant in variants:
-        mine = failures.filter(pl.col("variant") == variant)[column].fill_null("not looked into")
-        counts = dict(mine.value_counts().iter_rows())
-        amounts[variant] = {key: 100 * count / max(1, frames.get(variant, 0)) for key, count in counts.items()}
-    return amounts
+        classes = failures.filter(pl.col("variant") == variant)[column].fill_null(NOT_BLAMED)
+        counts = dict(classes.value_counts().iter_rows())
+        rates[variant] = {key: 100 * count / max(1, frames.get(variant, 0)) for key, count in counts.items()}
+    return rates

@@ -1,4 +1,4 @@
-"""The worst frames of a study, looked at again."""
+"""Worst frames of a study: selection, and pictures of their trials run again."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
 SHOWN = 4
+"""Number of worst frames on a page."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame of a trial as one variant estimated it.
+    """A frame of a trial with the result of one variant.
 
     Attributes:
-        trial: identity.
-        variant: of the method.
-        frame: index.
-        cost: how bad it is, millimetres: the errors summed, and the limit for everyone missed or made up.
-        setting: what is special about the trial, by name: the case, every factor, the seed.
+        trial: identity of the trial.
+        variant: name of the variant.
+        frame: frame index.
+        cost: sum of the errors of people, and 500 for every missed person or ghost, in millimetres.
+        setting: case, factors and seed of the trial, by name.
     """
 
     trial: str
@@ -47,14 +48,14 @@ class Frame:
 
 @dataclass(frozen=True)
 class Shown:
-    """A bad frame, shown.
+    """Pictures of a worst frame.
 
     Attributes:
-        picture: every camera's picture.
-        view: the people in 3D, over time.
-        setting: of the trial, one line.
-        trial: identity.
-        command: that renders the trial again.
+        picture: mosaic of the views.
+        view: 3D view of the people over time.
+        setting: setting of the trial in one line.
+        trial: identity of the trial.
+        command: command that renders the trial again.
     """
 
     picture: Picture
@@ -65,13 +66,13 @@ class Shown:
 
 
 def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
-    """The worst frames for the first variant of a study that has any, the worst first.
+    """Return the frames with the highest cost for the first variant with results, by falling cost.
 
-    One of a setting; where there are fewer settings than asked for, one of a trial.
+    There is one frame of each setting; where there are fewer settings than ``count``, one frame of each trial.
     """
     variant = next((name for name in results.info["variants"] if name in set(results.frames["variant"])), None)
     if variant is None:
-        return []  # nothing finished, and the tables have no columns
+        return []  # no trial finished, so the tables have no columns
     errors = results.people.group_by("trial", "variant", "frame").agg(pl.col("error_mm").sum())
     frames = (
         results.frames.filter(pl.col("variant") == variant)
@@ -87,11 +88,11 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
     for row in frames.iter_rows(named=True):
         about = settings[row["trial"]]
         setting = {key: about[key] for key in keys}
-        found = Frame(row["trial"], variant, row["frame"], row["cost"], setting | {"seed": about["seed"]})
+        frame = Frame(row["trial"], variant, row["frame"], row["cost"], setting | {"seed": about["seed"]})
         if str(setting) in first:
-            rest.append(found)
+            rest.append(frame)
         else:
-            first[str(setting)] = found
+            first[str(setting)] = frame
     chosen = list(first.values())[:count]
     chosen += rest[: count - len(chosen)]
     return sorted(chosen, key=lambda frame: -frame.cost)
@@ -100,12 +101,12 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
 def show(
     results: Results, frames: list[Frame], *, progress: Callable[[int], None] = lambda frames: None
 ) -> Iterator[tuple[Shown, Replay]]:
-    """Run the trials of frames again and show the frames; pictures are rasterised where the trials needed none.
+    """Run the trials of frames again and draw the frames; trials without pictures are rasterised for this.
 
     Raises:
-        ValueError: a trial that cannot be built any more: a file that it names is gone.
+        ValueError: a trial cannot be built any more, for example because a file that it names is gone.
     """
-    # Files in it are relative to where the study was started.
+    # Paths in the study file are relative to the folder in which the study was started.
     study = load_study(results.folder / "study.toml", limit=None, folder=Path()) if frames else None
     for number, frame in enumerate(frames, start=1):
         scenario = results.scenario_of(frame.trial)
@@ -129,7 +130,7 @@ def show(
 
 
 def _command(study: Study, scenario: Scenario) -> str:
-    """What renders a trial of a study again, for a shell."""
+    """Return the shell command that renders a trial of a study again."""
     setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
     files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.said))]
     sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]

@@ -1,4 +1,4 @@
-"""The page of a study: its numbers, its structure, and what it says where things went wrong."""
+"""Page of a study: its numbers, its structure, and its messages on failed trials."""
 
 import dataclasses
 import re
@@ -21,7 +21,7 @@ _VOID = {"meta", "input", "img", "br"}
 
 
 class Reader(HTMLParser):
-    """Tags with their attributes, and that all are closed in their order."""
+    """Parser that collects tags with their attributes, and checks that all are closed in order."""
 
     def __init__(self, page):
         super().__init__()
@@ -50,7 +50,7 @@ def page(tmp_path):
 
 
 def cells_of(page, row):
-    """The first line of every cell of the first table row with this heading."""
+    """Return the first line of every cell of the first table row with this heading."""
     found = re.search(rf'<tr[^>]*><th scope="row">{row}</th>(.*?)</tr>', page, re.DOTALL)
     return re.findall(r"<td[^>]*>([^<]*)", found.group(1))
 
@@ -68,16 +68,16 @@ def test_every_score_that_applies_has_its_mean(tmp_path):
     results = dataclasses.replace(results, trials=trials)
     page = render_study(results)
     table = page[page.index('class="panel every"') :]
-    told = 0
+    rows = 0
     for key, info in SCORES.items():
         values = results.trials.filter(pl.col("variant") == "fast")[key].drop_nulls()
         title = f"{info.title}, {info.unit}" if info.unit else info.title
         row = re.search(rf'<th scope="row">{re.escape(title)}<span.*?</tr>', table, re.DOTALL)
         assert (row is not None) == bool(len(values))
         if row is not None:
-            told += 1
+            rows += 1
             assert re.findall(r"<td>([^<]*)", row[0])[1] == f"{values.mean():.{info.digits}f}"
-    assert told == len(SCORES) - 1
+    assert rows == len(SCORES) - 1
 
 
 def test_every_value_of_a_factor_has_its_number(tmp_path):
@@ -114,7 +114,7 @@ def test_it_needs_nothing_from_elsewhere(page, shown, ran):
         }
 
 
-def test_failed_trials_are_told_before_any_number(tmp_path):
+def test_failed_trials_are_listed_before_any_number(tmp_path):
     failed = ({"case": "", "factors": {"cameras.count": 2}, "seed": 9, "error": "RunError: <b>out of memory"},) * 30
     page = render_study(make_study(tmp_path, failed=failed))
     assert page.index('role="alert"') < page.index("<table")
@@ -128,27 +128,27 @@ def test_failed_trials_are_told_before_any_number(tmp_path):
 def test_a_study_of_which_nothing_finished_says_so(tmp_path):
     made = make_study(tmp_path)
     nothing = dataclasses.replace(made, **{name: getattr(made, name).clear() for name in ("trials", "people")})
-    empty = pl.DataFrame(schema={"trial": pl.String, "variant": pl.String})  # as the engine has it
+    empty = pl.DataFrame(schema={"trial": pl.String, "variant": pl.String})  # as a study without results has it
     nothing = dataclasses.replace(nothing, frames=empty, people=empty, failures=empty)
     page = write_report(nothing).read_text(encoding="utf-8")
-    assert "Nothing finished" in page
+    assert "No trial of this study finished" in page
     Reader(page)
 
 
 def test_one_seed_has_no_intervals_and_no_tests(tmp_path):
     page = render_study(make_study(tmp_path, seeds=1))
-    assert "of one seed there is no interval" in page
+    assert "A single seed has no interval" in page
     assert "<small>" not in page
     assert "Holm" not in page
 
 
-def test_a_variant_that_is_surely_worse_is_bold(tmp_path):
-    page = render_study(make_study(tmp_path, seeds=12))  # 2^-12 withstands Holm's correction
+def test_a_variant_that_is_significantly_worse_is_bold(tmp_path):
+    page = render_study(make_study(tmp_path, seeds=12))  # p = 2^-12 stays significant after Holm's correction
     row = re.search(r'<th scope="row">fast<small class="note"> − full</small></th>(<td[^>]*>[^<]*)', page).group(1)
     assert row == '<td class="strong">−4.0'
 
 
-def test_breaking_points_are_told_for_the_thresholds_that_are_asked_for(tmp_path):
+def test_the_page_has_breaking_points_of_the_given_thresholds(tmp_path):
     results = make_study(tmp_path)
     assert "PCP under 90 %" in render_study(results)
     page = render_study(results, thresholds={"pcp": 80.0, "ghosts": 1.0})
@@ -158,9 +158,9 @@ def test_breaking_points_are_told_for_the_thresholds_that_are_asked_for(tmp_path
 
 
 def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page):
-    assert page.count("Both together") == 2 * 2  # cases and variants
-    assert render_study(make_study(tmp_path, factors=GRID)).count("Both together") == 2
-    assert "Both together" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
+    assert page.count("Both factors") == 2 * 2  # cases and variants
+    assert render_study(make_study(tmp_path, factors=GRID)).count("Both factors") == 2
+    assert "Both factors" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
 
 
 def test_every_case_has_a_row_for_each_variant(page, tmp_path):
@@ -180,7 +180,7 @@ def test_curves_and_breaking_points_are_of_one_case_each(tmp_path):
         "detector.profile": "Mean over cameras.count 2, 3, 5.",
     }
     assert figures == [(key, case, over[key]) for key in GRID for case in ("crowd", "empty")]
-    breaks = page[page.index("<h2>Where it breaks</h2>") :]
+    breaks = page[page.index("<h2>Breaking points</h2>") :]
     group, rest = re.search(r'colspan="4"><code>([^<]*)</code>(.*?)</tbody>', breaks, re.DOTALL).groups()
     assert group == "cameras.count"
     rows = re.findall(r'<th scope="row">PCP under 90 %</th><td>(\w+)</td><td[^>]*>([^<]*)', rest)
@@ -214,7 +214,7 @@ def test_a_study_of_one_setting_shows_the_worst_of_its_trials(tmp_path):
 
 
 def test_the_frames_shown_are_those_that_were_scored(ran, shown):
-    """The trials are run again: everybody's error must come out as the tables have it."""
+    """The trials are run again: the error of every person is the one in the tables."""
     assert len(shown) == 4
     for picture, again in shown:
         rows = ran.people.filter((pl.col("trial") == picture.trial) & (pl.col("variant") == "full"))
@@ -262,7 +262,7 @@ class TestCommand:
 
     def test_a_threshold_that_is_none(self, ran):
         assert "expected SCORE=NUMBER" in self.refused(ran.folder, "--threshold", "pcp")
-        assert "there is no such score" in self.refused(ran.folder, "--threshold", "pxp=90")
+        assert "no such score" in self.refused(ran.folder, "--threshold", "pxp=90")
 
     def test_a_place_that_cannot_be_written_to(self, ran, tmp_path):
         assert "there is no folder" in self.refused(ran.folder, "--out", tmp_path / "no" / "page.html")
