@@ -1,4 +1,4 @@
-"""The picture of what the project does: what it shows is what the run and the digest say, at its true place."""
+"""Overview picture of the README: it shows the data of the run and of the digest, at the right positions."""
 
 import dataclasses
 import json
@@ -16,27 +16,27 @@ from simharness.report.run.result_folder import run
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView
 from simharness.scenario.load import load
-from simharness.scenario.presets import SCENARIOS
+from simharness.scenario.shipped import shipped_folder
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from tools.readme_picture import picture as module
 from tools.readme_picture.breaking_chart import VARIANTS, breaking_chart
 from tools.readme_picture.picture import Tile, joined, main, overview
 
-RESULTS = SCENARIOS.parent / "results"
+RESULTS = shipped_folder().parent / "results"
 DIGEST = json.loads((RESULTS / "views" / "digest.json").read_text(encoding="utf-8"))
 SMALL = ["duration=0.4", "rate=5.0", "people.count=3", "cameras.size=[160,160]", 'method.variants=["full"]']
 FRAME, VIEWS = 1, (4, 3, 2)
 SVG = "{http://www.w3.org/2000/svg}"
 NUMBER = re.compile(r"-?\d+\.?\d*")
-LEAST_LETTERS = 22  # of a picture 1660 wide: 11 at the 830 of a README
+MIN_LETTERS = 22  # pixels in a picture 1660 wide: 11 at the 830 of a README
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A run of the picture's own scene, of which nobody needs to see much."""
+    """Small run of the scene of the picture."""
     out = tmp_path_factory.mktemp("runs")
-    return run(load(SCENARIOS / "overview.toml", overrides=SMALL), out=out)
+    return run(load(shipped_folder() / "overview.toml", overrides=SMALL), out=out)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +78,8 @@ def test_five_panels_stand_in_the_order_of_the_story_each_with_its_package(drawn
     names = [each.get("id") for each in drawn.iter(f"{SVG}g") if each.get("id")]
     assert names == ["simulate", "detect", "match", "reconstruct", "score"]
     for number, name in enumerate(names, 1):
-        said = "".join(panel(drawn, name).find(f"{SVG}text").itertext())
-        assert said.startswith(f"{number}{name}")
+        heading = "".join(panel(drawn, name).find(f"{SVG}text").itertext())
+        assert heading.startswith(f"{number}{name}")
     bars = [(float(each.get("y")), float(each.get("x")), each.text) for each in classed(drawn, "text", "bar")]
     assert [package for *_, package in sorted(bars)] == ["simharness", "mvpose", "mvpose", "simharness"]
 
@@ -90,7 +90,7 @@ def test_captions_are_short_and_letters_large_enough_for_a_readme(drawn):
     assert all(1 <= len(each["caption"].split()) <= 6 for each in captions.values())
     sizes = [float(size) for size in re.findall(r'font-size[=:]\s*"?([\d.]+)', ET.tostring(drawn, encoding="unicode"))]
     assert sizes
-    assert min(sizes) >= LEAST_LETTERS
+    assert min(sizes) >= MIN_LETTERS
     assert float(drawn.get("width")) == 1660
 
 
@@ -114,10 +114,10 @@ class TestDetect:
     def test_every_detection_of_the_view_stands_about_its_box_and_phantoms_are_red(self, drawn, record):
         tile = tiles(record)[1]
         detections, truth = record.detections[FRAME], record.truth[FRAME]
-        mine = np.flatnonzero(detections.view == VIEWS[0])
+        indices = np.flatnonzero(detections.view == VIEWS[0])
         expected = {
             tuple(np.round(tile.place(box[:2]), 1)): person
-            for box, person in zip(detections.boxes[mine], truth.person[mine], strict=True)
+            for box, person in zip(detections.boxes[indices], truth.person[indices], strict=True)
         }
         assert {-1} < set(expected.values())  # a phantom, and people
         found = {}
@@ -128,8 +128,8 @@ class TestDetect:
                 assert (box.get("stroke") == module._WRONG) == (person < 0)
         assert {corner: min(0, person) for corner, person in expected.items()} == found
 
-    def test_whoever_is_in_sight_and_not_detected_is_marked(self, record):
-        """Everything that the view detected is taken away from the method and from the truth about it."""
+    def test_people_who_are_visible_but_not_detected_are_marked(self, record):
+        """All detections of the view are removed, and their truth with them."""
         detections, truth = record.detections[FRAME], record.truth[FRAME]
         kept = detections.view != VIEWS[0]
         fields = ("view", "keypoints", "scores", "boxes", "box_scores")
@@ -137,11 +137,11 @@ class TestDetect:
         blind = dataclasses.replace(truth, person=truth.person[kept], error=truth.error[kept])
         replay = Replay(None, "full", record.time[:1], (blind,), (fewer,), ())
         tile = tiles(record)[1]
-        in_sight = np.flatnonzero((truth.visibility[VIEWS[0]] == 0).sum(axis=-1) >= module._SEEN)
-        assert len(in_sight)
+        visible = np.flatnonzero((truth.visibility[VIEWS[0]] == 0).sum(axis=-1) >= module._MIN_VISIBLE)
+        assert len(visible)
         marked = list(module._missed(replay, 0, tile))
         corners = [tuple(float(number) for number in NUMBER.findall(each["box"])[:2]) for each in marked]
-        assert corners == [tuple(np.round(tile.place(truth.boxes[VIEWS[0], k, :2]), 1)) for k in in_sight]
+        assert corners == [tuple(np.round(tile.place(truth.boxes[VIEWS[0], k, :2]), 1)) for k in visible]
         whole = Replay(None, "full", record.time[:1], (truth,), (detections,), ())
         assert len(list(module._missed(whole, 0, tile))) < len(marked)
 
@@ -182,7 +182,7 @@ class TestMatch:
         assert len(estimates) == len(owners)
         assert joins <= set(estimates) == colors
 
-    def test_a_view_without_the_person_is_passed_over_and_nobody_is_not_joined(self):
+    def test_views_without_the_person_are_skipped_and_unmatched_detections_are_not_joined(self):
         view = np.array([0, 0, 1, 2, 2, 2, 3])
         labels = np.array([0, -1, 1, 0, 1, -1, 0])
         assert joined(labels, view, [0, 1, 2]) == [(0, 3), (2, 4)]
@@ -229,7 +229,7 @@ class TestScore:
     """The fifth panel."""
 
     def axes(self, drawn):
-        """The scales that the ticks tell: from value to place, each way."""
+        """Return the scales of both axes, from value to position, fitted to the ticks."""
         score = panel(drawn, "score")
         across = [(float(tick.text), float(tick.get("x"))) for tick in classed(score, "text", "along")]
         down = [(float(tick.text), float(tick.get("y"))) for tick in classed(score, "text", "down")]
@@ -255,7 +255,7 @@ class TestScore:
     def test_rings_stand_where_the_mean_passes_the_threshold(self, drawn):
         x, y = self.axes(drawn)
         for variant in VARIANTS:
-            (told,) = (
+            (point,) = (
                 each
                 for each in DIGEST["breaking"]
                 if each["variant"] == variant and (each["factor"], each["score"]) == ("cameras.count", "pcp")
@@ -263,28 +263,28 @@ class TestScore:
             (curve,) = classed(panel(drawn, "score"), "g", "curve", variant)
             (ring,) = classed(curve, "circle", "breaks")
             place = [float(ring.get("cx")), float(ring.get("cy"))]
-            np.testing.assert_allclose(place, [x(told["value"]), y(told["threshold"])], atol=0.11)
-            said = "".join(curve.find(f"{SVG}text").itertext())
-            assert said == f"{variant} breaks below {told['value']:.1f}"
+            np.testing.assert_allclose(place, [x(point["value"]), y(point["threshold"])], atol=0.11)
+            label = "".join(curve.find(f"{SVG}text").itertext())
+            assert label == f"{variant} breaks below {point['value']:.1f}"
 
     def test_a_study_of_one_seed_has_no_intervals_and_one_that_holds_does_not_break(self):
-        told = json.loads(json.dumps(DIGEST))
+        digest = json.loads(json.dumps(DIGEST))
         for variant in VARIANTS:
-            line = told["factors"][0]["scores"][variant]["pcp"]
+            line = digest["factors"][0]["scores"][variant]["pcp"]
             line[:] = [None, *([mean, None, None] for mean, *_ in line[1:])]
-        for each in told["breaking"]:
+        for each in digest["breaking"]:
             each.update(value=None, why="never")
-        chart = breaking_chart(told, at=(0, 0, 100, 100))
+        chart = breaking_chart(digest, at=(0, 0, 100, 100))
         assert chart["curves"]
         for curve in chart["curves"]:
-            assert len(curve["points"]) == len(told["factors"][0]["values"]) - 1
+            assert len(curve["points"]) == len(digest["factors"][0]["values"]) - 1
             assert curve["breaks"] is None
-            assert curve["told"] == "does not break"
+            assert curve["label"] == "does not break"
 
     def test_the_axis_reaches_down_to_the_worst_score(self):
-        told = json.loads(json.dumps(DIGEST))
-        told["factors"][0]["scores"]["full"]["pcp"][0] = [14.0, 12.0, 16.0]
-        chart = breaking_chart(told, at=(0, 0, 100, 200))
+        digest = json.loads(json.dumps(DIGEST))
+        digest["factors"][0]["scores"]["full"]["pcp"][0] = [14.0, 12.0, 16.0]
+        chart = breaking_chart(digest, at=(0, 0, 100, 200))
         (full,) = (curve for curve in chart["curves"] if curve["variant"] == "full")
         assert chart["down"][0] == {"value": 10, "at": 200.0}
         np.testing.assert_allclose(full["points"][0], (0, 200 * 86 / 90), atol=0.051)
@@ -300,7 +300,7 @@ class TestFile:
         assert out.read_text(encoding="utf-8") == overview(record, DIGEST, frame=FRAME, views=VIEWS)
 
     @pytest.mark.parametrize(
-        ("options", "digest", "said"),
+        ("options", "digest", "message"),
         [
             (["--frame", "2"], "views", "--frame 2: the run has frames 0 to 1"),
             (["--views", "0,1"], "views", "--views 0,1: expected three different views of 0 to 4"),
@@ -310,11 +310,11 @@ class TestFile:
             ([], "none", "No such file"),
         ],
     )
-    def test_what_cannot_be_drawn_is_said(self, folder, tmp_path, capsys, options, digest, said):
+    def test_bad_input_gets_a_message(self, folder, tmp_path, capsys, options, digest, message):
         out = tmp_path / "overview.svg"
         frame = [] if "--frame" in options else ["--frame", "0"]
         assert main([str(folder), str(RESULTS / digest / "digest.json"), str(out), *frame, *options]) == 2
-        assert said in capsys.readouterr().err
+        assert message in capsys.readouterr().err
         assert not list(tmp_path.iterdir())
 
     def test_a_digest_that_is_none_is_named(self, folder, tmp_path, capsys):
@@ -336,5 +336,5 @@ class TestFile:
             assert len(panel(svg, name))
         chart = breaking_chart(DIGEST, at=module._CHART)
         for curve in chart["curves"]:
-            (there,) = classed(panel(svg, "score"), "g", "curve", curve["variant"])
-            assert curve["line"] in {path.get("d") for path in there.iter(f"{SVG}path")}
+            (group,) = classed(panel(svg, "score"), "g", "curve", curve["variant"])
+            assert curve["line"] in {path.get("d") for path in group.iter(f"{SVG}path")}

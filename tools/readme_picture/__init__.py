@@ -1,1 +1,1 @@
-"""Draws the picture at the top of the README."""
+"""Overview picture of the README."""

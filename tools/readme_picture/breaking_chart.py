@@ -1,4 +1,4 @@
-"""Where variants of the method break: PCP against the number of cameras, from the digest of a study, as plain SVG."""
+"""Chart of breaking points: PCP of the variants against the number of cameras, from the digest of a study."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from simharness.report.figures.svg_plots import VARIANT_COLORS
 Point = tuple[float, float]
 
 FACTOR, SCORE = "cameras.count", "pcp"
-"""What the last panel plots a score against, and which."""
+"""Factor and score of the chart."""
 
 VARIANTS = ("full", "no-3dps", "no-matching")
-"""Whose curves it shows."""
+"""Variants with a curve."""
 
-_WHY = {"never": "does not break", "at once": "is broken throughout"}
+_WITHOUT_POINT = {"never": "does not break", "at once": "is broken throughout"}
 
 
 def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, float]) -> dict[str, Any]:
-    """Lay out the curves of a digest with their intervals, and where they pass the threshold.
+    """Lay out the curves of a digest with their intervals and breaking points.
 
     Args:
-        digest: of a study: its ``digest.json``.
+        digest: contents of the ``digest.json`` of a study.
         at: left, top, width and height of the axes on the sheet.
 
     Returns:
-        What the template draws: axes with their ticks, and for each variant points, paths, and what is told of it.
+        Values for the template: axes with ticks, and for each variant points, paths and a label.
 
     Raises:
         ValueError: the study does not sweep ``cameras.count``, or lacks a variant.
     """
-    nothing: dict[str, Any] = {"values": [], "scores": {}}
-    factor = next((each for each in digest.get("factors", ()) if each["key"] == FACTOR), nothing)
+    empty: dict[str, Any] = {"values": [], "scores": {}}
+    factor = next((each for each in digest.get("factors", ()) if each["key"] == FACTOR), empty)
     if missing := [variant for variant in VARIANTS if variant not in factor["scores"]]:
         raise ValueError(
-            f"the digest has no {SCORE} of {', '.join(missing)} against {FACTOR}: expected the digest.json of a study "
-            "that sweeps it, such as results/views/digest.json"
+            f"the digest has no {SCORE} of {', '.join(missing)} against {FACTOR}; expected the digest.json of a study "
+            f"that sweeps {FACTOR}, such as results/views/digest.json"
         )
     left, top, width, height = at
     values = factor["values"]
@@ -65,14 +65,14 @@ def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, 
             {
                 "variant": variant,
                 "color": VARIANT_COLORS[row],
-                "width": 3 + 2 * (len(VARIANTS) - 1 - row),  # so that lines that coincide are all seen
+                "width": 3 + 2 * (len(VARIANTS) - 1 - row),  # lines that coincide stay visible
                 "points": points,
                 "line": path(points),
                 "band": path([*lows, *reversed(highs)]) + "Z",
                 "breaks": None if point is None else x(point),
                 "key": f"M{key[0]:.1f} {key[1]:.1f}h28",
-                "told": _WHY[breaking[variant]["why"]] if point is None else f"breaks below {point:.1f}",
-                "told_at": (round(key[0] + 42, 1), round(key[1] + 8, 1)),
+                "label": _WITHOUT_POINT[breaking[variant]["why"]] if point is None else f"breaks below {point:.1f}",
+                "label_at": (round(key[0] + 42, 1), round(key[1] + 8, 1)),
             }
         )
     return {
@@ -88,12 +88,12 @@ def breaking_chart(digest: Mapping[str, Any], *, at: tuple[float, float, float, 
 
 
 def path(points: Iterable[Point]) -> str:
-    """A line through points as SVG has it."""
+    """Return a line through points as the data of an SVG path."""
     return "M" + "L".join(f"{x} {y}" for x, y in points)
 
 
 def _known(values: Sequence[float], scores: Sequence[Any]) -> list[tuple[float, float, float, float]]:
-    """Value, mean and the ends of its interval wherever there is a mean; of a single seed the ends are the mean."""
+    """Return value, mean and ends of the interval where there is a mean; for a single seed the ends are the mean."""
     return [
         (value, ends[0], *(ends[0] if end is None else end for end in ends[1:]))
         for value, ends in zip(values, scores, strict=True)

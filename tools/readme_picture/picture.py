@@ -1,8 +1,8 @@
-"""What the project does in one picture: ``python -m tools.readme_picture.picture RUN DIGEST PICTURE.svg``.
+"""Overview picture of the README: ``python -m tools.readme_picture.picture RUN DIGEST PICTURE.svg``.
 
-Five panels: a rendered picture, what the simulated detector says of it, which detections the method takes for one
-person, where it puts these people, and how its score falls as cameras are taken away. The first four show a frame of a
-run, the last the digest of a study that sweeps ``cameras.count``. Everything is drawn from these outputs.
+Five panels: a rendered picture, its simulated detections, the detections that the method matches to one person, the
+reconstructed people, and the score against the number of cameras. The first four panels show a frame of a run, the last
+one shows the digest of a study that sweeps ``cameras.count``. Everything is drawn from these outputs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from simharness.trial.stages.capture import picture_source_of
 
 from mvpose.arrays import Floats
 from simharness.report.documents import fill_template
@@ -30,6 +29,7 @@ from simharness.report.study.room_view import RoomView
 from simharness.runtime.atomic_files import write_whole
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.capture import picture_source_of
 from simharness.types.truth import KeypointError
 from simharness.types.views import Visibility
 from simharness.world.scene.playback import Playback
@@ -37,28 +37,28 @@ from tools.readme_picture.breaking_chart import FACTOR, Point, breaking_chart, p
 
 _WIDTH, _HEIGHT = 1660, 872
 _MARGIN = 36
-_SIDE = 292  # of a tile
+_SIDE = 292  # width and height of a tile
 _GAP, _SEAM = 40, 24  # between panels, and between the views of one panel
-_TOP, _BELOW = 30, 478  # of the two rows
-_TITLE = 68  # from the top of a row to the line of its titles
+_TOP, _BELOW = 30, 478  # tops of the two rows
+_TITLE = 68  # from the top of a row to the baseline of its titles
 _TILE_TOP = _TOP + 114
 _ROOM = (_MARGIN, _BELOW + 84, 800, 300)  # left, top, width and height of the room
-_CHART = (936, _BELOW + 100, 672, 206)  # of the curves
+_CHART = (936, _BELOW + 100, 672, 206)  # left, top, width and height of the curves
 _HARNESS, _METHOD = "#2f6ea8", "#22805a"  # colours of the two packages
 _WRONG = "#e5262b"
-_SEEN = 5  # joints in sight of a person whom the detector ought to find
-_SHARPNESS = 2  # pixels of a tile's picture for one of the sheet
+_MIN_VISIBLE = 5  # visible joints from which on a person without a detection counts as missed
+_SHARPNESS = 2  # pixels of a tile's picture for one pixel of the sheet
 
 
 @dataclass(frozen=True)
 class Tile:
-    """Where the middle square of a view's picture stands on the sheet.
+    """Place on the sheet of the middle square of a view's picture.
 
     Attributes:
-        view: of the rig.
-        size: width and height of its pictures, pixels.
-        left: of the tile on the sheet.
-        top: of it.
+        view: index of the camera in the rig.
+        size: width and height of the camera's pictures in pixels.
+        left: left edge of the tile on the sheet.
+        top: top edge of the tile on the sheet.
     """
 
     view: int
@@ -67,7 +67,7 @@ class Tile:
     top: float
 
     def place(self, pixels: ArrayLike) -> Floats:
-        """Where pixels (..., 2) are on the sheet."""
+        """Return the positions of pixels (..., 2) on the sheet."""
         scale = _SIDE / min(self.size)
         return (np.asarray(pixels, float) + 0.5 - np.array(self.size) / 2) * scale + _SIDE / 2 + (self.left, self.top)
 
@@ -76,16 +76,16 @@ def overview(record: Record, digest: Mapping[str, Any], *, frame: int, views: Se
     """Draw the picture.
 
     Args:
-        record: of a run; its first variant is shown.
-        digest: of a study that sweeps ``cameras.count``: its ``digest.json``.
-        frame: of the run.
-        views: three of its rig; the first is the one whose detections are shown.
+        record: the run; its first variant is drawn.
+        digest: contents of the ``digest.json`` of a study that sweeps ``cameras.count``.
+        frame: frame of the run.
+        views: three views of the rig; the panel of the detector shows the first.
 
     Returns:
-        An SVG document with the pictures in it.
+        An SVG document with embedded pictures.
 
     Raises:
-        ValueError: no such frame or view, or the digest has no such curves.
+        ValueError: the frame or a view does not exist, or the digest has no such curves.
     """
     _check(record, frame, views)
     chart = breaking_chart(digest, at=_CHART)
@@ -129,7 +129,7 @@ def _check(record: Record, frame: int, views: Sequence[int]) -> None:
 
 
 def _tiles(record: Record, views: Sequence[int]) -> list[Tile]:
-    """The first view as it is, with its detections, and all views as they are matched."""
+    """Return the tiles: the first view without and with detections, then all views with their matching."""
     lefts = [_MARGIN, _MARGIN + _SIDE + _GAP]
     lefts += [lefts[-1] + _SIDE + _GAP + k * (_SIDE + _SEAM) for k in range(len(views))]
     shown = [views[0], views[0], *views]
@@ -137,7 +137,7 @@ def _tiles(record: Record, views: Sequence[int]) -> list[Tile]:
 
 
 def _bars(tiles: Sequence[Tile]) -> list[dict[str, Any]]:
-    """Which package does what."""
+    """Return the bars with the name of the package above its panels."""
     ends = (
         ("simharness", _HARNESS, _TOP, tiles[0].left, tiles[1].left + _SIDE),
         ("mvpose", _METHOD, _TOP, tiles[2].left, tiles[-1].left + _SIDE),
@@ -151,13 +151,13 @@ def _bars(tiles: Sequence[Tile]) -> list[dict[str, Any]]:
 
 
 def _panels(tiles: Sequence[Tile]) -> dict[str, dict[str, Any]]:
-    """Number, name and caption of each panel, and where they stand."""
-    said = (
+    """Return number, name, caption and position of each panel."""
+    panels = (
         ("simulate", "people, room, cameras", _HARNESS, tiles[0].left, _TOP),
         ("detect", "errors in red", _HARNESS, tiles[1].left, _TOP),
-        ("match", "one colour: taken for one person", _METHOD, tiles[2].left, _TOP),
+        ("match", "one colour for each person", _METHOD, tiles[2].left, _TOP),
         ("reconstruct", "thick estimate, thin truth, grey ghost", _METHOD, _ROOM[0], _BELOW),
-        ("score", "PCP, and where it breaks", _HARNESS, _ROOM[0] + _ROOM[2] + _GAP, _BELOW),
+        ("score", "PCP and breaking points", _HARNESS, _ROOM[0] + _ROOM[2] + _GAP, _BELOW),
     )
     return {
         name: {
@@ -168,12 +168,12 @@ def _panels(tiles: Sequence[Tile]) -> dict[str, dict[str, Any]]:
             "left": left,
             "top": top + _TITLE,
         }
-        for number, (name, caption, color, left, top) in enumerate(said, 1)
+        for number, (name, caption, color, left, top) in enumerate(panels, 1)
     }
 
 
 def _detected(replay: Replay, frame: int, tile: Tile) -> Iterator[dict[str, Any]]:
-    """The detections of a view: right ones white, phantoms and wrong keypoints red."""
+    """Return the detections of a view: correct ones in white, phantoms and wrong keypoints in red."""
     detections, truth = replay.detections[frame], replay.truth[frame]
     bad = np.isin(truth.error, (KeypointError.MISS, KeypointError.INVERSION, KeypointError.SWAP))
     for index in np.flatnonzero(detections.view == tile.view).tolist():
@@ -189,18 +189,18 @@ def _detected(replay: Replay, frame: int, tile: Tile) -> Iterator[dict[str, Any]
 
 
 def _missed(replay: Replay, frame: int, tile: Tile) -> Iterator[dict[str, Any]]:
-    """People in sight of a view whom it has no detection of."""
+    """Return the people who are visible in a view and have no detection there."""
     detections, truth = replay.detections[frame], replay.truth[frame]
-    found = truth.person[detections.view == tile.view]
-    in_sight = (truth.visibility[tile.view] == Visibility.VISIBLE).sum(axis=-1)
-    for person in np.flatnonzero(in_sight >= _SEEN).tolist():
-        if person not in found:
+    detected = truth.person[detections.view == tile.view]
+    visible = (truth.visibility[tile.view] == Visibility.VISIBLE).sum(axis=-1)
+    for person in np.flatnonzero(visible >= _MIN_VISIBLE).tolist():
+        if person not in detected:
             box = _outline(tile, truth.boxes[tile.view, person])
             yield {"kind": "missed", "color": _WRONG, "box": box, "limbs": "", "wrong": []}
 
 
 def _matched(replay: Replay, frame: int, tiles: Sequence[Tile]) -> Iterator[dict[str, Any]]:
-    """The detections of the views in the colours of whom they are taken for."""
+    """Return the detections of the views in the colours of their assigned people."""
     detections = replay.detections[frame]
     colors = _colors(replay, frame)
     for place, tile in enumerate(tiles, 2):
@@ -214,13 +214,13 @@ def _matched(replay: Replay, frame: int, tiles: Sequence[Tile]) -> Iterator[dict
 
 
 def _colors(replay: Replay, frame: int) -> list[str]:
-    """Of each detection of a frame: of the true person whose estimate it went into; grey of a ghost and of nobody."""
-    owners = np.append(replay.owners(frame), -1)  # label -1 is nobody
+    """Return the colour of each detection of a frame: the one of the true person of its estimate, else grey."""
+    owners = np.append(replay.owners(frame), -1)  # label -1 is no estimate
     return [css(person_color(int(owner))) for owner in owners[replay.estimates[frame].matching.labels]]
 
 
 def _joins(replay: Replay, frame: int, tiles: Sequence[Tile]) -> Iterator[dict[str, Any]]:
-    """Lines between the detections that went into one estimate, from view to view."""
+    """Return the lines between detections of the same estimate in neighbouring views."""
     detections = replay.detections[frame]
     colors = _colors(replay, frame)
     for one, other in joined(replay.estimates[frame].matching.labels, detections.view, [tile.view for tile in tiles]):
@@ -236,12 +236,12 @@ def _joins(replay: Replay, frame: int, tiles: Sequence[Tile]) -> Iterator[dict[s
 
 
 def joined(labels: NDArray[np.int64], view: NDArray[np.int64], views: Sequence[int]) -> list[tuple[int, int]]:
-    """Pairs of detections of one person in views that follow each other, of those views that have one.
+    """Return pairs of detections of the same person in successive views; views without such a detection are skipped.
 
     Args:
-        labels: person of each detection, (m,), -1 for nobody.
-        view: of each detection, (m,).
-        views: in the order in which they stand.
+        labels: person of each detection, (m,), -1 for none.
+        view: view of each detection, (m,).
+        views: views in the order of their tiles.
     """
     chains: dict[int, list[int]] = {}
     for each in views:
@@ -261,7 +261,7 @@ def _outline(tile: Tile, box: Floats) -> str:
 
 
 def _limbs(places: Floats) -> str:
-    """The limbs both of whose ends have a place; ``places`` (J, 2)."""
+    """Return the limbs whose two joints have a position as the data of an SVG path; ``places`` (J, 2)."""
     known = np.asarray(np.isfinite(places).all(axis=1))
     return "".join(path(_points(places[[a, b]])) for a, b in COCO17_BODY if known[a] and known[b])
 
@@ -271,7 +271,7 @@ def _points(places: Iterable[Any]) -> list[Point]:
 
 
 def _room(replay: Replay, frame: int) -> dict[str, Any]:
-    """The room with everybody in 3D and the cameras."""
+    """Return the view of the room with people in 3D and cameras."""
     left, top, width, height = _ROOM
     room = RoomView(replay, frame, (width, height))
     corner = (left + 0.5, top + 0.5)
@@ -294,7 +294,7 @@ def _room(replay: Replay, frame: int) -> dict[str, Any]:
 
 
 def _far_first(replay: Replay, frame: int, room: RoomView) -> list[tuple[int, Floats]]:
-    """The owners of the estimates and their joints on the sheet, the nearest last."""
+    """Return true person and pixels of the joints of each estimate, the nearest estimate last."""
     middle = [np.nanmean(joints, axis=0) for joints in replay.estimates[frame].joints]
     order = np.argsort([-np.linalg.norm(each - room.eye.center) for each in middle], kind="stable")
     owners, places = replay.owners(frame), room.estimates
@@ -302,19 +302,19 @@ def _far_first(replay: Replay, frame: int, room: RoomView) -> list[tuple[int, Fl
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the picture of a run and a digest; 2 where they are none."""
+    """Run the command; return 2 where the run or the digest cannot be read."""
     parser = argparse.ArgumentParser(
-        prog="python -m tools.readme_picture.picture", description="Draw what the project does in one picture."
+        prog="python -m tools.readme_picture.picture", description="Draw the overview picture of the README."
     )
     parser.add_argument("run", type=Path, help="folder of a finished run")
     parser.add_argument("digest", type=Path, help=f"digest.json of a study that sweeps {FACTOR}")
     parser.add_argument("picture", type=Path, help="the SVG file to write")
-    parser.add_argument("--frame", type=int, default=8, help="of the run (default: %(default)s)")
+    parser.add_argument("--frame", type=int, default=8, help="frame of the run (default: %(default)s)")
     parser.add_argument(
         "--views",
         type=_numbers,
         default="4,3,2",
-        help="three of the rig, the first for the detections (default: %(default)s)",
+        help="three views of the rig, the first one for the detections (default: %(default)s)",
     )
     options = parser.parse_args(arguments)
     try:
@@ -331,17 +331,17 @@ def _numbers(text: str) -> list[int]:
     try:
         return [int(number) for number in text.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected numbers with commas between, such as 4,3,2, got {text!r}") from None
+        raise argparse.ArgumentTypeError(f"expected numbers separated by commas, such as 4,3,2, got {text!r}") from None
 
 
 def _read_digest(file: Path) -> Mapping[str, Any]:
     try:
-        told = json.loads(file.read_text(encoding="utf-8"))
+        digest = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise ValueError(f"{file}: not JSON: {error}") from None
-    if not isinstance(told, dict):
-        raise ValueError(f"{file}: not the digest of a study: expected an object")
-    return told
+    if not isinstance(digest, dict):
+        raise ValueError(f"{file}: not the digest of a study: expected a JSON object, got {type(digest).__name__}")
+    return digest
 
 
 if __name__ == "__main__":

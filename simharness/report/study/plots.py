@@ -176,7 +176,7 @@ def heat_map(
             value = means[row, column]
             text, ink = "–", INK
             if np.isfinite(value):
-                text = fixed(value, score.digits)
+                text = fixed(float(value), score.digits)
                 ink = "#fbfbfb" if np.dot(mesh.cmap(mesh.norm(value))[:3], (0.299, 0.587, 0.114)) < _DARK else "#14161a"
             axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", color=ink, fontsize=8.5)
         axes.set_xticks(np.arange(means.shape[1]) + 0.5, [short(value) for value in along[1]])
