@@ -1,4 +1,4 @@
-"""The reference results beside the code: they can be read, and are of the scenarios as these are now."""
+"""The reference results, made by a version that may be older than the code: they can be read and fit the scenarios."""
 
 import functools
 import json
@@ -103,6 +103,12 @@ def test_no_evaluation_is_forgotten():
         for path in (ROOT / "results" / folder).glob("*.json")
     }
     assert told - {"shelf/detector.json"} == set(EVALUATIONS)
+
+
+@pytest.mark.parametrize("file", [*(f"{name}/digest.json" for name in DIGESTS), *EVALUATIONS])
+def test_the_readme_names_the_version_that_made_a_result(file):
+    made = json.loads((ROOT / "results" / file).read_text(encoding="utf-8"))
+    assert made["code"] in (ROOT / "results" / "README.md").read_text(encoding="utf-8").split("##")[0]
 
 
 def test_digests_are_of_one_code():
