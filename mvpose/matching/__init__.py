@@ -1,4 +1,4 @@
-"""Multi-way matching with cycle consistency (paper, section 3.2): detections of all views to people."""
+"""Multi-way matching with cycle consistency (paper, section 3.2), which groups detections of all views into people."""
 
 from __future__ import annotations
 
@@ -20,12 +20,20 @@ __all__ = ["Matcher", "match", "objective"]
 
 Method = Literal["admm", "clustering", "hungarian"]
 
-_ASYMMETRY = 1e-6  # what rounding may leave, in single precision too
+_ASYMMETRY = 1e-6  # tolerance for rounding, also in single precision
 
 
 @dataclass(frozen=True)
 class Matcher:
-    """How detections are matched; see :func:`match`."""
+    """Configured matching method; see :func:`match`.
+
+    Attributes:
+        method: ``"admm"``, ``"clustering"`` or ``"hungarian"``.
+        alpha: least affinity of a match, 0 to 1.
+
+    Raises:
+        ValueError: an unknown method, or ``alpha`` outside 0..1.
+    """
 
     method: Method = "admm"
     alpha: float = 0.5
@@ -37,7 +45,7 @@ class Matcher:
             raise ValueError(f"alpha must lie in 0..1, as affinities do, got {self.alpha}")
 
     def __call__(self, affinity: ArrayLike, view: ArrayLike) -> Matching:
-        """Match; see :func:`match`."""
+        """Group detections into people; see :func:`match`."""
         affinity, view = _checked(affinity, view)
         if self.method == "clustering":
             return self._matching(number_people(cluster(affinity, view, alpha=self.alpha)), affinity)
@@ -65,36 +73,37 @@ class Matcher:
 def match(affinity: ArrayLike, view: ArrayLike, *, method: Method = "admm", alpha: float = 0.5) -> Matching:
     """Group the detections of all views into people.
 
-    Every result is cycle-consistent: a person is a set of detections, at most one of a view. A detection that
-    matches no other is left out (label -1) as a false detection (paper, section 3.2).
+    Every result is cycle-consistent: a person is a set of detections with at most one per view. A detection that
+    matches no other is treated as a false detection and gets label -1 (paper, section 3.2).
 
     Args:
-        affinity: (m, m), symmetric, 0 to 1.
+        affinity: affinity matrix, (m, m), symmetric, 0 to 1.
         view: camera of each detection, (m,), in any order.
-        method: ``"admm"`` is Algorithm 1 of the paper; ``"clustering"`` works on the integer problem that it relaxes
-            and is much faster; ``"hungarian"`` matches each pair of views alone and breaks what is inconsistent at
-            its weakest links: the baseline.
-        alpha: a match must have more affinity than this to be worth making.
+        method: ``"admm"`` is Algorithm 1 of the paper; ``"clustering"`` solves the integer problem that it relaxes
+            and is much faster; ``"hungarian"`` is the baseline, which matches each pair of views separately and
+            resolves inconsistencies by dropping the weakest links.
+        alpha: least affinity of a match, 0 to 1.
 
     Returns:
         The people; ``objective`` is :func:`objective` of the labels, so that methods can be compared.
 
     Raises:
-        ValueError: a shape, method or alpha that does not fit, or an affinity that is not symmetric or outside 0..1.
+        ValueError: a wrong shape, an unknown method, ``alpha`` outside 0..1, or an affinity that is not symmetric or
+            outside 0..1.
     """
     return Matcher(method=method, alpha=alpha)(affinity, view)
 
 
 def objective(labels: ArrayLike, affinity: ArrayLike, *, alpha: float = 0.5) -> float:
-    """``<alpha E - A, P>`` of a grouping, summed over unordered pairs: what every method minimises.
+    """Return ``<alpha E - A, P>`` of a grouping, summed over unordered pairs, which every method minimises.
 
-    The nuclear norm of a consistent P is m whatever the grouping, so the paper's second term is left out.
+    The nuclear norm of a consistent P is m for every grouping, so the second term of the paper is left out.
     """
     return _objective(read_only(labels, np.int64), read_only(affinity, np.float64), float(alpha))
 
 
 def _checked(affinity: ArrayLike, view: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Both as read-only arrays, the affinity exactly symmetric."""
+    """Return both as read-only arrays, with the affinity exactly symmetric."""
     if not (isinstance(view, np.ndarray) and view.ndim == 1 and view.dtype == np.int64):
         view = as_array(view, ("m",), "view", np.int64)
     shape = (len(view), len(view))
@@ -103,7 +112,8 @@ def _checked(affinity: ArrayLike, view: ArrayLike) -> tuple[NDArray[np.float64],
     affinity = read_only(affinity, np.float64)
     asymmetry = _asymmetry(affinity)
     if not asymmetry <= _ASYMMETRY:
-        raise ValueError("affinity must be symmetric with values in 0..1")
+        got = "values outside 0..1 or NaN" if np.isinf(asymmetry) else f"an asymmetry of {asymmetry:.3g}"
+        raise ValueError(f"affinity must be symmetric with values in 0..1, got {got}")
     if asymmetry > 0.0:
         affinity = read_only(0.5 * (affinity + affinity.T), np.float64)
     return affinity, read_only(view, np.int64)
@@ -111,9 +121,9 @@ def _checked(affinity: ArrayLike, view: ArrayLike) -> tuple[NDArray[np.float64],
 
 @njit(cache=True)
 def _asymmetry(affinity):
-    """Greatest difference from the transpose; infinite where a value is outside 0..1 or not a number."""
+    """Return the greatest difference from the transpose; infinite if a value is outside 0..1 or NaN."""
     m, side, worst = len(affinity), 32, 0.0
-    for top in range(0, m, side):  # square tiles: both the matrix and its transpose stay in the cache
+    for top in range(0, m, side):  # square tiles, so that the matrix and its transpose both stay in the cache
         for left in range(top, m, side):
             for i in range(top, min(top + side, m)):
                 for j in range(max(left, i), min(left + side, m)):

@@ -1,22 +1,22 @@
 """Multi-way matching by convex optimisation: Algorithm 1 of the paper.
 
-Minimise ``<alpha E - A, P> + lambda ||P||_*`` over P in C, by ADMM between the spectral step (singular value
-thresholding, here of a symmetric matrix, so by its eigenvalues) and the exact projection onto C. E marks the pairs
-of different views: a match must earn more than alpha to be worth making.
+Minimise ``<alpha E - A, P> + lambda ||P||_*`` over P in C by ADMM, which alternates between a spectral step (singular
+value thresholding; the matrix is symmetric, so its eigenvalues are used) and the exact projection onto C. E marks the
+pairs of different views: a match reduces the objective only if its affinity exceeds alpha.
 
-On C the trace is m, so ``||P||_* = m + 2 (sum of the magnitudes of negative eigenvalues)``: lambda charges only for
-what is not positive semidefinite, that is, not cycle-consistent. So the dual variable is kept as ``Y = lambda I - S``,
-and the spectral step of ``P + Y / rho`` keeps the positive eigenvalues of ``Z = P - S / rho`` and raises those below
-``-2 lambda / rho`` by as much. Of the latter there are hardly ever any, and of the former about one a person, so only
-the top of the spectrum is computed.
+On C the trace is m, so ``||P||_* = m + 2 (sum of the magnitudes of negative eigenvalues)``: lambda penalises only the
+part that is not positive semidefinite, that is, not cycle-consistent. So the dual variable is kept as
+``Y = lambda I - S``, and the spectral step of ``P + Y / rho`` keeps the positive eigenvalues of ``Z = P - S / rho`` and
+raises those below ``-2 lambda / rho`` by that amount. The latter hardly ever occur, and there is about one positive
+eigenvalue per person, so only the top of the spectrum is computed.
 
-The solver may start from a grouping: P its permutation matrix, S a Laplacian with the gains (affinities less alpha)
-within its parts as weights. Were none of these gains negative and none between parts positive, any share of the whole
-Laplacian would prove the grouping optimal: S P = 0 and the eigenvalues of S lie in 0 to 2 lambda, so Q = P; and
-P + (S + gain) / rho is at least 1 within parts and at most 0 between them, so its projection is P. The first iteration
-changes nothing and says so by its residuals. Gains between parts make the proof harder; what S starts with of either
-kind (`_WITHIN`, `_BETWEEN`) took the fewest iterations on synthetic crowds. The optimum is that of the convex problem
-from any start.
+The solver may start from a grouping: P is its permutation matrix and S a Laplacian with the gains (affinity minus
+alpha) within its parts as weights. If no gain within parts is negative and none between parts is positive, any
+fraction of the whole Laplacian proves the grouping optimal: S P = 0 and the eigenvalues of S lie in 0 to 2 lambda, so
+Q = P; and P + (S + gain) / rho is at least 1 within parts and at most 0 between them, so its projection is P. The first
+iteration then changes nothing, and its residuals stop the solver. Positive gains between parts make the proof harder;
+the fractions of both kinds with which S starts (`_WITHIN`, `_BETWEEN`) took the fewest iterations on synthetic crowds.
+The optimum of the convex problem does not depend on the start.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from mvpose.arrays import Floats
 from mvpose.matching.projection import block_starts, project_block
 from mvpose.threads import one_thread
 
-_BALANCE = 10.0  # residuals further apart than this change rho (Boyd et al. 2011, section 3.4.1)
+_BALANCE = 10.0  # ratio of residuals beyond which rho changes (Boyd et al. 2011, section 3.4.1)
 _BALANCE_EVERY = 10  # iterations; a step size that changes more often can cycle
-_RELAXATION = 1.6  # over-relaxation (Boyd et al. 2011, section 3.4.3), until P comes to rest: then it would only swing
-_AT_REST = 0.1  # of the primal residual
-_WITHIN, _BETWEEN = 0.3, 0.5  # of the gains within and between parts that S starts with
-_SPARE = 4  # eigenvalues beyond those expected to be positive; the first that is not proves that all were found
-_FEW = 6  # a part of the spectrum below one in as many costs less than the whole
-_SINGLE = 1e-5  # a tolerance above this leaves room for the rounding of single precision, 1e-6 of the greatest entry
+_RELAXATION = 1.6  # over-relaxation (Boyd et al. 2011, section 3.4.3), off once P is at rest to avoid oscillation
+_AT_REST = 0.1  # movement of P as a fraction of the primal residual
+_WITHIN, _BETWEEN = 0.3, 0.5  # initial S as fractions of the gains within and between parts
+_SPARE = 4  # extra eigenvalues beyond the expected positive ones; one that is not positive proves completeness
+_FEW = 6  # computing part of the spectrum pays off if it is less than the whole divided by this
+_SINGLE = 1e-5  # least tolerance for which single precision suffices; its rounding is 1e-6 of the greatest entry
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The relaxed solution.
+    """Solution of the relaxed problem.
 
     Attributes:
-        P: (m, m), in C.
-        Y: the dual variable, (m, m); its spectral norm is lambda but for the residuals.
-        iterations: how many were taken.
-        residuals: primal ``||P - Q||`` and dual ``rho ||P - P_before||`` (with over-relaxation, by how far Y misses
+        P: relaxed permutation matrix, (m, m), in C.
+        Y: dual variable, (m, m); its spectral norm is lambda up to the residuals.
+        iterations: number of iterations.
+        residuals: primal ``||P - Q||`` and dual ``rho ||P - P_before||`` (with over-relaxation, the distance of Y from
             the subgradient of ``lambda ||Q||_*``), Frobenius norms over m.
         converged: whether both residuals fell below the tolerance.
         gain: ``A - alpha E``, (m, m).
@@ -66,7 +66,7 @@ class Relaxation:
 
     @property
     def objective(self) -> float:
-        """``<alpha E - A, P> + lambda ||P||_*``."""
+        """Value of ``<alpha E - A, P> + lambda ||P||_*``."""
         return float(self.weight * np.abs(np.linalg.eigvalsh(self.P)).sum() - (self.gain * self.P).sum())
 
 
@@ -84,17 +84,17 @@ def solve(
     """Solve the relaxed matching problem (paper, equation 9).
 
     Args:
-        affinity: A, (m, m), symmetric, 0 to 1.
+        affinity: affinity matrix A, (m, m), symmetric, 0 to 1.
         view: camera of each row, (m,), sorted.
-        parts: a grouping to start from, (m,), at most one row of a view in a part; default all rows apart.
-        alpha: what a match must earn.
-        weight: lambda, the price of cycle inconsistency.
-        rho: the first step size; balanced against the residuals afterwards.
-        tolerance: both residuals over m must fall below this.
-        most_iterations: give up after as many.
+        parts: initial grouping, (m,), with at most one row per view in a part; by default every row is a part.
+        alpha: least affinity of a match.
+        weight: lambda, the penalty on cycle inconsistency.
+        rho: initial step size; later adapted to balance the residuals.
+        tolerance: limit below which both residuals over m must fall.
+        most_iterations: limit of iterations.
 
     Returns:
-        The relaxed P and how the solver stopped.
+        The relaxed P, and the state of the solver at the end.
     """
     m, starts = len(view), block_starts(view)
     gain = np.where(view[:, None] == view, 0.0, affinity - alpha)
@@ -121,12 +121,12 @@ def _iterate(
     tolerance: float,
     most_iterations: int,
 ) -> tuple[int, float, float]:
-    """Algorithm 1 on the upper triangles of P and S, in place; iterations and both residuals."""
+    """Run Algorithm 1 on the upper triangles of P and S, in place; return the iterations and both residuals."""
     Z, prices = np.zeros_like(P), np.zeros((len(starts), len(P)))
     primal, dual, moved, iteration, positive = np.inf, np.inf, np.inf, 0, 0
     while iteration < most_iterations and (primal >= tolerance or dual >= tolerance):
         iteration += 1
-        lowest = _point(P, S, rho, Z)
+        lowest = _set_target(P, S, rho, Z)
         if lowest >= -2.0 * weight / rho:
             Q, positive = _positive_part(Z, positive, single=tolerance > _SINGLE)
         else:
@@ -136,22 +136,22 @@ def _iterate(
         if iteration % _BALANCE_EVERY == 0:
             factor = 2.0 if primal > _BALANCE * moved else 0.5 if moved > _BALANCE * primal else 1.0
             rho *= factor
-            prices /= factor  # prices are per step: P's target is Q - (Y - gain) / rho
+            prices /= factor  # prices scale with the step, because the target of P is Q - (Y - gain) / rho
     return iteration, primal, dual
 
 
 def _positive_part(Z: Floats, expected: int, *, single: bool) -> tuple[Floats, int]:
-    """``Z`` (m, m), upper triangle given, with its negative eigenvalues set to 0; how many are positive."""
+    """Return ``Z`` (m, m), given by its upper triangle, with negative eigenvalues set to 0, and the positive count."""
     from scipy.linalg import lapack
 
     m, kind = len(Z), np.float32 if single else np.float64
-    some, every = (lapack.ssyevr, lapack.ssyevd) if single else (lapack.dsyevr, lapack.dsyevd)
-    wanted, complete = expected + max(_SPARE, expected // 8), False
-    while expected and not complete and _FEW * wanted < m:
-        values, vectors, found, _, info = some(Z.T.astype(kind), range="I", il=m - wanted + 1, iu=m, lower=1)
-        values, complete, wanted = values[:found], info == 0 and values[0] <= 0.0, 2 * wanted
+    solve_part, solve_all = (lapack.ssyevr, lapack.ssyevd) if single else (lapack.dsyevr, lapack.dsyevd)
+    requested, complete = expected + max(_SPARE, expected // 8), False
+    while expected and not complete and _FEW * requested < m:
+        values, vectors, found, _, info = solve_part(Z.T.astype(kind), range="I", il=m - requested + 1, iu=m, lower=1)
+        values, complete, requested = values[:found], info == 0 and values[0] <= 0.0, 2 * requested
     if not complete:
-        values, vectors, info = every(Z.T.astype(kind), lower=1)
+        values, vectors, info = solve_all(Z.T.astype(kind), lower=1)
         if info:
             values, vectors = np.linalg.eigh(Z, UPLO="U")
     positive = int((values > 0.0).sum())
@@ -160,24 +160,24 @@ def _positive_part(Z: Floats, expected: int, *, single: bool) -> tuple[Floats, i
 
 
 def _threshold(Z: Floats, gap: float) -> tuple[Floats, int]:
-    """As :func:`_positive_part`, but eigenvalues below ``-gap`` keep what is beyond it."""
+    """Return :func:`_positive_part`, but with eigenvalues below ``-gap`` raised by ``gap`` instead of set to 0."""
     values, vectors = np.linalg.eigh(Z, UPLO="U")
     shrunk = np.maximum(values, 0.0) + np.minimum(values + gap, 0.0)
     return (vectors * shrunk) @ vectors.T, int((values > 0.0).sum())
 
 
 @njit(cache=True, error_model="numpy")
-def _point(P, S, rho, Z):
-    """Set Z to P - S / rho, upper triangles; a lower bound of its eigenvalues (Gershgorin's)."""
+def _set_target(P, S, rho, Z):
+    """Set Z to P - S / rho (upper triangles) and return Gershgorin's lower bound of its eigenvalues."""
     m = len(P)
     reach = np.zeros(m)
     for i in range(m):
-        own = 0.0
+        row_sum = 0.0
         for j in range(i + 1, m):
             Z[i, j] = P[i, j] - S[i, j] / rho
-            own += abs(Z[i, j])
+            row_sum += abs(Z[i, j])
             reach[j] += abs(Z[i, j])
-        reach[i] += own
+        reach[i] += row_sum
     lowest = np.inf
     for i in range(m):
         Z[i, i] = P[i, i] - S[i, i] / rho
@@ -187,9 +187,9 @@ def _point(P, S, rho, Z):
 
 @njit(cache=True, error_model="numpy")
 def _project_and_ascend(Q, P, S, gain, rho, relaxation, starts, prices):
-    """P onto C, Y up the dual, upper triangles in place; both residuals, and rho times how far P moved.
+    """Project P onto C and update the dual S, upper triangles in place; return both residuals and rho times P's step.
 
-    ``prices[block, row]`` is the price of that row's sum within its block against ``block``, from the last call.
+    ``prices[block, row]`` is the dual price of the row sum in the block against ``block``, from the last call.
     """
     blocks = len(starts) - 1
     primal, dual, moved = 0.0, 0.0, 0.0

@@ -1,6 +1,6 @@
-"""The assignment problem, as a kernel that other kernels can call.
+"""Assignment problem as a numba kernel, and the baseline that matches each pair of views by it.
 
-SciPy has it too, but not for numba, and a call of SciPy's costs more than all the local moves of a frame.
+SciPy's solver cannot be called from numba, and one call of it costs more than all local moves of a frame.
 """
 
 from __future__ import annotations
@@ -12,31 +12,31 @@ from numpy.typing import NDArray
 
 @njit(cache=True)
 def best_assignment(value):
-    """Give rows different columns so that the values add up to the most; pairs of no positive value stay apart.
+    """Assign rows to different columns with the greatest sum of values; pairs without positive value stay unassigned.
 
-    Shortest augmenting paths with prices (Jonker and Volgenant 1987; Crouse 2016): the cost of a pair is its negative
-    value, and one more column of cost 0 a row is where a row goes that is better off alone. Rows whose favourite is
-    free take it at once, so only contested ones need a path.
+    The method is shortest augmenting paths with prices (Jonker and Volgenant 1987; Crouse 2016). The cost of a pair is
+    its negative value; one extra column of cost 0 per row takes rows that are better left unassigned. Rows whose best
+    column is free take it at once, so only contested rows need a path.
 
     Args:
-        value: (rows, columns), finite.
+        value: value of each pair, (rows, columns), finite.
 
     Returns:
-        The column of each row, -1 for none, (rows,).
+        Column of each row, -1 for none, (rows,).
     """
     rows, real = value.shape
     columns = real + rows
     row_price, column_price = np.zeros(rows), np.zeros(columns)
     column_of, row_of = np.full(rows, -1, np.int64), np.full(columns, -1, np.int64)
     for i in range(rows):
-        most, favourite = 0.0, real + i
+        best_value, favourite = 0.0, real + i
         for j in range(real):
-            if value[i, j] > most:
-                most, favourite = value[i, j], j
-        row_price[i] = -most
+            if value[i, j] > best_value:
+                best_value, favourite = value[i, j], j
+        row_price[i] = -best_value
         if row_of[favourite] < 0:
             row_of[favourite], column_of[i] = i, favourite
-    distance, before = np.empty(columns), np.empty(columns, np.int64)
+    distance, previous = np.empty(columns), np.empty(columns, np.int64)
     settled = np.empty(columns, np.bool_)
     for start in range(rows):
         if column_of[start] >= 0:
@@ -44,7 +44,7 @@ def best_assignment(value):
         for j in range(columns):
             distance[j], settled[j] = np.inf, False
         i, reach, end = start, 0.0, -1
-        while end < 0:  # Dijkstra from the free row to the nearest free column, over costs less prices
+        while end < 0:  # Dijkstra's algorithm from the free row to the nearest free column, over costs minus prices
             nearest, base = -1, reach - row_price[i]
             for j in range(columns):
                 if settled[j]:
@@ -52,7 +52,7 @@ def best_assignment(value):
                 cost = -value[i, j] if j < real and value[i, j] > 0.0 else 0.0
                 length = base + cost - column_price[j]
                 if length < distance[j]:
-                    distance[j], before[j] = length, i
+                    distance[j], previous[j] = length, i
                 if nearest < 0 or distance[j] < distance[nearest]:
                     nearest = j
             reach = distance[nearest]
@@ -66,8 +66,8 @@ def best_assignment(value):
             if settled[j]:
                 row_price[row_of[j]] += reach - distance[j]
                 column_price[j] -= reach - distance[j]
-        while True:  # every row on the path moves on to the column that it was reached from
-            i = before[end]
+        while True:  # shift the assignments along the path
+            i = previous[end]
             row_of[end] = i
             column_of[i], end = end, column_of[i]
             if i == start:
@@ -81,16 +81,16 @@ def best_assignment(value):
 def match_view_pairs(
     affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5
 ) -> NDArray[np.float64]:
-    """Match every pair of views by the Hungarian algorithm.
+    """Match every pair of views separately: the baseline without cycle consistency (paper, section 3.2, figure 3).
 
     Args:
-        affinity: (m, m), symmetric, 0 to 1.
+        affinity: affinity matrix, (m, m), symmetric, 0 to 1.
         view: camera of each detection, (m,), in any order.
-        alpha: pairs with less affinity than this are not matched.
+        alpha: least affinity of a match.
 
     Returns:
         Affinities of the matched pairs and 0 elsewhere, (m, m), symmetric. Each block is a partial permutation; all
-        together need not be cycle-consistent.
+        blocks together need not be cycle-consistent.
     """
     result = np.zeros_like(affinity)
     rows_of = [np.flatnonzero(view == one) for one in np.unique(view)]

@@ -1,14 +1,14 @@
-"""Multi-way matching as constrained correlation clustering: the integer problem itself, fast.
+"""Multi-way matching as constrained correlation clustering: a fast heuristic for the integer problem.
 
-Where P is consistent its nuclear norm is m whatever the grouping, so in the limit of a large lambda the paper's problem
-is to partition the detections, at most one of a view in a part, so that the affinities less alpha within parts sum to
-the most. Greedy edge contraction (Keuper et al., "Efficient decomposition of image and mesh graphs by lifted
-multicuts", ICCV 2015) joins the best two parts while that gains. Then one view after another is taken out and put back
-by the best assignment of its detections to the parts of the others (a detection that gains nowhere is split off), and
-parts are joined, until nothing gains; with two views this is the Hungarian algorithm.
+The nuclear norm of a consistent P is m for every grouping. So in the limit of a large lambda the problem of the paper
+is to partition the detections, with at most one per view in a part, so that the sum of affinity minus alpha within
+parts is greatest. Greedy edge contraction (Keuper et al., "Efficient decomposition of image and mesh graphs by lifted
+multicuts", ICCV 2015) joins the best two parts as long as the sum grows. Then one view after another is removed and its
+detections are put back by the best assignment to the parts of the other views (a detection without gain becomes a part
+alone), and parts are joined, until the sum no longer grows. With two views this is the Hungarian algorithm.
 
-Everything takes time m^2: a contraction costs one row, because parts remember their best partner, and an assignment is
-solved only for a view that has a detection which would rather be elsewhere.
+All steps take time m^2: a contraction costs one row, because parts store their best partner, and an assignment is
+solved only for a view with a detection that would gain in another part.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mvpose.matching.assignment import best_assignment
 from mvpose.matching.rounding import rank_views, read_only
 
-_LEAST_GAIN = 1e-9  # less is rounding, and could go round in circles
+_LEAST_GAIN = 1e-9  # a smaller gain is rounding error and could cause cycles
 _MOST_ROUNDS = 50
 
 
@@ -28,35 +28,35 @@ def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: fl
     """Partition the detections.
 
     Args:
-        affinity: (m, m), symmetric, 0 to 1.
+        affinity: affinity matrix, (m, m), symmetric, 0 to 1.
         view: camera of each detection, (m,), in any order.
-        alpha: what a match must earn.
+        alpha: least affinity of a match.
 
     Returns:
-        A part for every detection, (m,): arbitrary names below m, at most one detection of a view in a part.
+        Part of every detection, (m,): arbitrary numbers below m, with at most one detection per view in a part.
     """
-    order = np.argsort(view, kind="stable")  # the search goes from view to view: in the same order however listed
+    order = np.argsort(view, kind="stable")  # the search visits views in the same order for any order of detections
     part = np.empty(len(order), np.int64)
     part[order] = _cluster(affinity[order[:, None], order], view[order], alpha)
     return part
 
 
 def _cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
-    """As :func:`cluster`, of detections in the order of their views."""
+    """Partition detections that are sorted by view; see :func:`cluster`."""
     affinity, alpha = read_only(affinity, np.float64), float(alpha)
     rank, views = rank_views(read_only(view, np.int64))
     gains = _pair_gains(affinity, alpha, rank)
     part = _contract(gains)
     parts, size, order, start = _member_gains(affinity, alpha, rank, views, part, gains)
     for _ in range(_MOST_ROUNDS):
-        parts = _put_back_views(affinity, alpha, rank, order, start, part, parts, size, gains)
+        parts = _reassign_views(affinity, alpha, rank, order, start, part, parts, size, gains)
         if not _join_parts(rank, views, part, parts, size, gains):
             break
     return part
 
 
 def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.int64]:
-    """Partition the detections by greedy contraction alone: what :func:`cluster` starts from; see there."""
+    """Partition the detections by greedy contraction only, the first step of :func:`cluster`."""
     affinity, alpha = read_only(affinity, np.float64), float(alpha)
     rank, _ = rank_views(read_only(view, np.int64))
     return _contract(_pair_gains(affinity, alpha, rank))
@@ -74,12 +74,12 @@ def _pair_gains(affinity, alpha, rank):
 
 @njit(cache=True)
 def _contract(gain):
-    """Join the two parts with the greatest positive gain until there are none; the part that each ends in, (n,).
+    """Join the two parts with the greatest positive gain until there are none; return the final part of each, (n,).
 
-    ``gain`` (n, n), symmetric, -inf where two may not be joined, is used up. Only the row of the part that grows is
-    brought up to date, so the gain of two parts stands in the row of the one that grew last. Each part remembers its
-    best partner and their gain. When a join takes the partner away or makes it worse, that gain is still an upper
-    bound, and a new partner is sought only if the bound is the greatest of all.
+    ``gain`` (n, n) is symmetric, with -inf where two parts must not be joined, and is overwritten. Only the row of the
+    part that grows is updated, so the gain of two parts is found in the row of the one that grew last. Each part stores
+    its best partner and their gain. When a join removes the partner or lowers the gain, the stored gain is still an
+    upper bound, and a new partner is searched for only when this bound is the greatest of all.
     """
     n = len(gain)
     part, alive = np.arange(n), np.arange(n)
@@ -132,21 +132,21 @@ def _contract(gain):
 
 @njit(cache=True)
 def _member_gains(affinity, alpha, rank, views, part, gains):
-    """Overwrite ``gains`` (m, m): row i, column p is what detection i gains beside the members of other views in p.
+    """Overwrite ``gains`` (m, m): row i, column p is the gain of detection i with the members of other views in part p.
 
-    Parts are renamed 0, 1, ... in place; there are never more than detections.
+    Parts are renumbered 0, 1, ... in place; there are never more than m.
 
     Returns:
-        How many parts there are, the size of each, the detections view by view, and where each view's begin.
+        Number of parts, size of each part, detections sorted by view, and start of each view in that order.
     """
     m = len(part)
-    size, name, parts = np.zeros(m, np.int64), np.empty(m, np.int64), 0
+    size, number, parts = np.zeros(m, np.int64), np.empty(m, np.int64), 0
     for i in range(m):
-        if part[i] == i:  # a part goes by the name of one of its members
-            name[i] = parts
+        if part[i] == i:  # the number of a part is the index of one of its members
+            number[i] = parts
             parts += 1
     for i in range(m):
-        part[i] = name[part[i]]
+        part[i] = number[part[i]]
         size[part[i]] += 1
     for i in range(m):
         for p in range(parts):
@@ -165,64 +165,64 @@ def _member_gains(affinity, alpha, rank, views, part, gains):
 
 
 @njit(cache=True)
-def _put_back_views(affinity, alpha, rank, order, start, part, parts, size, gains):
-    """Put back view by view until every view in turn has stayed as it was; how many parts there are then."""
-    views, quiet, r = len(start) - 1, 0, 0
+def _reassign_views(affinity, alpha, rank, order, start, part, parts, size, gains):
+    """Reassign view by view until no view changes in a full turn; return the number of parts."""
+    views, unchanged, r = len(start) - 1, 0, 0
     for _ in range(_MOST_ROUNDS * views):
-        if quiet == views:
+        if unchanged == views:
             break
-        mine = order[start[r] : start[r + 1]]
-        quiet += 1
-        if _would_rather_move(mine, part, parts, gains):
-            wanted, gained = _best_parts(mine, part, parts, gains)
+        detections = order[start[r] : start[r + 1]]
+        unchanged += 1
+        if _any_gains_by_move(detections, part, parts, gains):
+            best_part, gained = _best_parts(detections, part, parts, gains)
             if gained > _LEAST_GAIN:
-                quiet = 0
-                for a in range(len(mine)):
-                    parts = _move(mine[a], wanted[a], affinity, alpha, rank, part, parts, size, gains)
+                unchanged = 0
+                for a in range(len(detections)):
+                    parts = _move(detections[a], best_part[a], affinity, alpha, rank, part, parts, size, gains)
         r = r + 1 if r + 1 < views else 0
     return parts
 
 
 @njit(cache=True)
-def _would_rather_move(mine, part, parts, gains):
-    """Whether a detection would gain more elsewhere or alone. If none would, the assignment is the best there is."""
-    for i in mine:
-        own = gains[i, part[i]] + _LEAST_GAIN
-        if own < 0.0:
+def _any_gains_by_move(detections, part, parts, gains):
+    """Return whether a detection would gain in another part or alone; if not, the assignment already is the best."""
+    for i in detections:
+        current_gain = gains[i, part[i]] + _LEAST_GAIN
+        if current_gain < 0.0:
             return True
         for p in range(parts):
-            if gains[i, p] > own:
+            if gains[i, p] > current_gain:
                 return True
     return False
 
 
 @njit(cache=True)
-def _best_parts(mine, part, parts, gains):
-    """Best assignment of one view's detections to parts: the part of each, -1 for alone, and what that gains."""
+def _best_parts(detections, part, parts, gains):
+    """Return the best part for each detection of one view, -1 for alone, and the gain over the current assignment."""
     choices, count = np.empty(parts, np.int64), 0
     for p in range(parts):
-        for i in mine:
+        for i in detections:
             if gains[i, p] > 0.0:
                 choices[count] = p
                 count += 1
                 break
-    value = np.empty((len(mine), count))
+    value = np.empty((len(detections), count))
     gained = 0.0
-    for a in range(len(mine)):
-        gained -= gains[mine[a], part[mine[a]]]
+    for a in range(len(detections)):
+        gained -= gains[detections[a], part[detections[a]]]
         for b in range(count):
-            value[a, b] = gains[mine[a], choices[b]]
-    wanted = best_assignment(value)
-    for a in range(len(mine)):
-        if wanted[a] >= 0:
-            gained += value[a, wanted[a]]
-            wanted[a] = choices[wanted[a]]
-    return wanted, gained
+            value[a, b] = gains[detections[a], choices[b]]
+    best_part = best_assignment(value)
+    for a in range(len(detections)):
+        if best_part[a] >= 0:
+            gained += value[a, best_part[a]]
+            best_part[a] = choices[best_part[a]]
+    return best_part, gained
 
 
 @njit(cache=True)
 def _move(i, to, affinity, alpha, rank, part, parts, size, gains):
-    """Move detection i into part ``to``, or alone where that is -1; the number of parts, empty ones included."""
+    """Move detection i to part ``to``, or to a part alone if -1; return the number of parts, including empty ones."""
     if to == part[i] or (to < 0 and size[part[i]] == 1):
         return parts
     if to < 0:
@@ -245,23 +245,23 @@ def _move(i, to, affinity, alpha, rank, part, parts, size, gains):
 
 @njit(cache=True)
 def _join_parts(rank, views, part, parts, size, gains):
-    """Contract whole parts while that gains; whether any were joined."""
+    """Join whole parts as long as the sum grows; return whether any were joined."""
     seen, between = np.zeros((parts, views), np.bool_), np.zeros((parts, parts))
     for i in range(len(part)):
         seen[part[i], rank[i]] = True
     for i in range(len(part)):
         for p in range(parts):
             between[part[i], p] += -np.inf if seen[p, rank[i]] else gains[i, p]
-    name = _contract(between)
+    number = _contract(between)
     joined = False
     for p in range(parts):
-        if name[p] != p:
+        if number[p] != p:
             joined = True
             for i in range(len(part)):
-                gains[i, name[p]] += gains[i, p]
+                gains[i, number[p]] += gains[i, p]
                 gains[i, p] = 0.0
-            size[name[p]] += size[p]
+            size[number[p]] += size[p]
             size[p] = 0
     for i in range(len(part)):
-        part[i] = name[part[i]]
+        part[i] = number[part[i]]
     return joined

@@ -1,13 +1,13 @@
-"""The exact Euclidean projection onto the paper's set C (equations 1, 6, 7 and 8).
+"""Exact Euclidean projection onto the set C of the paper (equations 1, 6, 7 and 8).
 
-C holds the symmetric matrices with identity blocks on the diagonal (a view against itself) whose other blocks are
-non-negative with row and column sums at most one. Blocks are independent, so each upper block is projected and
-mirrored. For one block Y the dual of the projection has one price a row (u) and one a column (v), and
-``X = max(0, Y - u - v)``; with v held, each row's u is an exact one-dimensional solve, and the other way round.
-Alternating the two climbs a smooth concave dual to its maximum, but slowly along chains of rows and columns that
-compete; so each round ends in a Newton step of v (the dual is piecewise quadratic), and two to five rounds reach the
-last digits where hundreds were needed. The alternation decides when to stop, so a bad Newton step only costs a round.
-Prices of the last call are an excellent start for the next.
+C is the set of symmetric matrices with identity blocks on the diagonal (a view against itself) whose other blocks are
+non-negative with row and column sums of at most one. Blocks are independent, so each upper block is projected and
+mirrored. For one block Y the dual of the projection has one price per row (u) and per column (v), and
+``X = max(0, Y - u - v)``. With v fixed, the price u of each row is an exact one-dimensional solve, and vice versa.
+Alternating between the two maximises a smooth concave dual, but converges slowly along chains of competing rows and
+columns. So each round ends with a Newton step of v (the dual is piecewise quadratic), after which two to five rounds
+reach full precision where hundreds were needed. The alternation decides when to stop, so a bad Newton step only costs
+a round. The prices of the last call are an excellent start for the next.
 """
 
 from __future__ import annotations
@@ -16,39 +16,39 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-TOLERANCE = 1e-10  # change of the prices
+TOLERANCE = 1e-10  # greatest change of a price in the last round
 MOST_ROUNDS = 10_000
-_MOST_NEWTON = 40  # rounds; after them plain alternation, which cannot cycle
-_SLACK = 1e-11  # of a row's sum; well above rounding for entries up to a thousand
-_SINGULAR = 1e-9  # a pivot; those of a regular system are at least 1 over the number of rows
+_MOST_NEWTON = 40  # rounds with a Newton step; later rounds only alternate, which cannot cycle
+_SLACK = 1e-11  # tolerance of a row sum; well above rounding error for entries up to a thousand
+_SINGULAR = 1e-9  # least pivot; pivots of a regular system are at least 1 over the number of rows
 
 
 def project(matrix: ArrayLike, view: ArrayLike) -> NDArray[np.float64]:
     """Project a symmetric matrix onto C.
 
     Args:
-        matrix: (m, m), symmetric.
-        view: camera of each row, (m,), sorted so that a view's rows are together.
+        matrix: symmetric matrix, (m, m).
+        view: camera of each row, (m,), sorted.
 
     Returns:
-        The nearest matrix of C in the Frobenius norm, (m, m).
+        Nearest matrix of C in the Frobenius norm, (m, m).
 
     Raises:
-        ValueError: a shape that does not fit, or views that are not sorted.
+        ValueError: a wrong shape, or views that are not sorted.
     """
     result = np.array(matrix, dtype=np.float64, order="C")
     view = np.asarray(view, dtype=np.int64)
     if result.shape != (len(view), len(view)):
-        raise ValueError(f"matrix must be ({len(view)}, {len(view)}) for {len(view)} views of rows, got {result.shape}")
+        raise ValueError(f"matrix must be ({len(view)}, {len(view)}), as view has {len(view)} rows, got {result.shape}")
     starts = block_starts(view)
     _project(result, starts)
     return result
 
 
 def block_starts(view: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First row of every view's block, then m; ``view`` must be sorted."""
+    """Return the first row of every view's block, followed by m; ``view`` must be sorted."""
     if (np.diff(view) < 0).any():
-        raise ValueError("rows must be sorted by view")
+        raise ValueError("rows must be sorted by view: sort matrix and view by np.argsort(view, kind='stable') first")
     return np.concatenate([[0], np.flatnonzero(np.diff(view)) + 1, [len(view)]]) if len(view) else np.zeros(1, np.int64)
 
 
@@ -78,17 +78,17 @@ def _project(X, starts):
 def project_block(Y, u, v):
     """Project ``Y``, C-contiguous, onto the doubly substochastic matrices in place, from prices ``u`` and ``v``."""
     rows, columns = Y.shape
-    turned, room = np.empty((columns, rows)), np.empty((columns + 2, columns))
+    transposed, workspace = np.empty((columns, rows)), np.empty((columns + 2, columns))
     for i in range(rows):
         for j in range(columns):
-            turned[j, i] = Y[i, j]
+            transposed[j, i] = Y[i, j]
     for round_ in range(MOST_ROUNDS):
         change = _solve_rows(Y, u, v)
-        change = max(change, _solve_rows(turned, v, u))
+        change = max(change, _solve_rows(transposed, v, u))
         if change < TOLERANCE:
             break
         if round_ < _MOST_NEWTON:
-            _newton_step(Y, u, v, room)
+            _newton_step(Y, u, v, workspace)
     for i in range(rows):
         for j in range(columns):
             Y[i, j] = max(0.0, Y[i, j] - u[i] - v[j])
@@ -96,7 +96,7 @@ def project_block(Y, u, v):
 
 @njit(cache=True, fastmath={"reassoc"})
 def _excess(row, price, prices):
-    """What max(0, row - price - prices) sums to above one, and how many entries are positive."""
+    """Return the sum of max(0, row - price - prices) minus one, and the number of positive entries."""
     total, above = -1.0, 0.0
     for j in range(len(row)):
         value = row[j] - prices[j] - price
@@ -109,9 +109,9 @@ def _excess(row, price, prices):
 def _solve_rows(Y, u, v):
     """Set every u_i to the least non-negative price at which row i of max(0, Y - u - v) sums to at most one.
 
-    The sum falls with the price along a convex polygon. So Newton's step from a price that is too high ends at or
-    below the root, and from below the steps never overshoot and end after finitely many: the set of entries above the
-    price only shrinks. The greatest change is returned.
+    The sum is a convex, piecewise linear, decreasing function of the price. So a Newton step from a price that is too
+    high ends at or below the root, and steps from below never overshoot and end after finitely many, because the set
+    of entries above the price only shrinks. The greatest change of a price is returned.
     """
     change = 0.0
     for i in range(len(u)):
@@ -120,7 +120,7 @@ def _solve_rows(Y, u, v):
         if excess < 0.0 and price > 0.0:
             price = max(0.0, price + excess / above) if above > 0.0 else 0.0
             excess, above = _excess(row, price, v)
-        while excess > _SLACK:  # also ends on NaN
+        while excess > _SLACK:  # false for NaN, so the loop ends
             price += excess / above
             excess, above = _excess(row, price, v)
         change = max(change, abs(price - u[i]))
@@ -129,14 +129,14 @@ def _solve_rows(Y, u, v):
 
 
 @njit(cache=True, error_model="numpy")
-def _newton_step(Y, u, v, room):
-    """Newton's step of the positive prices v, with those of the rows eliminated: the next rows' solve follows them.
+def _newton_step(Y, u, v, workspace):
+    """Take a Newton step of the positive column prices v, with the row prices eliminated (solved in the next round).
 
-    The system is a Laplacian plus a non-negative diagonal, so Cholesky needs no pivoting; where a group of rows and
-    columns is tight all over, its prices are determined but for a constant, the last pivot vanishes, and that price
-    stays.
+    The system is a Laplacian plus a non-negative diagonal, so Cholesky needs no pivoting. Where all constraints of a
+    group of rows and columns are tight, its prices are determined only up to a constant: the last pivot vanishes and
+    that price is kept.
     """
-    H, step, tight, count = room, room[-1], room[-2], 0
+    H, step, tight, count = workspace, workspace[-1], workspace[-2], 0
     for j in range(len(v)):
         if v[j] > 0.0:
             tight[count] = j

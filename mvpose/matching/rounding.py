@@ -1,4 +1,4 @@
-"""From a relaxed permutation matrix to people: the paper's threshold at 1/2, made consistent."""
+"""Rounding of a relaxed permutation matrix to people: the paper's threshold of 1/2, made cycle-consistent."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from mvpose.checks import seal
 
 
 def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5) -> NDArray[np.int64]:
-    """Group detections whose P exceeds the threshold, at most one detection of a view in a group.
+    """Group detections whose P exceeds the threshold, with at most one detection per view in a group.
 
-    Pairs are joined from the surest down; a pair that would put two detections of one view into a group is
-    refused. Where P is cycle-consistent this is exactly P > threshold; where it is not, the weakest links break.
+    Pairs are joined in order of decreasing P; a pair that would put two detections of one view into a group is
+    skipped. Where P is cycle-consistent the result is exactly P > threshold; elsewhere the weakest links are dropped.
 
     Args:
-        P: (m, m), symmetric.
+        P: relaxed permutation matrix, (m, m), symmetric.
         view: camera of each row, (m,).
-        threshold: the least P of a match.
+        threshold: value that P of a match must exceed.
 
     Returns:
-        Person of each detection, numbered by their first detection, -1 where a detection matches no other, (m,).
+        Person of each detection, (m,), numbered by first detection; -1 for a detection that matches no other.
     """
     first, second = np.nonzero(np.triu(threshold < P, k=1))
-    surest = np.argsort(-P[first, second], kind="stable")
-    return number_people(_join_pairs(first[surest], second[surest], read_only(view, np.int64)))
+    descending = np.argsort(-P[first, second], kind="stable")
+    return number_people(_join_pairs(first[descending], second[descending], read_only(view, np.int64)))
 
 
 def number_people(group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Renumber group names 0 to m - 1, (m,), as 0, 1, ... by first member; groups of one become -1."""
+    """Renumber groups, (m,) with values 0 to m - 1, as 0, 1, ... by first member; groups of one become -1."""
     labels = _number_people(read_only(group, np.int64))
     seal(labels)
     return labels
 
 
 def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
-    """The same numbers as a read-only C-contiguous array: numba compiles a kernel anew for any other kind."""
+    """Return a read-only C-contiguous array, so that numba does not compile kernels again for other array types."""
     result = np.ascontiguousarray(array, dtype)
     if result.flags.writeable:
         result = result.view()
@@ -46,7 +46,7 @@ def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
 
 @njit(cache=True)
 def rank_views(view):
-    """Number the views 0, 1, ... by their first detection: the number of each detection's view, and how many."""
+    """Number the views 0, 1, ... by first detection; return the number for each detection, (m,), and the count."""
     m = len(view)
     rank, seen, views = np.empty(m, np.int64), np.empty(m, np.int64), 0
     for i in range(m):
@@ -69,16 +69,16 @@ def _join_pairs(first, second, view):
     for i in range(m):
         seen[i, rank[i]] = True
     for k in range(len(first)):
-        keep, gone = group[first[k]], group[second[k]]
-        fits = keep != gone
+        kept, absorbed = group[first[k]], group[second[k]]
+        fits = kept != absorbed
         for r in range(views):
-            fits = fits and not (seen[keep, r] and seen[gone, r])
+            fits = fits and not (seen[kept, r] and seen[absorbed, r])
         if fits:
             for r in range(views):
-                seen[keep, r] = seen[keep, r] or seen[gone, r]
+                seen[kept, r] = seen[kept, r] or seen[absorbed, r]
             for i in range(m):
-                if group[i] == gone:
-                    group[i] = keep
+                if group[i] == absorbed:
+                    group[i] = kept
     return group
 
 

@@ -1,7 +1,7 @@
 """Networks in ONNX files, run by onnxruntime: re-ID descriptors and top-down pose heads.
 
-``ReId(file).describe(detections, images)`` gives detections their descriptors, ``PoseHead(file).detect(images, view,
-boxes)`` makes detections of boxes. Onnxruntime is imported when a file is opened.
+``ReId(file).describe(detections, images)`` adds descriptors to detections; ``PoseHead(file).detect(images, view,
+boxes)`` computes detections for boxes. Onnxruntime is imported when a file is opened.
 """
 
 from mvpose.networks.card import Card

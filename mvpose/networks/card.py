@@ -1,4 +1,4 @@
-"""What a network's file does not say by itself: how its input is made, and what its output means."""
+"""Model card: input normalisation and output conventions of a network, which its ONNX file does not state."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from typing import Any, Literal, Self
 Colour = tuple[float, float, float]
 
 PREFIX = "mvpose."
-"""Before every key of a card in an ONNX file's ``metadata_props``: other programs keep theirs there too."""
+"""Prefix of the card's keys in the ``metadata_props`` of an ONNX file, which other programs also use."""
 
 _CHOICES = {"color_order": ("rgb", "bgr"), "cells": ("stride", "span", "area")}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """How to feed a network and how to read it. The defaults are those of the field: RGB, ImageNet normalisation.
+    """Model card of a network. The defaults are the common convention: RGB with ImageNet normalisation.
 
-    A card travels in the ONNX file: each field is an entry ``mvpose.<field>`` of ``metadata_props``, as JSON
-    (``mvpose.mean`` = ``[0.485, 0.456, 0.406]``); fields at their defaults are left out. For a file of someone else's
-    that carries none and needs one, state it beside the file.
+    A card is stored in the ONNX file: each field is an entry ``mvpose.<field>`` of ``metadata_props``, as JSON
+    (``mvpose.mean`` = ``[0.485, 0.456, 0.406]``); fields at their defaults are left out. For a file without a card,
+    pass one to :class:`mvpose.networks.Session`.
 
     Attributes:
-        name: how messages and reports call the network.
-        size: width and height of the input in pixels; only needed where the file leaves them open.
-        mean: subtracted from red, green and blue in 0..1. A network that takes 0..255 as they come has mean 0 and
-            std 1/255.
-        std: what the difference is divided by.
-        color_order: in which the channels are fed.
-        outputs: names of the outputs to read, in order; all where empty.
-        midpoint: re-ID: distance of two unit descriptors at which they are as likely as not of one person.
-        slope: re-ID: distance over which that likelihood falls from 1/2 to 1/(1 + e).
-        padding: pose: the crop's size over that of the box.
-        peak: pose: height of a heat map, or of a SimCC vector, where the network is sure.
-        cells: pose: which pixel of the input, W wide, cell k of w stands for. ``stride``: k W/w, as heads trained by
-            HRNet's or SimpleBaseline's code and SimCC heads have it; ``span``: k (W - 1)/(w - 1), unbiased data
-            processing (UDP; ViTPose); ``area``: the middle of the W/w pixels that the cell covers (CPN).
+        name: name of the network in messages and reports.
+        size: width and height of the input in pixels; needed only if the file leaves them open.
+        mean: value subtracted from red, green and blue in 0..1. A network that takes unnormalised 0..255 has mean 0
+            and std 1/255.
+        std: divisor of the difference.
+        color_order: order of the input channels.
+        outputs: names of the outputs to read, in order; empty for all.
+        midpoint: re-ID: distance of two unit descriptors at affinity 1/2.
+        slope: re-ID: distance over which the affinity falls from 1/2 to 1/(1 + e).
+        padding: pose: size of the crop over the size of the box.
+        peak: pose: height of a confident peak of a heat map, or of a SimCC vector.
+        cells: pose: pixel of the input, W wide, that corresponds to cell k of w. ``stride``: k W/w, for heads trained
+            with the code of HRNet or SimpleBaseline and for SimCC heads; ``span``: k (W - 1)/(w - 1), unbiased data
+            processing (UDP; ViTPose); ``area``: the centre of the W/w pixels that the cell covers (CPN).
 
     Raises:
-        ValueError: a value that cannot be, with the field's name.
+        ValueError: an invalid value; the message names the field.
     """
 
     name: str = ""
@@ -68,39 +68,44 @@ class Card:
         object.__setattr__(self, "outputs", _names("outputs", self.outputs))
         for key in ("midpoint", "slope", "padding", "peak"):
             value = getattr(self, key)
-            unstated = value is None and key in ("midpoint", "slope")
-            if not unstated and not (_is_number(value) and value > 0):
+            optional = value is None and key in ("midpoint", "slope")
+            if not optional and not (_is_number(value) and value > 0):
                 raise ValueError(f"card: {key} must be a positive number, got {value!r}")
         for key, choices in _CHOICES.items():
             if getattr(self, key) not in choices:
                 raise ValueError(f"card: {key} must be one of {', '.join(choices)}, got {getattr(self, key)!r}")
         if (self.midpoint is None) != (self.slope is None):
-            raise ValueError("card: midpoint and slope make one sigmoid: state both or neither")
+            raise ValueError(
+                f"card: midpoint and slope define one sigmoid, got {self.midpoint} and {self.slope}: "
+                "give both or neither"
+            )
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, str]) -> Self:
-        """The card among a file's ``metadata_props``; other entries are passed over.
+        """Read the card from the ``metadata_props`` of a file; entries without the prefix are ignored.
 
         Raises:
-            ValueError: an entry that begins like ours and is none of the fields, is not JSON, or cannot be.
+            ValueError: an entry with the prefix that is not a field, is not JSON, or has an invalid value.
         """
         known = [field.name for field in fields(cls)]
-        stated: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for entry, text in metadata.items():
             if not entry.startswith(PREFIX):
                 continue
             key = entry.removeprefix(PREFIX)
             if key not in known:
-                raise ValueError(f"card: no field {key!r} (metadata entry {entry!r}); there are {', '.join(known)}")
+                raise ValueError(
+                    f"card: unknown field {key!r} (metadata entry {entry!r}); expected one of {', '.join(known)}"
+                )
             try:
                 value = json.loads(text)
             except json.JSONDecodeError as error:
                 raise ValueError(f"card: metadata entry {entry!r} must be JSON, got {text!r}: {error}") from None
-            stated[key] = tuple(value) if isinstance(value, list) else value
-        return cls(**stated)
+            values[key] = tuple(value) if isinstance(value, list) else value
+        return cls(**values)
 
     def to_metadata(self) -> dict[str, str]:
-        """The card as entries of ``metadata_props``, for whoever writes the file (``onnx.helper.set_model_props``)."""
+        """Return the card as entries of ``metadata_props``, to be written by ``onnx.helper.set_model_props``."""
         return {
             PREFIX + field.name: json.dumps(getattr(self, field.name))
             for field in fields(self)
@@ -113,7 +118,7 @@ def _is_number(value: object) -> bool:
         return False
     try:
         return math.isfinite(value)
-    except OverflowError:  # an integer beyond every float
+    except OverflowError:  # an integer beyond the range of floats
         return False
 
 
@@ -128,10 +133,10 @@ def _numbers(key: str, values: Any) -> Colour:
 
 
 def _names(key: str, values: Any) -> tuple[str, ...]:
-    listed = tuple(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes, Mapping)) else None
-    if listed is None or not all(isinstance(name, str) for name in listed):
-        raise ValueError(f"card: {key} must be names in a tuple, got {values!r}")
-    return listed
+    names = tuple(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes, Mapping)) else None
+    if names is None or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"card: {key} must be a tuple of names, got {values!r}")
+    return names
 
 
 def _size(value: Any) -> tuple[int, int]:

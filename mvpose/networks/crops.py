@@ -1,10 +1,10 @@
-"""Crops: boxes of images, stretched to the input size of a network.
+"""Crops: boxes of images, resampled to the input size of a network.
 
-A crop lies in its image without rotation: the centre of its pixel (u, v) is the image pixel
-``origin + stride * (u, v)``, as :class:`mvpose.heatmaps.Heatmaps` lie. A negative stride mirrors.
+A crop is axis-aligned in its image: the centre of its pixel (u, v) is the image pixel ``origin + stride * (u, v)``, as
+in :class:`mvpose.heatmaps.Heatmaps`. A negative stride mirrors the crop.
 
-Written here and not taken from OpenCV: mvpose does without it, and its ``warpAffine`` takes four neighbours however
-much it shrinks, so that what a distant network sees of a near person flickers with the box.
+OpenCV is not used because mvpose does not depend on it, and because ``warpAffine`` interpolates between four pixels
+at any reduction, so that small crops of large boxes alias and flicker as the box moves.
 """
 
 from __future__ import annotations
@@ -24,20 +24,22 @@ Images = Sequence[NDArray[np.uint8] | None]
 
 
 class Placement(NamedTuple):
-    """Where crops lie in their images: the pixel of the centre of crop pixel (0, 0), and pixels from one to the next.
+    """Position of m crops in their images.
 
-    Both are x and y, (m, 2).
+    Attributes:
+        origin: image pixel of the centre of crop pixel (0, 0), x and y, (m, 2).
+        stride: image pixels between neighbouring crop pixels, x and y, (m, 2).
     """
 
     origin: Floats
     stride: Floats
 
-    def of(self, rows: NDArray[np.bool_]) -> Placement:
-        """Some of the crops."""
+    def select(self, rows: NDArray[np.bool_]) -> Placement:
+        """Return the placement of some of the crops, given by a mask (m,)."""
         return Placement(self.origin[rows], self.stride[rows])
 
     def mirrored(self, middle: float) -> Placement:
-        """The same crops seen in a mirror: pixel u of each becomes pixel ``2 * middle - u``."""
+        """Return the crops mirrored left-right: pixel u becomes pixel ``2 * middle - u``."""
         origin, stride = self.origin.copy(), self.stride.copy()
         origin[:, 0] += 2.0 * middle * stride[:, 0]
         stride[:, 0] *= -1.0
@@ -45,17 +47,17 @@ class Placement(NamedTuple):
 
 
 def stretched(boxes: Floats, size: tuple[int, int]) -> Placement:
-    """Boxes, (m, 4), stretched to width and height whatever their aspect: re-ID networks are trained so.
+    """Place boxes, (m, 4), stretched to width and height regardless of aspect, the convention of re-ID networks.
 
-    The edges of the box are the outer edges of the crop's first and last pixels.
+    The edges of the box are the outer edges of the first and last pixels of the crop.
     """
-    with np.errstate(over="ignore"):  # boxes beyond all numbers: none of their crop is in view
+    with np.errstate(over="ignore"):  # a box that overflows is never in view
         stride = boxes[:, 2:] / np.array(size)
         return Placement(boxes[:, :2] + 0.5 * stride, stride)
 
 
 def padded(boxes: Floats, size: tuple[int, int], padding: float) -> Placement:
-    """Boxes, (m, 4), widened ``padding`` times about their middles and then, one way, to the crop's aspect."""
+    """Place boxes, (m, 4), enlarged by ``padding`` around their centres and extended to the aspect of the crop."""
     with np.errstate(over="ignore", invalid="ignore"):  # as above
         extent = padding * boxes[:, 2:] / np.array(size)
         stride = np.repeat(extent.max(axis=1, keepdims=True), 2, axis=1)
@@ -66,18 +68,18 @@ def padded(boxes: Floats, size: tuple[int, int], padding: float) -> Placement:
 def in_view(
     images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, least: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Which crops show something of the image of their view, (m,).
+    """Return a mask of the crops that show part of the image of their view, (m,).
 
-    Those with an area, of whose pixels some, and at least a share ``least``, have their centres inside the image. The
-    others are of the colour of the fill, all but that share, and look alike whoever is in the box. A view whose image
-    is None has no picture: none of its crops is in view.
+    These are the crops with an area, of which at least one pixel and at least a fraction ``least`` of the pixels have
+    their centres inside the image. The other crops consist mostly of the fill colour and look alike for every person.
+    No crop of a view whose image is None is in view.
 
     Args:
-        images: (h, w, 3) of each view.
-        view: whose image each crop is of, (m,).
-        placement: where in the image it lies.
+        images: image of each view, (h, w, 3) or None.
+        view: view of each crop, (m,).
+        placement: position of the crops in their images.
         size: width and height of the crops.
-        least: 0 to 1.
+        least: least fraction of pixels inside the image, 0 to 1.
     """
     sizes = np.array([(0, 0) if image is None else (image.shape[1], image.shape[0]) for image in images], float)
     extent = sizes.reshape(-1, 2)[view]
@@ -90,10 +92,10 @@ def in_view(
 
 
 def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None:
-    """Refuse what is no list of pictures, a picture or None for every view that is named, and boxes that are none.
+    """Check that images holds a picture or None for every view of a box, and that boxes are finite.
 
     Raises:
-        ValueError: a view without an image, an image that is not (h, w, 3) uint8, a box that is not finite.
+        ValueError: a view beyond the list of images, an image that is not (h, w, 3) uint8, a box that is not finite.
     """
     if not np.isfinite(boxes).all():
         bad = int(np.flatnonzero(~np.isfinite(boxes).all(axis=1))[0])
@@ -118,18 +120,18 @@ def check_images(images: Images, view: NDArray[np.int64], boxes: Floats) -> None
 def cut(
     images: Images, view: NDArray[np.int64], placement: Placement, size: tuple[int, int], *, fill: tuple[int, int, int]
 ) -> Pixels:
-    """Crops of a width and a height, (m, height, width, 3), red green blue.
+    """Cut crops out of images, (m, height, width, 3), red green blue.
 
-    Where a crop shrinks its box, each pixel is a mean of all it covers, weighted by a triangle two of the crop's
-    pixels wide (as Pillow's and torchvision's antialiased bilinear resizing): nothing of the image is skipped, so a
-    crop changes smoothly with its box. Where it enlarges, this is bilinear interpolation. A pixel whose centre is
-    outside the image is of the colour ``fill``; one inside is a mean of pixels inside.
+    Where a crop reduces its box, each pixel is a mean over all the image pixels that it covers, weighted by a triangle
+    two crop pixels wide (the antialiased bilinear resizing of Pillow and torchvision). No image pixel is skipped, so a
+    crop changes smoothly with its box. Where a crop enlarges its box, this is bilinear interpolation. A crop pixel
+    whose centre is outside the image has the colour ``fill``; one inside is a mean of pixels inside.
 
     Args:
-        images: (h, w, 3) of each view, checked by :func:`check_images`, and a picture in each view that is named.
-        view: whose image each crop is of, (m,).
-        placement: where in the image it lies.
-        size: width and height.
+        images: image of each view, (h, w, 3), checked by :func:`check_images`; not None for the views of crops.
+        view: view of each crop, (m,).
+        placement: position of the crops in their images.
+        size: width and height of the crops.
         fill: red, green and blue outside the image.
     """
     width, height = size
@@ -143,9 +145,9 @@ def cut(
 
 @njit(cache=True)
 def _taps(origin, stride, count, length):
-    """For every pixel of a crop, along one axis: its first pixel of the image, how many, and their weights.
+    """Return, for every crop pixel along one axis, its first image pixel, their number, and their weights.
 
-    None where the centre is outside.
+    The number is 0 where the centre is outside the image.
     """
     reach = max(1.0, abs(stride))
     first, many = np.zeros(count, np.int64), np.zeros(count, np.int64)
@@ -167,17 +169,17 @@ def _taps(origin, stride, count, length):
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
 def _cut(image, origin, stride, fill, crop):
-    """One crop, (H, W, 3), of an image, (h, 3 w): the axes are weighted one after the other, rows first."""
+    """Write one crop, (H, W, 3), of an image, (h, 3 w), by separable resampling, rows first."""
     height, width = crop.shape[:2]
     top, tall, down = _taps(origin[1], stride[1], height, image.shape[0])
     left, wide, across = _taps(origin[0], stride[0], width, image.shape[1] // 3)
-    start, end = image.shape[1], 0  # of the columns that are needed
+    start, end = image.shape[1], 0  # range of the columns needed
     for u in range(width):
         if wide[u]:
             start, end = min(start, 3 * left[u]), max(end, 3 * (left[u] + wide[u]))
     line = np.zeros(max(end - start, 0), np.float32)
     for v in range(height):
-        line[:] = 0.5  # rounds the result
+        line[:] = 0.5  # so that the conversion to integers rounds
         for k in range(tall[v]):
             source, weight = image[top[v] + k, start:end], down[v, k]
             for c in range(len(line)):

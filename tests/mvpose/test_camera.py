@@ -160,7 +160,10 @@ BAD_CAMERAS = {
     "K projective": ({"K": GOOD.K + [[0, 0, 0], [0, 0, 0], [0.1, 0, 0]]}, "the last row of K must be 0 0 1"),
     "K with a lower skew": ({"K": GOOD.K + [[0, 0, 0], [2, 0, 0], [0, 0, 0]]}, r"K\[1, 0\] must be 0.*in K\[0, 1\]"),
     "focal length zero": ({"K": [[0, 0, 5], [0, 9, 5], [0, 0, 1]]}, "focal lengths must be positive, got 0 and 9"),
-    "focal length flipped": ({"K": [[9, 0, 5], [0, -9, 5], [0, 0, 1]]}, "positive, got 9 and -9; put a flipped image axis"),
+    "focal length flipped": (
+        {"K": [[9, 0, 5], [0, -9, 5], [0, 0, 1]]},
+        "positive, got 9 and -9; put a flipped image axis",
+    ),
     "R scaled": ({"R": 2 * GOOD.R}, "R is not a rotation .* rows of unit length"),
     "R sheared": ({"R": GOOD.R + [[0, 0.01, 0], [0, 0, 0], [0, 0, 0]]}, "R is not a rotation"),
     "R zero": ({"R": np.zeros((3, 3))}, "R is not a rotation"),

@@ -43,7 +43,10 @@ BAD = {
     "view beyond integers": ({"view": [1e30]}, "view must be numbers .* that fit int64"),
     "view not flat": ({"view": [[0]]}, r"view must be \(m,\), got \(1, 1\)"),
     "box not finite": ({"boxes": [[0, 0, np.nan, 5]]}, "boxes must be finite .* for detection 0"),
-    "box inside out": ({"boxes": [[9, 9, -3, 5]]}, r"got \[9\.0, 9\.0, -3\.0, 5\.0\] .*; convert corners x0, y0, x1, y1 to"),
+    "box inside out": (
+        {"boxes": [[9, 9, -3, 5]]},
+        r"got \[9\.0, 9\.0, -3\.0, 5\.0\] .*; convert corners x0, y0, x1, y1 to",
+    ),
     "box score": ({"box_scores": [1.1]}, r"box_scores must lie in 0\.\.1, got 1\.1 for detection 0"),
     "box score unknown": ({"box_scores": [np.nan]}, r"box_scores must lie in 0\.\.1, got nan"),
     "descriptors of others": ({"descriptors": np.zeros((2, 8))}, r"descriptors must be \(1, D\), got \(2, 8\)"),

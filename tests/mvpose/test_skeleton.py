@@ -29,9 +29,9 @@ def test_edges_join_all_joints(skeleton):
 BAD = {
     "a loop": ({"parents": (-1, 2, 1)}, "must form one tree"),
     "two roots": ({"parents": (-1, -1, 0)}, r"must have one root \(-1\)"),
-    "a joint that is not there": ({"parents": (-1, 0, 3)}, "joints below 3"),
+    "a joint that is not there": ({"parents": (-1, 0, 3)}, "joint indices below 3"),
     "a parent short": ({"parents": (-1, 0)}, "parents must have 3 entries, got 2"),
-    "one name twice": ({"joints": ("a", "b", "b")}, "joints must be different names"),
+    "one name twice": ({"joints": ("a", "b", "b")}, "joints must be one or more different names"),
     "no joints": ({"joints": ()}, "joints must be one or more different names"),
     "a mirror of one side": ({"mirror": (0, 2, 2)}, r"mirror must hold pairs .*; 'b' \(1\) has 2"),
     "a mirror beyond": ({"mirror": (0, 1, 5)}, r"'c' \(2\) has 5"),

@@ -85,7 +85,7 @@ def test_half_precision_weights_between_single_precision_ends(tmp_path):
 
 def test_an_open_size_is_read_from_the_card(tmp_path):
     path = mean_color(tmp_path / "net.onnx", size=("w", "h"))
-    with pytest.raises(ValueError, match=r"leaves the width of its input 'input' open; state Card\(size="):
+    with pytest.raises(ValueError, match=r"leaves the width of its input 'input' open; give Card\(size="):
         Session(path)
     session = Session(path, card=Card(size=(32, 64)))
     assert session.size == (32, 64)
@@ -129,13 +129,13 @@ def test_a_file_that_is_missing_is_refused(tmp_path):
 @given(st.floats(0, 1, exclude_max=True))
 def test_a_file_that_is_cut_off_anywhere_is_refused(tmp_path, share):
     whole = mean_color(tmp_path / "net.onnx").read_bytes()
-    with pytest.raises(ValueError, match=r"cut\.onnx: cannot be loaded: it is cut off, is no ONNX file"):
+    with pytest.raises(ValueError, match=r"cut\.onnx: cannot be loaded: it is truncated, is not an ONNX file"):
         Session(broken(tmp_path / "cut.onnx", whole[: int(share * len(whole))]))
 
 
 @pytest.mark.parametrize("content", [b"", b"not a network at all, but a letter", bytes(range(256)) * 40])
 def test_a_file_of_something_else_is_refused(tmp_path, content):
-    with pytest.raises(ValueError, match="cannot be loaded: it is cut off, is no ONNX file"):
+    with pytest.raises(ValueError, match="cannot be loaded: it is truncated, is not an ONNX file"):
         Session(broken(tmp_path / "net.onnx", content))
 
 
@@ -173,7 +173,7 @@ def test_two_inputs_are_refused(tmp_path):
 
 @pytest.mark.parametrize(("size", "message"), [((16, 64), "width 32"), ((32, 128), "height 64")])
 def test_a_card_that_contradicts_the_file_is_refused(tmp_path, size, message):
-    with pytest.raises(ValueError, match=rf"takes pictures of {message}, but its card says size = \({size[0]}, "):
+    with pytest.raises(ValueError, match=rf"takes pictures of {message}, but its card has size = \({size[0]}, "):
         Session(mean_color(tmp_path / "net.onnx"), card=Card(size=size))
 
 
@@ -181,7 +181,7 @@ def test_a_bad_card_is_refused_with_the_name_of_its_file(tmp_path):
     graph = Graph(("n", 3, 64, 32))
     graph.output("features", ("n", 3, 64, 32))
     path = graph.save(tmp_path / "net.onnx", metadata={"mvpose.cell": '"area"'})
-    with pytest.raises(ValueError, match=rf"network {path}: card: no field 'cell' .* there are name, size"):
+    with pytest.raises(ValueError, match=rf"network {path}: card: unknown field 'cell' .* expected one of name, size"):
         Session(path)
 
 
@@ -193,7 +193,7 @@ def test_an_output_that_is_not_finite_is_refused(tmp_path, half):
     graph.add("Div", mean, np.zeros(3)) if not half else graph.add("Mul", mean, np.full(3, 6e4))
     graph.add("Mul", graph.last, np.full(3, 8.0))
     graph.output("features", ("n", 3))
-    hint = "; float16 ends at 65504: export in float32" if half else ""
+    hint = "; float16 overflows beyond 65504: export in float32" if half else ""
     with pytest.raises(ValueError, match=f"output 'features' has values that are not finite{hint}$"):
         Session(graph.save(tmp_path / "net.onnx"))
 
@@ -249,7 +249,7 @@ def test_outputs_are_chosen_by_name(tmp_path):
         Session(path)
     session = Session(path, card=Card(outputs=("features",)))
     np.testing.assert_allclose(session(crops())[0], mean(crops()), atol=1e-5)
-    with pytest.raises(ValueError, match="has no output 'feature'; it has 'features', 'identity'"):
+    with pytest.raises(ValueError, match="has no output 'feature'; expected one of 'features', 'identity'"):
         Session(path, card=replace(session.card, outputs=("feature",)))
 
 
@@ -282,7 +282,7 @@ def test_cuda_that_does_not_come_up_is_refused_where_it_is_asked_for(tmp_path, m
     monkeypatch.setattr(
         onnxruntime, "get_available_providers", lambda: ["CUDAExecutionProvider", "CPUExecutionProvider"]
     )
-    with pytest.raises(ValueError, match=r"provider 'cuda': CUDA does not come up here, .* on CPUExecutionProvider; "):
+    with pytest.raises(ValueError, match=r"provider 'cuda': CUDA cannot be started here, .* on CPUExecutionProvider; "):
         Session(path, provider="cuda")
     assert Session(path, provider="auto").providers == ["CPUExecutionProvider"]
 
@@ -299,7 +299,7 @@ def test_weights_that_are_missing_or_cut_off_are_named(tmp_path):
     np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)
     weights.write_bytes(weights.read_bytes()[:-1])
     for _ in range(2):
-        with pytest.raises(ValueError, match="its weights lie in a file of their own, which is missing or cut off"):
+        with pytest.raises(ValueError, match="its weights are in a separate file, which is missing or truncated"):
             Session(path)
         weights.unlink(missing_ok=True)
 
@@ -315,7 +315,7 @@ def test_a_file_of_a_newer_onnx_says_so_wherever_it_lies(tmp_path, newer):
         model.ir_version = 99
     save(model, folder / "net.onnx")
     with pytest.raises(
-        ValueError, match=r"it is of a newer ONNX than onnxruntime .* reads\. Install a newer onnxruntime"
+        ValueError, match=r"it has a newer ONNX version than onnxruntime .* reads\. Install a newer onnxruntime"
     ):
         Session(folder / "net.onnx")
 
@@ -331,9 +331,7 @@ def test_an_input_that_is_open_everywhere_is_fed_colours_first_and_says_so_where
         if not channels_last:
             np.testing.assert_allclose(Session(path, card=card)(crops())[0], mean(crops()), atol=1e-5)
         else:
-            with pytest.raises(
-                ValueError, match=r"if it takes \(n, height, width, 3\), export it with that shape stated"
-            ):
+            with pytest.raises(ValueError, match=r"if it takes \(n, height, width, 3\), export it with a fixed shape"):
                 Session(path, card=card)
 
 

@@ -139,7 +139,7 @@ def test_a_peak_of_its_own_scale_is_stated_on_the_card(tmp_path):
     path = dots(tmp_path / "head.onnx", card=Card(peak=255.0), gains=GAINS)
     assert_heights(PoseHead(path).detect([image], [0], [box]).scores[0], GAINS)
     with pytest.raises(
-        ValueError, match=r"heights reach 2[01]\d, expected about 1 at a sure peak; state .* Card\(peak="
+        ValueError, match=r"heights reach 2[01]\d, expected about 1 at a confident peak; give .* Card\(peak="
     ):
         PoseHead(Session(path, card=Card())).detect([image], [0], [box])
 
@@ -232,7 +232,7 @@ def test_another_network_in_its_place_is_refused(tmp_path):
 @pytest.mark.parametrize("make", [dots, simcc_dots])
 def test_another_skeleton_is_refused(tmp_path, make):
     path = make(tmp_path / "head.onnx", gains=(1.0,) * 14)
-    with pytest.raises(ValueError, match="has 14 joints, skeleton 'coco17' has 17; state the head's skeleton"):
+    with pytest.raises(ValueError, match="has 14 joints, but skeleton 'coco17' has 17; pass the skeleton of the head"):
         PoseHead(path)
     found = PoseHead(path, skeleton=SHELF14).detect([picture(SIZE, (300, 200, 3, WHITE))], [0], [(250, 100, 100, 200)])
     assert found.skeleton is SHELF14

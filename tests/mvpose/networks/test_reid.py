@@ -141,7 +141,7 @@ def test_the_scale_of_distances_is_on_the_card(tmp_path, reid):
 
 def test_another_network_in_its_place_is_refused(tmp_path):
     heads = dots(tmp_path / "pose.onnx")
-    with pytest.raises(ValueError, match=r"must be descriptors \(n, D\) .* got \(n, 17, 64, 48\): is it a re-ID"):
+    with pytest.raises(ValueError, match=r"must be descriptors \(n, D\) .* got \(n, 17, 64, 48\); pass a re-ID"):
         ReId(heads)
     graph = Graph(("n", 3, 64, 32))
     mean = graph.add("ReduceMean", axes=[2, 3], keepdims=0)
@@ -149,7 +149,7 @@ def test_another_network_in_its_place_is_refused(tmp_path):
     graph.add("ReduceMean", mean, axes=[1], keepdims=1)
     graph.output("score", ("n", 1))
     path = graph.save(tmp_path / "two.onnx")
-    with pytest.raises(ValueError, match="reads one output, the file has 2: 'features', 'score'"):
+    with pytest.raises(ValueError, match="reads one output, but the file has 2: 'features', 'score'"):
         ReId(path)
     assert ReId(Session(path, card=Card(outputs=("features",)))).dimensions == 3
     with pytest.raises(ValueError, match=r"with D of 2 or more, got \(n, 1\)"):
