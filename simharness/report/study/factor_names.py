@@ -37,8 +37,8 @@ NAMES: Mapping[str, str] = MappingProxyType(
 """Names of the keys that the studies of this project sweep: the descriptions of keys are too long for an axis."""
 
 _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first match counts
-    (r"degrees a minute", "degrees a minute"),
-    (r"metres a minute", "m a minute"),
+    (r"degrees per minute", "degrees per minute"),
+    (r"metres per minute", "m per minute"),
     (r"degrees", "degrees"),
     (r"metres", "m"),
     (r"seconds|^s(?=,)", "s"),
@@ -46,7 +46,7 @@ _UNITS = (  # patterns in descriptions of keys, and the unit of each; the first 
     (r"pixels|^px(?=,)", "px"),
     (r"newtons", "N"),
     (r"stops", "stops"),
-    (r"as a share", "as a share"),
+    (r"relative", "relative"),
 )
 
 

@@ -1,4 +1,4 @@
-"""A study that was run, small and without pictures; everything else here is made."""
+"""Small real study without pictures; all other studies of these tests are synthetic."""
 
 import pytest
 
@@ -22,20 +22,20 @@ cameras.count = [2, 3]
 
 @pytest.fixture(scope="session")
 def ran(tmp_path_factory):
-    """Two settings at two seeds by two variants."""
-    from simharness.scenario.profiles import SHIPPED
+    """Results of two settings at two seeds with two variants."""
+    from simharness.scenario.shipped import shipped_folder
     from simharness.scenario.study_definition import load_study
     from simharness.study.runner import run_study
 
     folder = tmp_path_factory.mktemp("ran")
     file = folder / "tiny.toml"
-    file.write_text(STUDY.format(quickstart=SHIPPED.parent / "quickstart.toml"))
+    file.write_text(STUDY.format(quickstart=shipped_folder() / "quickstart.toml"))
     return run_study(load_study(file), out=folder / "out", command="simharness study tiny.toml")
 
 
 @pytest.fixture(scope="session")
 def shown(ran):
-    """The worst frames of that study, with the trials that they are from."""
+    """Worst frames of that study, with their trials."""
     from simharness.report.study.worst_frames import show, worst_frames
 
     return list(show(ran, worst_frames(ran)))

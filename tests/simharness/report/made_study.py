@@ -1,4 +1,4 @@
-"""A study that nobody ran: every table as a real one has it, with numbers that are known beforehand."""
+"""Synthetic study: result tables in the format of a real study, with known numbers."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from simharness.failures.blame import FAILURE_SCHEMA
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
-from simharness.scoring.stage_blame import FAILURE_SCHEMA
 from simharness.study.result_folder import Results
 from simharness.types.random_streams import stream
 
@@ -21,7 +21,7 @@ STAGES = ("detection", "matching", "reconstruction")
 
 
 def pcp_of(variant: str, factors: dict[str, Any], seed: int, slope: float = 5.0) -> float:
-    """What PCP is in a made study: linear in every number, a little different at each seed and variant."""
+    """Return the PCP of the synthetic study: linear in every number, with offsets for seed and variant."""
     numbers = [value for value in factors.values() if isinstance(value, int | float)]
     return 60.0 + slope * sum(numbers) + 0.5 * (seed % 3) - (4.0 if variant != "full" else 0.0)
 
@@ -38,7 +38,7 @@ def make_study(
     failed: tuple[dict[str, Any], ...] = (),
     **info: Any,
 ) -> Results:
-    """A study over a grid, or one factor at a time with each factor's first value as the base."""
+    """Return a study of a grid, or of one factor at a time, where each factor's first value is the base."""
     factors = {"cameras.count": [2, 3, 5]} if factors is None else factors
     keys = list(factors)
     if one_at_a_time:
@@ -83,7 +83,7 @@ def make_study(
     schema = {"trial": pl.String, "variant": pl.String, **FAILURE_SCHEMA}
     known = {
         "name": "made",
-        "description": "A study that nobody ran",
+        "description": "A synthetic study",
         "code": "0.1.0",
         "seeds": list(range(seeds)),
         "variants": list(variants),

@@ -15,11 +15,11 @@ def test_the_frames_of_a_film_are_evenly_spaced_and_few(count):
     assert frames[0] == 0
     assert 0 < len(frames) <= 60
     assert len(set(np.diff(frames))) <= 1
-    assert frames == list(range(count)) or len(frames) > 30  # no more are left out than must be
+    assert frames == list(range(count)) or len(frames) > 30  # no more frames are left out than necessary
 
 
-def test_the_film_plays_every_view_at_the_speed_of_life():
-    """Two cameras; the first sees red turn to blue, the second is always green."""
+def test_the_film_plays_every_view_in_real_time():
+    """Two cameras: the first shows red and then blue, the second is always green."""
     red, green, blue = (
         np.full((60, 80, 3), color, np.uint8) for color in ((220, 30, 30), (30, 200, 30), (30, 30, 220))
     )

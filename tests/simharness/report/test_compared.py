@@ -1,4 +1,4 @@
-"""How variants differ: what is paired with what."""
+"""Differences between variants: pairing of trials."""
 
 import numpy as np
 import polars as pl
@@ -12,7 +12,7 @@ AT = KEYS.index("mpjpe_mm")
 
 
 def trials_of(rows):
-    """A table of trials, of ``variant``, ``seed``, a factor and MPJPE; all other scores apply nowhere."""
+    """Return a table of trials with ``variant``, ``seed``, a factor and MPJPE; all other scores are null."""
     empty = dict.fromkeys(KEYS)
     table = [
         {"trial": f"{factor} {seed}", "case": "", "varied": "", "seed": seed, "variant": variant, "factor": factor}
@@ -31,8 +31,8 @@ def written(cell):
     return float(cell.text.replace("−", "-"))
 
 
-def test_settings_that_one_variant_lacks_are_compared_with_nothing():
-    """A is right at both settings, B only at the easy one, 10 mm worse there: it is not better by 215."""
+def test_settings_that_one_variant_lacks_are_not_compared():
+    """A has results at both settings, B only at the easy one, where it is 10 mm worse: it is not better by 215 mm."""
     rows = [
         row
         for seed in range(6)
@@ -49,8 +49,8 @@ def test_settings_that_one_variant_lacks_are_compared_with_nothing():
     known=st.lists(st.lists(st.sampled_from("AB2"), min_size=3, max_size=3), min_size=2, max_size=5),
     shift=st.integers(-40, 40),
 )
-def test_where_a_variant_is_worse_by_as_much_everywhere_it_is_worse_by_that(known, shift):
-    """Settings differ by as much as they like, and whoever knows the score of them."""
+def test_a_constant_difference_is_found_whichever_settings_have_the_score(known, shift):
+    """Settings have very different scores, and either variant may lack the score of some."""
     rows = []
     for seed, settings in enumerate(known):
         for factor, who in enumerate(settings):

@@ -1,4 +1,4 @@
-"""Curves and breaking points of a study whose scores are known beforehand."""
+"""Curves and breaking points of a synthetic study with known scores."""
 
 import numpy as np
 import polars as pl
@@ -8,7 +8,7 @@ from made_study import make_study
 from simharness.report.study.curves import breaking, factors, factors_by_case, grid, panels
 
 VARIANTS = ("full", "fast")
-SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # what four seeds add to PCP on average
+SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # mean offset of PCP over four seeds
 
 
 def test_a_line_is_the_mean_over_seeds(tmp_path):
@@ -128,7 +128,7 @@ def test_a_score_that_falls_as_the_factor_grows_breaks_above(tmp_path):
 
 
 def test_the_same_curve_mirrored_breaks_at_the_mirrored_value(tmp_path):
-    """Growing harm and shrinking help are one computation: values change their sign, and the ends change places."""
+    """Breaking above and below are one computation: values change their sign, and the ends are exchanged."""
     (down,) = factors(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
     (up,) = factors(make_study(tmp_path, factors={"cameras.count": [-5, -3, -2]}, slope=-5.0))
     one, other = breaking(down, ["full"], "pcp", 80.0)[0], breaking(up, ["full"], "pcp", 80.0)[0]
@@ -138,7 +138,7 @@ def test_the_same_curve_mirrored_breaks_at_the_mirrored_value(tmp_path):
 
 
 @pytest.mark.parametrize(("threshold", "why"), [(50.0, "never"), (99.0, "at once")])
-def test_what_does_not_break_within_the_range_is_told_as_such(tmp_path, threshold, why):
+def test_without_a_breaking_point_in_the_range_the_reason_is_given(tmp_path, threshold, why):
     (factor,) = factors(make_study(tmp_path))
     (full,) = breaking(factor, ["full"], "pcp", threshold)
     assert (full.point.value, full.point.why) == (None, why)

@@ -1,4 +1,4 @@
-"""What is kept of a study beside the code: right numbers, where they come from, and a picture that stands by itself."""
+"""Digest of a study: its numbers, its provenance, and a standalone picture of its curves."""
 
 import json
 import re
@@ -28,54 +28,54 @@ def study(tmp_path):
 
 
 def test_means_are_those_of_the_trials(study):
-    told = digest(study)
+    numbers = digest(study)
     for variant in ("full", "fast"):
         at = [[pcp_of(variant, {"cameras.count": n}, seed, 10.0) for seed in range(4)] for n in COUNTS]
-        mean, low, high = told["means"][variant]["pcp"]
+        mean, low, high = numbers["means"][variant]["pcp"]
         assert mean == pytest.approx(np.mean(at), abs=1e-4)
         assert low <= mean <= high
-        (factor,) = told["factors"]
+        (factor,) = numbers["factors"]
         assert factor["values"] == COUNTS
         assert [ends[0] for ends in factor["scores"][variant]["pcp"]] == pytest.approx(np.mean(at, axis=1), abs=1e-4)
 
 
-def test_it_says_where_it_breaks(study):
+def test_a_digest_has_breaking_points(study):
     full = next(each for each in digest(study)["breaking"] if each["variant"] == "full")
-    # The mean of full is 60.375 + 10 n, for 0.5 (seed % 3) is 0.375 on average: 90 at 2.96 cameras.
+    # The mean of full is 60.375 + 10 n, because 0.5 (seed % 3) is 0.375 on average: 90 at 2.96 cameras.
     assert full["value"] == pytest.approx(2.9625, abs=1e-3)
     assert full["worse_when"] == "less"
     assert full["low"] <= full["value"] <= full["high"]
 
 
 def test_every_failure_has_a_kind_and_a_stage(study):
-    told = digest(study)["failures"]
-    for variant, failed in told.items():
-        mine = study.failures.filter(study.failures["variant"] == variant)
+    numbers = digest(study)["failures"]
+    for variant, failed in numbers.items():
+        failures = study.failures.filter(study.failures["variant"] == variant)
         frames = len(study.frames.filter(study.frames["variant"] == variant))
-        assert len(mine) > 0
+        assert len(failures) > 0
         for column in ("kinds", "stages"):
-            assert sum(failed[column].values()) == pytest.approx(100 * len(mine) / frames, abs=0.01)
-        alone = [each for each in mine["matching_alone"].to_list() if each is not None]
+            assert sum(failed[column].values()) == pytest.approx(100 * len(failures) / frames, abs=0.01)
+        alone = [each for each in failures["matching_alone"].to_list() if each is not None]
         assert failed["matching_alone"] == pytest.approx(100 * sum(alone) / len(alone), abs=0.05)
         assert 0 < failed["matching_alone"] < 100
         assert failed["kinds"].keys() <= KIND_COLORS.keys()
         assert failed["stages"].keys() <= BLAME_COLORS.keys()
 
 
-def test_a_whole_method_is_to_blame_only_where_one_from_elsewhere_is(study):
-    def owners(told):
-        return re.findall(r"^\| by (\w+) \|", markdown(told), re.MULTILINE)
+def test_the_stage_method_is_listed_only_for_user_defined_estimators(study):
+    def stages(numbers):
+        return re.findall(r"^\| by (\w+) \|", markdown(numbers), re.MULTILINE)
 
-    assert owners(digest(study)) == ["detection", "matching", "reconstruction"]
-    stages = study.failures["stage"].replace({"matching": "method"})
-    told = digest(replace(study, failures=study.failures.with_columns(stages)))
-    assert owners(told) == ["detection", "matching", "reconstruction", "method"]
-    assert told["failures"]["full"]["stages"]["method"] > 0
+    assert stages(digest(study)) == ["detection", "matching", "reconstruction"]
+    blamed = study.failures["stage"].replace({"matching": "method"})
+    numbers = digest(replace(study, failures=study.failures.with_columns(blamed)))
+    assert stages(numbers) == ["detection", "matching", "reconstruction", "method"]
+    assert numbers["failures"]["full"]["stages"]["method"] > 0
 
 
 def test_failures_have_intervals_over_seeds(study):
-    told = digest(study)["failures"]
-    for failed in told.values():
+    numbers = digest(study)["failures"]
+    for failed in numbers.values():
         ends = failed["intervals"]
         rates = [(failed[column][key], *ends[column][key]) for column in ("kinds", "stages") for key in failed[column]]
         for rate, low, high in [*rates, (failed["matching_alone"], *ends["matching_alone"])]:
@@ -88,12 +88,12 @@ def test_failures_have_intervals_over_seeds(study):
 
 
 def study_of_seed(study, name, seed):
-    """A table of a study, of one seed alone."""
+    """Return the rows of one seed of a table of a study."""
     trials = study.trials.filter(pl.col("seed") == seed)["trial"].unique()
     return getattr(study, name).filter(pl.col("trial").is_in(trials.implode()))
 
 
-def test_seeds_that_fail_alike_leave_no_doubt(study):
+def test_seeds_with_the_same_failures_have_an_interval_of_no_width(study):
     failures = study.failures.clear().vstack(
         pl.DataFrame(
             [
@@ -113,7 +113,7 @@ def test_seeds_that_fail_alike_leave_no_doubt(study):
     }
 
 
-def test_the_text_says_what_its_words_mean(study):
+def test_the_text_explains_its_terms(study):
     text = markdown(digest(study))
     for table in (text.split("## Failures")[1], text.split("## Breaking points")[1].split("## ")[0]):
         cells = set(re.findall(r"\| (?:by )?([a-z][a-z ]*?) (?=\|)", table)) - {"failures", "factor", "broken", "full"}
@@ -125,8 +125,8 @@ def test_the_text_says_what_its_words_mean(study):
 
 
 def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
-    told = digest(study)
-    block = markdown(told).split("`full`, all scores, against `cameras.count`:\n\n")[1].split("\n\n")[0]
+    numbers = digest(study)
+    block = markdown(numbers).split("`full`, all scores, against `cameras.count`:\n\n")[1].split("\n\n")[0]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines() if "--" not in line]
     assert rows[0][1:7] == [f"AP {limit}, %" for limit in (25, 50, 75, 100, 125, 150)]
     assert [row[0] for row in rows[1:]] == [str(count) for count in COUNTS]
@@ -134,7 +134,7 @@ def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
     assert [float(row[pcp].split()[0]) for row in rows[1:]] == pytest.approx(
         [np.mean([pcp_of("full", {"cameras.count": n}, seed, 10.0) for seed in range(4)]) for n in COUNTS], abs=0.05
     )
-    (factor,) = told["factors"]
+    (factor,) = numbers["factors"]
     for number, row in enumerate(rows[1:]):
         for key, cell in zip(PRINTED, row[1:], strict=True):
             _, *ends = factor["scores"]["full"][key][number]
@@ -144,32 +144,34 @@ def test_the_table_in_the_form_of_papers_has_the_first_variants_means(study):
 
 @pytest.mark.parametrize("score", ["pcp", "map", "ghosts"])
 def test_every_variant_has_its_score_at_every_value(study, score):
-    told = digest(study)
+    numbers = digest(study)
     title = f"{SCORES[score].title}, {SCORES[score].unit}, against `cameras.count`:\n\n"
-    block = markdown(told).split(title)[1].split("\n\n")[0]
+    block = markdown(numbers).split(title)[1].split("\n\n")[0]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()]
     assert rows[0] == ["cameras.count", "full", "fast"]
-    (factor,) = told["factors"]
+    (factor,) = numbers["factors"]
     for column, variant in enumerate(("full", "fast"), 1):
         means = [ends[0] for ends in factor["scores"][variant][score]]
         assert [float(row[column].split()[0]) for row in rows[2:]] == pytest.approx(means, abs=0.051)
 
 
-def test_it_says_where_it_comes_from(study):
-    told = digest(study)
-    assert told["command"] == study.info["command"]
-    assert all(told[key] == study.info[key] for key in PROVENANCE if key != "seconds")
-    assert told["seconds"] > 0
-    assert told["seconds"] == pytest.approx(study.trials["seconds"].sum(), abs=0.1)
-    text = markdown(told)
+def test_a_digest_has_its_provenance(study):
+    numbers = digest(study)
+    assert numbers["command"] == study.info["command"]
+    assert all(numbers[key] == study.info[key] for key in PROVENANCE if key != "seconds")
+    assert numbers["seconds"] > 0
+    assert numbers["seconds"] == pytest.approx(study.trials["seconds"].sum(), abs=0.1)
+    text = markdown(numbers)
     assert study.info["command"] in text
     assert all(f"{name} {version}" in text for name, version in study.info["versions"].items())
     assert all(digest[:8] in text for digest in study.info["digests"].values())
 
 
 def test_a_table_has_as_many_cells_as_headings(tmp_path):
-    told = digest(make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("a", "b")))
-    tables = [[line for line in block.splitlines() if line.startswith("|")] for block in markdown(told).split("\n\n")]
+    numbers = digest(make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("a", "b")))
+    tables = [
+        [line for line in block.splitlines() if line.startswith("|")] for block in markdown(numbers).split("\n\n")
+    ]
     tables = [table for table in tables if table]
     assert len(tables) == 3 + 2 * 2 * 4 + 1 + 1  # all and two cases, two factors in each, breaking points, failures
     for table in tables:
@@ -197,7 +199,7 @@ def test_the_picture_is_one_document_with_every_plot_inside(tmp_path):
 
 @pytest.fixture
 def cases(tmp_path):
-    """Two cases of which one has 5 points of PCP more, and 90 points of precision more."""
+    """Study of two cases; the second has 5 points of PCP and 90 points of precision more."""
     study = make_study(tmp_path, factors={"cameras.count": COUNTS, "people.count": [1, 4]}, cases=("poor", "good"))
     more = pl.when(pl.col("case") == "good")
     trials = study.trials.with_columns(
@@ -207,7 +209,7 @@ def cases(tmp_path):
 
 
 def of_case(study, case):
-    """A study without cases, of the trials of one."""
+    """Return the trials of one case as a study without cases."""
     trials = study.trials.filter(pl.col("case") == case)
     kept = {name: getattr(study, name) for name in ("frames", "people", "failures")}
     kept = {name: rows.filter(pl.col("trial").is_in(trials["trial"].implode())) for name, rows in kept.items()}
@@ -215,35 +217,35 @@ def of_case(study, case):
 
 
 def test_each_case_breaks_by_itself(cases):
-    told = digest(cases)
-    assert list(told["by_case"]) == ["poor", "good"]
-    for case, part in told["by_case"].items():
+    numbers = digest(cases)
+    assert list(numbers["by_case"]) == ["poor", "good"]
+    for case, part in numbers["by_case"].items():
         alone = digest(of_case(cases, case))
         assert part == {"factors": alone["factors"], "breaking": alone["breaking"]}
     poor, good = (
         next(
             each["value"] for each in part["breaking"] if (each["factor"], each["variant"]) == ("cameras.count", "full")
         )
-        for part in told["by_case"].values()
+        for part in numbers["by_case"].values()
     )
     assert (poor, good) == pytest.approx((3.425, 2.425))  # 60.375 + 5 (n + 2.5) is 90, and 85
-    rows = [line for line in markdown(told).splitlines() if line.startswith("| `cameras.count` |")]
+    rows = [line for line in markdown(numbers).splitlines() if line.startswith("| `cameras.count` |")]
     assert [row.split("|")[2].strip() for row in rows] == ["poor", "poor", "good", "good"]  # PCP and precision
     for (row, *_), value in zip((rows[:2], rows[2:]), (poor, good), strict=True):
         assert f"below {value:.3g} (" in row
     assert digest(of_case(cases, "good"))["by_case"] == {}
 
 
-def test_a_mean_over_cases_or_other_keys_is_told_as_one(cases):
-    told = digest(cases)
-    pooled, _ = told["factors"]
+def test_a_mean_over_cases_or_other_keys_is_labelled(cases):
+    numbers = digest(cases)
+    pooled, _ = numbers["factors"]
     assert pooled["over"] == {"people.count": [1, 4], "case": ["poor", "good"]}
-    for part in told["by_case"].values():
+    for part in numbers["by_case"].values():
         assert [factor["over"] for factor in part["factors"]] == [{"people.count": [1, 4]}, {"cameras.count": COUNTS}]
-    drawn, text = curves(cases), markdown(told)
-    for said in ("mean over people.count 1, 4", "mean over cameras.count 2, 3, 5"):
-        assert drawn.count(f">{said}<") == 2 * 4  # cases and scores
-        assert text.count(said) == 2 * 4  # cases and tables
+    drawn, text = curves(cases), markdown(numbers)
+    for note in ("mean over people.count 1, 4", "mean over cameras.count 2, 3, 5"):
+        assert drawn.count(f">{note}<") == 2 * 4  # cases and scores
+        assert text.count(note) == 2 * 4  # cases and tables
     assert "over case" not in text
 
 
@@ -275,13 +277,13 @@ def test_ghosts_break_precision_where_they_cannot_break_pcp(tmp_path):
     assert points["full", "precision"]["worse_when"] == "greater"
 
 
-def test_what_has_no_size_is_refused():
+def test_a_plot_without_a_size_is_refused():
     with pytest.raises(ValueError, match="viewBox"):
         plot_sheet([["<svg></svg>"]])
 
 
 class TestFiles:
-    """On disk."""
+    """Files of a digest."""
 
     def test_a_digest_replaces_an_older_one_and_nothing_else(self, study, tmp_path):
         folder = tmp_path / "kept"
@@ -289,21 +291,21 @@ class TestFiles:
             write_digest(study, folder)
         assert sorted(file.name for file in folder.iterdir()) == ["curves.svg", "digest.json", "table.md"]
         assert json.loads((folder / "digest.json").read_text()) == digest(study)
-        mine = tmp_path / "mine"
-        mine.mkdir()
-        (mine / "thesis.txt").touch()
+        other = tmp_path / "other"
+        other.mkdir()
+        (other / "thesis.txt").touch()
         with pytest.raises(ValueError, match="holds no digest"):
-            write_digest(study, mine)
-        assert [file.name for file in mine.iterdir()] == ["thesis.txt"]
+            write_digest(study, other)
+        assert [file.name for file in other.iterdir()] == ["thesis.txt"]
 
-    def test_a_study_that_is_not_whole_has_none(self, tmp_path):
+    def test_a_study_with_failed_trials_has_no_digest(self, tmp_path):
         failed = ({"case": "", "factors": {"cameras.count": 2}, "seed": 0, "error": "no room"},)
         study = make_study(tmp_path, factors={"cameras.count": COUNTS}, failed=failed)
         with pytest.raises(ValueError, match="1 trials failed"):
             write_digest(study, tmp_path / "kept")
         assert not (tmp_path / "kept").exists()
 
-    def test_page_recording_and_digest_are_asked_for_one_by_one(self, tmp_path):
+    def test_page_recording_and_digest_are_separate_requests(self, tmp_path):
         result = CliRunner().invoke(app, ["report", str(tmp_path), "--digest", "a", "--rerun", "b"])
         assert result.exit_code == 2
         assert "--rerun and --digest" in result.stderr

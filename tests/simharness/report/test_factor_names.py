@@ -1,4 +1,4 @@
-"""Names and units of swept keys: all that the studies of this project sweep have one, and units are the scenario's."""
+"""Names and units of swept keys: every key that a study of this project sweeps has a name; units are the scenario's."""
 
 import tomllib
 from pathlib import Path
@@ -11,7 +11,7 @@ SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
 
 def swept():
-    """Every key that a scenario file sweeps."""
+    """Return all keys that scenario files sweep."""
 
     def walk(table, above=()):
         for key, value in table.items():
@@ -35,20 +35,20 @@ def test_what_a_study_sweeps_has_a_name(key):
     ("key", "unit"),
     [
         ("faults.translation", "m"),
-        ("faults.translation_drift", "m a minute"),
+        ("faults.translation_drift", "m per minute"),
         ("faults.rotation", "degrees"),
-        ("faults.rotation_drift", "degrees a minute"),
+        ("faults.rotation_drift", "degrees per minute"),
         ("faults.clock_offset", "s"),
         ("faults.center", "px"),
-        ("faults.focal", "as a share"),
+        ("faults.focal", "relative"),
         ("detector.phantoms.life", "s"),
         ("rate", "Hz"),
         ("people.assist", "N"),
         ("cameras.count", ""),
         ("people.count", ""),
-        ("detector.profile", ""),  # no key of a scenario: a name for many
+        ("detector.profile", ""),  # not a key of a scenario: one name for many parameters
         ("cameras.count.more", ""),
-        ("people.children", ""),  # years are told, but of children
+        ("people.children", ""),  # its description has years, but as an age and not as the unit
     ],
 )
 def test_the_unit_is_the_one_of_the_description(key, unit):

@@ -1,4 +1,4 @@
-"""Studies in which a variant could not be measured in some trials."""
+"""Studies in which a variant failed in some trials."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from simharness.report.study.worst_frames import worst_frames
 
 
 def lacking(results, variant, trials):
-    """The study without some trials of a variant, as it is told where that variant failed in them."""
+    """Return the study in which a variant failed in some trials."""
     failed = [
         {"trial": trial, "case": "", "factors": {}, "seed": 0, "variants": [variant], "error": f"{variant}: boom"}
         for trial in trials
@@ -24,7 +24,7 @@ def lacking(results, variant, trials):
 
 @pytest.mark.parametrize("variant", ["full", "fast"])
 def test_a_difference_is_over_the_trials_that_both_have(tmp_path, variant):
-    # PCP grows by 5 a camera, and is lower by 4 for "fast" in every trial: so it is, whatever trials are compared.
+    # PCP grows by 5 per camera and is lower by 4 for "fast" in every trial, so the difference is 4 in all subsets.
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, seeds=4)
     hard = results.trials.filter(pl.col("cameras.count") == 5, pl.col("seed") < 3)["trial"].unique().to_list()
     (cells,) = compared(lacking(results, variant, hard).trials, ("full", "fast")).values()
@@ -33,7 +33,7 @@ def test_a_difference_is_over_the_trials_that_both_have(tmp_path, variant):
 
 @pytest.mark.parametrize("variant", ["full", "fast"])
 @pytest.mark.parametrize("share", [0.1, 0.9, 1.0])
-def test_the_page_is_made_of_what_is_there(tmp_path, variant, share):
+def test_the_page_is_made_from_the_trials_that_finished(tmp_path, variant, share):
     factors = {"cameras.count": [2, 3, 5], "people.count": [1, 2]}
     results = make_study(tmp_path, factors=factors, seeds=3)
     trials = results.trials["trial"].unique(maintain_order=True).to_list()

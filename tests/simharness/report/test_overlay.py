@@ -125,7 +125,7 @@ def test_the_first_six_people_differ_to_every_eye(sight):
     assert apart.min() > 15  # CIE76; about 2.3 is just noticeable
 
 
-def test_colours_repeat_but_nobody_is_grey():
+def test_colours_repeat_and_no_person_is_grey():
     assert person_color(0) == person_color(8) != person_color(1)
     assert person_color(-1) == UNMATCHED
     assert css((0, 119, 187)) == "#0077bb"
@@ -141,8 +141,8 @@ def test_a_mosaic_holds_every_picture_untouched():
         [c for c in np.argwhere((sheet == p[0, 0]).all(-1)) if (sheet[c[0] : c[0] + 120, c[1] : c[1] + 160] == p).all()]
         for p in pictures
     ]
-    assert [len(found) for found in corners] == [1] * 5
-    places = np.array([found[0] for found in corners])
+    assert [len(matches) for matches in corners] == [1] * 5
+    places = np.array([matches[0] for matches in corners])
     assert len(set(places[:3, 0])) == 1 < len(set(places[:, 0]))  # three above, two below
     assert (places[3:, 1] == places[:2, 1]).all()
     assert (sheet[: places[0, 0], places[0, 1] : places[0, 1] + 60] < 120).any()  # the title stands above

@@ -1,4 +1,4 @@
-"""The page's own arithmetic, and that what people write into a scenario cannot break it."""
+"""Page of a run: its arithmetic, and its safety against markup in a scenario."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,10 @@ FRAMES = 4
 
 
 def make_record(*, people: int = 3, lost: bool = True, **scenario) -> Record:
-    """Estimates in another order than the people, person p off by (p + 1) cm; in frame 2 person 0 is lost."""
+    """Return a run with estimates in another order than the people, person p with an error of (p + 1) cm.
+
+    Person 0 is missed in frame 2 unless ``lost`` is false.
+    """
     rng = np.random.default_rng(0)
     rig = build_rig(Cameras(count=2))
     truth, estimates, detections = [], [], []
@@ -79,7 +82,7 @@ def test_the_numbers_of_the_page_are_those_of_the_summary():
     assert "75.0" in page  # person 0 was found in 3 of 4 frames
 
 
-def test_what_people_write_is_text():
+def test_text_of_the_user_is_escaped():
     page = render(make_record(description="<script>alert(1)</script> & more"))
     assert "<script>" not in page
     assert "&lt;script&gt;" in page

@@ -1,4 +1,4 @@
-"""Plots: the page's colours, no ids twice, and nothing breaks on nothing."""
+"""Plots: colours of the page, unique ids, and empty data."""
 
 import itertools
 import re
@@ -46,9 +46,9 @@ def test_every_plot_is_one_svg_element_in_the_colours_of_the_page(people, frames
         assert ET.fromstring(svg.replace("xlink:", "")).tag.endswith("svg")
         assert "currentColor" in svg
         assert "var(--faint)" in svg
-        assert "#0102" not in svg, "a stand-in was left"
-        assert "#ffffff" not in svg, "a white background does not go with a dark page"
-        assert not re.match(r"<svg[^>]* width=", svg), "the page says how wide"
+        assert "#0102" not in svg, "a placeholder colour was left"
+        assert "#ffffff" not in svg, "a white background is wrong on a dark page"
+        assert not re.match(r"<svg[^>]* width=", svg), "the page sets the width"
 
 
 def test_plots_on_one_page_share_no_ids():
@@ -67,17 +67,17 @@ def test_plots_are_the_same_every_time():
     assert draw_all() == draw_all()
 
 
-def test_a_method_without_stages_is_one():
-    svg = plots.stage_times({"own": {"total": 7.0}, "full": {"affinity": 1.0, "matching": 2.0, "total": 3.0}})
+def test_a_method_without_stages_has_the_stage_method():
+    svg = plots.stage_times({"custom": {"total": 7.0}, "full": {"affinity": 1.0, "matching": 2.0, "total": 3.0}})
     assert svg.count("7.0 ms") == svg.count("3.0 ms") == 1
     colors = [STAGE_COLORS[stage] for stage in ("affinity", "matching", "method")]
     assert all(color in svg for color in colors)
     assert STAGE_COLORS["method"] not in plots.stage_times({"full": {"affinity": 1.0, "total": 1.0}})
 
 
-def test_nothing_to_plot_is_still_a_plot():
-    nobody = np.full((4, 2), np.nan)
-    assert "<svg" in plots.error_over_time(np.arange(4.0), nobody, colors=COLORS)
+def test_empty_data_gives_a_plot():
+    missed = np.full((4, 2), np.nan)
+    assert "<svg" in plots.error_over_time(np.arange(4.0), missed, colors=COLORS)
     assert "<svg" in plots.error_distribution({"full": np.zeros(0)})
     assert "<svg" in plots.stage_times({})
     rig = build_rig(Cameras())
@@ -89,7 +89,7 @@ def test_nothing_to_plot_is_still_a_plot():
     "values", [[0, 0.25, 0.5, 1, 2, 4], [0, 0.02, 0.05, 0.1, 0.2, 0.4], [2, 3, 4, 5, 6], [0, 0.001, 1], [5], [3, 3.001]]
 )
 def test_labels_along_an_axis_do_not_run_into_each_other(values):
-    """Drawn by matplotlib, boxes of what is written stand apart; the first is there, and all that have room."""
+    """Labels in the SVG do not overlap; the first label is always drawn, and all labels where there is room."""
     drawn = study_plots.curve(
         "labels",
         factor="faults.rotation",
@@ -113,8 +113,8 @@ def test_labels_along_an_axis_do_not_run_into_each_other(values):
     ("values", "left_out"),
     [([5.0, 10.0, 20.0, 40.0, 60.0, 90.0, 120.0, 180.0], 0), ([1, 2, 4, 8, 16, 32, 64, 128, 256, 512], 0)],
 )
-def test_ticks_are_the_values_that_were_tried(values, left_out):
-    """On a logarithmic axis, too, and of more than a few."""
+def test_ticks_are_the_swept_values(values, left_out):
+    """On a logarithmic axis as well, and with many values."""
     drawn = study_plots.curve(
         "ticks",
         factor="cameras.spread",
@@ -130,17 +130,17 @@ def test_ticks_are_the_values_that_were_tried(values, left_out):
 
 def test_an_axis_has_name_unit_and_key():
     lines = {"full": [Interval(90.0, 80.0, 95.0, 3)] * 2}
-    said = {"values": [0.0, 1.0], "numeric": True, "lines": lines, "score": SCORES["pcp"]}
+    options = {"values": [0.0, 1.0], "numeric": True, "lines": lines, "score": SCORES["pcp"]}
     assert ">error of camera positions, m (faults.translation)<" in study_plots.curve(
-        "named", factor="faults.translation", **said
+        "named", factor="faults.translation", **options
     )
-    assert ">sensor.shutter, s<" in study_plots.curve("unnamed", factor="sensor.shutter", **said)
+    assert ">sensor.shutter, s<" in study_plots.curve("unnamed", factor="sensor.shutter", **options)
 
 
-def test_what_a_mean_is_over_is_short():
-    said = study_plots.mean_over(
+def test_the_note_on_a_mean_is_short():
+    note = study_plots.mean_over(
         {"cameras.count": (2, 4), "cameras.spread": (5.0, 10.0, 20.0, 40.0, 60.0, 90.0, 180.0)}
     )
-    assert said == "mean over cameras.count 2, 4 and cameras.spread (5 to 180, 7 values)"
+    assert note == "mean over cameras.count 2, 4 and cameras.spread (5 to 180, 7 values)"
     assert study_plots.mean_over({"detector.profile": tuple("abcdefg")}) == "mean over detector.profile (7 values)"
     assert study_plots.mean_over({}) == ""

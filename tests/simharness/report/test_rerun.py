@@ -1,4 +1,4 @@
-"""A recording for the viewer of rerun, written and read back."""
+"""Recording for the rerun viewer, written and read back."""
 
 import sys
 
@@ -12,8 +12,8 @@ from simharness.report.study.rerun_recording import write_rerun
 MAGIC = b"RRF2"
 
 
-def test_without_the_sdk_it_says_what_to_install(ran, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rerun", None)  # as if it were not there
+def test_without_the_sdk_the_message_says_what_to_install(ran, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)  # as if it were not installed
     file = tmp_path / "worst.rrd"
     result = CliRunner().invoke(app, ["report", str(ran.folder), "--rerun", str(file)], catch_exceptions=False)
     assert result.exit_code == 2
@@ -27,7 +27,7 @@ class TestWithTheSdk:
         pytest.importorskip("rerun", reason="the rerun SDK is not installed: pip install -e '.[viewer]'")
 
     def read(self, file):
-        """The rows of every entity: its path, and for each of its chunks a table."""
+        """Return the tables of every entity by its path, one table for each chunk."""
         assert file.read_bytes()[:4] == MAGIC
         chunk = pytest.importorskip("rerun.chunk", reason="this version of the SDK cannot read recordings")
         entities = {}

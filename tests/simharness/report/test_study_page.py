@@ -188,13 +188,13 @@ def test_curves_and_breaking_points_are_of_one_case_each(tmp_path):
     assert "<td>crowd</td>" not in render_study(make_study(tmp_path, factors=GRID))
 
 
-def test_what_people_write_is_text(tmp_path):
+def test_text_of_the_user_is_escaped(tmp_path):
     page = render_study(make_study(tmp_path, description="<script>alert(1)</script>", command="a <b> & c"))
     assert "<script>alert" not in page
     assert "a &lt;b&gt; &amp; c" in page
 
 
-def test_the_worst_frames_are_the_dearest_one_of_a_setting(tmp_path):
+def test_the_worst_frames_have_the_highest_cost_and_one_of_each_setting(tmp_path):
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 4, 5, 6]})
     errors = results.people.filter(pl.col("variant") == "full").group_by("trial", "frame").agg(pl.col("error_mm").sum())
     costs = {}
