@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simharness.scenario.profiles import read_profile
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Cameras, Clutter, People, Scenario
 
 

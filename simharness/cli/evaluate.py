@@ -96,9 +96,8 @@ def twin(
         from simharness.reality.twin import compare, print_comparison
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
-        from simharness.scenario.profiles import SHIPPED
 
-        loaded, recorded = load(scenario or SHIPPED.parent / "shelf.toml"), read_shelf(folder)
+        loaded, recorded = load(scenario or "shelf"), read_shelf(folder)
         with reporter() as bars:
             comparison = compare(recorded, loaded, count=twins, reporter=bars)
         if json_file is not None:

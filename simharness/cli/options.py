@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take, and how a command was asked for."""
+"""Arguments and options that several commands share, and the command line as text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from typing import Annotated
 
 import typer
 
-ScenarioFile = Annotated[Path, typer.Argument(help="The scenario file, TOML.", metavar="SCENARIO")]
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(
+        help="A scenario file (TOML), or the name of a shipped scenario: [cyan]quickstart[/].", metavar="SCENARIO"
+    ),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
@@ -17,10 +22,10 @@ Overrides = Annotated[
 Seed = Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")]
 JsonFile = Annotated[
     Path | None,
-    typer.Option("--json", metavar="FILE", help="Write everything there too.", dir_okay=False),
+    typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False),
 ]
 
 
 def command_line() -> str:
-    """How the user asked for this, to be run again."""
+    """Return the command line of this process, for reproduction."""
     return shlex.join(["simharness", *sys.argv[1:]])

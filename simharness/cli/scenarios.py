@@ -1,8 +1,7 @@
-"""``simharness scenarios``, ``show`` and ``schema``: what scenario files there are, and what they say."""
+"""``simharness scenarios``, ``show`` and ``schema``: the shipped scenarios, and the contents of scenario files."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,26 +24,29 @@ def add_to(app: typer.Typer) -> None:
 
 
 def scenarios() -> None:
-    """List what ships: scenarios, and the rigs and detectors that a scenario may begin with."""
+    """List the shipped scenarios, and the rigs and detector profiles with which a scenario may begin."""
     with border():
-        from simharness.scenario.presets import PROFILES, RIGS, SCENARIOS, about
+        from simharness.scenario.presets import PROFILES, RIGS, summary_of
         from simharness.scenario.resolution import read_plan
+        from simharness.scenario.shipped import shipped_folder
 
-        plans = [read_plan(path) for path in sorted(SCENARIOS.glob("*.toml"))]
+        folder = shipped_folder()
+        plans = [read_plan(path) for path in sorted(folder.glob("*.toml"))]
         rows = [
             (plan.document.path.stem, plan.base.description, f"{plan.trials:,}" if plan.is_study else "")
             for plan in plans
         ]
         presets = {
-            kind: [(path.stem, about(path), "") for path in sorted(kind.shipped.glob("*.toml"))]
+            kind: [(path.stem, summary_of(path), "") for path in sorted(kind.shipped.glob("*.toml"))]
             for kind in (RIGS, PROFILES)
         }
     width = max(len(name) for table in (rows, *presets.values()) for name, *_ in table)
     console = Console()
-    console.print(_table(f"{_path(SCENARIOS)}/NAME.toml", rows, width, trials=True))
+    console.print(_table('simharness run NAME, or extends = "NAME"', rows, width, trials=True))
     for kind, table in presets.items():
         console.print()
         console.print(_table(f'[{kind.section}] {kind.key} = "NAME"', table, width))
+    console.print(f"\nFiles: {_relative(folder)}", soft_wrap=True, highlight=False, markup=False)
 
 
 def show(
@@ -52,7 +54,7 @@ def show(
     overrides: Overrides = None,
     seed: Seed = None,
 ) -> None:
-    """Print a scenario with all that it leaves unsaid, as TOML; of a study how many trials it makes, and its base."""
+    """Print a scenario as TOML with all its defaults; of a study its factors, its number of trials and its base."""
     with border():
         from simharness.scenario.outline import outline
         from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
@@ -62,16 +64,16 @@ def show(
         try:
             load_study(scenario, overrides=overrides or ())
         except StudyTooLarge:
-            note = "simharness study asks for --yes before it runs so many trials."
+            note = "simharness study needs --yes to run so many trials."
     typer.echo(outline(plan, note), nl=False)
 
 
 def schema(
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write it there instead of printing it.", dir_okay=False)
+        Path | None, typer.Option(metavar="FILE", help="Write it to this file instead of printing it.", dir_okay=False)
     ] = None,
 ) -> None:
-    """Write the JSON schema of scenario files, by which editors complete and check them."""
+    """Print the JSON schema of scenario files, with which editors complete and validate them."""
     with border():
         from simharness.scenario.schema import dumps
 
@@ -85,7 +87,7 @@ def schema(
 
 
 def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, trials: bool = False) -> Table:
-    """Names ``width`` wide, what they are, and how many trials they make."""
+    """Return a table of names, ``width`` columns wide, descriptions and, if requested, numbers of trials."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -95,11 +97,11 @@ def _table(title: str, rows: Sequence[tuple[str, str, str]], width: int, *, tria
     table.add_column("")
     if trials:
         table.add_column("trials", justify="right", no_wrap=True)
-    for name, about, count in rows:
-        table.add_row(name, Text(about), *([count] if trials else []))
+    for name, description, count in rows:
+        table.add_row(name, Text(description), *([count] if trials else []))
     return table
 
 
-def _path(path: Path) -> str:
-    """Relative to where we are, where it is below."""
-    return os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
+def _relative(path: Path) -> Path:
+    """Return a path relative to the working directory, where it is below it."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

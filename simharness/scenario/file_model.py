@@ -1,6 +1,6 @@
-"""All that a scenario file may say: a scenario, what it begins with, and what makes a study of it.
+"""All keys of a scenario file: a scenario, the presets and bases with which it begins, and the keys of a study.
 
-A :class:`~simharness.scenario.sections.scenario.Scenario` is what is left when presets, bases and sweeps are resolved.
+A :class:`~simharness.scenario.sections.scenario.Scenario` remains when presets, bases and sweeps are resolved.
 """
 
 from __future__ import annotations
@@ -18,25 +18,34 @@ Seed = Annotated[int, Field(ge=0)]
 
 
 class CamerasSection(Cameras):
-    """[cameras] as a file may write it."""
+    """[cameras] of a file."""
 
-    rig: str = Field("", description="the rig to begin with, of scenarios/rigs or a TOML file; other keys change it")
+    rig: str = Field(
+        "",
+        description="rig with which the section begins: a name in scenarios/rigs, or a TOML file; other keys change it",
+    )
 
 
 class DetectorSection(Detector):
-    """[detector] as a file may write it."""
+    """[detector] of a file."""
 
     profile: str = Field(
-        "typical", description="the detector to begin with, of scenarios/detectors or a TOML file; other keys change it"
+        "typical",
+        description="detector profile with which the section begins: a name in scenarios/detectors, or a TOML file; "
+        "other keys change it",
     )
 
 
 class ScenarioFile(Scenario):
-    """Keys that a scenario file may have. :mod:`simharness.scenario.resolution` gives them meaning."""
+    """Keys of a scenario file. :mod:`simharness.scenario.resolution` gives them meaning."""
 
-    extends: str = Field("", description="a scenario file to begin with, relative to this one; keys here go over it")
+    extends: str = Field(
+        "",
+        description="scenario with which the file begins: a file, relative to this one, or the name of a shipped "
+        "scenario; keys of this file go over it",
+    )
     seeds: Annotated[int, Field(ge=1)] | Annotated[tuple[Seed, ...], Field(min_length=1)] = Field(
-        1, description="how many, from the scenario's on, or a list"
+        1, description="number of seeds, from the scenario's seed on, or a list of seeds"
     )
     variants: tuple[str, ...] = Field((), description="the same as method.variants")
     cameras: CamerasSection = CamerasSection()

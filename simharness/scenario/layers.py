@@ -1,4 +1,4 @@
-"""Settings over settings: what a file says over its base, a scenario over its presets, a sweep over a scenario."""
+"""Layers of settings: a file over its base, a scenario over its presets, a sweep over a scenario."""
 
 from __future__ import annotations
 
@@ -8,41 +8,43 @@ from typing import Any
 from simharness.scenario.sections.detector import KINDS
 
 Key = tuple[str, ...]
-Places = dict[Key, str]
-"""Who set a key where it is not the file that is read: ``--set people.count=6`` for ("people", "count")."""
+Origins = dict[Key, str]
+"""Origin of each key that was set last by something other than the file being read, for messages: ``--set
+people.count=6`` for ("people", "count"). Entries are in the order in which keys were set."""
 
 RANGE = ("from", "to", "steps", "scale")
-"""The words of a range in a sweep."""
+"""Keys of a range of values in a sweep."""
 
 
-def over(base: Any, said: Any) -> Any:
-    """What is said over what was, both left as they are.
+def merge(base: Any, changes: Any) -> Any:
+    """Return changes over a base; both stay as they are.
 
-    Sections go key by key, lists and ranges are replaced, a number for all joints gives way joint by joint.
+    Sections are merged key by key. Lists and ranges are replaced. A number for all kinds of joints is expanded where
+    the changes name single kinds.
     """
-    if not isinstance(said, Mapping) or is_range(said):
-        return said
-    if isinstance(base, int | float) and said and set(said) <= set(KINDS):
+    if not isinstance(changes, Mapping) or is_range(changes):
+        return changes
+    if isinstance(base, int | float) and changes and set(changes) <= set(KINDS):
         base = dict.fromkeys(KINDS, base)
     if not isinstance(base, Mapping):
-        return said
-    return {**base, **{key: over(base.get(key), value) for key, value in said.items()}}
+        return changes
+    return {**base, **{key: merge(base.get(key), value) for key, value in changes.items()}}
 
 
-def is_range(said: Mapping[str, Any]) -> bool:
-    """Whether a table is a range of values, and no section."""
-    return any(word in said for word in RANGE)
+def is_range(table: Mapping[str, Any]) -> bool:
+    """Return whether a table is a range of values, not a section."""
+    return any(key in table for key in RANGE)
 
 
 def nested(key: Key, value: Any) -> dict[str, Any]:
-    """``("people", "count"), 6`` as ``{"people": {"count": 6}}``."""
+    """Return ``{"people": {"count": 6}}`` for ``("people", "count"), 6``."""
     for part in reversed(key):
         value = {part: value}
     return value
 
 
 def leaves(data: Mapping[str, Any], above: Key = ()) -> Iterator[Key]:
-    """The keys that have a value in some settings."""
+    """Yield the keys that have a value, in all sections."""
     for name, value in data.items():
         if isinstance(value, Mapping) and value:
             yield from leaves(value, (*above, name))
@@ -50,13 +52,13 @@ def leaves(data: Mapping[str, Any], above: Key = ()) -> Iterator[Key]:
             yield (*above, name)
 
 
-def set_place(places: Places, key: Key, place: str) -> None:
-    """Note who set a key last."""
-    places.pop(key, None)  # places are in the order in which keys were set
-    places[key] = place
+def set_origin(origins: Origins, key: Key, origin: str) -> None:
+    """Record what set a key last."""
+    origins.pop(key, None)  # the order of the entries is the order of setting
+    origins[key] = origin
 
 
-def touch(one: Key, other: Key) -> bool:
-    """Whether two keys are the same, or one is a section that holds the other."""
+def overlap(one: Key, other: Key) -> bool:
+    """Return whether two keys are the same, or one is a section that holds the other."""
     shared = min(len(one), len(other))
     return one[:shared] == other[:shared]

@@ -1,4 +1,4 @@
-"""Scenario files: TOML in, a checked :class:`Scenario` out, one clear message for each mistake."""
+"""Loading of a single scenario: a TOML file in, a validated :class:`Scenario` out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from simharness.runtime.version import code_version
 from simharness.scenario.resolution import read_plan
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.toml_reader import ScenarioError
+from simharness.scenario.toml_files import ScenarioError
 
 
 def load(
@@ -19,29 +19,30 @@ def load(
     """Read a scenario file.
 
     Args:
-        path: a TOML file; what its keys mean is written in :mod:`simharness.scenario.sections.scenario`. It begins
-            with the file that it extends, its cameras with the rig and its detector with the profile that they name.
-        overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the file's; a value that
-            is not TOML is taken as a bare word, so ``rendering.renderer=gl`` needs no quotes.
+        path: a TOML file, or the name of a shipped scenario ("quickstart"). Its keys are documented in
+            :mod:`simharness.scenario.sections.scenario`; it is merged over the file that it extends, and over the rig
+            and the detector profile that it names.
+        overrides: ``"people.count=6"``: a dotted key and a TOML value that replaces the one of the file. A value that
+            is not TOML is taken as text, so that ``rendering.renderer=gl`` needs no quotes.
         seed: replaces the scenario's seed.
-        folder: what files that the scenario file names are relative to; by default its own.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
 
     Raises:
-        ScenarioError: a file that is missing or not TOML, a key that does not exist (the nearest one is
-            named), or a value of the wrong type or out of range, all named at once; or a file that makes more than
-            one scenario, a study.
+        ScenarioError: the file does not exist or is not TOML; a key does not exist (the message names the nearest) or
+            has a value of a wrong type or out of range (all are reported together); or the file is a study, with more
+            than one trial.
     """
     plan = read_plan(path, overrides=overrides, seed=seed, folder=folder)
     if plan.is_study:
         raise ScenarioError(
-            f"{path}: is a study, not one scenario: it makes {plan.trials:,} trials ({plan.settings:,} x "
+            f"{path}: is a study, not a single scenario: it has {plan.trials:,} trials ({plan.settings:,} x "
             f"{len(plan.seeds):,}, settings x seeds); run it with simharness study {path}"
         )
     return plan.base
 
 
 def fingerprint(scenario: Scenario) -> str:
-    """Ten hexadecimal digits that change with any value of the scenario, its files and the version of the code."""
+    """Return ten hexadecimal digits that depend on all values of a scenario, its files and the version of the code."""
     resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
     digest = hashlib.blake2b(resolved.encode(), digest_size=5)
     for file in (*scenario.files, *scenario.method.estimators.files):

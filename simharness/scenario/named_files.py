@@ -1,4 +1,4 @@
-"""Files that a scenario file names are relative to its folder; what the command line names is not."""
+"""Paths in scenario files: relative to the folder of the file; on the command line, to the working directory."""
 
 from __future__ import annotations
 
@@ -6,37 +6,31 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-_FILES = (
-    ("people", "motion", "file"),
-    ("people", "motion", "skeleton"),
-    ("cameras", "file"),
-    ("detector", "onnx"),
-    ("appearance", "network"),
-)
-_FILES_OR_NAMES = (("cameras", "rig"), ("detector", "profile"))
-_ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
+from simharness.scenario.layers import Key
+from simharness.scenario.sections.scenario import FILE_KEYS
 
-Key = tuple[str, ...]
+_PRESET_KEYS = (("cameras", "rig"), ("detector", "profile"))  # a TOML file or the name of a preset
+_ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
 
 
 def locate_files(data: dict[str, Any], folder: Path) -> None:
-    """Write the folder before the files that a scenario, its cases and its sweep name, in place."""
+    """Prefix the files that a scenario, its cases and its sweep name with a folder, in place."""
     for settings in _settings(data):
-        for key, value in list(_named(settings)):
+        for key, value in list(_file_values(settings)):
             section = _section(settings, key[:-1])
             assert section is not None
             section[key[-1]] = _located(key, value, folder)
 
 
 def relative_files(settings: dict[str, Any]) -> Iterator[tuple[Key, str]]:
-    """The keys of a scenario that name files by paths that are not absolute, and those paths."""
-    for key, value in _named(settings):
+    """Yield the keys of a scenario that name files by relative paths, and those paths."""
+    for key, value in _file_values(settings):
         if _is_file(key, value) and not Path(value).is_absolute():
             yield key, value
 
 
 def _settings(data: dict[str, Any]) -> Iterator[Any]:
-    """Whatever may have the keys of a scenario."""
+    """Yield all parts of a file that may have keys of a scenario."""
     yield data
     cases, sweep = data.get("cases"), data.get("sweep")
     if isinstance(cases, dict):
@@ -47,9 +41,9 @@ def _settings(data: dict[str, Any]) -> Iterator[Any]:
             yield from sweep["paired"]
 
 
-def _named(settings: Any) -> Iterator[tuple[Key, Any]]:
-    """The keys of some settings that may name files, and what they say."""
-    for key in (*_FILES, *_FILES_OR_NAMES):
+def _file_values(settings: Any) -> Iterator[tuple[Key, Any]]:
+    """Yield the keys that may name files, and their values."""
+    for key in (*FILE_KEYS, *_PRESET_KEYS):
         section = _section(settings, key[:-1])
         if section is not None and key[-1] in section:
             yield key, section[key[-1]]
@@ -58,7 +52,7 @@ def _named(settings: Any) -> Iterator[tuple[Key, Any]]:
 
 
 def _section(settings: Any, names: Sequence[str]) -> dict[str, Any] | None:
-    """A section of some settings; None where they have none."""
+    """Return a section; None where it is absent or not a table."""
     for name in names:
         settings = settings.get(name) if isinstance(settings, dict) else None
     return settings if isinstance(settings, dict) else None
@@ -73,6 +67,6 @@ def _located(key: Key, value: Any, folder: Path) -> Any:
 def _is_file(key: Key, value: Any) -> bool:
     if not isinstance(value, str) or not value:
         return False
-    if key in _FILES_OR_NAMES:
+    if key in _PRESET_KEYS:
         return value.endswith(".toml")
-    return key in _FILES or ".py:" in value
+    return key in FILE_KEYS or ".py:" in value

@@ -1,4 +1,4 @@
-"""What a scenario file amounts to, for people: the resolved base as TOML, and what is varied above it."""
+"""Outline of a scenario file for people: the varied keys as comments, and the resolved base as TOML."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 from simharness.scenario.layers import leaves
 from simharness.scenario.resolution import Plan
 from simharness.scenario.sweep import Axis
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 
-_WIDTH = 96  # of a line of values
-_MOST = 12  # values of one factor
+_WIDTH = 96  # columns of a line of values
+_MOST = 12  # listed values of one factor
 
 
 def outline(plan: Plan, note: str = "") -> str:
-    """The base as TOML that :func:`simharness.scenario.load.load` reads back; of a study with what is varied.
+    """Return the base as TOML, which :func:`simharness.scenario.load.load` reads back; above it what a study varies.
 
     Args:
-        plan: of the file.
-        note: of a study, a line more.
+        plan: the resolved file.
+        note: additional line about a study.
     """
     lines = _lines(plan, note) if plan.is_study else []
     comments = "".join(f"# {line}".rstrip() + "\n" for line in lines)
@@ -39,7 +39,7 @@ def _lines(plan: Plan, note: str) -> list[str]:
     rows = [("variants", ", ".join(variants)), ("seeds", _seeds(plan.seeds))]
     lines += _table(rows)
     if plan.sweep.axes:
-        how = "the base, and one at a time" if plan.sweep.one_at_a_time else "every combination of"
+        how = "the base, and one key at a time" if plan.sweep.one_at_a_time else "all combinations of"
         lines += ["", f"sweep: {how}", *_table([row for axis in plan.sweep.axes for row in _axis(axis)])]
     if plan.cases[0].name:
         lines += ["", "cases", *_table([(case.name, _changes(case.changes)) for case in plan.cases])]
@@ -57,20 +57,20 @@ def _seeds(seeds: Sequence[int]) -> str:
 
 
 def _axis(axis: Axis) -> list[tuple[str, str]]:
-    """A row for every key; those that go together with the first follow it."""
+    """Return a row for every key; paired keys follow the first."""
     first, *others = axis.keys
     values = [_some(list(map(_shown, column))) for column in zip(*axis.values, strict=True)]
     return list(zip([first, *(f"with {key}" for key in others)], values, strict=True))
 
 
 def _changes(changes: Mapping[str, Any]) -> str:
-    said = []
+    assignments = []
     for key in leaves(changes):
         value: Any = changes
         for part in key:
             value = value[part]
-        said.append(f"{'.'.join(key)} = {_shown(value)}")
-    return ", ".join(said) or "the base"
+        assignments.append(f"{'.'.join(key)} = {_shown(value)}")
+    return ", ".join(assignments) or "the base"
 
 
 def _some(values: Sequence[str]) -> str:
@@ -86,7 +86,7 @@ def _shown(value: Any) -> str:
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> list[str]:
-    """Names in a column, what belongs to them beside it, wrapped."""
+    """Return a table of two columns as lines; the second column is wrapped."""
     width = 2 + max(len(name) for name, _ in rows) + 2
     lines = []
     for name, text in rows:

@@ -1,9 +1,8 @@
-"""Presets: files of settings of one section that scenarios begin with, by name.
+"""Presets of a section: rigs and detector profiles, files of settings that scenarios name.
 
 ``[detector] profile = "typical"`` takes ``scenarios/detectors/typical.toml`` and ``[cameras] rig = "dome12"`` takes
-``scenarios/rigs/dome12.toml``: from ``detectors`` or ``rigs`` beside the scenario, or else what comes with the
-project. Other keys of the section change it. A preset may begin with another one, too: ``profile = "typical"`` in its
-first lines.
+``scenarios/rigs/dome12.toml``: from a folder ``detectors`` or ``rigs`` beside the scenario, or else from the shipped
+scenarios. Other keys of the section change the preset. A preset may begin with another preset by the same key.
 """
 
 from __future__ import annotations
@@ -18,29 +17,27 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from simharness.scenario.layers import Places, over
+from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
 from simharness.scenario.sections.cameras import Cameras
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.section import Section
-from simharness.scenario.toml_reader import ScenarioError, read_toml
-from simharness.scenario.validation_messages import explain
-
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
-"""Where the scenarios are that come with the project, and its presets beneath them."""
+from simharness.scenario.shipped import shipped_folder
+from simharness.scenario.toml_files import ScenarioError, read_toml
+from simharness.scenario.validation_messages import explain_all
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of preset.
+    """Kind of preset.
 
     Attributes:
-        section: that it is of.
-        key: of the section that names one.
-        title: what messages call one.
-        folder: name of the folder that they lie in.
-        model: of the section.
-        default: the preset of those who name none; "": there is none.
+        section: section to which the presets belong.
+        key: key of the section that names a preset.
+        title: name of the kind in messages.
+        folder: name of the folder of the presets.
+        model: model of the section.
+        default: preset of scenarios that name none; "": no preset.
     """
 
     section: str
@@ -52,18 +49,18 @@ class Kind:
 
     @property
     def shipped(self) -> Path:
-        """The folder of those that come with the project."""
-        return SCENARIOS / self.folder
+        """Folder of the shipped presets."""
+        return shipped_folder() / self.folder
 
-    def named(self, data: Mapping[str, Any]) -> Any:
-        """Which preset the settings of a scenario begin with; "": none, their section is written out.
+    def name_in(self, data: Mapping[str, Any]) -> Any:
+        """Return the preset with which the settings of a scenario begin; "": none, the section is written out.
 
-        A detector that is written out says its name.
+        A detector that is written out has a key ``name``.
         """
-        said = data.get(self.section, {})
-        if not isinstance(said, Mapping):
+        section = data.get(self.section, {})
+        if not isinstance(section, Mapping):
             return ""
-        return said.get(self.key, "" if "name" in said else self.default)
+        return section.get(self.key, "" if "name" in section else self.default)
 
 
 PROFILES = Kind("detector", "profile", "detector profile", "detectors", Detector, "typical")
@@ -72,41 +69,46 @@ KINDS = (PROFILES, RIGS)
 
 
 def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path()) -> Path:
-    """The file of a preset.
+    """Return the file of a preset.
 
     Args:
-        kind: of preset.
-        name: of it, or of a TOML file.
-        folders: the preset is looked for in them, and beneath them in the folder of its kind, before the shipped.
-        near: what the name of a file is relative to.
+        kind: kind of preset.
+        name: name of a preset, or path of a TOML file.
+        folders: folders searched before the shipped one, each with its subfolder of the kind.
+        near: folder to which the path of a TOML file is relative.
 
     Raises:
-        ScenarioError: there is no preset of that name.
+        ScenarioError: no preset has this name.
     """
     if name.endswith(".toml"):
         return near / name
-    places = [folder if folder.name == kind.folder else folder / kind.folder for folder in folders] + [kind.shipped]
-    for place in places:
-        if (place / f"{name}.toml").is_file():
-            return place / f"{name}.toml"
-    known = sorted({file.stem for place in places for file in place.glob("*.toml")})
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f" Did you mean {close[0]}?" if close else ""
+    searched = [folder if folder.name == kind.folder else folder / kind.folder for folder in folders] + [kind.shipped]
+    for folder in searched:
+        if (folder / f"{name}.toml").is_file():
+            return folder / f"{name}.toml"
+    known = sorted({file.stem for folder in searched for file in folder.glob("*.toml")})
+    near_names = difflib.get_close_matches(name, known, n=1)
+    hint = f" Did you mean {near_names[0]}?" if near_names else ""
     raise ScenarioError(
-        f"{kind.section}.{kind.key} = {_shown(name)}: no such {kind.key}; there are "
-        f"{', '.join(known) or 'none'}, or name a file that ends in .toml.{hint}"
+        f"{kind.section}.{kind.key} = {_shown(name)}: no such {kind.key}; expected one of "
+        f"{', '.join(known) or 'none'}, or a file that ends in .toml.{hint}"
     )
 
 
 def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict[str, Any]:
-    """The settings of a preset's file, with those that it begins with.
+    """Return the settings of a preset's file, merged over those of the preset with which it begins.
+
+    Args:
+        kind: kind of preset.
+        path: its file.
+        above: files that begin with this one.
 
     Raises:
-        ScenarioError: it cannot be read, begins with itself, or says something that its section has not.
+        ScenarioError: the file cannot be read, begins with itself, or has a key or value that the section refuses.
     """
     if path in above:
         raise ScenarioError(
-            f"{path}: begins with {kind.key} {above[-1].stem!r}, which begins with it; take one of them out"
+            f"{path}: begins with {kind.key} {above[-1].stem!r}, which begins with it; remove one {kind.key}"
         )
     settings = read_toml(path)
     begins = settings.pop(kind.key, "")
@@ -115,18 +117,32 @@ def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict
         raise ScenarioError(f"{path}: {kind.key}: expected the name of a {kind.title}, got {_shown(begins)}")
     if begins:
         base = read_preset(kind, file_of(kind, begins, [path.parent], near=path.parent), above=(*above, path))
-        settings = over(base, settings)
+        settings = merge(base, settings)
     try:
         kind.model.model_validate_json(json.dumps(settings, default=str), strict=True)
     except ValidationError as error:
-        mistakes: list[Any] = [{**mistake, "loc": (kind.section, *mistake["loc"])} for mistake in error.errors()]
-        lines = [explain(mistake, {}, str(path)) for mistake in mistakes]
+        lines = explain_all(error, {}, str(path), section=(kind.section,))
         raise ScenarioError("\n".join(dict.fromkeys(lines))) from None
     return settings
 
 
-def about(path: Path) -> str:
-    """What a preset is, in a line: the first sentence of the comment that its file begins with."""
+def read_profile(name: str, *, folder: Path | None = None) -> Detector:
+    """Read a detector profile.
+
+    Args:
+        name: name of a shipped profile ("typical"), or of a TOML file, relative to ``folder``.
+        folder: folder that is searched first; by default the working directory.
+
+    Raises:
+        ScenarioError: no profile has this name, or it has a key or value that a detector refuses.
+    """
+    folder = folder or Path()
+    settings = read_preset(PROFILES, file_of(PROFILES, name, [folder], near=folder))
+    return Detector.model_validate_json(json.dumps(settings), strict=True)
+
+
+def summary_of(path: Path) -> str:
+    """Return one line about a preset: the first sentence of the comment at the top of its file."""
     words: list[str] = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.removeprefix("#").strip() or not line.startswith("#"):
@@ -136,40 +152,40 @@ def about(path: Path) -> str:
 
 
 class Presets:
-    """The presets that the settings of one scenario file, or of a study's, may name; each is read once."""
+    """Presets that the settings of a scenario file or study name; each is read once."""
 
     def __init__(self, folders: Sequence[Path]) -> None:
-        """Look for them in ``folders``: the scenario's and its bases'."""
+        """Look for presets in ``folders``: those of the scenario and its bases."""
         self._folders = folders
         self._read: dict[tuple[str, str], dict[str, Any]] = {}
 
-    def under(self, data: dict[str, Any], places: Places) -> dict[str, Any]:
-        """The settings with the presets under them that they name.
+    def under(self, data: dict[str, Any], origins: Origins) -> dict[str, Any]:
+        """Return the settings of a scenario, merged over the presets that they name.
 
         Args:
-            data: of a scenario.
-            places: who set a key, for messages.
+            data: settings of a scenario.
+            origins: origins of the keys, for messages.
 
         Raises:
-            ScenarioError: there is no such preset, or it says something that its section has not.
+            ScenarioError: no such preset, or it has a key or value that the section refuses.
         """
         for kind in KINDS:
-            name = kind.named(data)
-            said = data.get(kind.section, {})
-            if not isinstance(said, Mapping):
+            name = kind.name_in(data)
+            section = data.get(kind.section, {})
+            if not isinstance(section, Mapping):
                 continue
-            said = {key: value for key, value in said.items() if key != kind.key}
-            settings = self._settings(kind, name, places)
-            if said and name and kind is PROFILES:
+            changes = {key: value for key, value in section.items() if key != kind.key}
+            settings = self._settings(kind, name, origins)
+            if changes and name and kind is PROFILES:
                 settings = {**settings, "name": f"{settings.get('name', name)}, changed"}
-            data = {**data, kind.section: over(settings, said)}
+            data = {**data, kind.section: merge(settings, changes)}
         return data
 
-    def _settings(self, kind: Kind, name: Any, places: Places) -> dict[str, Any]:
+    def _settings(self, kind: Kind, name: Any, origins: Origins) -> dict[str, Any]:
         if name == "":
             return {}
-        place = places.get((kind.section, kind.key))
-        where = f"{place}: " if place else ""
+        origin = origins.get((kind.section, kind.key))
+        where = f"{origin}: " if origin else ""
         if not isinstance(name, str):
             raise ScenarioError(
                 f"{where}{kind.section}.{kind.key}: expected the name of a {kind.title}, got {_shown(name)}"
@@ -183,13 +199,13 @@ class Presets:
         return self._read[kind.key, name]
 
 
-def layered(base: dict[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said over what was; a section that was written out makes way for a preset, not to change it."""
+def merge_with_presets(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes over a base, where a preset that the changes name replaces a section that is written out."""
     for kind in KINDS:
-        chosen = said.get(kind.section)
-        if isinstance(chosen, Mapping) and chosen.get(kind.key) and not kind.named(base):
+        chosen = changes.get(kind.section)
+        if isinstance(chosen, Mapping) and chosen.get(kind.key) and not kind.name_in(base):
             base = {name: section for name, section in base.items() if name != kind.section}
-    return over(base, said)
+    return merge(base, changes)
 
 
 def _shown(value: Any) -> str:

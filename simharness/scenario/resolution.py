@@ -1,11 +1,12 @@
-"""What a scenario file amounts to: its base, and how many trials its sweep, cases and seeds make.
+"""Resolution of a scenario file: its base scenario, and the number of trials of its sweep, cases and seeds.
 
-Settings are counted here, not made: however many they are, it takes neither long nor much memory.
+Settings are counted here and not made, so that a huge study costs neither time nor memory.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -14,33 +15,33 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from simharness.scenario.extends import Document, read_document
-from simharness.scenario.layers import Places, leaves, nested, over, set_place
-from simharness.scenario.presets import KINDS, Presets, layered
+from simharness.scenario.document import Document, read_document
+from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
+from simharness.scenario.presets import KINDS, Presets, merge_with_presets
 from simharness.scenario.sections.gate import Gate
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
 from simharness.scenario.sweep import Sweep, SweepReader, Value
-from simharness.scenario.toml_reader import ScenarioError
-from simharness.scenario.validation_messages import explain, place_of
+from simharness.scenario.toml_files import ScenarioError
+from simharness.scenario.validation_messages import explain_all, origin_of
 
 
 @dataclass(frozen=True)
 class Case:
-    """A named change of the base; the base itself in a file without cases.
+    """Named change of the base; the base itself in a file without cases.
 
     Attributes:
-        name: "" where the file has none.
-        data: the keys of its scenario file.
-        places: who set a key.
-        changes: the keys that it changes.
-        scenario: what they make.
-        values: of all swept keys, dotted, where they are not varied.
+        name: name of the case; "" where the file has no cases.
+        data: keys of the scenario file with the changes.
+        origins: origins of the keys.
+        changes: keys that the case changes.
+        scenario: resolved scenario.
+        values: values of all swept keys, dotted, where they are not varied.
     """
 
     name: str
     data: dict[str, Any]
-    places: Places
+    origins: Origins
     changes: Mapping[str, Any]
     scenario: Scenario
     values: Mapping[str, Value]
@@ -48,14 +49,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scenario file amounts to.
+    """Resolved scenario file: the base scenario, and what is varied.
 
     Attributes:
-        document: what the file and its bases say.
-        base: the scenario without sweep and cases; its seed is the first.
-        seeds: of every setting.
-        sweep: what is varied.
-        cases: at least one.
+        document: keys of the file and its bases.
+        base: the scenario without sweep and cases; its seed is the first one.
+        seeds: seeds of every setting.
+        sweep: factors and their values.
+        cases: at least one case.
         gate: section [gate].
     """
 
@@ -68,75 +69,70 @@ class Plan:
 
     @property
     def settings(self) -> int:
-        """How many settings there are."""
+        """Number of settings."""
         return sum(self.sweep.count(case.values) for case in self.cases)
 
     @property
     def trials(self) -> int:
-        """How many trials: settings times seeds."""
+        """Number of trials: settings times seeds."""
         return self.settings * len(self.seeds)
 
     @property
     def is_study(self) -> bool:
-        """Whether it is more than the base at its seed."""
+        """Whether there is more than the base at one seed."""
         return bool(self.sweep.axes or self.cases[0].name or len(self.seeds) > 1)
 
 
 class Resolver:
-    """Makes scenarios of settings; what is wrong with them goes to a list."""
+    """Validation of settings; mistakes are collected in a list."""
 
     def __init__(self, document: Document, mistakes: list[str]) -> None:
-        """Resolve settings of ``document``, and append to ``mistakes``."""
+        """Resolve settings of ``document``; append messages to ``mistakes``."""
         self._presets = Presets(document.folders)
         self._file = str(document.path)
         self._mistakes = mistakes
         self._sections: dict[Any, Section] = {}
 
-    def scenario(self, data: dict[str, Any], places: Places) -> Scenario | None:
-        """The scenario that settings make; None where they make none.
+    def scenario(self, data: dict[str, Any], origins: Origins) -> Scenario | None:
+        """Return the scenario of some settings; None where they are not valid.
 
-        Sections that are equal are one object: thousands of settings differ in a few.
+        Equal sections are shared as one object, because thousands of settings differ in a few sections.
         """
         try:
-            data = self._presets.under(data, places)
+            data = self._presets.under(data, origins)
         except ScenarioError as error:
             self._mistakes.append(str(error))
             return None
         try:
-            # Through JSON, for that is where pydantic's strict mode still takes arrays for tuples: count = "4"
-            # and count = true are refused, count = 4 and fov = 75 are fine.
+            # Through JSON, where pydantic's strict mode accepts arrays as tuples: count = "4" and count = true are
+            # refused, count = 4 and fov = 75 are accepted.
             scenario = Scenario.model_validate_json(json.dumps(data, default=str), strict=True)
         except ValidationError as error:
-            self._explain(error, places)
+            self._mistakes += explain_all(error, origins, self._file)
             return None
         sections = {key: section for key, section in scenario if isinstance(section, Section)}
         shared = {
-            # Which keys a section was given is part of what it says: a layout that was not may be missed.
+            # Sections are shared only with equal sets of given keys: some checks depend on which keys were given.
             key: self._sections.setdefault((key, section, frozenset(section.model_fields_set)), section)
             for key, section in sections.items()
         }
         return scenario.model_copy(update=shared)
 
-    def gate(self, said: Any, places: Places) -> Gate:
-        """The section [gate]."""
+    def gate(self, data: Any, origins: Origins) -> Gate:
+        """Return the section [gate]."""
         try:
-            return Gate.model_validate_json(json.dumps(said, default=str), strict=True)
+            return Gate.model_validate_json(json.dumps(data, default=str), strict=True)
         except ValidationError as error:
-            self._explain(error, places, "gate")
+            self._mistakes += explain_all(error, origins, self._file, section=("gate",))
             return Gate()
-
-    def _explain(self, error: ValidationError, places: Places, *above: str) -> None:
-        for mistake in error.errors():
-            located: Any = {**mistake, "loc": (*above, *mistake["loc"])}
-            self._mistakes.append(explain(located, places, self._file))
 
 
 def refuse(mistakes: Sequence[str]) -> None:
-    """Raise a :class:`ScenarioError` that says every mistake once, where there are any."""
+    """Raise a :class:`ScenarioError` with every distinct mistake, if there are any."""
     if mistakes:
-        # All values of a range may be wrong in the same way: the first that was got will do.
-        said = {mistake.rpartition(", got ")[0] or mistake: mistake for mistake in reversed(mistakes)}
-        raise ScenarioError("\n".join(reversed(said.values())))
+        # All values of a range may be wrong in the same way: the message about the first is enough.
+        messages = {re.split(", (?:e.g.|got) ", mistake)[0]: mistake for mistake in reversed(mistakes)}
+        raise ScenarioError("\n".join(reversed(messages.values())))
 
 
 def read_plan(
@@ -148,79 +144,79 @@ def read_plan(
     variants: Sequence[str] | None = None,
     folder: Path | None = None,
 ) -> Plan:
-    """Read what a scenario file amounts to.
+    """Read and resolve a scenario file.
 
     Args:
-        path: a TOML file.
-        overrides: as of :func:`simharness.scenario.load.load`.
+        path: a TOML file, or the name of a shipped scenario.
+        overrides: as in :func:`simharness.scenario.load.load`.
         seed: replaces the scenario's seed.
-        seeds: replaces the study's seeds: how many, or which.
+        seeds: replaces the study's seeds: their number, or a list of them.
         variants: replaces the variants.
-        folder: what files that the scenario file names are relative to; by default its own.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
 
     Raises:
         ScenarioError: as :func:`simharness.scenario.load.load`.
     """
     document = read_document(path, overrides=overrides, folder=folder)
-    data, places = dict(document.data), document.places
+    data, origins = dict(document.data), document.origins
     for key, value in (("seed", seed), ("seeds", seeds)):
         if value is not None:
             data[key] = list(value) if isinstance(value, Sequence) else value
-            set_place(places, (key,), f"--{key}")
+            set_origin(origins, (key,), f"--{key}")
     if variants is not None:
-        data = over(data, {"method": {"variants": list(variants)}})
-        set_place(places, ("method", "variants"), "--variants")
+        data = merge(data, {"method": {"variants": list(variants)}})
+        set_origin(origins, ("method", "variants"), "--variants")
 
     mistakes: list[str] = []
-    reader = SweepReader(places, str(document.path), mistakes)
+    reader = SweepReader(origins, str(document.path), mistakes)
     resolver = Resolver(document, mistakes)
     sweep = reader.sweep(data.pop("sweep", {}))
     changes = reader.cases(data.pop("cases", {}), sweep) or {"": {}}
-    gate = resolver.gate(data.pop("gate", {}), places)
+    gate = resolver.gate(data.pop("gate", {}), origins)
     all_seeds = _seeds(data, document, mistakes)
     _check_presets(data, sweep, reader, mistakes)
-    base = resolver.scenario(data, places)
+    base = resolver.scenario(data, origins)
     cases = [_case(name, changed, data, sweep, reader, resolver) for name, changed in changes.items()]
-    if mistakes:  # then say those of swept values, too, which nobody gets to
+    if mistakes:  # report those of swept values as well: settings are not made after a mistake
         for axis in sweep.axes:
             for values in axis.values:
-                resolver.scenario(*vary(data, places, sweep, dict(zip(axis.keys, values, strict=True))))
+                resolver.scenario(*vary(data, origins, sweep, dict(zip(axis.keys, values, strict=True))))
     refuse(mistakes)
     assert base is not None
     return Plan(document, base, all_seeds, sweep, tuple(filter(None, cases)), gate)
 
 
 def vary(
-    data: dict[str, Any], places: Places, sweep: Sweep, values: Mapping[str, Value]
-) -> tuple[dict[str, Any], Places]:
-    """The settings with swept keys at values, and who set them.
+    data: dict[str, Any], origins: Origins, sweep: Sweep, values: Mapping[str, Value]
+) -> tuple[dict[str, Any], Origins]:
+    """Return the keys of a scenario file with swept keys at some values, and the origins of all keys.
 
     Args:
-        data: the keys of a scenario file.
-        places: who set a key.
-        sweep: that the values are from.
-        values: of dotted keys.
+        data: keys of a scenario file.
+        origins: origins of the keys.
+        sweep: the sweep of the values.
+        values: values by dotted key.
     """
     changes: dict[str, Any] = {}
-    places = dict(places)
+    origins = dict(origins)
     for dotted, value in values.items():
         key = tuple(dotted.split("."))
-        changes = over(changes, nested(key, value))
-        set_place(places, key, sweep.places[dotted])
-    return layered(data, changes), places
+        changes = merge(changes, nested(key, value))
+        set_origin(origins, key, sweep.origins[dotted])
+    return merge_with_presets(data, changes), origins
 
 
 def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
-    """What a setting has for a dotted key; None where there is nothing, or not one number for all joints.
+    """Return the value of a dotted key in a setting; None where it has none, or different numbers for the joints.
 
     Args:
-        scenario: the setting, resolved.
-        data: the keys of its scenario file, which name its presets.
-        key: of a scenario file.
+        scenario: the resolved setting.
+        data: keys of its scenario file, which name its presets.
+        key: dotted key of a scenario file.
     """
     for kind in KINDS:
         if key == f"{kind.section}.{kind.key}":
-            return kind.named(data)
+            return kind.name_in(data)
     value: Any = reduce(getattr, key.split("."), scenario)
     if not isinstance(value, Section):
         return value
@@ -231,48 +227,53 @@ def value_at(scenario: Scenario, data: Mapping[str, Any], key: str) -> Value:
 def _case(
     name: str, changes: dict[str, Any], data: dict[str, Any], sweep: Sweep, reader: SweepReader, resolver: Resolver
 ) -> Case | None:
-    places = dict(reader.places)
+    origins = dict(reader.origins)
     for key in leaves(changes):
-        set_place(places, key, reader.place(("cases", name, *key)))
-    data = layered(data, changes)
-    scenario = resolver.scenario(data, places)
+        set_origin(origins, key, reader.origin(("cases", name, *key)))
+    data = merge_with_presets(data, changes)
+    scenario = resolver.scenario(data, origins)
     if scenario is None:
         return None
     values = {key: value_at(scenario, data, key) for key in sweep.keys}
-    return Case(name, data, places, changes, scenario, values)
+    return Case(name, data, origins, changes, scenario, values)
 
 
 def _seeds(data: dict[str, Any], document: Document, mistakes: list[str]) -> Sequence[int]:
-    """Take the seeds out of the data, and put the first where the scenario's is."""
-    places, file = document.places, str(document.path)
-    said = data.pop("seeds", 1)
-    place = place_of(("seeds",), places, file)
-    if isinstance(said, list) and said and all(isinstance(seed, int) and seed >= 0 for seed in said):
-        if len(set(said)) < len(said):
-            mistakes.append(f"{place}: seeds: a seed is in the list twice; take one out")
-        chosen = place_of(("seed",), places, file)
-        if chosen.startswith("--"):
-            mistakes.append(f"{chosen}: the study lists its seeds, seeds = {said}; replace those, seeds = 1 for one")
-        data["seed"] = said[0]
-        return tuple(said)
-    if isinstance(said, bool) or not isinstance(said, int) or said < 1:
-        shown = json.dumps(said, default=str)
+    """Remove the seeds from the data, and set the scenario's seed to the first of them."""
+    origins, file = document.origins, str(document.path)
+    seeds = data.pop("seeds", 1)
+    origin = origin_of(("seeds",), origins, file)
+    if isinstance(seeds, list) and seeds and all(isinstance(seed, int) and seed >= 0 for seed in seeds):
+        if len(set(seeds)) < len(seeds):
+            mistakes.append(f"{origin}: seeds: a seed is in the list twice; remove one of them")
+        single = origin_of(("seed",), origins, file)
+        if single.startswith("--"):
+            mistakes.append(
+                f"{single}: the study has a list of seeds, seeds = {seeds}, which replaces seed; set seeds instead, "
+                "seeds = 1 for a single one"
+            )
+        data["seed"] = seeds[0]
+        return tuple(seeds)
+    if isinstance(seeds, bool) or not isinstance(seeds, int) or seeds < 1:
+        shown = json.dumps(seeds, default=str)
         mistakes.append(
-            f"{place}: seeds: expected how many, 1 or more, or a list of them such as [0, 1, 2], got {shown}"
+            f"{origin}: seeds: expected a number of seeds, 1 or more, or a list of seeds, e.g. [0, 1, 2], got {shown}"
         )
-        said = 1
+        seeds = 1
     first = data.get("seed", 0)
-    return range(first, first + said) if isinstance(first, int) else range(said)  # the scenario says what is wrong
+    # A seed that is not a number is reported with the scenario.
+    return range(first, first + seeds) if isinstance(first, int) else range(seeds)
 
 
 def _check_presets(data: dict[str, Any], sweep: Sweep, reader: SweepReader, mistakes: list[str]) -> None:
-    """Refuse to sweep over presets that all would be changed by a section that was written out."""
+    """Refuse to sweep over presets beside a section that is written out and would change each of them."""
     for kind in KINDS:
         key = f"{kind.section}.{kind.key}"
         written = data.get(kind.section)
-        if key in sweep.keys and isinstance(written, Mapping) and written and not kind.named(data):
+        if key in sweep.keys and isinstance(written, Mapping) and written and not kind.name_in(data):
+            where = reader.origin(("sweep", kind.section, kind.key))
             mistakes.append(
-                f"{reader.place(('sweep', kind.section, kind.key))}: [{kind.section}] says {', '.join(written)}, which "
-                f"would change every {kind.title} of the sweep; name the {kind.title} that they belong to, "
+                f"{where}: [{kind.section}] has the keys {', '.join(written)}, "
+                f"which would change every {kind.title} of the sweep; name the {kind.title} to which they belong, "
                 f'[{kind.section}] {kind.key} = "NAME"'
             )

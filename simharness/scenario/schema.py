@@ -1,7 +1,7 @@
-"""The JSON schema of scenario files, for editors: completion, what keys mean, and mistakes while they are made.
+"""JSON schema of scenario files, for editors: completion, descriptions of keys, and validation while typing.
 
-It follows from the models; what it cannot say (keys that belong together, presets that exist) is left to
-:func:`simharness.scenario.load.load`.
+It is derived from the models. Rules that a schema cannot express (keys that belong together, presets that exist) are
+checked by :func:`simharness.scenario.load.load` alone.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Schema = dict[str, Any]
 _DEFS = "#/$defs/"
 _RANGE: Schema = {
     "type": "object",
-    "description": "a range of values, its ends among them",
+    "description": "a range of values, including both ends",
     "properties": {
         "from": {"type": "number"},
         "to": {"type": "number"},
@@ -32,20 +32,20 @@ _RANGE: Schema = {
 
 
 def scenario_schema() -> Schema:
-    """The JSON schema (2020-12) of a scenario file."""
+    """Return the JSON schema (2020-12) of a scenario file."""
     schema = ScenarioFile.model_json_schema(schema_generator=_Generator)
     definitions: dict[str, Schema] = schema["$defs"]
     properties: dict[str, Schema] = schema["properties"]
     for name in ("Shares", "Amounts"):
         definitions[name] = _by_joint(definitions[name])
-    varied = {key for key in properties if (key,) not in NOT_VARIED} - {"method"}  # which has nothing but the variants
+    varied = {key for key in properties if (key,) not in NOT_VARIED} - {"method"}  # its only values are the variants
     case = {key: {"$ref": f"#/properties/{key}"} for key in properties if key in varied}
     swept = _Swept(definitions)
     keys = swept.properties({key: properties[key] for key in properties if key in varied}, "#")
     definitions["Range"] = _RANGE
     definitions["Paired"] = _table(keys)
-    one_at_a_time = {"type": "boolean", "description": "the base, and every key by itself, not every combination"}
-    paired = {"type": "array", "items": {"$ref": f"{_DEFS}Paired"}, "description": "keys whose values go together"}
+    one_at_a_time = {"type": "boolean", "description": "the base, and each key alone, instead of all combinations"}
+    paired = {"type": "array", "items": {"$ref": f"{_DEFS}Paired"}, "description": "keys that are varied together"}
     properties["sweep"] |= _table({**keys, "one_at_a_time": one_at_a_time, "paired": paired})
     properties["cases"]["additionalProperties"] = _table(case)
     properties["extends"]["minLength"] = properties["variants"]["minItems"] = 1
@@ -56,31 +56,31 @@ def scenario_schema() -> Schema:
 
 
 def dumps() -> str:
-    """The schema as the text of a file."""
+    """Return the schema as the text of a file."""
     return json.dumps(scenario_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 class _Generator(GenerateJsonSchema):
-    """No titles: they repeat the names of keys."""
+    """Generator without titles, which would repeat the names of the keys."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
 
 
 def _by_joint(section: Schema) -> Schema:
-    """A section with something for each kind of joint, or a number for all of them."""
+    """Return the schema of a section with a value for each kind of joint, or one number for all kinds."""
     number = {key: value for key, value in section["properties"]["nose"].items() if key != "default"}
     return {"description": section["description"], "anyOf": [number, section]}
 
 
 class _Swept:
-    """Writes the definitions of sections in [sweep], where every key has a list or a range of its values."""
+    """Definitions of the sections in [sweep], where every key has a list or a range of values."""
 
     def __init__(self, definitions: dict[str, Schema]) -> None:
         self._definitions = definitions
 
     def properties(self, keys: dict[str, Schema], above: str) -> dict[str, Schema]:
-        """The keys of a section that is at the address ``above``."""
+        """Return the keys of the section at the address ``above``."""
         return {key: self._key(schema, f"{above}/properties/{key}") for key, schema in keys.items()}
 
     def _key(self, schema: Schema, address: str) -> Schema:
@@ -105,7 +105,7 @@ def _table(properties: dict[str, Schema]) -> Schema:
 
 
 def _without_tables(schema: Any) -> Any:
-    """Without defaults that are whole sections: they say again what the sections say."""
+    """Return a schema without defaults that are whole sections, which would repeat the sections."""
     if isinstance(schema, list):
         return [_without_tables(each) for each in schema]
     if not isinstance(schema, dict):

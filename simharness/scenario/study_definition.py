@@ -1,31 +1,31 @@
-"""Studies: a scenario file with a sweep, cases, seeds and variants, and the settings that they make.
+"""Study: a scenario file with a sweep, cases, seeds and variants, and its settings.
 
-A scenario file may say, beside the keys of a scenario::
+Beside the keys of a scenario, a scenario file may have::
 
-    extends = "quickstart.toml"       # a base, relative to this file; what is said here goes over it, key by key
-    seeds = 20                        # how many, from the scenario's seed on, or a list of seeds
+    extends = "quickstart"            # a base: a shipped scenario, or a file relative to this one
+    seeds = 20                        # their number, from the scenario's seed on, or a list of seeds
     variants = ["full", "fast"]       # the same as method.variants
 
-    [sweep]                           # keys of a scenario, each with values: every combination of them
+    [sweep]                           # keys of a scenario, each with values: all combinations
     cameras.count = [2, 3, 5, 8]
     detector.phantoms.rate = { from = 0.0, to = 2.0, steps = 5 }        # scale = "log" for a geometric range
     detector.profile = ["poor", "typical"]
-    one_at_a_time = true              # instead: the base, and every key by itself
+    one_at_a_time = true              # instead: the base, and each key alone
 
-    [[sweep.paired]]                  # values that go together, in turn
+    [[sweep.paired]]                  # keys that are varied together
     cameras.count = [3, 5]
     cameras.radius = [3.0, 4.0]
 
     [cases.crowd]                     # named changes, each run with every setting of the sweep
     people.count = 8
 
-    [method.estimators]               # methods of one's own, for variants to name: simharness.trial.stages.estimators
-    mine = "mine.py:Mine"
+    [method.estimators]               # user-defined estimators: simharness.trial.stages.estimators
+    custom = "custom.py:Custom"
 
     [gate]                            # simharness.scenario.sections.gate
 
-A setting at a seed is a trial; all variants of a trial see the same detections. A file that says none of this is a
-study of one trial.
+A setting at a seed is a trial; all variants of a trial get the same detections. A file without these keys is a study of
+one trial.
 """
 
 from __future__ import annotations
@@ -37,19 +37,20 @@ from typing import Any
 
 from simharness.scenario.resolution import Plan, Resolver, read_plan, refuse, value_at, vary
 from simharness.scenario.sections.gate import Gate
+from simharness.scenario.sections.method import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sweep import Value
-from simharness.scenario.toml_reader import ScenarioError
-from simharness.scenario.validation_messages import place_of
+from simharness.scenario.toml_files import ScenarioError
+from simharness.scenario.validation_messages import origin_of
 
 __all__ = ["LIMIT", "Setting", "Study", "StudyTooLarge", "Value", "load_study"]
 
 LIMIT = 10_000
-"""The most trials of a study that nobody has said yes to."""
+"""Largest number of trials of a study that is run without confirmation (``--yes``)."""
 
 
 class StudyTooLarge(ScenarioError):
-    """A study of more trials than anybody is likely to mean."""
+    """Study with more trials than the limit."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +58,12 @@ class Setting:
     """One combination of factors.
 
     Attributes:
-        case: name of the case; "" where the file has none.
-        varied: where keys are swept one at a time, the dotted key that this setting varies, the first of those that go
-            together; "" for the base, and for combinations.
-        factors: every swept dotted key and its value here, the base's where it is not varied. None: there is no value,
-            or joints have different ones.
-        scenario: resolved; its seed is the study's first, its variants are the study's.
+        case: name of the case; "" where the file has no cases.
+        varied: where keys are swept one at a time, the dotted key that this setting varies, the first of paired keys;
+            "" for the base, and for combinations.
+        factors: every swept dotted key and its value in this setting, that of the base where it is not varied. None:
+            no value, or different values for the joints.
+        scenario: resolved scenario, with the first seed and all variants of the study.
     """
 
     case: str
@@ -73,20 +74,20 @@ class Setting:
 
 @dataclass(frozen=True)
 class Study:
-    """What a scenario file is run for.
+    """All trials of a scenario file.
 
     Attributes:
-        name: of the scenario.
-        description: of the scenario.
-        seeds: of every setting.
-        variants: of the method, in every trial.
-        factors: dotted keys that are swept, in the file's order.
-        one_at_a_time: every factor by itself, beside the base.
-        settings: case by case, the last factor first.
+        name: name of the scenario.
+        description: description of the scenario.
+        seeds: seeds of every setting.
+        variants: variants of the method in every trial.
+        factors: dotted keys that are swept, in the order of the file.
+        one_at_a_time: whether each factor is varied alone.
+        settings: settings case by case; the last factor varies fastest.
         gate: section [gate].
-        path: of the file.
+        path: the file, or the name of a shipped scenario, as it was given.
         base: the scenario without sweep and cases, at the first seed.
-        said: the keys of the file, of what it extends and of the command line, before presets and sweep are resolved.
+        data: keys of the file, of its bases and of the command line, before presets and sweep are resolved.
     """
 
     name: str
@@ -99,15 +100,15 @@ class Study:
     gate: Gate
     path: Path
     base: Scenario
-    said: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def trials(self) -> int:
-        """How many trials there are: settings times seeds."""
+        """Number of trials: settings times seeds."""
         return len(self.settings) * len(self.seeds)
 
     def at(self, setting: Setting, seed: int) -> Scenario:
-        """The scenario of a trial."""
+        """Return the scenario of a trial."""
         return setting.scenario.model_copy(update={"seed": seed})
 
 
@@ -120,26 +121,26 @@ def load_study(
     limit: int | None = LIMIT,
     folder: Path | None = None,
 ) -> Study:
-    """Read a scenario file as a study; every setting is resolved and checked.
+    """Read a scenario file as a study; every setting is resolved and validated.
 
     Args:
-        path: a TOML file.
-        overrides: as of :func:`simharness.scenario.load.load`: ``"sweep.cameras.count=[2, 3]"`` is one, too.
-        seeds: replaces the file's seeds: how many, or which.
+        path: a TOML file, or the name of a shipped scenario.
+        overrides: as in :func:`simharness.scenario.load.load`; also ``"sweep.cameras.count=[2, 3]"``.
+        seeds: replaces the file's seeds: their number, or a list of them.
         variants: replaces the file's variants.
-        limit: the most trials; None: any number.
-        folder: what files that the scenario file names are relative to; by default its own.
+        limit: largest number of trials; None: no limit.
+        folder: folder to which files named in the scenario file are relative; by default that of the file.
 
     Raises:
-        StudyTooLarge: there would be more trials than ``limit``; none was made.
-        ScenarioError: as :func:`simharness.scenario.load.load`. All mistakes of a study are named at once.
+        StudyTooLarge: more trials than ``limit``; no setting is made.
+        ScenarioError: as :func:`simharness.scenario.load.load`. All mistakes of a study are reported together.
     """
     plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants, folder=folder)
     _check_variants(plan)
     if limit is not None and plan.trials > limit:
         raise StudyTooLarge(
             f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
-            f"than {limit:,}: sweep over fewer values, or add --yes if you mean it"
+            f"than {limit:,}: sweep over fewer values, or add --yes to run it"
         )
     return Study(
         name=plan.base.name,
@@ -152,20 +153,20 @@ def load_study(
         gate=plan.gate,
         path=Path(path),
         base=plan.base,
-        said=plan.document.data,
+        data=plan.document.data,
     )
 
 
 def _settings(plan: Plan) -> Iterator[Setting]:
-    """Every setting; when all were made, what is wrong with them is raised."""
+    """Yield every setting; at the end, raise the mistakes of all of them."""
     mistakes: list[str] = []
     resolver = Resolver(plan.document, mistakes)
     for case in plan.cases:
         for varied, values in plan.sweep.settings(case.values):
-            data, places = vary(case.data, case.places, plan.sweep, values)
-            scenario = resolver.scenario(data, places)
+            data, origins = vary(case.data, case.origins, plan.sweep, values)
+            scenario = resolver.scenario(data, origins)
             if scenario is not None:
-                mistakes += _blind(scenario, plan)
+                mistakes += _without_descriptors(scenario, plan)
                 yield Setting(
                     case.name, varied, {key: value_at(scenario, data, key) for key in plan.sweep.keys}, scenario
                 )
@@ -173,25 +174,23 @@ def _settings(plan: Plan) -> Iterator[Setting]:
 
 
 def _check_variants(plan: Plan) -> None:
-    from simharness.scenario.sections.variants import wrong_variants
-
-    for key, said in wrong_variants(plan.base.method):
-        place = place_of(("method", *key.split(".")), plan.document.places, str(plan.document.path))
-        raise ScenarioError(f"{place}: {key if key == 'variants' else f'method.{key}'}: {said}")
+    for key, message in wrong_variants(plan.base.method):
+        origin = origin_of(("method", *key.split(".")), plan.document.origins, str(plan.document.path))
+        raise ScenarioError(f"{origin}: {key if key == 'variants' else f'method.{key}'}: {message}")
 
 
-def _blind(scenario: Scenario, plan: Plan) -> list[str]:
-    """What to say of variants that have nothing to go by in a scenario."""
+def _without_descriptors(scenario: Scenario, plan: Plan) -> list[str]:
+    """Return a message about variants that need descriptors in a scenario without them."""
     from mvpose.pipeline import NEED_DESCRIPTORS
 
-    blind = NEED_DESCRIPTORS & set(scenario.method.variants)
-    if not blind or scenario.appearance.source != "none":
+    affected = NEED_DESCRIPTORS & set(scenario.method.variants)
+    if not affected or scenario.appearance.source != "none":
         return []
     return [
-        f"{_place_of_variants(plan)}: variants: {', '.join(blind)} goes by descriptors, and detections have none; "
+        f"{_origin_of_variants(plan)}: variants: {', '.join(affected)} needs descriptors, which the detections lack; "
         'choose appearance.source = "pictures" or "drawn", or another variant'
     ]
 
 
-def _place_of_variants(plan: Plan) -> str:
-    return place_of(("method", "variants"), plan.document.places, str(plan.document.path))
+def _origin_of_variants(plan: Plan) -> str:
+    return origin_of(("method", "variants"), plan.document.origins, str(plan.document.path))

@@ -1,4 +1,4 @@
-"""[sweep]: the values that keys of a scenario take, and their combinations."""
+"""[sweep]: values of the keys of a scenario, and their combinations."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from simharness.scenario.layers import RANGE, Key, Places, is_range, touch
-from simharness.scenario.validation_messages import explain, is_key, place_of, section_at
+from simharness.scenario.layers import RANGE, Key, Origins, is_range, overlap
+from simharness.scenario.validation_messages import explain, is_key, origin_of, section_at
 
 Value = str | int | float | bool | tuple[Any, ...] | None
 
 _MOST_STEPS = 10_000
 _HOW = 'write a list, [2, 3, 5], or a range, { from = 0.0, to = 2.0, steps = 5 }, geometric with scale = "log"'
-_SEEDS = "say seeds = 20, or a list of seeds, at the top of the file"
-_NAMES = "name what differs by [cases.NAME] with the keys that it changes"
-_VARIANTS = 'say variants = ["full", "fast"] at the top of the file: all of them see the same detections'
+_SEEDS = "write seeds = 20, or a list of seeds, at the top of the file"
+_NAMES = "write [cases.NAME] with the keys that differ"
+_VARIANTS = 'write variants = ["full", "fast"] at the top of the file: all variants get the same detections'
 NOT_VARIED: dict[Key, str] = {
     ("seed",): _SEEDS,
     ("seeds",): _SEEDS,
@@ -27,7 +27,7 @@ NOT_VARIED: dict[Key, str] = {
     ("variants",): _VARIANTS,
     ("method", "variants"): _VARIANTS,
     ("method", "estimators"): _VARIANTS,
-    ("extends",): "a study has one base; make a study of each file",
+    ("extends",): "a study has one base; write one study for each base",
     ("gate",): "a study has one gate",
     ("sweep",): "a study has one [sweep]",
     ("cases",): "a study has one table of [cases]",
@@ -36,35 +36,35 @@ NOT_VARIED: dict[Key, str] = {
 
 @dataclass(frozen=True)
 class Axis:
-    """Keys whose values go together; most often one key.
+    """Keys that are varied together; most often a single key.
 
     Attributes:
-        keys: dotted, (k,).
-        values: of the keys, (steps, k).
+        keys: dotted keys, (k,).
+        values: values of the keys, (steps, k).
     """
 
     keys: tuple[str, ...]
     values: tuple[tuple[Value, ...], ...]
 
     def others(self, base: Mapping[str, Value]) -> list[tuple[Value, ...]]:
-        """The values that are not the base's."""
-        there = tuple(base[key] for key in self.keys)
-        return [values for values in self.values if values != there]
+        """Return the values that differ from those of the base."""
+        base_values = tuple(base[key] for key in self.keys)
+        return [values for values in self.values if values != base_values]
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is varied.
+    """Axes of a study.
 
     Attributes:
-        axes: in the order of the file.
-        one_at_a_time: the base, and every axis by itself; else every combination.
-        places: who said the values of a dotted key, for messages.
+        axes: axes in the order of the file.
+        one_at_a_time: whether the settings are the base and each axis alone; else all combinations.
+        origins: origin of the values of each dotted key, for messages.
     """
 
     axes: tuple[Axis, ...] = ()
     one_at_a_time: bool = False
-    places: Mapping[str, str] = field(default_factory=dict)
+    origins: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -72,16 +72,16 @@ class Sweep:
         return tuple(key for axis in self.axes for key in axis.keys)
 
     def count(self, base: Mapping[str, Value]) -> int:
-        """How many settings :meth:`settings` gives, without making them."""
+        """Return the number of settings of :meth:`settings`, without making them."""
         if self.one_at_a_time:
             return 1 + sum(len(axis.others(base)) for axis in self.axes)
         return math.prod(len(axis.values) for axis in self.axes)
 
     def settings(self, base: Mapping[str, Value]) -> Iterator[tuple[str, dict[str, Value]]]:
-        """Which key is varied, "" for the base and for combinations, and the values of all keys that change.
+        """Yield the varied key, "" for the base and for combinations, and the values of all keys that change.
 
         Args:
-            base: the values of all swept keys where they are not varied.
+            base: values of all swept keys where they are not varied.
         """
         if self.one_at_a_time:
             yield "", {}
@@ -94,26 +94,27 @@ class Sweep:
 
 
 class SweepReader:
-    """Reads [sweep] and [cases] and notes all that is wrong with them."""
+    """Reader of [sweep] and [cases]; mistakes are collected in a list."""
 
-    def __init__(self, places: Places, file: str, mistakes: list[str]) -> None:
-        """Read what ``file`` says, of which ``places`` knows who set what; append to ``mistakes``."""
-        self.places = places
+    def __init__(self, origins: Origins, file: str, mistakes: list[str]) -> None:
+        """Read sections of ``file``, whose keys have the origins ``origins``; append messages to ``mistakes``."""
+        self.origins = origins
         self._file = file
         self._mistakes = mistakes
-        self._said: dict[str, str] = {}
+        self._swept: dict[str, str] = {}
 
-    def sweep(self, said: Any) -> Sweep:
-        """What [sweep] says."""
-        if not isinstance(said, Mapping):
-            self._refuse(("sweep",), f"sweep: expected a section [sweep] with keys of a scenario, got {_shown(said)}")
+    def sweep(self, section: Any) -> Sweep:
+        """Return the axes of [sweep]."""
+        if not isinstance(section, Mapping):
+            message = f"sweep: expected a section [sweep] with keys of a scenario, got {_shown(section)}"
+            self._refuse(("sweep",), message)
             return Sweep()
-        said = dict(said)
-        one_at_a_time = said.pop("one_at_a_time", False)
+        section = dict(section)
+        one_at_a_time = section.pop("one_at_a_time", False)
         if not isinstance(one_at_a_time, bool):
             self._refuse(("sweep", "one_at_a_time"), f"one_at_a_time: expected true, got {_shown(one_at_a_time)}")
-        paired = said.pop("paired", [])
-        axes = [Axis((dotted,), tuple((value,) for value in values)) for dotted, values in self._varied(said)]
+        paired = section.pop("paired", [])
+        axes = [Axis((dotted,), tuple((value,) for value in values)) for dotted, values in self._varied(section)]
         for axis in axes:
             self._refuse_repeated(axis, ("sweep", *axis.keys[0].split(".")))
         if isinstance(paired, list) and all(isinstance(table, Mapping) for table in paired):
@@ -122,46 +123,48 @@ class SweepReader:
             self._refuse(("sweep", "paired"), f"paired: expected tables [[sweep.paired]], got {_shown(paired)}")
         keys = [tuple(key.split(".")) for axis in axes for key in axis.keys]
         for index, key in enumerate(keys):
-            if clash := next((other for other in keys[:index] if touch(key, other)), None):
-                also = "" if clash == key else f", for {'.'.join(clash)} is"
-                self._refuse(("sweep", *key), f"{'.'.join(key)} is swept twice{also}; take one out")
-        return Sweep(tuple(axes), one_at_a_time is True, self._said)
+            if clash := next((other for other in keys[:index] if overlap(key, other)), None):
+                also = "" if clash == key else f", because {'.'.join(clash)} is swept"
+                self._refuse(("sweep", *key), f"{'.'.join(key)} is swept twice{also}; remove one of them")
+        return Sweep(tuple(axes), one_at_a_time is True, self._swept)
 
-    def cases(self, said: Any, sweep: Sweep) -> dict[str, dict[str, Any]]:
-        """The changes of every case of [cases]."""
-        if not isinstance(said, Mapping) or not all(isinstance(changes, Mapping) for changes in said.values()):
-            expected = "expected a section [cases.NAME] with the keys that it changes for each case"
-            self._refuse(("cases",), f"cases: {expected}, got {_shown(said)}")
+    def cases(self, section: Any, sweep: Sweep) -> dict[str, dict[str, Any]]:
+        """Return the changes of every case of [cases]."""
+        if not isinstance(section, Mapping) or not all(isinstance(changes, Mapping) for changes in section.values()):
+            expected = "expected a section [cases.NAME] for each case, with the keys that it changes"
+            self._refuse(("cases",), f"cases: {expected}, got {_shown(section)}")
             return {}
         swept = [tuple(key.split(".")) for key in sweep.keys]
-        for name, changes in said.items():
+        for name, changes in section.items():
             if not name or not set(name) <= set("abcdefghijklmnopqrstuvwxyz0123456789_-"):
-                expected = "expected a name of small letters, digits, - and _"
+                expected = "expected a name of lowercase letters, digits, - and _"
                 self._refuse(("cases", name), f"cases.{name}: {expected}")
             for key in _written(changes):
                 dotted = ".".join(key)
                 if key in NOT_VARIED or key[:1] in NOT_VARIED:
                     how = NOT_VARIED.get(key) or NOT_VARIED[key[:1]]
-                    self._refuse(("cases", name, *key), f"{dotted} is nothing for a case: {how}")
-                elif any(touch(key, other) for other in swept):
-                    self._refuse(("cases", name, *key), f"{dotted} is swept, too; take it out of the case or the sweep")
-        return {name: dict(changes) for name, changes in said.items()}
+                    self._refuse(("cases", name, *key), f"a case cannot change {dotted}: {how}")
+                elif any(overlap(key, other) for other in swept):
+                    self._refuse(
+                        ("cases", name, *key), f"{dotted} is swept as well; remove it from the case or from the sweep"
+                    )
+        return {name: dict(changes) for name, changes in section.items()}
 
-    def place(self, key: Key) -> str:
-        """Who said a key of [sweep] or [cases], as messages begin."""
-        place = place_of(key, self.places, self._file)
+    def origin(self, key: Key) -> str:
+        """Return the origin of a key of [sweep] or [cases], with which its messages begin."""
+        origin = origin_of(key, self.origins, self._file)
         section = "sweep" if key[0] == "sweep" else ".".join(key[:2])
-        return place if place.startswith("--") else f"{place}, [{section}]"
+        return origin if origin.startswith("--") else f"{origin}, [{section}]"
 
     def _refuse(self, key: Key, message: str) -> None:
-        self._mistakes.append(f"{self.place(key)}: {message}")
+        self._mistakes.append(f"{self.origin(key)}: {message}")
 
     def _pair(self, table: Mapping[str, Any]) -> Axis | None:
         varied = dict(self._varied(table, ("sweep", "paired")))
         lengths = {key: len(values) for key, values in varied.items()}
         if len(set(lengths.values())) > 1:
-            counts = ", ".join(f"{key} has {length}" for key, length in lengths.items())
-            self._refuse(("sweep", "paired"), f"lists of [[sweep.paired]] go together and must be as long: {counts}")
+            counts = ", ".join(f"{length} of {key}" for key, length in lengths.items())
+            self._refuse(("sweep", "paired"), f"lists of [[sweep.paired]] must have the same length, got {counts}")
             return None
         if not varied:
             return None
@@ -173,41 +176,43 @@ class SweepReader:
         repeated = next((value for index, value in enumerate(axis.values) if value in axis.values[:index]), None)
         if repeated is not None:
             shown = " and ".join(map(_shown, repeated))
-            self._refuse(key, f"{' and '.join(axis.keys)}: {shown} is in the list twice; take one out")
+            self._refuse(key, f"{' and '.join(axis.keys)}: {shown} is in the list twice; remove one of them")
 
-    def _varied(self, said: Mapping[str, Any], within: Key = ("sweep",), above: Key = ()) -> Iterator[tuple[str, list]]:
-        """Every dotted key with its values; those that are wrong are refused and left out."""
-        for name, value in said.items():
+    def _varied(
+        self, section: Mapping[str, Any], within: Key = ("sweep",), above: Key = ()
+    ) -> Iterator[tuple[str, list]]:
+        """Yield every dotted key with its values; invalid ones are reported and left out."""
+        for name, value in section.items():
             key = (*above, name)
-            place = within if within[-1] == "paired" else (*within, *key)
+            full = within if within[-1] == "paired" else (*within, *key)
             if key in NOT_VARIED:
-                self._refuse(place, f"{'.'.join(key)} is not swept: {NOT_VARIED[key]}")
+                self._refuse(full, f"{'.'.join(key)} cannot be swept: {NOT_VARIED[key]}")
             elif not is_key(key):
                 unknown = {"type": "extra_forbidden", "loc": key}
-                self._mistakes.append(explain(unknown, {key: self.place(place)}, self._file))
+                self._mistakes.append(explain(unknown, {key: self.origin(full)}, self._file))
             elif isinstance(value, Mapping) and section_at(key) is not None and not is_range(value):
                 yield from self._varied(value, within, key)
-            elif values := self._values(".".join(key), value, place):
-                self._said[".".join(key)] = self.place(place)
+            elif values := self._values(".".join(key), value, full):
+                self._swept[".".join(key)] = self.origin(full)
                 yield ".".join(key), values
 
-    def _values(self, dotted: str, said: Any, place: Key) -> list[Value]:
+    def _values(self, dotted: str, value: Any, key: Key) -> list[Value]:
         try:
-            return _values(said)
+            return _values(value)
         except ValueError as error:
-            self._refuse(place, f"{dotted}: {error}")
+            self._refuse(key, f"{dotted}: {error}")
             return []
 
 
-def _values(said: Any) -> list[Value]:
-    """The values that a list or a range means."""
-    if isinstance(said, Mapping):
-        return _range(dict(said))
-    if not isinstance(said, list):
-        raise ValueError(f"expected values to sweep over, got {_shown(said)}; {_HOW}")
-    values = [_frozen(value) for value in said]
+def _values(written: Any) -> list[Value]:
+    """Return the values of a list or a range."""
+    if isinstance(written, Mapping):
+        return _range(dict(written))
+    if not isinstance(written, list):
+        raise ValueError(f"expected values to sweep over, got {_shown(written)}; {_HOW}")
+    values = [_frozen(value) for value in written]
     if not values:
-        raise ValueError(f"an empty list sweeps over nothing; {_HOW}")
+        raise ValueError(f"expected at least one value, got an empty list; {_HOW}")
     return values
 
 
@@ -219,11 +224,11 @@ def _frozen(value: Any) -> Value:
     raise ValueError(f"expected numbers, words, true, false or lists of them, got {_shown(value)}")
 
 
-def _range(said: dict[str, Any]) -> list[Value]:
-    """The values of { from, to, steps, scale }, (steps,)."""
-    first, last, steps, scale = (said.pop(word, None) for word in RANGE)
-    if said or first is None or last is None or steps is None:
-        wrong = f"{', '.join(said)} is no word of a range" if said else "a range has from, to and steps"
+def _range(table: dict[str, Any]) -> list[Value]:
+    """Return the values of { from, to, steps, scale }, (steps,)."""
+    first, last, steps, scale = (table.pop(key, None) for key in RANGE)
+    if table or first is None or last is None or steps is None:
+        wrong = f"{', '.join(table)} is not a key of a range" if table else "a range needs from, to and steps"
         raise ValueError(f"{wrong}; {_HOW}")
     for word, value in (("from", first), ("to", last)):
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -233,7 +238,7 @@ def _range(said: dict[str, Any]) -> list[Value]:
     if scale not in (None, "linear", "log"):
         raise ValueError(f'expected scale = "linear" or "log", got {_shown(scale)}')
     if first == last:
-        raise ValueError(f"a range from {first} to {last} is one value; write a list, [{first}]")
+        raise ValueError(f"a range from {first} to {last} is a single value; write a list, [{first}]")
     if scale == "log":
         if first <= 0 or last <= 0:
             raise ValueError(f'a range with scale = "log" needs from and to above 0, got {first} and {last}')
@@ -246,7 +251,7 @@ def _range(said: dict[str, Any]) -> list[Value]:
 
 
 def _written(changes: Mapping[str, Any], above: Key = ()) -> Iterator[Key]:
-    """The keys that a case changes, down to values and to sections that a study has one of."""
+    """Yield the keys that a case changes, down to values and to sections that cannot be varied."""
     for name, value in changes.items():
         key = (*above, name)
         if isinstance(value, Mapping) and value and key not in NOT_VARIED:

@@ -1,4 +1,4 @@
-"""What a scenario says wrongly, in one clear line each: the place, the key, what was expected, what was got."""
+"""Messages about mistakes in scenario files, one line each: where, the key, what was expected, what was given."""
 
 from __future__ import annotations
 
@@ -8,86 +8,225 @@ import re
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from simharness.scenario.file_model import ScenarioFile
+from simharness.scenario.sections.section import Elements
 
-_VARIANTS = ("method", "variants")  # for which a file may also say variants
+_VARIANTS = ("method", "variants")  # a file may also write it as variants
 _SHOWN = 60  # characters of a refused value that a message repeats
 
 
-def explain(mistake: Mapping[str, Any], places: dict[tuple[str, ...], str], file: str) -> str:
-    """One of pydantic's errors as "place: key: what was expected, what was got".
+def explain_all(
+    error: ValidationError, origins: dict[tuple[str, ...], str], file: str, *, section: tuple[str, ...] = ()
+) -> list[str]:
+    """Return a message for each mistake of a validation.
 
     Args:
-        mistake: the error; its location is that in a :class:`ScenarioFile`.
-        places: who set a key where the file did not: ``--set people.count=6`` for ("people", "count").
-        file: the file that is at fault where nobody else is.
+        error: raised by a model of a scenario file.
+        origins: as in :func:`explain`.
+        file: as in :func:`explain`.
+        section: location of the model in a scenario file.
+    """
+    mistakes: list[dict[str, Any]] = [{**mistake, "loc": (*section, *mistake["loc"])} for mistake in error.errors()]
+    wrong = [mistake["loc"] for mistake in mistakes]
+    # A list whose elements are wrong counts as too short as well, because only valid elements are counted.
+    return [
+        explain(mistake, origins, file)
+        for mistake in mistakes
+        if mistake["type"] != "too_short" or not any(each[:-1] == mistake["loc"] for each in wrong if each)
+    ]
+
+
+def explain(mistake: Mapping[str, Any], origins: dict[tuple[str, ...], str], file: str) -> str:
+    """Return one of pydantic's errors as "where: key: what was expected, what was given".
+
+    Args:
+        mistake: the error; its location is one in a :class:`ScenarioFile`.
+        origins: origin of the keys that were not set by ``file``: ``--set people.count=6`` for ("people", "count").
+        file: the file that is named where a key has no other origin.
     """
     location = tuple(mistake["loc"])
-    place = place_of(location, places, file)
-    key = _written(location, places)
+    origin = origin_of(location, origins, file)
+    key = _written(location, origins)
     if mistake["type"] == "extra_forbidden":
-        return f"{place}: {_unknown(location)}"
+        return f"{origin}: {_unknown(location)}"
+    if length := _wrong_length(mistake, location, origins):
+        return f"{origin}: {length}"
     if mistake["type"] == "missing":
-        return f"{place}: {key} is missing and has no default; give it a value"
-    section = section_at(location)
-    if mistake["type"] in ("model_type", "model_attributes_type") and section is not None:
-        expected = f"a section [{key}] with keys {', '.join(sorted(section.model_fields)) or 'of your own'}"
-    else:
-        said = mistake["msg"].replace(" should match ", " should be text that matches ")
-        said = re.sub(r" items? after validation, not \d+$", "", said).replace("at least 1", "at least one")
-        expected = re.sub(r"^(?:\w+ should(?: be| have)?|Value error,) ", "", said)
+        return f"{origin}: {key} is missing and has no default; give it a value"
+    expected, hint = _expected(mistake, location, key), _nearest(mistake, location)
     field = _field(location)
     about = f" ({field.description})" if field is not None and field.description else ""
-    got = json.dumps(mistake["input"], ensure_ascii=False, default=str)
-    got = got if len(got) <= _SHOWN else got[: _SHOWN - 1] + "…"
-    return f"{place}: {key}{about}: expected {expected}, got {got}"
+    return f"{origin}: {key}{about}: expected {expected}, got {_shown(mistake['input'])}{hint}"
 
 
-def place_of(location: Sequence[str | int], places: dict[tuple[str, ...], str], file: str) -> str:
-    """Who set a key last, or something in it, or the section that it is in; the file where nobody else did."""
+def origin_of(location: Sequence[str | int], origins: dict[tuple[str, ...], str], file: str) -> str:
+    """Return the last origin of a key, of something in it, or of the section around it; else the file."""
     location = tuple(location)
     setters = (
-        place
-        for key, place in reversed(places.items())
+        origin
+        for key, origin in reversed(origins.items())
         if location[: len(key)] == key or key[: len(location)] == location
     )
     return next(setters, file)
 
 
 def is_key(location: Sequence[str]) -> bool:
-    """Whether a scenario file has a key, or a section."""
+    """Return whether a scenario file has a key or section of this name."""
     section = section_at(location[:-1])
     return section is not None and location[-1] in section.model_fields
 
 
 def section_at(location: Sequence[str | int]) -> type[BaseModel] | None:
-    """The section that a location names, the file for none; None where it names a value or nothing."""
+    """Return the section at a location; the whole file for an empty one; None for values and unknown keys."""
     section: type[BaseModel] | None = ScenarioFile
     for part in location:
         section = None if section is None else _nested(section.model_fields.get(str(part)))
     return section
 
 
+@dataclass(frozen=True)
+class _List:
+    """Type of a list in a scenario file.
+
+    Attributes:
+        elements: types of the elements; one type of a list of any length.
+        names: names of the elements of a list of fixed length; () where they have none.
+        fixed: whether the length is fixed.
+        default: default of the field, where the list is the field's whole value.
+    """
+
+    elements: tuple[Any, ...]
+    names: tuple[str, ...]
+    fixed: bool
+    default: Any = None
+
+    def example(self, given: Any) -> str:
+        """Return a valid value as TOML-like text, with as much of the given value as possible."""
+        if not self.fixed:
+            number = _plain(self.elements[0]) in (int, float)
+            single = not isinstance(given, bool) and isinstance(given, (int, float) if number else str)
+            return _shown([given] if single else list(self.default or ()))
+        if isinstance(given, str):
+            numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", given)]
+            given = numbers if len(numbers) == len(self.elements) else []
+        numbers = [value for value in given if isinstance(value, int | float)] if isinstance(given, list) else []
+        default = list(self.default or [0] * len(self.elements))
+        values = [*numbers[: len(default)], *default[len(numbers) :]]
+        return "[" + ", ".join(f"{value:g}" for value in values) + "]"
+
+
+def _expected(mistake: Mapping[str, Any], location: tuple[str | int, ...], key: str) -> str:
+    """Return what a message says was expected."""
+    section = section_at(location)
+    if mistake["type"] in ("model_type", "model_attributes_type") and section is not None:
+        return f"a section [{key}] with keys {', '.join(sorted(section.model_fields)) or 'of your choice'}"
+    kind = _list_at(location)
+    if kind is not None and mistake["type"] in ("tuple_type", "list_type"):
+        example = kind.example(mistake["input"])
+        form = f"[{', '.join(kind.names)}]" if kind.fixed and kind.names else "a list"
+        return f"{form}, e.g. {example}" if example != "[]" else form
+    message = mistake["msg"].replace(" should match ", " should be text that matches ")
+    message = re.sub(r" items? after validation, not \d+$", "", message).replace("at least 1", "at least one")
+    return re.sub(r"^(?:\w+ should(?: be| have)?|Value error,) ", "", message)
+
+
+def _wrong_length(mistake: Mapping[str, Any], location: tuple[str | int, ...], origins: Mapping[Any, str]) -> str:
+    """Return the message about a list of fixed length that is too short or too long; "" for other mistakes."""
+    if mistake["type"] == "missing" and location and isinstance(location[-1], int):
+        location = location[:-1]
+    elif mistake["type"] != "too_long":
+        return ""
+    kind = _list_at(location)
+    if kind is None or not kind.fixed:
+        return ""
+    given, field = mistake["input"], _field(location)
+    whole = field is not None and not isinstance(location[-1], int)
+    about = (field.description if whole and field is not None else None) or ", ".join(kind.names)
+    return (
+        f"{_written(location, origins)}: expected {len(kind.elements)} numbers{f' ({about})' if about else ''}, "
+        f"got {len(given)}: {_shown(given)}; e.g. {kind.example(given)}"
+    )
+
+
+def _nearest(mistake: Mapping[str, Any], location: Sequence[str | int]) -> str:
+    """Return a hint at the valid value that was probably meant, for keys with a list of valid values."""
+    if mistake["type"] != "literal_error" or not isinstance(mistake["input"], str):
+        return ""
+    values = [str(value) for value in typing.get_args(_type_at(location)[0])]
+    near = difflib.get_close_matches(mistake["input"], values, n=1, cutoff=0.5)
+    return f"; did you mean {_shown(near[0])}?" if near else ""
+
+
+def _type_at(location: Sequence[str | int]) -> tuple[Any, tuple[str, ...], Any]:
+    """Return the type at a location, the names of its elements and its default; (None, (), None) for unknown keys."""
+    section: type[BaseModel] | None = ScenarioFile
+    found: Any = None
+    names: tuple[str, ...] = ()
+    default: Any = None
+    for part in location:
+        if section is not None:
+            field = section.model_fields.get(str(part))
+            if field is None:
+                return None, (), None
+            section, found, default = _nested(field), _plain(field.annotation), field.default
+            names = next((each.names for each in field.metadata if isinstance(each, Elements)), ())
+            continue
+        elements = typing.get_args(found)
+        if typing.get_origin(found) is not tuple or not isinstance(part, int) or not elements:
+            return None, (), None
+        element = elements[0] if elements[-1] is Ellipsis else elements[min(part, len(elements) - 1)]
+        extra = typing.get_args(element)[1:] if typing.get_origin(element) is Annotated else ()
+        names = next((each.names for each in extra if isinstance(each, Elements)), ())
+        found, default = _plain(element), None
+    return found, names, default
+
+
+def _list_at(location: Sequence[str | int]) -> _List | None:
+    """Return the type of a list at a location; None where the value is not a list."""
+    kind, names, default = _type_at(location)
+    if typing.get_origin(kind) is not tuple:
+        return None
+    elements = typing.get_args(kind)
+    fixed = elements[-1] is not Ellipsis
+    return _List(elements if fixed else elements[:1], names, fixed, default if isinstance(default, tuple) else None)
+
+
+def _plain(kind: Any) -> Any:
+    """Return a type without its annotations, and without None where it is optional."""
+    if typing.get_origin(kind) is Annotated:
+        return _plain(typing.get_args(kind)[0])
+    if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
+        present = [each for each in typing.get_args(kind) if each is not type(None)]
+        return _plain(present[0]) if len(present) == 1 else kind
+    return kind
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
+
+
 def _dotted(location: Sequence[str | int]) -> str:
-    """``("cameras", "size", 1)`` as ``cameras.size[1]``."""
+    """Return ``cameras.size[1]`` for ``("cameras", "size", 1)``."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
 
 
-def _written(location: tuple[str | int, ...], places: dict[tuple[str, ...], str]) -> str:
-    """A location as whoever set it last wrote it: as ``variants`` or as ``method.variants``, which are the same."""
-    last = next((key for key in reversed(places) if key in (_VARIANTS, _VARIANTS[1:])), _VARIANTS)
+def _written(location: tuple[str | int, ...], origins: Mapping[Any, str]) -> str:
+    """Return a location as it was written last: ``variants`` or ``method.variants``, which are the same key."""
+    last = next((key for key in reversed(list(origins)) if key in (_VARIANTS, _VARIANTS[1:])), _VARIANTS)
     if location[: len(_VARIANTS)] == _VARIANTS:
         location = (*last, *location[len(_VARIANTS) :])
     return _dotted(location)
 
 
 def _unknown(location: Sequence[str | int]) -> str:
-    """What to say of a key that does not exist."""
+    """Return the message about a key that does not exist."""
     *parents, wrong = map(str, location)
     section = section_at(parents) or ScenarioFile
     valid = sorted(section.model_fields)
@@ -100,7 +239,7 @@ def _unknown(location: Sequence[str | int]) -> str:
 
 
 def _keys(section: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Every dotted key of a section and the sections in it."""
+    """Yield every dotted key of a section and of the sections in it."""
     for name, field in section.model_fields.items():
         yield prefix + name
         nested = _nested(field)
@@ -109,7 +248,7 @@ def _keys(section: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 
 def _field(location: Sequence[str | int]) -> FieldInfo | None:
-    """The field that a location, or the beginning of it, names."""
+    """Return the field at a location, or at the longest part of it that names one."""
     section: type[BaseModel] | None = ScenarioFile
     field = None
     for part in location:
@@ -121,8 +260,6 @@ def _field(location: Sequence[str | int]) -> FieldInfo | None:
 
 
 def _nested(field: FieldInfo | None) -> type[BaseModel] | None:
-    """The section that a field holds, if it holds one."""
-    kind: Any = None if field is None else field.annotation
-    if isinstance(kind, types.UnionType):  # a section that may be absent
-        kind = next((each for each in typing.get_args(kind) if each is not type(None)), None)
+    """Return the section that a field holds; None where it holds a value."""
+    kind: Any = None if field is None else _plain(field.annotation)
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None

@@ -46,15 +46,16 @@ def study(tmp_path):
     return path
 
 
-def test_all_that_ships_is_listed_with_a_line_of_its_own(simharness):
+def test_all_shipped_files_are_listed_with_a_description(simharness):
     result = simharness("scenarios")
     assert result.exit_code == 0
-    tables = result.stdout.split("\n\n")
+    *tables, files = result.stdout.split("\n\n")
     assert len(tables) == 3
+    assert files.startswith("Files: ")
     for table, folder in zip(tables, (".", "rigs", "detectors"), strict=True):
         names = [line.split()[0] for line in table.splitlines()[3:] if not line.startswith("  ")]
         assert names == sorted(path.stem for path in (SCENARIOS / folder).glob("*.toml"))
-    assert max(map(len, result.stdout.splitlines())) <= 100
+    assert max(len(line) for table in tables for line in table.splitlines()) <= 100
 
 
 def test_a_study_is_listed_with_its_trials(simharness):
@@ -94,7 +95,7 @@ class TestShow:
         }
 
     def test_a_scenario_has_no_comment_above_it(self, simharness):
-        assert simharness("show", str(SCENARIOS / "quickstart.toml")).stdout.startswith('name = "quickstart"\n')
+        assert simharness("show", str(SCENARIOS / "quickstart.toml")).stdout.startswith('name = "quickstart" ')
 
     def test_a_study_that_is_too_large_is_shown_with_its_number(self, simharness, study):
         steps = "sweep.people.spacing={from=0.5, to=1, steps=1000}"

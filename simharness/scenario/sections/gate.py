@@ -1,4 +1,4 @@
-"""[gate]: what ``simharness check`` counts as worse."""
+"""[gate]: what ``simharness check`` counts as a regression."""
 
 from __future__ import annotations
 
@@ -8,23 +8,25 @@ from simharness.scenario.sections.section import Amount, Section
 
 
 class Tolerance(Section):
-    """How much worse the mean of a score may get: what lies within is never a regression, however certain."""
+    """Largest loss in the mean of a score that is not a regression, however significant it is."""
 
-    pcp: Amount = Field(1.0, description="points of percent")
-    recall: Amount = Field(1.0, description="points of percent")
-    precision: Amount = Field(1.0, description="points of percent")
+    pcp: Amount = Field(1.0, description="percentage points")
+    recall: Amount = Field(1.0, description="percentage points")
+    precision: Amount = Field(1.0, description="percentage points")
     mpjpe_mm: Amount = Field(2.0, description="millimetres")
-    match_f1: Amount = Field(1.0, description="points of percent")
-    ghosts: Amount = Field(0.05, description="ghosts a frame")
+    match_f1: Amount = Field(1.0, description="percentage points")
+    ghosts: Amount = Field(0.05, description="ghosts per frame")
 
 
 class Gate(Section):
-    """What ``simharness check`` counts as worse: a change that is both significant and larger than its tolerance."""
+    """Rule of ``simharness check``: a regression is a loss that is significant and larger than its tolerance."""
 
     level: float = Field(
-        0.05, gt=0.0, lt=1.0, description="chance that a method that did not change is said to be worse"
+        0.05, gt=0.0, lt=1.0, description="significance level: chance of a false alarm where the method did not change"
     )
     slowdown: float = Field(
-        1.5, gt=1.0, description="how many times as long a frame may take, beside a reference kernel of the same run"
+        1.5,
+        gt=1.0,
+        description="largest factor by which the time of a frame, relative to a reference kernel, may grow",
     )
     tolerance: Tolerance = Tolerance()

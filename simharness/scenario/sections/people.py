@@ -1,4 +1,4 @@
-"""[people]: who is in the room and what they do."""
+"""[people]: the people in the room and their activities."""
 
 from __future__ import annotations
 
@@ -34,41 +34,45 @@ ActivityName = Literal[
 
 
 class Mocap(Section):
-    """Recorded motion, for those whose activity is "mocap"; everybody's, where no activities are given."""
+    """Recorded motion of the people whose activity is "mocap"; of all people where no activities are given."""
 
-    file: str = Field("", description="an AMC or BVH file, relative to the scenario file; empty: none")
-    skeleton: str = Field("", description="the ASF file of an AMC file; empty: the only one beside it")
-    start: Amount = Field(0.0, description="where in the clip to begin, seconds")
+    file: str = Field("", description="AMC or BVH file, relative to the scenario file; empty: none")
+    skeleton: str = Field("", description="ASF file of an AMC file; empty: the only one in the same folder")
+    start: Amount = Field(0.0, description="start time in the recording, seconds")
 
 
 class People(Section):
-    """Who is in the room and what they do."""
+    """The people in the room and their activities."""
 
-    count: int = Field(4, ge=0, le=100)
+    count: int = Field(4, ge=0, le=100, description="number of people")
     activities: tuple[ActivityName, ...] = Field(
         ("walk", "wave"),
         min_length=1,
-        description="handed out in turn, one to each person, those of pairs to two at a time",
+        description="activities, assigned in turn: one to each person, those of pairs to two people at a time",
     )
     area: Positive = Field(
         2.0,
-        description="half the side of the square about the origin that they stay in, metres; a recorded motion that "
-        "does not fit into it may use the whole room",
+        description="half the side of the square around the origin in which people stay, metres; a recorded motion "
+        "that does not fit into it may use the whole room",
     )
     around: Amount = Field(
         0.0,
-        description="radius about the origin that they keep free, metres; the first thing of the clutter stands there",
+        description="radius around the origin that people keep free, metres; the first object of [clutter] is there",
     )
-    spacing: Positive = Field(0.8, description="least distance between the pelvises of two people, metres")
-    children: Share = Field(0.0, description="chance that a person is a child of 5 to 12 years")
-    look_alike: Share = Field(0.0, description="0: everybody is dressed differently; 1: all wear one uniform")
-    alike: Count = Field(0, description="how many people look_alike is about, from the first; 0: everybody")
+    spacing: Positive = Field(0.8, description="smallest distance between the pelvises of two people, metres")
+    children: Share = Field(0.0, description="probability that a person is a child of 5 to 12 years")
+    look_alike: Share = Field(
+        0.0, description="similarity of clothes; 0: all people are dressed differently; 1: all wear one uniform"
+    )
+    alike: Count = Field(
+        0, description="number of people to whom look_alike applies, counted from the first; 0: all people"
+    )
     playback: Literal["kinematic", "dynamic"] = Field(
         "kinematic", description="kinematic: as planned; dynamic: tracked by actuators under gravity and contact"
     )
     assist: Positive = Field(
         300.0,
-        description="dynamic playback: the largest force that helps a pelvis along, newtons; who runs needs 1000 or so",
+        description="dynamic playback: largest force that supports a pelvis, newtons; running needs about 1000",
     )
     motion: Mocap = Mocap()
 

@@ -5,7 +5,7 @@ import tomllib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.toml_writer import toml
+from simharness.scenario.toml_files import toml
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]))  # half a surrogate pair is no text
 NUMBERS = st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.scenario.layers import over
+from simharness.scenario.layers import merge
 from simharness.scenario.load import ScenarioError, load
 from simharness.scenario.sections.scenario import Scenario
 
@@ -75,7 +75,7 @@ def test_variants_are_those_of_the_last_who_says(write):
         "fast",
     )
     twice = write("twice.toml", 'name = "t"\nvariants = ["fast"]\n[method]\nvariants = ["full"]')
-    assert refusal(twice) == f"{twice}: variants and method.variants are the same; say one of them"
+    assert refusal(twice) == f"{twice}: variants and method.variants are the same key; remove one of them"
 
 
 class TestMistakes:
@@ -107,8 +107,10 @@ class TestMistakes:
         assert f"did you mean {near}?" in message
 
     def test_what_is_no_file_name_is_refused(self, write):
-        assert "extends: expected the name of a scenario file, got 3" in refusal(write("a.toml", "extends = 3"))
-        assert "extends stands in files alone" in refusal(write("a.toml", 'name = "a"'), overrides=["extends=b.toml"])
+        assert "extends: expected a scenario file or the name of a shipped one, got 3" in refusal(
+            write("a.toml", "extends = 3")
+        )
+        assert "extends cannot be set" in refusal(write("a.toml", 'name = "a"'), overrides=["extends=b.toml"])
 
 
 KEYS = [("a",), ("b", "a"), ("b", "b"), ("c", "a", "a"), ("c", "a", "b")]
@@ -125,10 +127,10 @@ def as_sections(settings):
     return data
 
 
-@given(base=SETTINGS, said=SETTINGS)
-def test_settings_go_over_settings_as_one_dictionary_of_dotted_keys_over_another(base, said):
+@given(base=SETTINGS, changes=SETTINGS)
+def test_settings_are_merged_like_dictionaries_of_dotted_keys(base, changes):
     before = as_sections(base)
-    assert over(before, as_sections(said)) == as_sections(base | said)
+    assert merge(before, as_sections(changes)) == as_sections(base | changes)
     assert before == as_sections(base)  # it is left as it is
 
 

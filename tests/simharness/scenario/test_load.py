@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from simharness.scenario.load import ScenarioError, fingerprint, load
 from simharness.scenario.resolution import read_plan
 from simharness.scenario.sections.scenario import Cameras, People, Scenario
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 
 SHIPPED = sorted((Path(__file__).parents[3] / "scenarios").glob("*.toml"))
 
@@ -69,11 +69,11 @@ class TestKeys:
 
 class TestValues:
     @pytest.mark.parametrize(
-        ("text", "said"),
+        ("text", "message"),
         [
-            ("[people]\ncount = -1", "people.count: expected greater than or equal to 0, got -1"),
-            ('[people]\ncount = "4"', 'people.count: expected a valid integer, got "4"'),
-            ("[people]\ncount = true", "people.count: expected a valid integer, got true"),
+            ("[people]\ncount = -1", "people.count (number of people): expected greater than or equal to 0, got -1"),
+            ('[people]\ncount = "4"', 'people.count (number of people): expected a valid integer, got "4"'),
+            ("[people]\ncount = true", "people.count (number of people): expected a valid integer, got true"),
             ("[people]\ncount = 4.5", "got 4.5"),
             ("[cameras]\nfov = nan", "got NaN"),
             ("[cameras]\nsize = [640, 480.5]", "cameras.size[1]"),
@@ -83,19 +83,83 @@ class TestValues:
             ("duration = 2024-01-01", "duration"),
         ],
     )
-    def test_a_wrong_value_names_file_key_expected_and_got(self, scenario_file, text, said):
+    def test_a_wrong_value_names_file_key_expected_and_got(self, scenario_file, text, message):
         path = scenario_file('name = "x"\n' + text)
-        message = refusal(path)
-        assert message.startswith(f"{path}: ")
-        assert said in message
-        assert "expected" in message
+        refused = refusal(path)
+        assert refused.startswith(f"{path}: ")
+        assert message in refused
+        assert "expected" in refused
 
     def test_an_integer_is_a_number(self, scenario_file):
         assert load(scenario_file('name = "x"\n[cameras]\nfov = 80')).cameras.fov == 80.0
 
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            (
+                "[room]\nsize = [7, 5.5]",
+                "room.size: expected 3 numbers (x, y, z in metres), got 2: [7, 5.5]; e.g. [7, 5.5, 3]",
+            ),
+            ("[room]\nsize = [7]", "got 1: [7]; e.g. [7, 8, 3]"),
+            ("[room]\nsize = [7, 8, 3, 2]", "got 4: [7, 8, 3, 2]; e.g. [7, 8, 3]"),
+            ("[cameras]\nsize = [640]", "cameras.size: expected 2 numbers (width, height in pixels"),
+            ("[cameras]\npositions = [[1, 2, 3], [1, 2]]", "cameras.positions[1]: expected 3 numbers (x, y, z), got 2"),
+            ("[cameras]\ndistortion = [-0.1, 0.02]", "got 2: [-0.1, 0.02]; e.g. [-0.1, 0.02, 0, 0, 0]"),
+            ("[faults]\nswapped = [[1]]", "faults.swapped[0]: expected 2 numbers (camera, camera), got 1: [1]"),
+            (
+                "[detector.bias]\nhips = [0.1]",
+                "3 numbers (forward, outward, up), got 1: [0.1]; e.g. [0.1, 0, 0]",
+            ),
+        ],
+    )
+    def test_a_list_of_a_wrong_length_is_one_mistake_with_an_example(self, scenario_file, text, message):
+        path = scenario_file('name = "x"\n' + text)
+        refused = refusal(path)
+        assert len(refused.splitlines()) == 1
+        assert refused.startswith(f"{path}: ")
+        assert message in refused
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ('[cameras]\nsize = "1920x1080"', 'expected [width, height], e.g. [1920, 1080], got "1920x1080"'),
+            ('[cameras]\nsize = "large"', 'expected [width, height], e.g. [800, 600], got "large"'),
+            ("[cameras]\nsize = 640", "expected [width, height], e.g. [800, 600], got 640"),
+            ('[room]\nsize = "7 x 5.5 x 3"', "expected [x, y, z], e.g. [7, 5.5, 3], got"),
+            ("[cameras]\naim = 1.0", "expected [x, y, z], e.g. [0, 0, 0.9], got 1.0"),
+            ('[people]\nactivities = "walk"', 'expected a list, e.g. ["walk"], got "walk"'),
+            ('variants = "full"', 'expected a list, e.g. ["full"], got "full"'),
+            ("[cameras]\nheights = 1.5", "expected a list, e.g. [1.5], got 1.5"),
+        ],
+    )
+    def test_a_value_that_is_not_a_list_is_one_mistake_with_an_example(self, scenario_file, text, message):
+        refused = refusal(scenario_file('name = "x"\n' + text))
+        assert len(refused.splitlines()) == 1
+        assert message in refused
+
+    @pytest.mark.parametrize(
+        ("text", "near"),
+        [
+            ('[people]\nactivities = ["wlak"]', "walk"),
+            ('[people]\nactivities = ["walk", "shakehands"]', "shake_hands"),
+            ('[rendering]\nrenderer = "opengl"', "gl"),
+            ('[cameras]\nlayout = "rings"', "ring"),
+            ('[cameras]\nlayout = "preset"\npreset = "panoptik"', "panoptic"),
+            ('[appearance]\nsource = "picture"', "pictures"),
+            ('[detector.heatmaps]\nsize = "64x64"', "64x48"),
+        ],
+    )
+    def test_a_misspelled_word_is_one_mistake_with_the_nearest(self, scenario_file, text, near):
+        refused = refusal(scenario_file('name = "x"\n' + text))
+        assert len(refused.splitlines()) == 1
+        assert refused.endswith(f'; did you mean "{near}"?')
+
+    def test_a_word_like_no_other_gets_no_guess(self, scenario_file):
+        assert "did you mean" not in refusal(scenario_file('name = "x"\n[rendering]\nrenderer = "zzz"'))
+
 
 class TestTooFew:
-    """Lists that are too short are told by the key that was written."""
+    """Lists that are too short are reported under the key that was written."""
 
     @pytest.mark.parametrize("key", ["variants", "method.variants", "people.activities"])
     def test_in_a_file(self, scenario_file, key):
@@ -106,7 +170,7 @@ class TestTooFew:
 
     @pytest.mark.parametrize("key", ["variants", "method.variants"])
     @pytest.mark.parametrize("below", ["variants", "method.variants"])
-    def test_over_a_file_that_says_it_too(self, scenario_file, key, below):
+    def test_over_a_file_with_the_same_key(self, scenario_file, key, below):
         base = scenario_file(f'name = "x"\n{below} = ["full"]')
         assert refusal(base, overrides=[f"{key}=[]"]).startswith(f"--set {key}=[]: {key} (")
         top = scenario_file(f'extends = "{base.name}"\nname = "y"\n{key} = []', "top.toml")
@@ -154,7 +218,7 @@ class TestFiles:
             assert message.count(path) == 1
         assert (f"{files - 10} more" in message) == (files > 10)
 
-    def test_a_mark_of_byte_order_is_no_mistake(self, tmp_path):
+    def test_a_byte_order_mark_is_accepted(self, tmp_path):
         """Editors of Windows begin a file with one."""
         path = tmp_path / "x.toml"
         path.write_bytes(b'\xef\xbb\xbfname = "x"\n[people]\ncount = 3\n')
@@ -216,7 +280,7 @@ class TestOverrides:
         assert load(base).seed == 3
         assert load(base, seed=0).seed == 0
 
-    def test_a_bad_seed_is_told_of_by_its_option(self, base):
+    def test_a_bad_seed_is_reported_with_its_option(self, base):
         assert refusal(base, seed=-1).startswith("--seed: seed")
 
 
@@ -272,40 +336,45 @@ class TestNamedFiles:
         assert load(path, folder=Path()).cameras.file == "rig.json"
         assert [file.name for file in load(path).files] == ["a.bvh", "rig.json"]
 
-    def test_methods_of_ones_own_are_files_or_modules(self, scenario_file):
+    def test_user_defined_estimators_are_files_or_modules(self, scenario_file):
         path = scenario_file(
-            'name = "x"\nmethod.estimators = { mine = "in/mine.py:Mine", theirs = "package.module:Theirs" }'
+            'name = "x"\nmethod.estimators = { custom = "in/custom.py:Custom", installed = "package.module:Installed" }'
         )
-        there = {"mine": f"{path.parent}/in/mine.py:Mine", "theirs": "package.module:Theirs"}
+        expected = {"custom": f"{path.parent}/in/custom.py:Custom", "installed": "package.module:Installed"}
         loaded = load(path)
-        assert loaded.method.estimators.places == there
-        assert load(path, folder=Path()).method.estimators.places["mine"] == "in/mine.py:Mine"
-        more = load(path, overrides=['method.estimators.mine="other.py:Mine"', "method.estimators.more=third.py:make"])
-        assert more.method.estimators.places == there | {"mine": "other.py:Mine", "more": "third.py:make"}
+        assert loaded.method.estimators.places == expected
+        assert load(path, folder=Path()).method.estimators.places["custom"] == "in/custom.py:Custom"
+        more = load(
+            path, overrides=['method.estimators.custom="other.py:Custom"', "method.estimators.more=third.py:make"]
+        )
+        assert more.method.estimators.places == expected | {"custom": "other.py:Custom", "more": "third.py:make"}
         path.write_text(dumps(more), encoding="utf-8")
         assert load(path, folder=Path()) == more != loaded
 
-    def test_a_method_of_ones_own_changes_the_fingerprint(self, scenario_file):
-        path = scenario_file('name = "x"\nmethod.estimators.mine = "mine.py:Mine"')
+    def test_a_user_defined_estimator_changes_the_fingerprint(self, scenario_file):
+        path = scenario_file('name = "x"\nmethod.estimators.custom = "custom.py:Custom"')
         missing = fingerprint(load(path))
-        path.with_name("mine.py").write_text("1")
+        path.with_name("custom.py").write_text("1")
         first = fingerprint(load(path))
-        path.with_name("mine.py").write_text("2")
+        path.with_name("custom.py").write_text("2")
         assert len({missing, first, fingerprint(load(path))}) == 3
 
     @pytest.mark.parametrize(
-        ("written", "said"),
+        ("written", "message"),
         [
-            ('estimators.Mine = "mine.py:Mine"', "expected names of small letters, digits, - and _, 'Mine' is none"),
-            ('estimators.mine = "mine.py"', "FILE.py:ATTRIBUTE or PACKAGE.MODULE:ATTRIBUTE, '"),
-            ('estimators.mine = "mine.py:two words"', "is neither"),
-            ("estimators.mine = 3", "method.estimators.mine: expected a valid string, got 3"),
-            ('estimators = "mine.py:Mine"', "expected a section [method.estimators] with keys of your own"),
+            (
+                'estimators.Custom = "custom.py:Custom"',
+                "lowercase letters, digits, - and _; 'Custom' has other characters",
+            ),
+            ('estimators.custom = "custom.py"', "FILE.py:ATTRIBUTE or PACKAGE.MODULE:ATTRIBUTE; '"),
+            ('estimators.custom = "custom.py:two words"', "is neither"),
+            ("estimators.custom = 3", "method.estimators.custom: expected a valid string, got 3"),
+            ('estimators = "custom.py:Custom"', "expected a section [method.estimators] with keys of your choice"),
         ],
     )
-    def test_what_is_no_place_of_a_method_is_refused(self, scenario_file, written, said):
+    def test_an_invalid_estimator_is_refused(self, scenario_file, written, message):
         path = scenario_file(f'name = "x"\n[method]\n{written}')
-        assert said in refusal(path)
+        assert message in refusal(path)
         assert refusal(path).startswith(f"{path}: method.estimators")
 
     def test_what_is_in_them_changes_the_fingerprint(self, scenario_file):

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.profiles import SHIPPED, read_profile
+from simharness.scenario.presets import PROFILES, read_profile
 from simharness.scenario.sections.detector import KINDS, Detector, Keypoints
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_a_scenario_that_was_written_out_needs_no_profile(folder, tmp_path_facto
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('profile = "typicl"', "no such profile; there are .*typical.*Did you mean typical"),
+        ('profile = "typicl"', "no such profile; expected one of .*typical.*Did you mean typical"),
         ('profile = "none.toml"', "none.toml: no such file"),
         ("profile = 3", "expected the name of a detector profile, got 3"),
         ("[detector.keypoints.miss]\ntoes = 0.1", r"detector\.keypoints\.miss\.toes is not a key.*has ankles"),
@@ -83,7 +83,7 @@ def test_mistakes_in_a_profile_name_its_file(folder):
         load(scenario(folder, '[detector]\nprofile = "mine"'))
 
 
-@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(PROFILES.shipped.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_shipped_profile_is_named_as_its_file(path):
     assert read_profile(path.stem).name == path.stem
 

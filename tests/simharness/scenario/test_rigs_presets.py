@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simharness.scenario.load import ScenarioError, load
-from simharness.scenario.presets import RIGS, about
+from simharness.scenario.presets import RIGS, summary_of
 from simharness.scenario.sections.scenario import Cameras
 from simharness.scenario.study_definition import load_study
 from simharness.world.rigs.layouts import build_rig
@@ -44,7 +44,7 @@ def test_every_shipped_rig_can_be_built_and_says_what_it_is(path, scenario):
     cameras = load(scenario(f'[cameras]\nrig = "{path.stem}"')).cameras
     for room in [(8.0, 8.0, 3.0), None]:
         assert len(build_rig(cameras, room=room)) == CAMERAS[path.stem]
-    assert 20 < len(about(path)) < 100
+    assert 20 < len(summary_of(path)) < 100
 
 
 def test_ring5_is_quickstarts_rig(scenario):
@@ -79,7 +79,7 @@ class TestCamerasThatWereWrittenOut:
         cameras = load(scenario(self.WRITTEN), overrides=["cameras.fov=60", "cameras.rig=mine"]).cameras
         assert cameras == Cameras(layout="arc", count=7, fov=60.0)
 
-    def test_they_make_way_for_one_of_a_file_that_extends_theirs(self, scenario, tmp_path):
+    def test_they_make_way_for_one_of_a_file_that_extends_them(self, scenario, tmp_path):
         scenario(self.WRITTEN)
         top = tmp_path / "top.toml"
         top.write_text('extends = "room.toml"\n[cameras]\nrig = "mine"\nfov = 60')
@@ -94,7 +94,7 @@ class TestCamerasThatWereWrittenOut:
 
     def test_they_would_change_all_rigs_of_a_sweep(self, scenario):
         path = scenario(self.WRITTEN + '[sweep]\ncameras.rig = ["mine", "dome12"]')
-        with pytest.raises(ScenarioError, match=r"\[cameras\] says count, heights, which would change every rig"):
+        with pytest.raises(ScenarioError, match="has the keys count, heights, which would change every rig"):
             load_study(path)
         path = scenario('[cameras]\nrig = "ring5"\nfov = 60\n[sweep]\ncameras.rig = ["mine", "dome12"]')
         assert [(s.scenario.cameras.count, s.scenario.cameras.fov) for s in load_study(path).settings] == [
@@ -106,7 +106,7 @@ class TestCamerasThatWereWrittenOut:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('rig = "dome13"', r'cameras\.rig = "dome13": no such rig; there are .*mine.*Did you mean dome12\?'),
+        ('rig = "dome13"', r'cameras\.rig = "dome13": no such rig; expected one of .*mine.*Did you mean dome12\?'),
         ('rig = "none.toml"', "none.toml: no such file"),
         ("rig = 3", "cameras.rig: expected the name of a rig, got 3"),
         ('rgi = "dome12"', r"cameras\.rgi is not a key; did you mean cameras\.rig\?"),

@@ -217,10 +217,13 @@ class TestRanges:
         assert all(type(value) is int for value in values(study, "cameras.count"))
 
     @pytest.mark.parametrize(
-        ("text", "said"),
+        ("text", "part"),
         [
-            ("{ start = 0, stop = 2, num = 5 }", "start, stop, num is no word of a range; write a list, [2, 3, 5], or"),
-            ("{ from = 0, to = 2 }", "a range has from, to and steps"),
+            (
+                "{ start = 0, stop = 2, num = 5 }",
+                "start, stop, num is not a key of a range; write a list, [2, 3",
+            ),
+            ("{ from = 0, to = 2 }", "a range needs from, to and steps"),
             ("{ from = 0, to = 2, steps = 2.5 }", "expected 2 to 10000 steps, got 2.5"),
             ("{ from = 0, to = 2, steps = 1 }", "expected 2 to 10000 steps, got 1"),
             ("{ from = 0, to = 2, steps = 1000000000 }", "expected 2 to 10000 steps, got 1000000000"),
@@ -228,18 +231,18 @@ class TestRanges:
             ("{ from = true, to = 2, steps = 3 }", "expected a number for from, got true"),
             ('{ from = 0, to = 2, steps = 3, scale = "log" }', "needs from and to above 0, got 0 and 2"),
             ('{ from = 1, to = 2, steps = 3, scale = "cubic" }', 'expected scale = "linear" or "log", got "cubic"'),
-            ("{ from = 2, to = 2, steps = 3 }", "is one value; write a list, [2]"),
+            ("{ from = 2, to = 2, steps = 3 }", "is a single value; write a list, [2]"),
             ("2.0", "expected values to sweep over, got 2.0; write a list"),
-            ("[]", "an empty list sweeps over nothing"),
+            ("[]", "expected at least one value, got an empty list"),
             ("[1.0, 2.0, 1.0]", "1.0 is in the list twice"),
             ("[{ a = 1 }]", "expected numbers, words"),
         ],
     )
-    def test_what_is_no_range_says_how_to_write_one(self, study_file, text, said):
+    def test_what_is_no_range_says_how_to_write_one(self, study_file, text, part):
         path = study_file(f"[sweep]\npeople.area = {text}")
         message = refusal(path)
         assert message.startswith(f"{path}, [sweep]: people.area: ")
-        assert said in message
+        assert part in message
 
 
 class TestSeedsAndVariants:
@@ -272,31 +275,39 @@ class TestSeedsAndVariants:
     @pytest.mark.parametrize("seeds", ["0", "-1", "true", "2.5", "[]", "[1, -1]", '["a"]', '"all"'])
     def test_what_are_no_seeds_is_refused(self, study_file, seeds):
         path = study_file(f"seeds = {seeds}")
-        assert refusal(path).startswith(f"{path}: seeds: expected how many, 1 or more, or a list of them")
+        assert refusal(path).startswith(f"{path}: seeds: expected a number of seeds, 1 or more, or a list of seeds")
 
-    def test_seeds_that_nobody_would_get_are_refused(self, study_file):
+    def test_seeds_without_effect_are_refused(self, study_file):
         assert "seeds: a seed is in the list twice" in refusal(study_file("seeds = [1, 1]"))
         message = refusal(study_file("seeds = [1, 2]"), overrides=["seed=3"])
-        assert message.startswith("--set seed=3: the study lists its seeds, seeds = [1, 2]")
+        assert message.startswith("--set seed=3: the study has a list of seeds, seeds = [1, 2]")
 
-    def test_variants_that_are_not_there_are_refused(self, study_file):
+    def test_unknown_variants_are_refused(self, study_file):
         path = study_file('variants = ["ful"]')
-        assert refusal(path).startswith(f"{path}: variants: there is no 'ful'; did you mean full? there are full, ")
-        assert refusal(path, variants=["best"]).startswith("--variants: variants: there is no 'best'")
-        assert "has one twice" in refusal(path, variants=["full", "full"])
-        assert "goes by descriptors" in refusal(path, variants=["appearance"])
+        assert refusal(path).startswith(
+            f"{path}: variants: unknown variant 'ful'; did you mean full? expected one of full, "
+        )
+        assert refusal(path, variants=["best"]).startswith("--variants: variants: unknown variant 'best'")
+        assert "a variant is listed twice" in refusal(path, variants=["full", "full"])
+        assert "needs descriptors" in refusal(path, variants=["appearance"])
         drawn = load_study(path, variants=["appearance"], overrides=["appearance.source=drawn"])
         assert drawn.variants == ("appearance",)
 
-    def test_methods_of_ones_own_are_variants_and_no_presets(self, study_file):
-        path = study_file('variants = ["full", "mine"]\n[method.estimators]\nmine = "mine.py:Mine"')
-        assert load_study(path).variants == ("full", "mine")
-        assert "there is no 'mien'; did you mean mine? there are full, " in refusal(path, variants=["mien"])
-        clash = "method.estimators.full=mine.py:Mine"
-        assert refusal(path, overrides=[clash]).startswith(f"--set {clash}: method.estimators.full: that is a preset")
+    def test_user_defined_estimators_are_variants_and_not_presets(self, study_file):
+        path = study_file('variants = ["full", "custom"]\n[method.estimators]\ncustom = "custom.py:Custom"')
+        assert load_study(path).variants == ("full", "custom")
+        assert "unknown variant 'custm'; did you mean custom? expected one of full, " in refusal(
+            path, variants=["custm"]
+        )
+        clash = "method.estimators.full=custom.py:Custom"
+        assert refusal(path, overrides=[clash]).startswith(
+            f"--set {clash}: method.estimators.full: this is the name of a preset"
+        )
 
-    def test_a_study_with_a_method_of_ones_own_is_written_as_it_was_run(self, study_file, tmp_path):
-        path = study_file('variants = ["mine"]\n[method.estimators]\nmine = "mine.py:Mine"\n[sweep]\nrate = [2, 3]')
+    def test_a_study_with_a_user_defined_estimator_is_written_as_it_was_run(self, study_file, tmp_path):
+        path = study_file(
+            'variants = ["custom"]\n[method.estimators]\ncustom = "custom.py:Custom"\n[sweep]\nrate = [2, 3]'
+        )
         study = load_study(path)
         written = tmp_path / "elsewhere" / "study.toml"
         written.parent.mkdir()
@@ -306,59 +317,62 @@ class TestSeedsAndVariants:
 
 class TestMistakes:
     @pytest.mark.parametrize(
-        ("text", "said"),
+        ("text", "part"),
         [
             ("cameras.cuont = [2]", "cameras.cuont is not a key; did you mean cameras.count? [cameras] has"),
             ("camera.count = [2]", "camera is not a key; did you mean cameras?"),
             ("detector.profil = ['poor']", "detector.profil is not a key; did you mean detector.profile?"),
-            ("people.count = [1, -1]", "people.count: expected greater than or equal to 0, got -1"),
-            ("people.count = { from = 1, to = 2, steps = 3 }", "people.count: expected a valid integer, got 1.5"),
-            ("people.activities = ['walk', 'run']", 'expected a valid array, got "walk"'),
+            ("people.count = [1, -1]", "people.count (number of people): expected greater than or equal to 0, got -1"),
+            (
+                "people.count = { from = 1, to = 2, steps = 3 }",
+                "people.count (number of people): expected a valid integer, got 1.5",
+            ),
+            ("people.activities = ['walk', 'run']", 'expected a list, e.g. ["walk"], got "walk"'),
             ("people = [1, 2]", "people: expected a section [people] with keys"),
             ("detector.profile = ['poor', 'tipical']", 'detector.profile = "tipical": no such profile'),
-            ("seed = [1, 2]", "seed is not swept: say seeds = 20"),
-            ("seeds = [1, 2]", "seeds is not swept: say seeds = 20"),
-            ("name = ['a']", "name is not swept: name what differs by [cases.NAME]"),
-            ("method.variants = [['full']]", 'method.variants is not swept: say variants = ["full", "fast"]'),
-            ("method.estimators.mine = ['a.py:A']", "method.estimators is not swept: say variants = "),
-            ("gate.level = [0.1]", "gate is not swept"),
+            ("seed = [1, 2]", "seed cannot be swept: write seeds = 20"),
+            ("seeds = [1, 2]", "seeds cannot be swept: write seeds = 20"),
+            ("name = ['a']", "name cannot be swept: write [cases.NAME]"),
+            ("method.variants = [['full']]", 'method.variants cannot be swept: write variants = ["full", "fast"]'),
+            ("method.estimators.custom = ['a.py:A']", "method.estimators cannot be swept: write variants = "),
+            ("gate.level = [0.1]", "gate cannot be swept"),
             ("one_at_a_time = 1", "one_at_a_time: expected true, got 1"),
             ("paired = [1]", "paired: expected tables [[sweep.paired]], got [1]"),
             (
                 "[[sweep.paired]]\npeople.count = [1, 2]\npeople.area = [1.0, 2.0, 3.0]",
-                "must be as long: people.count has 2, people.area has 3",
+                "must have the same length, got 2 of people.count, 3 of people.area",
             ),
             ("[[sweep.paired]]\npeople.count = [4, 5, 4]\npeople.area = [2, 1, 2]", "4 and 2 is in the list twice"),
             ("people.count = [1]\n[[sweep.paired]]\npeople.count = [2]", "people.count is swept twice"),
             (
                 "detector.keypoints.miss = [0.1]\n[[sweep.paired]]\ndetector.keypoints.miss.hips = [0.1]",
-                "detector.keypoints.miss.hips is swept twice, for detector.keypoints.miss is",
+                "detector.keypoints.miss.hips is swept twice, because detector.keypoints.miss is swept",
             ),
         ],
     )
-    def test_of_a_sweep(self, study_file, text, said):
+    def test_of_a_sweep(self, study_file, text, part):
         path = study_file(f"[sweep]\n{text}")
         message = refusal(path)
         assert message.startswith(f"{path}, [sweep]: ")
-        assert said in message
+        assert part in message
         assert len(message.splitlines()) == 1
 
     @pytest.mark.parametrize(
-        ("text", "said"),
+        ("text", "part"),
         [
             ("people.cuont = 2", "people.cuont is not a key; did you mean people.count?"),
-            ("people.count = -2", "people.count: expected greater than or equal to 0, got -2"),
-            ("seed = 2", "seed is nothing for a case: say seeds = 20"),
-            ("method.variants = ['full']", "method.variants is nothing for a case"),
-            ("method.estimators.mine = 'a.py:A'", "method.estimators is nothing for a case"),
-            ("room.size = [8.0, 8.0, 3.0]", "room.size is swept, too"),
+            ("people.count = -2", "people.count (number of people): expected greater than or equal to 0, got -2"),
+            ("seed = 2", "a case cannot change seed: write seeds = 20"),
+            ("method.variants = ['full']", "a case cannot change method.variants"),
+            ("method.estimators.custom = 'a.py:A'", "a case cannot change method.estimators"),
+            ("room.size = [8.0, 8.0, 3.0]", "room.size is swept as well"),
         ],
     )
-    def test_of_a_case(self, study_file, text, said):
+    def test_of_a_case(self, study_file, text, part):
         path = study_file(f"[sweep]\nroom.size = [[9.0, 9.0, 3.0]]\n[cases.a]\n{text}")
         message = refusal(path)
         assert message.startswith(f"{path}, [cases.a]: ")
-        assert said in message
+        assert part in message
 
     def test_of_the_command_line(self, study_file):
         path = study_file("[sweep]\npeople.count = [1]")
@@ -370,7 +384,7 @@ class TestMistakes:
     def test_tables_that_are_none(self, study_file):
         assert "sweep: expected a section [sweep]" in refusal(study_file("sweep = 3"))
         assert "cases: expected a section [cases.NAME]" in refusal(study_file("cases = 3"))
-        assert "cases.A b: expected a name of small letters" in refusal(study_file('[cases."A b"]'))
+        assert "cases.A b: expected a name of lowercase letters" in refusal(study_file('[cases."A b"]'))
         assert "gate.levle is not a key; did you mean gate.level?" in refusal(study_file("[gate]\nlevle = 0.1"))
 
     def test_all_mistakes_are_named_at_once_and_each_once(self, study_file):
@@ -408,7 +422,7 @@ class TestLargeStudies:
         ):
             load_study(study_file("seeds = 1000000000000"))
 
-    def test_the_limit_is_what_somebody_says(self, study_file):
+    def test_the_limit_is_an_argument(self, study_file):
         path = study_file("seeds = 4\n[sweep]\npeople.count = [1, 2, 3]")
         assert load_study(path, limit=12).trials == 12
         assert load_study(path, limit=None).trials == 12
@@ -431,7 +445,7 @@ class TestLoad:
         path = study_file(text)
         with pytest.raises(ScenarioError) as caught:
             load(path)
-        assert str(caught.value).startswith(f"{path}: is a study, not one scenario: ")
+        assert str(caught.value).startswith(f"{path}: is a study, not a single scenario: ")
         assert f"simharness study {path}" in str(caught.value)
 
     @pytest.mark.parametrize(("text", "seed"), [("seeds = 1", 4), ("seeds = [9]", 9), ("[gate]\nlevel = 0.1", 4)])
