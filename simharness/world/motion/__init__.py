@@ -1,1 +1,1 @@
-"""What people do: paths, gaits and gestures, turned into the joint angles of one body."""
+"""Motion of people: tracks, activities, recorded motion, and the joint angles that follow from them."""

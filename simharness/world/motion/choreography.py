@@ -1,4 +1,4 @@
-"""Who does what, where: from the people of a scenario to everyone's motion and the things that they use."""
+"""Choreography: motions and props of all people of a scenario."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from simharness.world.motion.trajectory import Trajectory
 _PACE = (1.05, 1.25)  # steps in a room are short and quick
 _GRAVITY = 9.81
 _RUNNING = 0.7  # speed over sqrt(g x leg length) at which people change from walking to running
-_DEEPEST = 0.01  # metres that people may be in one another who do nothing together
-_BESIDE = 0.3  # metres between someone's pelvis and the ground plan of somebody else's things
-_CHECKS = 3  # of motions planned at ``RATE``, every so manyth is checked for contact
+_DEEPEST = 0.01  # metres: largest penetration of people of different groups
+_BESIDE = 0.3  # metres: least distance of a pelvis from the footprint of another group's prop
+_CHECKS = 3  # every third time of a motion planned at ``RATE`` is checked for contact
 _ORIGIN = Spot(place=np.zeros(2), bearing=0.0)
 
 
 @dataclass(frozen=True)
 class Choreography:
-    """Everyone's motion in the order of the people, and the things that they use."""
+    """Motions of all people, in their order, and the props that they use."""
 
     motions: tuple[Motion, ...]
     props: tuple[Prop, ...]
@@ -40,11 +40,11 @@ class Choreography:
 
 @dataclass(frozen=True)
 class Group:
-    """Those who do one activity together: one person, or two.
+    """Performers of one activity: one person, or two.
 
     Attributes:
-        people: their indices.
-        activity: what they do.
+        people: indices of the people.
+        activity: their activity.
     """
 
     people: tuple[int, ...]
@@ -54,20 +54,20 @@ class Group:
 def choreograph(
     scenario: Scenario, cast: Sequence[Kinematics], time: Floats, *, widest: float | None = None
 ) -> Choreography:
-    """Plan what everybody does.
+    """Plan the motions and props of all people.
 
-    A party's draws come from the streams of its first person, so one more person changes none of the others, except
-    where the whole plan starts over or where the one left over from a pair finds a partner.
+    A group draws from the streams of its first person, so one more person changes none of the others, except where the
+    whole plan starts over or where a person without a partner gets one.
 
     Args:
-        scenario: its people, seed and duration.
-        cast: the bodies, in the order of the people.
-        time: seconds, (N,), the times at which motions are planned (``motion_clock``).
+        scenario: scenario; its people, seed and duration are used.
+        cast: bodies, in the order of the people.
+        time: times in seconds at which motions are planned, (N,), see ``motion_clock``.
         widest: largest ``people.area`` that the room allows, metres: what a recorded path may use that does not fit
             into ``people.area``; None: ``people.area``.
 
     Raises:
-        ValueError: people that do not fit, naming the keys of the scenario to change.
+        ValueError: people do not fit; the message names the keys of the scenario to change.
     """
     people = scenario.people
     known = dict(activities())
@@ -75,17 +75,20 @@ def choreograph(
         known["mocap"] = _recorded(scenario)
     missing = [name for name in people.activities if name not in known]
     if missing:
-        raise ValueError(f"people.activities: {missing[0]!r} is not known here; there are {', '.join(sorted(known))}")
-    parties = assign_activities([known[name] for name in people.activities], people.count, spare=known["stand"])
-    stage = _Stage(scenario.seed, parties, cast, time, people.spacing)
+        raise ValueError(
+            f"people.activities: no module registers the activity {missing[0]!r}; registered are "
+            f"{', '.join(sorted(known))}"
+        )
+    groups = assign_activities([known[name] for name in people.activities], people.count, fallback=known["stand"])
+    stage = _Stage(scenario.seed, groups, cast, time, people.spacing)
     plan_tracks(
         scenario.seed,
-        stage.wishes,
+        stage.requests,
         area=people.area,
         spacing=people.spacing,
         around=people.around,
         span=(float(time[0]), float(time[-1])),
-        people=[party.people[0] for party in parties],
+        people=[group.people[0] for group in groups],
         widest=widest,
         admit=stage.admit,
     )
@@ -95,35 +98,35 @@ def choreograph(
     )
 
 
-def assign_activities(activities: Sequence[Activity], count: int, *, spare: Activity) -> tuple[Group, ...]:
-    """Give the activities out in turn, each to as many people as it takes.
+def assign_activities(activities: Sequence[Activity], count: int, *, fallback: Activity) -> tuple[Group, ...]:
+    """Assign the activities to people in turn, each to as many people as it takes.
 
     Args:
-        activities: in their order; they begin again after the last.
-        count: how many people there are.
-        spare: what the last one does who finds no partner.
+        activities: activities in their order, repeated after the last one.
+        count: number of people.
+        fallback: activity of the last person, if the one in turn needs a partner and none is left.
     """
-    parties: list[Group] = []
+    groups: list[Group] = []
     first = 0
     while first < count:
-        activity = activities[len(parties) % len(activities)]
+        activity = activities[len(groups) % len(activities)]
         if first + activity.performers > count:
-            activity = spare
-        parties.append(Group(tuple(range(first, first + activity.performers)), activity))
+            activity = fallback
+        groups.append(Group(tuple(range(first, first + activity.performers)), activity))
         first += activity.performers
-    return tuple(parties)
+    return tuple(groups)
 
 
 def roles(people: People) -> tuple[str, ...]:
-    """What each person of a scenario does, by name."""
+    """Return the name of the activity of each person of a scenario."""
     known = dict(activities())
     known["mocap"] = replace(known["stand"], name="mocap")
-    parties = assign_activities([known[name] for name in people.activities], people.count, spare=known["stand"])
-    return tuple(party.activity.name for party in parties for _ in party.people)
+    groups = assign_activities([known[name] for name in people.activities], people.count, fallback=known["stand"])
+    return tuple(group.activity.name for group in groups for _ in group.people)
 
 
 def _recorded(scenario: Scenario) -> Activity:
-    """The activity of those who move as somebody once did."""
+    """Return the activity that plays the recorded motion of a scenario."""
     from simharness.world.motion.mocap import load_clip
 
     clip = load_clip(scenario.people.motion)
@@ -135,61 +138,61 @@ def _recorded(scenario: Scenario) -> Activity:
 
 
 class _Stage:
-    """Where parties perform while the plan is made: whoever gets in the way of another is sent elsewhere.
+    """Performances of all groups while tracks are planned; rejects tracks on which groups would touch.
 
     Attributes:
-        wishes: what each party asks of its track.
+        requests: track request of each group.
     """
 
     def __init__(
-        self, seed: int, parties: Sequence[Group], cast: Sequence[Kinematics], time: Floats, spacing: float
+        self, seed: int, groups: Sequence[Group], cast: Sequence[Kinematics], time: Floats, spacing: float
     ) -> None:
-        self._parties, self._cast, self._time, self._spacing = parties, cast, time, spacing
-        self._crowd = ContactModel(cast)
+        self._groups, self._cast, self._time, self._spacing = groups, cast, time, spacing
+        self._contacts = ContactModel(cast)
         self._checks = time[::_CHECKS]
         self._performing: list[partial[Performance]] = []
         self._at_origin: dict[int, Performance] = {}
-        self._acts: dict[int, tuple[Performance, list[SampledBody]]] = {}  # of the parties that have a track
-        self.wishes: list[TrackRequest] = []
-        for index, party in enumerate(parties):
-            manner = stream(seed, "people", party.people[0], "gait")
-            froude, pace = manner.uniform(*party.activity.froude), manner.uniform(*_PACE)
-            self._performing.append(partial(self._perform, seed, party, pace))
-            self.wishes.append(self._wish(index, party.activity, cast[party.people[0]], froude))
+        self._placed: dict[int, tuple[Performance, list[SampledBody]]] = {}  # of the groups that have a track
+        self.requests: list[TrackRequest] = []
+        for index, group in enumerate(groups):
+            manner = stream(seed, "people", group.people[0], "gait")
+            froude, pace = manner.uniform(*group.activity.froude), manner.uniform(*_PACE)
+            self._performing.append(partial(self._perform, seed, group, pace))
+            self.requests.append(self._request(index, group.activity, cast[group.people[0]], froude))
 
     @property
     def performances(self) -> list[Performance]:
-        """Of the parties that have a track, in their order."""
-        return [self._acts[index][0] for index in sorted(self._acts)]
+        """Performances of the groups that have a track, in the order of the groups."""
+        return [self._placed[index][0] for index in sorted(self._placed)]
 
     def admit(self, index: int, track: Track, before: Sequence[int]) -> bool:
-        """Let a party perform on its track; not where it touches one before, or is in the way of its things."""
-        for party in set(self._acts) - set(before):  # of a plan that was given up
-            del self._acts[party]
+        """Accept a track unless its group would touch another one, or one would obstruct the props of the other."""
+        for group in set(self._placed) - set(before):  # groups of an abandoned plan
+            del self._placed[group]
         if isinstance(track, Loop):
             performance = self._performing[index](track)
         else:
             spot = track.spot if isinstance(track, RecordedPath) else track
             performance = move_to(self._origin(index), spot)
-        movers = zip(self._parties[index].people, performance.motions, strict=True)
-        present = [self._crowd.sample(person, motion, self._checks) for person, motion in movers]
-        if self._collides(performance, present):
+        movers = zip(self._groups[index].people, performance.motions, strict=True)
+        bodies = [self._contacts.sample(person, motion, self._checks) for person, motion in movers]
+        if self._collides(performance, bodies):
             return False
-        self._acts[index] = (performance, present)
+        self._placed[index] = (performance, bodies)
         return True
 
-    def _perform(self, seed: int, party: Group, pace: float, track: Track) -> Performance:
-        rng = stream(seed, "people", party.people[0], "motion")  # begun anew for each track: the manner stays
-        movers = [self._cast[person] for person in party.people]
-        return party.activity.perform(movers, track, self._time, rng=rng, pace=pace)
+    def _perform(self, seed: int, group: Group, pace: float, track: Track) -> Performance:
+        rng = stream(seed, "people", group.people[0], "motion")  # restarted for each track, so that the manner stays
+        movers = [self._cast[person] for person in group.people]
+        return group.activity.perform(movers, track, self._time, rng=rng, pace=pace)
 
     def _origin(self, index: int) -> Performance:
-        """What is done on a spot is the same on every spot: it is done once, and carried there."""
+        """Return the performance at the origin, made once: it is the same on every spot and only has to be moved."""
         if index not in self._at_origin:
             self._at_origin[index] = self._performing[index](_ORIGIN)
         return self._at_origin[index]
 
-    def _wish(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> TrackRequest:
+    def _request(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> TrackRequest:
         if activity.name == "mocap":
             return RecordedRequest(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
         if activity.track is not Loop:
@@ -201,22 +204,22 @@ class _Stage:
             slowest = min(slowest, unit * _RUNNING)
         return LoopRequest(activity.name, unit * froude, slowest, fastest, running)
 
-    def _collides(self, performance: Performance, present: Sequence[SampledBody]) -> bool:
-        """Whether a performance comes too near to those before it."""
-        others = [presence for _, others in self._acts.values() for presence in others]
-        for one in present:
+    def _collides(self, performance: Performance, bodies: Sequence[SampledBody]) -> bool:
+        """Return whether a performance comes too near to those of other groups."""
+        others = [presence for _, others in self._placed.values() for presence in others]
+        for one in bodies:
             for other in others:
                 apart = np.linalg.norm(one.motion.root[:, :2] - other.motion.root[:, :2], axis=1)
-                if apart.min() < self._spacing or self._crowd.penetration(one, other).max() > _DEEPEST:
+                if apart.min() < self._spacing or self._contacts.penetration(one, other).max() > _DEEPEST:
                     return True
-        before = [prop for earlier, _ in self._acts.values() for prop in earlier.props]
-        return any(obstructs(prop, one.motion) for prop in before for one in present) or any(
+        before = [prop for earlier, _ in self._placed.values() for prop in earlier.props]
+        return any(obstructs(prop, one.motion) for prop in before for one in bodies) or any(
             obstructs(prop, other.motion) for prop in performance.props for other in others
         )
 
 
 def move_to(performance: Performance, spot: Spot) -> Performance:
-    """A performance at the origin, facing along x, carried to a spot."""
+    """Return a performance, made at the origin and facing along x, moved to a spot."""
     motions = tuple(
         Motion(motion.time, _moved_poses(motion.root, spot), motion.angles) for motion in performance.motions
     )
@@ -228,7 +231,7 @@ def move_to(performance: Performance, spot: Spot) -> Performance:
 
 
 def _moved_poses(pose: Floats, spot: Spot) -> Floats:
-    """Poses (N, 7) turned by a spot's bearing about the origin, and shifted to its place."""
+    """Return poses (N, 7) rotated by a spot's bearing about the origin and shifted to its position."""
     turn = Rotation.from_euler("Z", spot.bearing)
     place = np.column_stack([pose[:, :2] @ rotation_2d(spot.bearing).T + spot.place, pose[:, 2]])
     facing = (turn * Rotation.from_quat(pose[:, 3:], scalar_first=True)).as_quat(scalar_first=True)
@@ -236,7 +239,7 @@ def _moved_poses(pose: Floats, spot: Spot) -> Floats:
 
 
 def obstructs(prop: Prop, motion: Motion) -> bool:
-    """Whether someone's pelvis comes too near to the ground plan of a thing."""
+    """Return whether a pelvis comes too near to the footprint of a prop."""
     pose = prop.trajectory.at(motion.time)
     turn = Rotation.from_quat(pose[:, 3:], scalar_first=True).inv()
     way = turn.apply(np.column_stack([motion.root[:, :2] - pose[:, :2], np.zeros(len(pose))]))[:, :2]

@@ -1,4 +1,4 @@
-"""How deep people are in one another, told by MuJoCo from the contact shapes of their bodies."""
+"""Interpenetration of people, measured by MuJoCo with the contact geometry of their bodies."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from mvpose.arrays import Floats
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Addresses, Kinematics
 
-_FLESH = 0.15  # metres: how far a body reaches to the side beyond the heads of its bones, at most
+_FLESH = 0.15  # metres: largest extent of a body beyond the heads of its bones
 
 
 @dataclass(frozen=True)
 class SampledBody:
-    """Someone at N times.
+    """Body of one person at N times, with its bounding rectangles on the floor.
 
     Attributes:
         person: index into the cast.
-        motion: sampled at these times.
-        low: least x and y that the body reaches to, (N, 2) metres; ``high`` the greatest.
+        motion: motion, sampled at these times.
+        low: lowest x and y of the body, (N, 2) metres.
+        high: highest x and y of the body, (N, 2) metres.
     """
 
     person: int
@@ -33,16 +34,16 @@ class SampledBody:
     high: Floats
 
     def near(self, other: SampledBody) -> NDArray[np.intp]:
-        """The indices of the times at which two might touch."""
+        """Return the indices of the times at which the bounding rectangles of two people overlap."""
         meet = (self.low < other.high) & (other.low < self.high)
         return np.flatnonzero(meet.all(axis=1))
 
 
 class ContactModel:
-    """Bodies that may touch, two at a time in a MuJoCo model with nothing else.
+    """Contact between bodies, computed for one pair at a time in a MuJoCo model of the two alone.
 
     Args:
-        cast: the bodies, in the order of the people.
+        cast: bodies, in the order of the people.
     """
 
     def __init__(self, cast: Sequence[Kinematics]) -> None:
@@ -50,17 +51,17 @@ class ContactModel:
         self._pairs: dict[tuple[int, int], _Pair] = {}
 
     def sample(self, person: int, motion: Motion, time: ArrayLike) -> SampledBody:
-        """Where the body of a person is at times (N,), seconds."""
+        """Return the body of a person at times (N,) in seconds."""
         mover, sampled = self._cast[person], motion.at(time)
         bones = mover.transforms(sampled)[:, :, :2]
         heads = np.matmul(bones[..., :3], mover.body.heads[:, :, None])[..., 0] + bones[..., 3]
         return SampledBody(person, sampled, heads.min(axis=1) - _FLESH, heads.max(axis=1) + _FLESH)
 
     def penetration(self, one: SampledBody, other: SampledBody) -> Floats:
-        """How deep two people are in one another, (N,) metres, 0 where they are apart.
+        """Return the penetration depth of two people, (N,) metres, 0 where they do not touch.
 
-        It is the depth of the deepest of MuJoCo's contacts between the shapes of the two: how far these would have to
-        move to get clear of each other.
+        It is the depth of the deepest MuJoCo contact between their geometries: the distance by which these would have
+        to move to separate.
         """
         depth = np.zeros(len(one.motion))
         near = one.near(other)
@@ -75,7 +76,7 @@ class ContactModel:
 
 
 def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: ArrayLike) -> Floats:
-    """How deep any two people are in one another at times (N,), (N, P, P) metres; see :meth:`ContactModel.penetration`."""
+    """Return the penetration depth of every pair at times (N,), (N, P, P) metres; see :class:`ContactModel`."""
     crowd = ContactModel(cast)
     people = [crowd.sample(person, motion, time) for person, motion in enumerate(motions)]
     depth = np.zeros((np.size(time), len(people), len(people)))
@@ -85,7 +86,7 @@ def penetration(cast: Sequence[Kinematics], motions: Sequence[Motion], time: Arr
 
 
 class _Pair:
-    """Two people in a MuJoCo model."""
+    """MuJoCo model of two people."""
 
     def __init__(self, one: Kinematics, other: Kinematics) -> None:
         spec = mujoco.MjSpec()
@@ -98,7 +99,7 @@ class _Pair:
         self._other = Addresses(self._model, other.body, prefix="other/")
 
     def depths(self, one: Motion, other: Motion, rows: NDArray[np.intp]) -> Floats:
-        """Depth of the deepest contact at rows (n,) of two motions, (n,) metres."""
+        """Return the depth of the deepest contact at rows (n,) of two motions, (n,) metres."""
         depth = np.zeros(len(rows))
         for k, row in enumerate(rows):
             self._one.write(self._data.qpos, one.root[row], one.angles[row])

@@ -1,4 +1,4 @@
-"""What a person does over time: the pelvis and the joint angles, to be read at any moment."""
+"""Motion of one person: pelvis pose and joint angles over time."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from simharness.world.motion.trajectory import check_poses, check_times, interpo
 
 @dataclass(frozen=True)
 class Motion:
-    """The configuration of one person at T times, and smoothly between them.
+    """Configuration of one person at T times, interpolated smoothly between them.
 
     Attributes:
-        time: seconds, (T,), ascending.
-        root: position of the pelvis in metres and its orientation as a unit quaternion w x y z, (T, 7).
+        time: times in seconds, (T,), ascending.
+        root: position of the pelvis in metres and orientation as a unit quaternion w x y z, (T, 7).
         angles: joint angles in radians, (T, D), in the order of ``simharness.world.humans.anatomy.DOFS``.
 
     Raises:
-        ValueError: a wrong shape, a value that is not finite, times that do not ascend, a quaternion that is not of
-            unit length.
+        ValueError: wrong shape, non-finite value, times that do not ascend, or a quaternion that does not have unit
+            length.
     """
 
     time: Floats
@@ -47,9 +47,9 @@ class Motion:
         return len(self.root)
 
     def at(self, time: ArrayLike) -> Motion:
-        """The same motion at other times (n,), ascending; before its first and after its last it stands still."""
+        """Return the motion resampled at times (n,), ascending; constant before the first and after the last time."""
         return Motion(np.asarray(time, float), *self.read(time))
 
     def read(self, time: ArrayLike) -> tuple[Floats, Floats]:
-        """Root (..., 7) and angles (..., D) at any times (...)."""
+        """Return root (..., 7) and angles (..., D) at any times (...)."""
         return interpolate_poses(self.time, self.root, time), interpolate(self.time, self.angles, time)

@@ -1,4 +1,4 @@
-"""Where people go: spots to stay on, smooth closed loops to walk or run round, recorded ways."""
+"""Tracks of people on the floor: spots, smooth closed loops to walk or run round, and recorded paths."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from scipy.interpolate import CubicSpline
 
 from mvpose.arrays import Floats
 
-SWAY = 0.05  # metres: how far a pelvis strays from its track, by swaying, shifting weight and reaching
-_TIGHTEST = 0.8  # metres: least radius of a turn, where there is room
-_FASTEST_TURN = 1.3  # radians a second: in a narrow space people walk more slowly
-_HARDEST_TURN = 3.5  # m/s², towards the middle of the bend: a runner leans by 20 degrees
+SWAY = 0.05  # metres: largest distance of a pelvis from its track, due to sway, weight shifts and reaching
+_TIGHTEST = 0.8  # metres: smallest turning radius where there is room
+_FASTEST_TURN = 1.3  # radians per second: in a narrow space people walk more slowly
+_HARDEST_TURN = 3.5  # m/s², towards the centre of the bend: a runner leans by 20 degrees
 _KNOTS = 48
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Staying at ``place`` (2,), metres, facing ``bearing``, radians from the x axis."""
+    """Fixed position ``place`` (2,) in metres with the facing direction ``bearing`` in radians from the x axis."""
 
     place: Floats
     bearing: float
 
     @property
     def fastest(self) -> float:
-        """Metres a second."""
+        """Highest speed in metres per second."""
         return 0.0
 
     def position(self, time: ArrayLike) -> Floats:
-        """Where the pelvis is, (..., 2) metres."""
+        """Return the position of the pelvis at times (...) in seconds, (..., 2) metres."""
         return np.broadcast_to(self.place, (*np.shape(time), 2))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Going round a closed smooth curve at constant speed.
+    """Closed smooth curve, followed at constant speed.
 
     Attributes:
-        curve: the curve as a periodic spline of arc length, metres to (2,) metres.
-        speed: metres a second.
-        start: arc length at time 0, metres.
+        curve: periodic spline from arc length in metres to position (2,) in metres.
+        speed: speed in metres per second.
+        start: arc length at time 0 in metres.
     """
 
     curve: CubicSpline
@@ -50,25 +50,25 @@ class Loop:
 
     @property
     def length(self) -> float:
-        """Once round, metres."""
+        """Length of one round in metres."""
         return float(self.curve.x[-1])
 
     @property
     def fastest(self) -> float:
-        """Metres a second."""
+        """Highest speed in metres per second."""
         return self.speed
 
     def position(self, time: ArrayLike) -> Floats:
-        """Where the pelvis is, (..., 2) metres."""
+        """Return the position of the pelvis at times (...) in seconds, (..., 2) metres."""
         return self.curve(self._arc(time))
 
     def heading(self, time: ArrayLike) -> Floats:
-        """Direction of travel, (...) radians from the x axis, in -pi..pi."""
+        """Return the direction of travel, (...) radians from the x axis, in -pi..pi."""
         tangent = self.curve(self._arc(time), 1)
         return np.arctan2(tangent[..., 1], tangent[..., 0])
 
     def curvature(self, time: ArrayLike) -> Floats:
-        """How sharply the way turns to the left, (...) radians a metre."""
+        """Return the signed curvature, (...) radians per metre; left turns are positive."""
         arc = self._arc(time)
         return _curvature(self.curve(arc, 1), self.curve(arc, 2))
 
@@ -78,12 +78,12 @@ class Loop:
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """A recorded way, begun at a spot.
+    """Recorded path that starts at a spot.
 
     Attributes:
-        spot: where it begins at time 0, and the bearing that turns it.
-        time: seconds, (N,), ascending.
-        offset: where the pelvis is at these times from where it begins, before the turn, (N, 2) metres.
+        spot: start position at time 0, and the bearing by which the path is rotated.
+        time: times in seconds, (N,), ascending.
+        offset: position of the pelvis at these times relative to the start, before the rotation, (N, 2) metres.
     """
 
     spot: Spot
@@ -92,12 +92,12 @@ class RecordedPath:
 
     @property
     def fastest(self) -> float:
-        """Metres a second."""
+        """Highest speed in metres per second."""
         moved = np.linalg.norm(np.diff(self.offset, axis=0), axis=1)
         return float((moved / np.diff(self.time)).max(initial=0.0))
 
     def position(self, time: ArrayLike) -> Floats:
-        """Where the pelvis is, (..., 2) metres."""
+        """Return the position of the pelvis at times (...) in seconds, (..., 2) metres."""
         time = np.asarray(time, float)
         way = np.stack([np.interp(time, self.time, self.offset[:, k]) for k in range(2)], axis=-1)
         return self.spot.place + way @ rotation_2d(self.spot.bearing).T
@@ -108,11 +108,13 @@ Track = Spot | Loop | RecordedPath
 
 @dataclass(frozen=True)
 class LoopLimits:
-    """How fast someone goes round a loop, and how tightly it may turn.
+    """Speeds of a person on a loop, and its smallest turning radius.
 
     Attributes:
-        speed: preferred, metres a second; ``slowest`` and ``fastest`` are what they also do to keep in time.
-        tightest: least radius of a turn, metres.
+        speed: preferred speed in metres per second.
+        slowest: lowest speed that the person accepts to stay synchronous with others, metres per second.
+        fastest: highest such speed, metres per second.
+        tightest: smallest turning radius in metres.
     """
 
     speed: float
@@ -122,10 +124,11 @@ class LoopLimits:
 
 
 def loop_limits(speed: float, *, slowest: float, fastest: float, half: float, running: bool) -> LoopLimits:
-    """What a square of half side ``half``, metres, lets of the speeds that someone would go at, metres a second.
+    """Return the speeds that a square with half side ``half`` (metres) allows of the given ones (metres per second).
 
-    A walker turns at 1.3 rad/s at most and else goes more slowly, however slowly; a runner is held on the bend by
-    3.5 m/s² at most. Nobody is asked to run more slowly than that allows: see whether ``slowest`` is above ``speed``.
+    A walker turns at 1.3 rad/s at most and slows down as far as that requires. A runner has a centripetal acceleration
+    of 3.5 m/s² at most; ``slowest`` is not lowered for it, so that the result has ``slowest > speed`` if the square is
+    too small to run in.
     """
     if running:
         tightest = min(max(_TIGHTEST, speed**2 / _HARDEST_TURN), 0.85 * half)
@@ -137,15 +140,15 @@ def loop_limits(speed: float, *, slowest: float, fastest: float, half: float, ru
 
 
 def rotation_2d(bearing: float) -> Floats:
-    """The rotation of the floor, (2, 2), that turns x into ``bearing``, radians."""
+    """Return the rotation of the floor plane, (2, 2), that maps the x axis to ``bearing`` in radians."""
     c, s = np.cos(bearing), np.sin(bearing)
     return np.array([[c, -s], [s, c]])
 
 
 def make_loop(points: Floats, *, speed: float, start: float) -> Loop:
-    """The smooth closed way through ``points`` (n, 2), metres, close together and in their order.
+    """Return the smooth loop through dense, ordered ``points`` (n, 2) in metres.
 
-    The first point is repeated at the end by this function, not by the caller; ``start`` is a share of the length.
+    This function repeats the first point at the end; callers must not. ``start`` is a fraction of the length.
     """
     closed = np.concatenate([points, points[:1]])
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
@@ -155,10 +158,10 @@ def make_loop(points: Floats, *, speed: float, start: float) -> Loop:
 
 
 def draw_spot(rng: np.random.Generator, *, half: float, apart: bool = False) -> Spot:
-    """A spot in the square of half side ``half``.
+    """Draw a spot in the square with half side ``half`` in metres.
 
-    Its bearing leads roughly towards the middle, as people in a group face, or anywhere for two who face each other
-    (``apart``).
+    The bearing points roughly to the centre, as people in a group face; with ``apart``, for two people who face each
+    other, it is uniform.
     """
     place = rng.uniform(-half, half, 2)
     inward = np.arctan2(-place[1], -place[0])
@@ -167,7 +170,7 @@ def draw_spot(rng: np.random.Generator, *, half: float, apart: bool = False) -> 
 
 
 def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset: Floats) -> RecordedPath | None:
-    """A recorded way turned and shifted by chance; None where the turned way does not fit into the square."""
+    """Draw rotation and shift of a recorded path; None if the rotated path does not fit into the square."""
     bearing = float(rng.uniform(-np.pi, np.pi))
     share = rng.uniform(size=2)
     way = offset @ rotation_2d(bearing).T
@@ -180,14 +183,14 @@ def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset
 def draw_loop(
     rng: np.random.Generator, *, half: float, speed: float, tightest: float = _TIGHTEST, widest: float | None = None
 ) -> Loop | None:
-    """A wobbly ellipse in the square of half side ``half``; None where the draw leaves it or turns too tightly.
+    """Draw a deformed ellipse in the square with half side ``half``; None if it leaves the square or turns too tightly.
 
     Args:
-        rng: draws it.
-        half: metres.
-        speed: metres a second.
-        tightest: least radius of its turns, metres.
-        widest: half of the longest that it is, metres; None: as long as fits.
+        rng: random generator.
+        half: half side of the square in metres.
+        speed: speed in metres per second.
+        tightest: smallest turning radius in metres.
+        widest: upper limit of the longer half axis in metres; None: as long as fits.
     """
     start = float(rng.uniform())
     points = _ellipse(rng, half, tightest, half if widest is None else widest)
@@ -200,7 +203,7 @@ def draw_loop(
 
 def _ellipse(rng: np.random.Generator, half: float, tightest: float, widest: float) -> Floats:
     wide = rng.uniform(tightest, widest)
-    slim = rng.uniform(np.sqrt(tightest * wide), wide)  # an ellipse turns most tightly at its ends, by slim² / wide
+    slim = rng.uniform(np.sqrt(tightest * wide), wide)  # an ellipse has its smallest radius at its ends: slim² / wide
     center = rng.uniform(-1.0, 1.0, 2) * (half - 0.9 * slim)
     wobble = rng.uniform(0.0, 0.12) * (1.0 - tightest * wide / slim**2)
     tilt, phase = rng.uniform(0.0, 2 * np.pi, 2)
@@ -211,7 +214,7 @@ def _ellipse(rng: np.random.Generator, half: float, tightest: float, widest: flo
 
 
 def _sharpest(points: Floats) -> float:
-    """About the greatest curvature of a closed curve given by close points (n, 2): cheap, before any spline."""
+    """Return the approximate greatest curvature of a closed curve of dense points (n, 2), without fitting a spline."""
     ahead, behind = np.roll(points, -1, axis=0), np.roll(points, 1, axis=0)
     return float(np.abs(_curvature((ahead - behind) / 2, ahead - 2 * points + behind)).max())
 

@@ -1,4 +1,4 @@
-"""Where a rigid thing is over time: sampled poses, and the smooth curve through them."""
+"""Trajectories of rigid objects: sampled poses and their smooth interpolation."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
 
-RATE = 60.0  # Hz: motions are planned at this rate and read at any time; frames and cameras have clocks of their own
+RATE = 60.0  # Hz: planning rate of motions, which are read at any time: frames and cameras have separate clocks
 _UNIT_TOLERANCE = 1e-6
 
 
 def motion_clock(duration: float, *, margin: float = 0.0) -> Floats:
-    """The times (N,) at which motions are planned: from ``-margin`` to ``duration + margin`` seconds and a little on.
+    """Return the times (N,) in seconds at which motions are planned.
 
-    Time 0 is among them. ``margin`` is how far the clocks of cameras are off at most.
+    They cover ``-margin`` to ``duration + margin`` and contain 0. ``margin`` is the largest offset of a camera clock in
+    seconds.
     """
     before = int(np.ceil(margin * RATE)) + 1
     after = int(np.ceil((duration + margin) * RATE)) + 1
@@ -27,15 +28,15 @@ def motion_clock(duration: float, *, margin: float = 0.0) -> Floats:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The poses of one rigid thing at N times.
+    """Poses of one rigid object at N times.
 
     Attributes:
-        time: seconds, (N,), ascending; one time alone stands still.
+        time: times in seconds, (N,), ascending; a single time means an object that stands still.
         pose: position in metres and orientation as a unit quaternion w x y z, (N, 7).
 
     Raises:
-        ValueError: a wrong shape, a value that is not finite, times that do not ascend, a quaternion that is not of
-            unit length.
+        ValueError: wrong shape, non-finite value, times that do not ascend, or a quaternion that does not have unit
+            length.
     """
 
     time: Floats
@@ -53,15 +54,15 @@ class Trajectory:
         return len(self.time)
 
     def at(self, time: ArrayLike) -> Floats:
-        """Poses (..., 7) at times (...); before the first and after the last the thing stands still."""
+        """Return poses (..., 7) at times (...); constant before the first and after the last time."""
         return interpolate_poses(self.time, self.pose, time)
 
 
 def interpolate(time: Floats, values: Floats, when: ArrayLike) -> Floats:
-    """The smooth curve through ``values`` (N, D) of ``time`` (N,) at times (...), (..., D).
+    """Interpolate ``values`` (N, D) at ``time`` (N,) smoothly to the times ``when`` (...); returns (..., D).
 
-    Cubic Hermite with central differences (Catmull and Rom, 1974): continuous velocity, and local, so that a curve
-    does not depend on how long it goes on. Held at its ends.
+    Cubic Hermite interpolation with central differences (Catmull and Rom, 1974): velocity is continuous, and the
+    support is local, so that a curve does not depend on its total length. Values are constant beyond both ends.
     """
     when = np.asarray(np.clip(when, time[0], time[-1]), float)
     if len(time) == 1:
@@ -78,7 +79,7 @@ def interpolate(time: Floats, values: Floats, when: ArrayLike) -> Floats:
 
 
 def interpolate_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
-    """As :func:`interpolate` for poses (N, 7): quaternions w x y z are interpolated on the shorter way and kept unit."""
+    """Interpolate poses (N, 7) as :func:`interpolate` does; quaternions w x y z take the shorter arc and stay unit."""
     flips = np.where((pose[1:, 3:] * pose[:-1, 3:]).sum(axis=1) < 0, -1.0, 1.0)
     signs = np.concatenate([np.ones(min(len(pose), 1)), np.cumprod(flips)])
     steady = np.concatenate([pose[:, :3], pose[:, 3:] * signs[:, None]], axis=1)
@@ -88,19 +89,19 @@ def interpolate_poses(time: Floats, pose: Floats, when: ArrayLike) -> Floats:
 
 
 def transform_points(points: NDArray[np.floating], pose: Floats) -> Floats:
-    """Points (n, 3) of a thing's own frame in the world, where its pose (7,) puts them."""
+    """Transform points (n, 3) from an object's frame, given by its pose (7,), to the world."""
     turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
     return np.asarray(points @ turn.T + pose[:3])
 
 
 def check_times(time: Floats, what: str) -> None:
-    """Refuse times that are none, not finite or do not ascend."""
+    """Raise ValueError for times that are empty, not finite, or do not ascend."""
     if not len(time) or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise ValueError(f"{what} time must be one or more finite seconds, ascending, got {time[:5].tolist()}...")
 
 
 def check_poses(pose: Floats, what: str) -> None:
-    """Refuse poses (N, 7) that are not finite or whose quaternions are not of unit length."""
+    """Raise ValueError for poses (N, 7) that are not finite or have quaternions that do not have unit length."""
     if not np.isfinite(pose).all():
         bad = int(np.flatnonzero(~np.isfinite(pose).all(axis=1))[0])
         raise ValueError(f"{what} must be finite; the one at index {bad} is not")

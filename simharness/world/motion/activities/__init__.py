@@ -1,1 +1,1 @@
-"""What one person does alone: gaits, gestures, and all that is done on a spot."""
+"""Activities of one person; ``simharness.world.motion.registry`` explains how to add one."""

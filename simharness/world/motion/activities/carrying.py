@@ -1,4 +1,4 @@
-"""Carrying a box: down to it, up with it, aside with it, and down again."""
+"""Activity "carry": lift a box, step aside with it, and put it down."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from simharness.world.motion.trajectory import Trajectory
 _GRIP, _NEARER = (
     0.75,
     0.15,
-)  # of the hands on the box: height, as a share of its own; nearer than its middle, of its depth
-_STRETCH = 0.92  # of the arms' length: how far they stretch down to it
-_TOE_ROOM = 0.02  # metres between toes and box
-_CARRIED = (0.62, -0.58)  # ahead of and over the shoulders, as shares of the arm: the hands of one who carries
+)  # grip on the box: height and distance behind its centre, as fractions of its height and depth
+_STRETCH = 0.92  # fraction of the arm length that is used to reach down
+_TOE_ROOM = 0.02  # metres between the toes and the box
+_CARRIED = (0.62, -0.58)  # hands while carrying: ahead of and above the shoulders, as fractions of the arm length
 
 
 @activity("carry", clearance=0.5)
@@ -53,40 +53,44 @@ def carry(
     stature = kinematics.body.stature
     depth, width = 0.14 * stature, (0.19 + 0.05 * big) * stature
     u, marks = cycle_time(time, 2 * (1.2, 1.3, 1.5, 1.3, 1.1), rng=rng, pace=pace)
-    way = (1.0 if sense < 0.5 else -1.0) * (0.11 + 0.05 * far) * stature
+    shift = (1.0 if sense < 0.5 else -1.0) * (0.11 + 0.05 * far) * stature
 
-    own = {side: stance(kinematics, side, apart=1.35, out=np.radians(18.0)).moved(0.05, -way / 2) for side in SIDES}
+    prints = {
+        side: stance(kinematics, side, apart=1.35, out=np.radians(18.0)).moved(0.05, -shift / 2) for side in SIDES
+    }
     steps: dict[str, list[tuple[float, float, Footprint]]] = {side: [] for side in SIDES}
-    low_keys, up_keys, hold_keys, aside_keys = ([(0.0, start)] for start in (0.0, 0.0, 0.0, -way / 2))
+    low_keys, up_keys, hold_keys, aside_keys = ([(0.0, start)] for start in (0.0, 0.0, 0.0, -shift / 2))
     aloft = np.zeros(len(time), bool)
-    for first, there in ((0, way / 2), (5, -way / 2)):
-        begun, down, lifted, carried, put, risen = marks[first : first + 6]
-        low_keys += [(begun, 0.0), (down, 1.0), (lifted, 0.0), (carried, 0.0), (put, 1.0), (risen, 0.0)]
+    for first, target in ((0, shift / 2), (5, -shift / 2)):
+        start, down, lifted, carried, put, risen = marks[first : first + 6]
+        low_keys += [(start, 0.0), (down, 1.0), (lifted, 0.0), (carried, 0.0), (put, 1.0), (risen, 0.0)]
         up_keys += [(down, 0.0), (lifted, 1.0), (carried, 1.0), (put, 0.0)]
-        hold_keys += [(begun + 0.3 * (down - begun), 0.0), (down, 1.0), (put, 1.0), (risen - 0.2, 0.0)]
-        aside_keys += [(lifted, -there), (carried, there)]
+        hold_keys += [(start + 0.3 * (down - start), 0.0), (down, 1.0), (put, 1.0), (risen - 0.2, 0.0)]
+        aside_keys += [(lifted, -target), (carried, target)]
         aloft |= (u > down) & (u < put)
         half = (carried - lifted) / 2
-        order = ("left", "right") if there > 0 else ("right", "left")
+        order = ("left", "right") if target > 0 else ("right", "left")
         for side, starts in zip(order, (lifted + 0.05, lifted + half), strict=True):
-            steps[side].append((starts, starts + 0.9 * half, own[side].moved(0.0, there + way / 2)))
+            steps[side].append((starts, starts + 0.9 * half, prints[side].moved(0.0, target + shift / 2)))
     low, up, hold, aside = (minimum_jerk(u, *keys) for keys in (low_keys, up_keys, hold_keys, aside_keys))
-    feet = {side: foot_path(kinematics, track, u, own[side], steps[side], lift=0.04) for side in SIDES}
-    motion = _bend(kinematics, track, time, own["left"], low, up, aside, feet, relaxed_posture(time, rng))
+    feet = {side: foot_path(kinematics, track, u, prints[side], steps[side], lift=0.04) for side in SIDES}
+    motion = _bend(kinematics, track, time, prints["left"], low, up, aside, feet, relaxed_posture(time, rng))
 
     once = np.zeros(1)
-    standing = {side: foot_path(kinematics, track, once, own[side]) for side in SIDES}
-    lowest = _bend(kinematics, track, once, own["left"], once + 1, once, once - way / 2, standing, {})
+    standing = {side: foot_path(kinematics, track, once, prints[side]) for side in SIDES}
+    lowest = _bend(kinematics, track, once, prints["left"], once + 1, once, once - shift / 2, standing, {})
     (shoulders,) = _in_spot(track, _shoulders(kinematics, lowest))
     arm = kinematics.arms["left"]
     length, apart = np.linalg.norm(arm.end - arm.anchors[0]), width / 2 - arm.anchors[0, 1]
-    toes = kinematics.soles["left"][:, 0].max() + own["left"].place[0]
-    held = np.array([toes + _TOE_ROOM + depth / 2 - _NEARER * depth, -way / 2])  # between the hands, on the floor
-    # Low enough to be gripped by this body, or as tall as drawn.
+    toes = kinematics.soles["left"][:, 0].max() + prints["left"].place[0]
+    held = np.array(
+        [toes + _TOE_ROOM + depth / 2 - _NEARER * depth, -shift / 2]
+    )  # midpoint of the hands, projected to the floor
+    # Tall enough to be gripped by this body, or as tall as drawn.
     drop = np.sqrt(max((_STRETCH * length) ** 2 - (held[0] - shoulders[0]) ** 2 - apart**2, 0.0))
     height = max((0.15 + 0.06 * tall) * stature, (shoulders[2] - drop) / _GRIP)
     grip = np.array([-_NEARER * depth, 0.0, _GRIP * height])
-    # In the air the box hangs from the shoulders, as the arms do that hold it.
+    # In the air the box moves with the shoulders, because the arms that hold it do.
     below = np.append(held, grip[2]) - shoulders
     ahead = np.array([_CARRIED[0] * length, 0.0, _CARRIED[1] * length])
     hung = _in_spot(track, _shoulders(kinematics, motion)) + below + up[:, None] * (ahead - below) - grip
@@ -114,7 +118,7 @@ def _bend(
     feet: Mapping[str, Foot],
     curves: Curves,
 ) -> Motion:
-    """The body down at the box as far as ``low`` says and carrying it as far as ``up`` says; the arms come later."""
+    """Return the motion without the arms: bent down to the box by ``low`` and carrying it by ``up``, each 0 to 1."""
     blend(curves, low, lumbar_flexion=42.0, thorax_flexion=28.0, neck_flexion=-12.0, thorax_rotation=0.0)
     blend(curves, up, lumbar_flexion=-3.0, thorax_rotation=0.0)
     blend(curves, low, **limbs(shoulder_flexion=75.0, shoulder_abduction=8.0, elbow_flexion=15.0))
@@ -127,7 +131,7 @@ def _bend(
 
 
 def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:
-    """The middle between the shoulders in the world, (T, 3) metres."""
+    """Return the midpoint of the shoulders in the world, (T, 3) metres."""
     ends = []
     for side in SIDES:
         turn, place = shoulder_girdle(kinematics, motion, side)
@@ -136,6 +140,6 @@ def _shoulders(kinematics: Kinematics, motion: Motion) -> Floats:
 
 
 def _in_spot(spot: Spot, place: Floats) -> Floats:
-    """Points (T, 3) of the world in the spot's frame."""
+    """Transform points (T, 3) from the world to the spot's frame."""
     back = Spot(np.zeros(2), -spot.bearing)
     return spot_to_world(back, place - [*spot.place, 0.0])

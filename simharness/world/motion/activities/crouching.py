@@ -1,4 +1,4 @@
-"""Going down and up again on one's feet: squat, crouch, kneel on one knee."""
+"""Activities "squat", "kneel" (on one knee) and "crouch": lowering the body and rising again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from simharness.world.motion.poses.posture import Curves, blend, limb, limbs, re
 from simharness.world.motion.poses.timing import cycle_time, minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
-_ON_TOES, _TIPPED = np.radians([-88.0, -94.5]).tolist()  # pitch of the foot behind a kneeling leg, and at most
-_ANKLE = float(np.radians(20.0))  # its dorsiflexion, where a greater one would be needed
+_ON_TOES, _TIPPED = np.radians(
+    [-88.0, -94.5]
+).tolist()  # pitch of the rear foot when kneeling: preferred and most negative
+_ANKLE = float(np.radians(20.0))  # largest dorsiflexion of the rear ankle
 _OTHER = {"left": "right", "right": "left"}
 
 
@@ -39,11 +41,11 @@ def squat(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     hip = hip_position(
         kinematics, shank=np.radians(4.0 + 15.0 * low), thigh=np.radians(5.0 + (55.0 + 23.0 * deep) * low)
     )
-    own = {side: stance(kinematics, side, apart=1.05 + 0.3 * wide, out=np.radians(10 + 8 * wide)) for side in SIDES}
-    hip[:, 0] += own["left"].place[0] + 0.1  # the spot is in the middle of where the pelvis goes
-    own = {side: foot.moved(0.1) for side, foot in own.items()}
+    prints = {side: stance(kinematics, side, apart=1.05 + 0.3 * wide, out=np.radians(10 + 8 * wide)) for side in SIDES}
+    hip[:, 0] += prints["left"].place[0] + 0.1  # centres the path of the pelvis on the spot
+    prints = {side: foot.moved(0.1) for side, foot in prints.items()}
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=0.004 * smooth_noise(time, rng, 0.2))
-    feet = {side: foot_path(kinematics, spot, time, own[side]) for side in SIDES}
+    feet = {side: foot_path(kinematics, spot, time, prints[side]) for side in SIDES}
     return solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
 
@@ -69,21 +71,21 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         pitch=pitch,
     )
     knelt = hip_position(kinematics, shank=shank, thigh=thigh, pitch=on_toes)
-    half = knelt[0] / 2  # the spot is in the middle of where the pelvis goes
-    behind, before = (stance(kinematics, side).moved(-half) for side in (back, front))
-    there = before.moved(_before(kinematics, knelt))
-    hip[:, 0] += behind.place[0]
-    aside = 0.35 * behind.place[1] * through(0.0, 1.0, 0.3)
+    half = knelt[0] / 2  # centres the path of the pelvis on the spot
+    back_print, front_print = (stance(kinematics, side).moved(-half) for side in (back, front))
+    lunge = front_print.moved(_front_offset(kinematics, knelt))
+    hip[:, 0] += back_print.place[0]
+    aside = 0.35 * back_print.place[1] * through(0.0, 1.0, 0.3)
     lean = np.radians(through(1.0, 8.0, 3.0 + 4.0 * bow))
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
     feet = {
-        back: foot_path(kinematics, spot, time, behind, pitch=pitch),
+        back: foot_path(kinematics, spot, time, back_print, pitch=pitch),
         front: foot_path(
             kinematics,
             spot,
             u,
-            before,
-            [(PEELING, stepped, there), (up + 0.1, home, before)],
+            front_print,
+            [(PEELING, stepped, lunge), (up + 0.1, home, front_print)],
             lift=0.09,
         ),
     }
@@ -96,7 +98,7 @@ def kneel(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
 
 @solo_activity("crouch", clearance=0.4)
 def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
-    """Stay low, one foot ahead and the heel of the other up, and shift and look about."""
+    """Stay low with one foot ahead and the heel of the other raised, shift the weight and look around."""
     handed, deep = rng.uniform(size=2)
     back = "right" if handed < 0.6 else "left"
     front = _OTHER[back]
@@ -106,17 +108,17 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
     thigh = np.radians(52.0 + 14.0 * deep)
     middle = hip_position(kinematics, shank=shank, thigh=thigh, pitch=pitch)
     hip = hip_position(kinematics, shank=shank - 0.06 * fidget, thigh=thigh + np.radians(12.0) * fidget, pitch=pitch)
-    behind = stance(kinematics, back).moved(-middle[0])
-    before = stance(kinematics, front).moved(_before(kinematics, middle, shank=np.radians(12.0)) - middle[0])
-    hip[:, 0] += behind.place[0]
+    back_print = stance(kinematics, back).moved(-middle[0])
+    front_print = stance(kinematics, front).moved(_front_offset(kinematics, middle, shank=np.radians(12.0)) - middle[0])
+    hip[:, 0] += back_print.place[0]
     lean = np.radians(16.0 + 8.0 * smooth_noise(time, rng, rate))
     aside = 0.035 * smooth_noise(time, rng, rate)
     pelvis, height = pelvis_from_hips(
         kinematics, spot, hip, lean=lean, aside=aside, bearing=np.radians(9.0) * smooth_noise(time, rng, rate)
     )
     feet = {
-        back: foot_path(kinematics, spot, time, behind, pitch=pitch),
-        front: foot_path(kinematics, spot, time, before),
+        back: foot_path(kinematics, spot, time, back_print, pitch=pitch),
+        front: foot_path(kinematics, spot, time, front_print),
     }
     curves = relaxed_posture(time, rng)
     on = np.ones(len(time))
@@ -134,7 +136,7 @@ def crouch(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.G
 
 
 def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:
-    """The forearm of the front leg's side rests on the thigh; the other arm hangs ahead of the hip."""
+    """Blend in, by ``on``, a forearm that rests on the front thigh and another arm that hangs ahead of the hip."""
     blend(
         curves,
         on,
@@ -144,10 +146,10 @@ def _rest_on_knee(curves: Curves, on: Floats, front: str) -> None:
 
 
 def _kneeling(kinematics: Kinematics) -> tuple[float, float, float]:
-    """Of a leg whose knee is on the floor: shank and thigh, radians from upright, and the pitch of the foot.
+    """Return shank and thigh tilt (radians from upright) and foot pitch of a leg with its knee on the floor.
 
-    The foot stands on its toes. A long one stands higher and so tilts the shank more than an ankle allows: it tips over
-    its toes a little.
+    The foot stands on its toes. A long foot stands higher and would need more dorsiflexion than the ankle has; it tips
+    over its toes a little instead.
     """
     _, lower = kinematics.leg_parts
     _, ankle = kinematics.rolling.at(np.array([_ON_TOES]))
@@ -155,8 +157,8 @@ def _kneeling(kinematics: Kinematics) -> tuple[float, float, float]:
     return shank, float(np.radians(6.0)), max(_TIPPED, min(_ON_TOES, _ANKLE - shank))
 
 
-def _before(kinematics: Kinematics, hip: Floats, *, shank: float = 0.3) -> float:
-    """How far ahead of the back foot the front one stands, metres, under a hip (2,), its shank so far from upright."""
+def _front_offset(kinematics: Kinematics, hip: Floats, *, shank: float = 0.3) -> float:
+    """Return the distance of the front foot ahead of the rear foot, metres, for a hip (2,) and a front shank tilt."""
     upper, lower = kinematics.leg_parts
     _, ankle = kinematics.rolling.at(np.asarray(0.0))
     rise = hip[1] - (float(ankle) + lower * np.cos(shank))

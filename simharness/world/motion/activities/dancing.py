@@ -1,4 +1,4 @@
-"""Dancing: step and touch from side to side on the beat, with arms that come and go."""
+"""Activity "dance": step-touch from side to side on the beat, with arms that are raised now and then."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from simharness.world.motion.poses.posture import blend, limb, relaxed_posture
 from simharness.world.motion.poses.timing import minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
-_BAR = 4  # beats: step, touch, step back, touch
-_STRAIGHTEST = np.radians(16.0)  # knees
-_FITTED = 200  # instants of a bar that the height of the pelvis is fitted to
-_TEMPO = (1.5, 1.8)  # beats a second at pace 1
+_BAR = 4  # beats per bar: step, touch, step back, touch
+_STRAIGHTEST = np.radians(16.0)  # smallest knee flexion
+_FITTED = 200  # samples per bar to which the height of the pelvis is fitted
+_TEMPO = (1.5, 1.8)  # beats per second at pace 1
 
 
 @solo_activity("dance", clearance=0.2)
@@ -26,29 +26,31 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
     """Step to one side, bring the other foot along, and back, bouncing on every beat.
 
     Args:
-        kinematics: the body.
-        spot: where and facing where.
-        time: seconds, (T,).
-        rng: draws the tempo and the manner.
-        pace: how much quicker than usual.
+        kinematics: body.
+        spot: position and facing direction.
+        time: times in seconds, (T,).
+        rng: random generator for tempo and manner.
+        pace: speed relative to the usual one.
     """
     tempo, offset, wide, bouncy, twisty, broad, first = rng.uniform(size=7)
     beat = pace * (_TEMPO[0] + (_TEMPO[1] - _TEMPO[0]) * tempo)
     count = beat * time + _BAR * offset
     lead, other, out = ("right", "left", -1.0) if first < 0.5 else ("left", "right", 1.0)
-    way = out * (0.1 + 0.07 * wide) * kinematics.body.stature
-    own = {side: stance(kinematics, side, apart=1.1, out=np.radians(14.0)).moved(0.0, -way / 2) for side in SIDES}
-    away = {side: foot.moved(0.0, way) for side, foot in own.items()}
+    shift = out * (0.1 + 0.07 * wide) * kinematics.body.stature
+    prints = {side: stance(kinematics, side, apart=1.1, out=np.radians(14.0)).moved(0.0, -shift / 2) for side in SIDES}
+    away = {side: foot.moved(0.0, shift) for side, foot in prints.items()}
     on = [(k + 0.25) / beat for k in range(_BAR)]
     lasts = 0.65 / beat
     steps: dict[str, list[tuple[float, float, Footprint]]] = {
-        lead: [(on[0], on[0] + lasts, away[lead]), (on[3], on[3] + lasts, own[lead])],
-        other: [(on[1], on[1] + lasts, away[other]), (on[2], on[2] + lasts, own[other])],
+        lead: [(on[0], on[0] + lasts, away[lead]), (on[3], on[3] + lasts, prints[lead])],
+        other: [(on[1], on[1] + lasts, away[other]), (on[2], on[2] + lasts, prints[other])],
     }
 
     def stances(count: Floats) -> tuple[Pelvis, dict[str, Foot]]:
-        u = np.mod(count, _BAR) / beat  # seconds since the bar began
-        aside = minimum_jerk(u, (0.0, -way / 2), (1.5 / beat, way / 2), (2.0 / beat, way / 2), (3.5 / beat, -way / 2))
+        u = np.mod(count, _BAR) / beat  # seconds since the start of the bar
+        aside = minimum_jerk(
+            u, (0.0, -shift / 2), (1.5 / beat, shift / 2), (2.0 / beat, shift / 2), (3.5 / beat, -shift / 2)
+        )
         sway, dip = np.sin(np.pi * count), 0.5 - 0.5 * np.cos(2 * np.pi * count)
         pelvis = Pelvis(
             ground=spot_to_world(spot, np.stack([0.01 * sway, aside], axis=-1)),
@@ -58,13 +60,13 @@ def dance(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
             list=np.radians((1.5 + 2.0 * twisty) * sway),
         )
         high = 0.05 + 0.03 * bouncy
-        return pelvis, {side: foot_path(kinematics, spot, u, own[side], steps[side], lift=high) for side in SIDES}
+        return pelvis, {side: foot_path(kinematics, spot, u, prints[side], steps[side], lift=high) for side in SIDES}
 
-    swing, sway = np.sin(0.5 * np.pi * count), np.sin(np.pi * count)  # once a bar, every two beats
-    dip = 0.5 - 0.5 * np.cos(2 * np.pi * count)  # every beat
+    swing, sway = np.sin(0.5 * np.pi * count), np.sin(np.pi * count)  # once per bar, once every two beats
+    dip = 0.5 - 0.5 * np.cos(2 * np.pi * count)  # once per beat
     curves = relaxed_posture(time, rng)
     always = np.ones(len(time))
-    raised = 0.5 + 0.5 * np.tanh(5.0 * smooth_noise(time, rng, 0.12) - 0.5)  # arms come up now and then
+    raised = 0.5 + 0.5 * np.tanh(5.0 * smooth_noise(time, rng, 0.12) - 0.5)  # arms are raised now and then
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         pump = np.sin(np.pi * count + (0.0 if sign > 0 else np.pi) + 0.6)
         blend(

@@ -1,11 +1,11 @@
-"""The gait of one body: what its feet and pelvis do in the course of a stride.
+"""Walking gait of one body: motion of feet and pelvis during a stride.
 
 The sagittal angles of hip, knee and ankle pass, within a few degrees, through the landmarks that D. A. Winter ("The
 Biomechanics and Motor Control of Human Gait", 2nd ed., 1991) and J. Perry and J. Burnfield ("Gait Analysis", 2nd ed.,
-2010) give for healthy adults at a comfortable speed: how far each joint goes, and when; the hip is relative to quiet
-standing. Between the landmarks they are smooth curves of ours, not a copy of a table. Played on a body they give the
-length of its stride and the pitch and swing of its feet; the feet are then planned in the world and the legs solved to
-meet them (``walking.py``), so that the curves hold on a straight way and bend gracefully on a curve.
+2010) give for healthy adults at a comfortable speed: range and timing of each joint; the hip is relative to quiet
+standing. Between the landmarks they are smooth curves, not a copy of a table. Applied to a body they give its stride
+length and the pitch and swing of its feet. ``walking.py`` then places the feet in the world and solves the legs, so
+that the curves are met on a straight path and approximated on a bend.
 """
 
 from __future__ import annotations
@@ -23,55 +23,57 @@ from simharness.world.motion.poses.foot_roll import FootRoll
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import smoothstep
 
-Knots = tuple[tuple[float, float], ...]  # (share of the stride, degrees)
+Knots = tuple[tuple[float, float], ...]  # (fraction of the stride, degrees)
 
-FOOT_OFF = 0.62  # share of the stride when the toes leave the floor; 0 is heel strike
-# Degrees at shares of the stride from heel strike to heel strike.
+FOOT_OFF = 0.62  # fraction of the stride at toe-off; 0 is heel strike
+# Degrees at fractions of the stride from heel strike to heel strike.
 _HIP: Knots = ((0.0, 21), (0.1, 17), (0.2, 9), (0.3, -1), (0.4, -10), (0.5, -17.5), (0.55, -19), (0.62, -13), (0.7, 3))
 _HIP += ((0.8, 17), (0.88, 23), (0.95, 22.5))
 _KNEE: Knots = ((0.0, 5), (0.06, 11), (0.14, 17), (0.22, 14), (0.31, 8), (0.4, 5), (0.46, 6), (0.52, 13), (0.58, 30))
 _KNEE += ((0.65, 53), (0.72, 62), (0.8, 50), (0.88, 24), (0.95, 7))
 _ANKLE: Knots = ((0.0, 0), (0.06, -5), (0.12, -2), (0.2, 4), (0.3, 7), (0.4, 10), (0.47, 11), (0.53, 5), (0.58, -7))
 _ANKLE += ((0.63, -16), (0.7, -9), (0.78, -1), (0.86, 2), (0.94, 1.5))
-_WALK_RATIO = 0.0065  # step length over steps a minute, m min: Sekiya et al., J. Hum. Mov. Stud. 30, 1996
-_VIGOUR = (0.3, 1.6)  # amplitudes, as a share of the curves, between which a stride is sought
+_WALK_RATIO = 0.0065  # step length over steps per minute, m min: Sekiya et al., J. Hum. Mov. Stud. 30, 1996
+_VIGOUR = (0.3, 1.6)  # range of amplitudes, relative to the curves, in which a stride is sought
 
-_FLAT, _HEEL_RISE = 0.1, 0.45  # shares of the stride when the foot has come down, when its heel has left the floor
-_STIFF_TOES = np.radians(250.0)  # toes do not bend here: a heel that rose as far over their tips would lift the leg
-_EARLY = 0.03  # of the stride: feet land this much nearer, or the leg would have to be longer at heel strike
-_HASTE = 1.02  # the foot is over its next print a little before it comes down on it
+_FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at heel rise
+_STIFF_TOES = np.radians(
+    250.0
+)  # toes do not bend in this model: a heel that rose fully over their tips would lift the leg
+_EARLY = 0.03  # fraction of the stride by which feet land nearer: the leg would be too short at heel strike
+_HASTE = 1.02  # the foot is above its next footprint a little before it lands
 _CLEARANCE = 0.02  # metres between the swinging foot and the floor
 _SAMPLES = 240
 
 
 def normative_angles(phase: ArrayLike) -> Floats:
-    """Flexion of hip and knee and dorsiflexion of the ankle, (..., 3) radians, at shares (...) of the stride."""
+    """Return hip flexion, knee flexion and ankle dorsiflexion, (..., 3) radians, at fractions (...) of the stride."""
     phase = np.mod(phase, 1.0)
     return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
 
 
 def periodic(knots: Knots) -> CubicSpline:
-    """The smooth curve of degrees through the knots that repeats with the stride."""
+    """Return the periodic cubic spline in degrees through the knots."""
     x, y = np.array([*knots, (1.0, knots[0][1])]).T
     return CubicSpline(x, y, bc_type="periodic")
 
 
 @dataclass(frozen=True)
 class Gait:
-    """One body's stride, from heel strike to heel strike of the same foot.
+    """Stride of one body, from heel strike to heel strike of the same foot.
 
     Attributes:
-        stride: length in metres.
-        frequency: strides a second.
-        vigour: amplitude as a share of the normative curves.
-        bob: amplitude of the pelvis's way up and down, metres.
-        lead: how far ahead of the pelvis a foot lands, metres (of its ankle, as if the foot lay flat).
-        phase: shares of the stride, (n,), from 0 to 1.
+        stride: stride length in metres.
+        frequency: strides per second.
+        vigour: amplitude relative to the normative curves.
+        bob: amplitude of the vertical motion of the pelvis, metres.
+        lead: distance from the pelvis forward to a landing foot, metres (to its ankle, as if the foot lay flat).
+        phase: fractions of the stride, (n,), from 0 to 1.
         pitch: pitch of the foot, toes up positive, (n,) radians.
-        lift: how far the foot in the air is higher than it must be, (n,) metres, 0 in stance.
-        progress: share of the stride that the swing foot has covered, (n,), 0 in stance.
-        foot_off: share of the stride when the toes leave the floor; 0 is when the foot strikes it.
-        rolling: the foot on the floor.
+        lift: clearance of the swinging foot beyond the necessary one, (n,) metres, 0 in stance.
+        progress: fraction of the stride that the swinging foot has covered, (n,), 0 in stance.
+        foot_off: fraction of the stride at toe-off; 0 is foot strike.
+        rolling: roll of the foot on the floor.
     """
 
     stride: float
@@ -88,15 +90,15 @@ class Gait:
 
     @property
     def speed(self) -> float:
-        """Metres a second."""
+        """Walking speed in metres per second."""
         return self.stride * self.frequency
 
     def foot(self, phase: Floats) -> tuple[Floats, Floats, Floats]:
-        """A foot at shares (...) of its stride.
+        """Return the state of a foot at fractions (...) of its stride.
 
         Returns:
-            Its pitch, toes up positive, (...) radians; how far its lowest point is over the floor, (...) metres, 0 in
-            stance; and the share of the stride that it has covered, (...), 0 in stance.
+            Pitch, toes up positive, (...) radians; height of the lowest point above the floor, (...) metres, 0 in
+            stance; and fraction of the stride that the foot has covered, (...), 0 in stance.
         """
         pitch_at, lift_at, progress_at = self._tables
         phase = np.mod(phase, 1.0)
@@ -112,20 +114,20 @@ class Gait:
         return pitch, PchipInterpolator(self.phase, self.lift), PchipInterpolator(self.phase, self.progress)
 
     def leg(self, phase: Floats) -> Floats:
-        """Flexion of hip and knee and dorsiflexion of the ankle on a straight way, (..., 3) radians."""
+        """Return hip flexion, knee flexion and ankle dorsiflexion on a straight path, (..., 3) radians."""
         return self.vigour * normative_angles(phase)
 
 
 def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
-    """How a body walks at a speed: the normative curves, larger or smaller.
+    """Return the gait of a body at a speed: the normative curves with a fitted amplitude.
 
     Args:
-        kinematics: the body.
-        speed: metres a second; stride and cadence share it by the walk ratio.
-        pace: cadence over the one that the walk ratio gives at the same stride; quick short steps are above 1.
+        kinematics: body.
+        speed: speed in metres per second; the walk ratio divides it into stride length and cadence.
+        pace: cadence relative to the walk ratio's at the same stride; above 1 for quick short steps.
 
     Raises:
-        ValueError: a speed at which this body does not walk.
+        ValueError: this body does not walk at this speed.
     """
     rolling = kinematics.rolling
     stride = float(np.sqrt(240.0 * _WALK_RATIO * speed / pace))
@@ -145,8 +147,8 @@ def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gai
     hasted = np.minimum(FOOT_OFF + _HASTE * (phase - FOOT_OFF), 1.0)
     progress[swing] = PchipInterpolator(phase[swing], progress[swing])(hasted[swing])
     along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
-    bump = along**1.5 * (1 - along) ** 2 / (0.3**1.5 * 0.4**2 / 0.7**3.5)  # 0 to 1 to 0, landing softly
-    # On stiff legs the pelvis would ride on arcs; real ones flatten these by half.
+    bump = along**1.5 * (1 - along) ** 2 / (0.3**1.5 * 0.4**2 / 0.7**3.5)  # 0 to 1 to 0, with a soft landing
+    # On stiff legs the pelvis would move on arcs; real legs halve their height.
     bob = stride**2 / (128.0 * kinematics.leg_length)
     return Gait(
         stride=stride,
@@ -165,7 +167,7 @@ def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gai
 
 @dataclass(frozen=True)
 class _Played:
-    """The curves on a body: the foot's pitch, and its print in the pelvis's frame, metres forward."""
+    """Curves applied to a body: pitch of the foot, and its footprint in the pelvis frame, metres forward."""
 
     phase: Floats
     pitch: Floats
@@ -187,8 +189,8 @@ def _play(kinematics: Kinematics, rolling: FootRoll, vigour: float) -> _Played:
     pitch = np.where(pitch < 0, pitch / (1 - pitch / _STIFF_TOES), pitch)
     pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
     print_x = place[:, 0] - rolling.at(pitch)[0]
-    # While the foot is planted, from its strike to that of the other, the pelvis covers half a stride over it; the
-    # curves do not do so at quite constant speed, which the pelvis will have.
+    # From the strike of a foot to that of the other the pelvis moves by half a stride over it. By the curves its speed
+    # would vary a little; the mean gives the constant speed that the pelvis has here.
     step = phase <= 0.5
     stride = 2 * float(print_x[0] - print_x[step][-1])
     lead = float(np.mean(print_x[step] + stride * phase[step])) - _EARLY * stride
@@ -196,13 +198,13 @@ def _play(kinematics: Kinematics, rolling: FootRoll, vigour: float) -> _Played:
 
 
 def flatten_stance(pitch: Floats, phase: Floats, *, down: float, up: float) -> Floats:
-    """The pitch of a stance foot that comes down smoothly, lies quite flat, and then rises as the curves say.
+    """Return the pitch of a stance foot that lands smoothly, lies exactly flat, and then rises as in the curves.
 
     Args:
-        pitch: what the curves say, (n,) radians.
-        phase: shares of the stride, (n,) from 0.
-        down: when the foot has come down.
-        up: when its heel has left the floor.
+        pitch: pitch of the curves, (n,) radians.
+        phase: fractions of the stride, (n,) from 0.
+        down: fraction at foot flat.
+        up: fraction at heel rise.
     """
     slope = (pitch[1] - pitch[0]) / phase[1]
     landing = CubicSpline([0.0, down], [pitch[0], 0.0], bc_type=((1, slope), (1, 0.0)))
@@ -211,7 +213,7 @@ def flatten_stance(pitch: Floats, phase: Floats, *, down: float, up: float) -> F
 
 
 def pin_ends(x: Floats, y: Floats, first: float, last: float) -> Floats:
-    """The curve ``y`` of ``x`` bent by a cubic so that it goes from first to last without velocity at either end."""
+    """Add a cubic to the curve ``y`` of ``x`` so that it has zero slope and given values at its ends."""
     slope = np.gradient(y, x)
     fault = CubicSpline(x[[0, -1]], [y[0] - first, y[-1] - last], bc_type=((1, slope[0]), (1, slope[-1])))
     return y - fault(x)

@@ -1,4 +1,7 @@
-"""What people do while they stand: shift their weight, wave, point, talk with their hands."""
+"""Activities of a standing person: "stand", "wave", "point" and "talk".
+
+A gesture is a function that changes joint angle curves (degrees) in place, decorated with :func:`_gesture`.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,9 @@ from simharness.world.motion.poses.posture import Curves, blend, draw_side, limb
 from simharness.world.motion.poses.timing import gesture_envelope, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
-_STRAIGHTEST = np.radians(8.0)  # knees at ease
-_FURTHEST = 0.034  # metres: the pelvis keeps within this of the spot's middle, ahead and aside
-_SHIFT = 0.018  # metres: the weight goes from foot to foot
+_STRAIGHTEST = np.radians(8.0)  # smallest knee flexion
+_FURTHEST = 0.034  # metres: largest offset of the pelvis from the spot along either axis
+_SHIFT = 0.018  # metres: sideways shift of the weight from foot to foot
 
 
 Bend = Callable[[Curves, Floats, np.random.Generator], None]
@@ -44,14 +47,14 @@ def _gesture(name: str) -> Callable[[Bend], Bend]:
 
 
 def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator) -> Motion:
-    """Stand on the spot and do one of ``GESTURES``, over and over, with natural pauses.
+    """Stand on the spot and repeat one of ``GESTURES`` with natural pauses.
 
     Args:
-        name: a key of ``GESTURES``.
-        kinematics: the body.
-        spot: where and facing where.
-        time: seconds, (T,).
-        rng: draws which arm, the rhythm, and the manner.
+        name: key of ``GESTURES``.
+        kinematics: body.
+        spot: position and facing direction.
+        time: times in seconds, (T,).
+        rng: random generator for the active arm, the rhythm and the manner.
     """
     curves = relaxed_posture(time, rng)
     curves |= {"forward": 0.006 * smooth_noise(time, rng, 0.2), "aside": _SHIFT * smooth_noise(time, rng, 0.12)}
@@ -63,7 +66,7 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
     )
     curves["lumbar_bending"] = np.degrees(pelvis.list)
     feet = {side: foot_path(kinematics, spot, time, stance(kinematics, side)) for side in SIDES}
-    # The height must hold for all that the pelvis ever does, not only for what it does in these seconds.
+    # The height must suit the whole range of the pelvis, not only its path in these seconds.
     ends = np.array([[ahead, left] for ahead in (-_FURTHEST, _FURTHEST) for left in (-_FURTHEST, _FURTHEST)])
     corners = _shifted(spot, *ends.T, turned=np.zeros(4), lean=np.zeros(4))
     planted = {side: foot_path(kinematics, spot, np.zeros(4), stance(kinematics, side)) for side in SIDES}
@@ -79,25 +82,25 @@ def gesture(name: str, kinematics: Kinematics, spot: Spot, time: Floats, *, rng:
 
 
 def _shifted(spot: Spot, forward: Floats, aside: Floats, *, turned: Floats, lean: Floats) -> Pelvis:
-    """The pelvis of a person who stands, forward and aside of the spot by metres (T,), turned and leaning (degrees)."""
+    """Return the pelvis of a standing person: shifts in metres (T,), ``turned`` and ``lean`` in degrees (T,)."""
     return Pelvis(
         ground=spot_to_world(spot, np.stack([forward, aside], axis=-1)),
         bob=np.zeros(len(forward)),
         bearing=spot.bearing + np.radians(turned),
         lean=np.radians(lean),
-        list=1.2 * aside,  # radians a metre: the hip over the standing foot is the higher one
+        list=1.2 * aside,  # radians per metre: the hip over the standing foot is higher
     )
 
 
 @_gesture("stand")
 def _stand(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
-    """Nothing but shifting weight and looking around a little more."""
+    """Look around a little more; the weight shifts anyway."""
     curves["neck_rotation"] = curves["neck_rotation"] + 15.0 * smooth_noise(time, rng, 0.12)
 
 
 @_gesture("wave")
 def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
-    """The hand goes up beside the head, palm forward, and waves from the elbow."""
+    """Raise a hand beside the head, palm forward, and wave from the elbow."""
     side, _ = draw_side(rng)
     on = gesture_envelope(time, rng, hold=2.4, rest=0.5)
     beat = np.sin(2 * np.pi * (rng.uniform(1.2, 1.7) * time + rng.uniform()))
@@ -116,10 +119,10 @@ def _wave(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 
 @_gesture("point")
 def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
-    """A straight arm points at something that the eyes follow too."""
+    """Point with a straight arm, and look in the same direction."""
     side, sign = draw_side(rng)
     on = gesture_envelope(time, rng, hold=2.0, rest=0.6)
-    away = rng.uniform(-10, 45) + 10.0 * smooth_noise(time, rng, 0.3)  # to the arm's side
+    away = rng.uniform(-10, 45) + 10.0 * smooth_noise(time, rng, 0.3)  # degrees to the side of the arm
     blend(
         curves,
         on,
@@ -141,7 +144,7 @@ def _point(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
 
 @_gesture("talk")
 def _talk(curves: Curves, time: Floats, rng: np.random.Generator) -> None:
-    """Both hands in front of the belly, beating along with what is said; the head nods."""
+    """Move both hands in front of the belly as in speech, and nod."""
     for side in SIDES:
         on = gesture_envelope(time, rng, hold=3.0, rest=0.5)
         blend(

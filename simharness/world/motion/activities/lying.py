@@ -1,4 +1,4 @@
-"""Lying down on one's back and getting up again: squat, sit on the floor, roll back, stretch the legs."""
+"""Activity "lie": squat, sit on the floor, roll onto the back, stretch the legs, and get up again."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from simharness.world.motion.poses.posture import Curves, blend, limbs, relaxed_
 from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk, smooth_noise
 from simharness.world.motion.registry import solo_activity
 
-_SITTING = 0.68  # of the leg's length: from ankles to hips of one who sits on the floor, knees up
-_BACK = 0.05  # and how much further when lying
-_STRETCHED = 0.965  # of the leg's length
-_HEELS = np.radians(10.0)  # pitch of the feet: while one sits on the floor the heels carry
-_TOES_UP = np.radians(58.0)  # while one lies
+_SITTING = 0.68  # distance from ankles to hips when sitting on the floor with bent knees, in leg lengths
+_BACK = 0.05  # additional distance when lying, in leg lengths
+_STRETCHED = 0.965  # distance from ankles to hips with stretched legs, in leg lengths
+_HEELS = np.radians(10.0)  # pitch of the feet while sitting on the floor, on the heels
+_TOES_UP = np.radians(58.0)  # pitch of the feet while lying
 _LYING: tuple[str, ...] = (
     "Hips",
     "LHipJoint",
@@ -42,18 +42,18 @@ _LYING: tuple[str, ...] = (
     "LeftShoulder",
 )
 _LYING += ("RightShoulder", "LeftUpLeg", "RightUpLeg")
-_SAMPLES, _SPARE = 14, 0.002  # metres: the trunk lies that much higher, for it moves a little as the legs do
-# Of the stature: how far the hands are from the middle, and the palms over the floor, on their thumbs, on their edges.
+_SAMPLES, _SPARE = 14, 0.002  # metres: extra height of the trunk, which moves a little with the legs
+# In statures: distance of the hands from the midline; heights of the palm on its thumb and on its edge.
 _HANDS, _THUMB, _EDGE = 0.2, 0.042, 0.05
-# A hand on the floor, its fingers ahead: the columns are where its x (the thumb), y and z (the wrist) point.
+# Hand on the floor, fingers ahead: the columns are the directions of its x (thumb), y and z (wrist) axes.
 _FLAT = {
     "left": np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
 }
-_OUT = np.radians(2.0)  # of the toes: an ankle does not let a leg that lies back turn them out
-_ROLL = (0.0, 0.5, 1.0)  # sitting, half-way, lying
-_TRUNK = {  # degrees at these
-    "lean": (-36.0, -55.0, -90.0),  # of the pelvis
+_OUT = np.radians(2.0)  # outward rotation of the toes: limited by the ankle of a lying leg
+_ROLL = (0.0, 0.5, 1.0)  # sitting, halfway, lying
+_TRUNK = {  # degrees at the values of _ROLL
+    "lean": (-36.0, -55.0, -90.0),  # pelvis
     "lumbar_flexion": (34.0, 34.0, 0.0),
     "thorax_flexion": (22.0, 24.0, 2.0),
     "neck_flexion": (4.0, 22.0, 4.0),
@@ -69,26 +69,26 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     squatted, sat, lain, stretched, stirred, bent, curled, raised, stood, _ = marks[1:]
 
     def through(*values: float) -> Floats:
-        """Values when standing, squatting, sitting, lying, and on the way back."""
+        """Return the curve through values for standing, squatting, sitting and lying, and back."""
         down = zip((0.0, squatted, sat, lain), values, strict=True)
         return minimum_jerk(u, *down, *zip((bent, curled, raised, stood), reversed(values), strict=True))
 
     low, down, roll = through(0.0, 1.0, 1.0, 1.0), through(0.0, 0.0, 1.0, 1.0), through(0.0, 0.0, 0.0, 1.0)
     length = kinematics.leg_length
-    half = 0.5 * (_SITTING + _BACK) * length  # the spot is in the middle of where the pelvis goes
-    own = {side: stance(kinematics, side, apart=0.95 + 0.2 * wide, out=_OUT).moved(half) for side in SIDES}
-    ankle = own["left"].place[0]
+    half = 0.5 * (_SITTING + _BACK) * length  # centres the path of the pelvis on the spot
+    prints = {side: stance(kinematics, side, apart=0.95 + 0.2 * wide, out=_OUT).moved(half) for side in SIDES}
+    ankle = prints["left"].place[0]
     lying = ankle - (_SITTING + _BACK) * length
     feet = {}
     for side, late in zip(SIDES, (0.0, 0.3), strict=True):
         ahead = float(lying + _STRETCHED * length - kinematics.rolling.at(np.asarray(_TOES_UP))[0])
-        far = Footprint((ahead, own[side].place[1] * (0.9 + 0.5 * open_)), own[side].bearing, pitch=_TOES_UP)
+        far = Footprint((ahead, prints[side].place[1] * (0.9 + 0.5 * open_)), prints[side].bearing, pitch=_TOES_UP)
         out = (lain + late * (stretched - lain), stretched - (0.3 - late) * (stretched - lain))
         home = (stirred + late * (bent - stirred), bent - (0.3 - late) * (bent - stirred))
         bent_knee = 1.0 - minimum_jerk(u, (out[0], 0.0), (out[1], 1.0), (home[0], 1.0), (home[1], 0.0))
-        steps = [(*out, far), (*home, own[side])]
+        steps = [(*out, far), (*home, prints[side])]
         feet[side] = foot_path(
-            kinematics, spot, u, own[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0
+            kinematics, spot, u, prints[side], steps, pitch=_HEELS * down * bent_knee, lift=0.02, peel=0.0
         )
 
     trunk = _trunk(roll)
@@ -106,16 +106,19 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
     blend(curves, down, **trunk, neck_rotation=14.0 * roll * smooth_noise(time, rng, 0.12))
     motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
 
-    # The hands support the body behind the hips, and lie beside them in the end.
+    # The hands support the body behind the hips, and finally lie beside them.
     seat = ankle - _SITTING * length
     arm = kinematics.arms["left"]
     reach = 0.955 * float(np.linalg.norm(arm.end - arm.anchors[0]))
-    behind, beside = seat - 0.3 * length, lying - arm.anchors[0, 2] + reach  # all but straight, or the elbows dip
+    behind, beside = (
+        seat - 0.3 * length,
+        lying - arm.anchors[0, 2] + reach,
+    )  # nearly straight: bent elbows would be below the floor
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         ahead, left = behind + roll * (beside - behind), np.full(len(time), sign * _HANDS * kinematics.body.stature)
         over = (_THUMB + roll * (_EDGE - _THUMB) + 0.25 * (1 - down)) * kinematics.body.stature
         place = np.stack([ahead, left, over], axis=-1)
-        fingers = spot.bearing + sign * np.radians(130.0 - 120.0 * roll)  # outwards and back, then along the body
+        fingers = spot.bearing + sign * np.radians(130.0 - 120.0 * roll)  # outward and backward, then along the body
         edge = sign * np.radians(75.0) * roll  # from the palm onto the edge of the hand, the thumb up
         turn = _about_z(fingers) @ _FLAT[side] @ _about_z(edge)
         back = arm_angles(
@@ -139,28 +142,28 @@ def lie(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gene
 
 
 def _about_z(angle: Floats) -> Floats:
-    """Rotations (T, 3, 3) by angles (T,)."""
+    """Return rotations about z, (T, 3, 3), by angles (T,) in radians."""
     return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).as_matrix()
 
 
 def _trunk(roll: Floats) -> Curves:
-    """How the trunk is held, in degrees, at shares (T,) of the way from sitting to lying."""
+    """Return the posture of the trunk in degrees at fractions (T,) between sitting and lying."""
     return {name: PchipInterpolator(_ROLL, values)(roll) for name, values in _TRUNK.items()}
 
 
 def _hip_height(kinematics: Kinematics, roll: Floats) -> Floats:
-    """Height of the hips, (T,) metres, at which the skin of the trunk just touches the floor, at shares (T,)."""
+    """Return the hip height, (T,) metres, at which the skin of the trunk just touches the floor, at fractions (T,)."""
     share = np.linspace(0.0, 1.0, _SAMPLES)
     trunk = _trunk(share)
     lean = np.radians(trunk.pop("lean"))
     body, spot, length = kinematics.body, Spot(np.zeros(2), 0.0), kinematics.leg_length
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     lying = np.isin(most, [body.index(name) for name in _LYING])
-    own = {side: stance(kinematics, side, out=_OUT) for side in SIDES}
-    feet = {side: foot_path(kinematics, spot, share, own[side], pitch=_HEELS) for side in SIDES}
+    prints = {side: stance(kinematics, side, out=_OUT) for side in SIDES}
+    feet = {side: foot_path(kinematics, spot, share, prints[side], pitch=_HEELS) for side in SIDES}
     height = np.full(_SAMPLES, 0.1)
     for _ in range(2):
-        hip = np.stack([own["left"].place[0] - (_SITTING + _BACK * share) * length, height], axis=-1)
+        hip = np.stack([prints["left"].place[0] - (_SITTING + _BACK * share) * length, height], axis=-1)
         pelvis, up = pelvis_from_hips(kinematics, spot, hip, lean=lean)
         motion = solve_legs(kinematics, share, pelvis, up, feet, pose_angles(_SAMPLES, **trunk))
         lowest = [body.skin(pose)[lying, 2].min() for pose in kinematics.transforms(motion)]

@@ -1,4 +1,4 @@
-"""Reaching for things up high and down low."""
+"""Activity "reach": reach for objects high up and low down."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from simharness.world.motion.registry import solo_activity
 
 @solo_activity("reach", clearance=0.2)
 def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
-    """Reach for something on a high shelf, on one's toes, then for something low in front, with bent knees."""
+    """Reach for an object on a high shelf, on tiptoe, then for a low object in front, with bent knees."""
     side, sign = draw_side(rng)
     tall, deep, across = rng.uniform(size=3)
     u, marks = cycle_time(time, (1.1, 0.5, 1.0, 0.3, 1.1, 0.5, 1.1, 0.4), rng=rng, pace=pace)
@@ -39,11 +39,11 @@ def reach(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Ge
         thigh=np.radians(7.0 + (24.0 + 30.0 * deep) * low),
         pitch=tiptoe,
     )
-    own = {foot: stance(kinematics, foot, apart=1.15).moved(0.06) for foot in SIDES}
-    hip[:, 0] += own["left"].place[0]
+    prints = {foot: stance(kinematics, foot, apart=1.15).moved(0.06) for foot in SIDES}
+    hip[:, 0] += prints["left"].place[0]
     aside = 0.012 * sign * np.maximum(high, low) + 0.005 * smooth_noise(time, rng, 0.2)
     pelvis, height = pelvis_from_hips(kinematics, spot, hip, lean=lean, aside=aside)
-    feet = {foot: foot_path(kinematics, spot, time, own[foot], pitch=tiptoe) for foot in SIDES}
+    feet = {foot: foot_path(kinematics, spot, time, prints[foot], pitch=tiptoe) for foot in SIDES}
     curves = relaxed_posture(time, rng)
     blend(
         curves,

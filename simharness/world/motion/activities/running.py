@@ -1,9 +1,9 @@
-"""Running along a loop: as walking, but with a stride in which both feet leave the floor.
+"""Activity "run": running round a loop with a flight phase.
 
-The sagittal angles of hip, knee and ankle pass through the landmarks of a runner at about 3 m/s as T. F. Novacheck
-gives them ("The biomechanics of running", Gait and Posture 7, 1998: foot off at 39 % of the stride; the knee flexes to
-about 40 degrees in stance and 90 in swing, the hip from 45 to -7, the ankle from 20 to -20); between the landmarks they
-are smooth curves of ours. Slower runners take the same shapes smaller.
+The sagittal angles of hip, knee and ankle pass through the landmarks that T. F. Novacheck gives for a runner at about
+3 m/s ("The biomechanics of running", Gait and Posture 7, 1998: toe-off at 39 % of the stride; knee flexion of about 40
+degrees in stance and 90 in swing, hip flexion from 45 to -7, ankle dorsiflexion from 20 to -20). Between the landmarks
+they are smooth curves. Slower runners use the same curves with a smaller amplitude.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import ease
 from simharness.world.motion.registry import solo_activity
 
-FOOT_OFF = 0.39  # share of the stride when the toes leave the floor; 0 is when the foot strikes it
-# Degrees at shares of the stride.
+FOOT_OFF = 0.39  # fraction of the stride at toe-off; 0 is foot strike
+# Degrees at fractions of the stride.
 _HIP: Knots = ((0.0, 30), (0.1, 26), (0.2, 14), (0.3, 2), (0.4, -7), (0.46, -5), (0.55, 9), (0.65, 29), (0.75, 42))
 _HIP += ((0.84, 45), (0.93, 38))
 _KNEE: Knots = ((0.0, 15), (0.08, 30), (0.16, 40), (0.24, 36), (0.32, 25), (0.39, 19), (0.46, 34), (0.55, 68))
 _KNEE += ((0.64, 89), (0.72, 85), (0.82, 56), (0.9, 26), (0.96, 13))
 _ANKLE: Knots = ((0.0, -3), (0.06, 2), (0.13, 9), (0.19, 10), (0.26, 4), (0.33, -6), (0.39, -16), (0.45, -20))
 _ANKLE += ((0.55, -8), (0.7, 0), (0.85, 3))
-_CADENCE = 1.2  # strides a second at pace 1 of legs 0.85 m long; quicker ones of shorter legs, as pendulums swing
+_CADENCE = 1.2  # strides per second at pace 1 with legs 0.85 m long; scales with leg length as a pendulum does
 _LEG = 0.85
-_VIGOUR = (0.15, 1.5)  # amplitudes, as a share of the curves, between which a stride is sought
-_FLAT, _HEEL_RISE = 0.06, 0.17  # shares of the stride when the foot has come down, when its heel has left the floor
-_EARLY = 0.07  # of the stride: feet land this much nearer, or the leg would have to be longer as they strike
-_CLEARANCE = 0.12  # between the swinging foot and the floor, of the leg's length
-_MIDSTANCE = 0.19  # when the pelvis is lowest
+_VIGOUR = (0.15, 1.5)  # range of amplitudes, relative to the curves, in which a stride is sought
+_FLAT, _HEEL_RISE = 0.06, 0.17  # fractions of the stride at foot flat and at heel rise
+_EARLY = 0.07  # fraction of the stride by which feet land nearer: the leg would be too short at foot strike
+_CLEARANCE = 0.12  # clearance of the swinging foot, in leg lengths
+_MIDSTANCE = 0.19  # fraction of the stride at which the pelvis is lowest
 _GRAVITY, _FLATTENED = 9.81, 0.6
 _STRAIGHTEST = np.radians(8.0)
-_WIDTH = 0.25  # of the prints, as a share of that of the feet in the neutral stance
+_WIDTH = 0.25  # lateral distance of the footprints relative to the neutral stance
 _SAMPLES = 240
 
 
@@ -49,11 +49,11 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     """Run round the loop at its speed.
 
     Args:
-        kinematics: the body.
-        loop: the way and the speed.
-        time: seconds, (T,).
-        pace: cadence over the usual.
-        rng: draws the phase and the manner.
+        kinematics: body.
+        loop: path and speed.
+        time: times in seconds, (T,).
+        rng: random generator for phase and manner.
+        pace: cadence relative to the usual one.
     """
     stride = make_stride(kinematics, speed=loop.speed, pace=pace)
     offset, swing, upright, droop = rng.uniform(size=4)
@@ -78,10 +78,10 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
         }
         return pelvis, feet
 
-    phase = offset + stride.frequency * time  # of the left foot
+    phase = offset + stride.frequency * time  # left foot
     pelvis, feet = stances(time, phase)
     cycle = 2 * np.pi * phase
-    forward = {"left": -np.cos(cycle - 0.1 * np.pi), "right": np.cos(cycle - 0.1 * np.pi)}  # with the other leg
+    forward = {"left": -np.cos(cycle - 0.1 * np.pi), "right": np.cos(cycle - 0.1 * np.pi)}  # with the opposite leg
     arms = (0.75 + 0.5 * swing) * (0.5 + 0.5 * vigour)
     turned = np.degrees(pelvis.bearing - loop.heading(time))
     bank = np.degrees(_bank(loop, time))
@@ -107,26 +107,26 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
 
 
 def _bank(loop: Loop, time: Floats) -> Floats:
-    """How far a runner leans into the bend, to the left, (T,) radians."""
+    """Return the lean of a runner into the bend, positive to the left, (T,) radians."""
     return np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.3, 0.3)
 
 
 def normative_angles(phase: ArrayLike) -> Floats:
-    """Flexion of hip and knee and dorsiflexion of the ankle, (..., 3) radians, at shares (...) of the stride."""
+    """Return hip flexion, knee flexion and ankle dorsiflexion, (..., 3) radians, at fractions (...) of the stride."""
     phase = np.mod(phase, 1.0)
     return np.radians(np.stack([periodic(knots)(phase) for knots in (_HIP, _KNEE, _ANKLE)], axis=-1))
 
 
 def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
-    """How a body runs at a speed: the cadence of its legs, and the curves as large as the stride needs.
+    """Return the running stride of a body at a speed: cadence by leg length, amplitude of the curves by stride length.
 
     Args:
-        kinematics: the body.
-        speed: metres a second.
-        pace: cadence over the usual.
+        kinematics: body.
+        speed: speed in metres per second.
+        pace: cadence relative to the usual one.
 
     Raises:
-        ValueError: a speed at which this body does not run.
+        ValueError: this body does not run at this speed.
     """
     frequency = _CADENCE * pace * float(np.sqrt(_LEG / kinematics.leg_length))
     stride = speed / frequency
@@ -143,8 +143,8 @@ def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> G
     progress = np.zeros(len(phase))
     ahead = (print_x + stride * phase - lead) / stride
     progress[swing] = pin_ends(phase[swing], ahead[swing], 0.0, 1.0)
-    # A wave of two periods a stride of which the top is the flight: it would fall freely there at an acceleration of g,
-    # but the flight is short, and what the wave lacks around it flattens it.
+    # A sine wave with two periods per stride, highest in flight. With the acceleration g at its top its amplitude would
+    # be g / (4 pi frequency)²; the flight is short, so the amplitude is reduced.
     bob = _FLATTENED * _GRAVITY / (4 * np.pi * frequency) ** 2
     along = np.maximum(phase - FOOT_OFF, 0.0) / (1 - FOOT_OFF)
     return Gait(
@@ -163,13 +163,13 @@ def make_stride(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> G
 
 
 def _swept(kinematics: Kinematics, vigour: float) -> float:
-    """How far the pelvis passes over a planted foot, metres."""
+    """Return the distance that the pelvis moves over a planted foot, metres."""
     phase, _, print_x = _play(kinematics, vigour)
     return float(print_x[0] - np.interp(FOOT_OFF, phase, print_x))
 
 
 def _play(kinematics: Kinematics, vigour: float) -> tuple[Floats, Floats, Floats]:
-    """The curves on a body: phase (n,), the foot's pitch (n,), and its print (n,) before the pelvis."""
+    """Apply the curves to a body; return phase, pitch of the foot, and its footprint ahead of the pelvis, (n,) each."""
     phase = np.linspace(0.0, 1.0, _SAMPLES + 1)
     hip, knee, ankle = (vigour * normative_angles(phase)).T
     order = kinematics.leg_order

@@ -1,4 +1,4 @@
-"""Sitting down on a chair behind, and standing up again."""
+"""Activity "sit": sit down on a chair, and stand up again."""
 
 from __future__ import annotations
 
@@ -25,25 +25,26 @@ from simharness.world.motion.poses.timing import cycle_time, ease, minimum_jerk
 from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
-_SHANK = np.radians(5.0)  # of a seated leg, the knee ahead of the ankle
-_LEANS = np.radians([-9.0, 0.0, 15.0, 35.0])  # of the pelvis, at which its height over the seat is found
+_SHANK = np.radians(5.0)  # forward tilt of a seated shank
+_LEANS = np.radians([-9.0, 0.0, 15.0, 35.0])  # leans of the pelvis at which its height above the seat is computed
 _LAP = ("Hips", "LHipJoint", "RHipJoint", "LeftUpLeg", "RightUpLeg", "LowerBack", "Spine", "Spine1")
-_GAP = 0.02  # metres between the back and the backrest
-_KNEE_ROOM = 0.1  # metres between the front edge of the seat and the knees' joints
-_WIDTH = 0.46  # metres, of the chair
-_THIGH = 0.1  # how thick a thigh is, with the hand on it, of the stature
-_BACKREST, _BACKREST_HEIGHT = 0.04, 0.42  # metres: its thickness, and up to where it goes above the seat
+_BACK_GAP = 0.02  # metres between the back and the backrest
+_KNEE_ROOM = 0.1  # metres between the front edge of the seat and the knee joints
+_WIDTH = 0.46  # metres: width of the chair
+_THIGH = 0.1  # thickness of a thigh with a hand on it, in statures
+_BACKREST, _BACKREST_HEIGHT = 0.04, 0.42  # metres: thickness of the backrest, and its height above the seat
 
 
 @dataclass(frozen=True)
 class Seat:
-    """A seat that fits one body, its feet flat on the floor.
+    """Seat that fits one body with its feet flat on the floor.
 
     Attributes:
-        height: of the seat, metres.
-        front, back: of the seat, metres ahead of the ankles.
-        lean: of the pelvis, ascending, (n,) radians, and ``hip`` (n, 2): where it then has the hips, metres ahead of
-            the ankles and up.
+        height: height of the seat, metres.
+        front: front edge of the seat, metres ahead of the ankles.
+        back: rear edge of the seat, metres ahead of the ankles.
+        lean: leans of the pelvis, ascending, (n,) radians.
+        hip: hip positions at these leans, (n, 2) metres ahead of the ankles and up.
     """
 
     height: float
@@ -53,7 +54,7 @@ class Seat:
     hip: Floats
 
     def hip_at(self, lean: Floats) -> Floats:
-        """Where the hips are, (T, 2), while the seated pelvis leans so far, (T,) radians."""
+        """Return the hip positions, (T, 2) metres, of a seated pelvis with leans (T,) in radians."""
         return np.stack([np.interp(lean, self.lean, self.hip[:, k]) for k in range(2)], axis=-1)
 
 
@@ -61,7 +62,7 @@ class Seat:
 def sit(
     performers: Sequence[Kinematics], track: Track, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
-    """Sit down on a chair behind, stay, lean forward, stand up, over and over."""
+    """Sit down on a chair behind, stay, lean forward and stand up, repeatedly."""
     (kinematics,) = performers
     assert isinstance(track, Spot)
     low, wide, slouch, along = rng.uniform(size=4)
@@ -75,20 +76,20 @@ def sit(
     lean = np.radians(1.0 - (5.0 + 4.0 * slouch) * seated + 30.0 * bow)
     hip = _sitting_down(kinematics, seat, seated, lean)
 
-    half = seat.hip[0, 0] / 2  # the spot is in the middle of where the pelvis goes
-    own = {side: stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
-    ankle = own["left"].place[0]
+    half = seat.hip[0, 0] / 2  # centres the path of the pelvis on the spot
+    prints = {side: stance(kinematics, side, apart=1.0 + 0.25 * wide).moved(-half) for side in SIDES}
+    ankle = prints["left"].place[0]
     hip[:, 0] += ankle
     pelvis, height = pelvis_from_hips(kinematics, track, hip, lean=lean)
     curves = relaxed_posture(time, rng)
     blend(curves, seated, lumbar_flexion=6.0 + 6 * slouch, thorax_flexion=4.0 + 6 * slouch, neck_flexion=2.0)
     blend(curves, bow, lumbar_flexion=14.0, thorax_flexion=10.0, neck_flexion=-10.0)
     blend(curves, np.maximum(seated, bow), **limbs(shoulder_flexion=24.0, shoulder_abduction=10.0, elbow_flexion=58.0))
-    feet = {side: foot_path(kinematics, track, time, own[side]) for side in SIDES}
+    feet = {side: foot_path(kinematics, track, time, prints[side]) for side in SIDES}
     motion = solve_legs(kinematics, time, pelvis, height, feet, pose_angles(len(time), **curves))
     lap = _knee(kinematics)[0] + ankle - (0.2 + 0.35 * along) * kinematics.leg_parts[0]
     for side in SIDES:
-        place = spot_to_world(track, [lap, own[side].place[1], seat.height + _THIGH * kinematics.body.stature])
+        place = spot_to_world(track, [lap, prints[side].place[1], seat.height + _THIGH * kinematics.body.stature])
         rested = ease((seated - 0.6) / 0.4)
         motion = reach_with(kinematics, motion, side, np.tile(place, (len(time), 1)), weight=rested)
     middle = spot_to_world(track, [(seat.front + seat.back) / 2 + ankle, 0.0])
@@ -98,8 +99,8 @@ def sit(
 
 
 def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -> Floats:
-    """Where the hips are, (T, 2), between standing (d = 0) and sitting (1)."""
-    # The legs' angles go from those of standing to those of sitting, the knees meanwhile forward over the feet.
+    """Return the hip positions, (T, 2) metres, between standing (d = 0) and sitting (d = 1)."""
+    # Leg angles change from standing to sitting; in between, the knees move forward over the feet.
     end, knee = seat.hip_at(lean), _knee(kinematics)
     sitting = np.arctan2(knee[0] - end[:, 0], end[:, 1] - knee[1])
     shank = np.radians(4.0) * (1 - d) + _SHANK * d + np.radians(12.0) * 4 * d * (1 - d)
@@ -108,27 +109,27 @@ def _sitting_down(kinematics: Kinematics, seat: Seat, d: Floats, lean: Floats) -
 
 
 def _knee(kinematics: Kinematics) -> Floats:
-    """Where the knees of someone seated are, (2,) metres ahead of the ankles and up."""
+    """Return the position of seated knees, (2,) metres ahead of the ankles and up."""
     lower = kinematics.leg_parts[1]
     _, ankle = kinematics.rolling.at(np.zeros(1))
     return np.array([lower * np.sin(_SHANK), ankle[0] + lower * np.cos(_SHANK)])
 
 
 def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
-    """Make a seat for a body, and find where its hips are when its skin just touches the seat.
+    """Fit a seat to a body: its size, and the hip positions at which the skin just touches it.
 
     Args:
-        kinematics: the body.
-        below_knee: how far the seat is below the knees' joints, metres; 0.05 to 0.1 lets the feet stand flat.
+        kinematics: body.
+        below_knee: distance of the seat below the knee joints, metres; with 0.05 to 0.1 the feet stand flat.
     """
     upper, knee = kinematics.leg_parts[0], _knee(kinematics)
     height, front = float(knee[1] - below_knee), float(knee[0] - _KNEE_ROOM)
     body, spot, count = kinematics.body, Spot(np.zeros(2), 0.0), len(_LEANS)
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     lap = np.isin(most, [body.index(name) for name in _LAP])
-    own = {side: stance(kinematics, side) for side in SIDES}
-    own = {side: foot.moved(-foot.place[0]) for side, foot in own.items()}
-    feet = {side: foot_path(kinematics, spot, np.zeros(count), own[side]) for side in SIDES}
+    prints = {side: stance(kinematics, side) for side in SIDES}
+    prints = {side: foot.moved(-foot.place[0]) for side, foot in prints.items()}
+    feet = {side: foot_path(kinematics, spot, np.zeros(count), prints[side]) for side in SIDES}
     up = np.full(count, height + 0.1)
     for _ in range(3):
         across = np.sqrt(np.maximum(upper**2 - (up - knee[1]) ** 2, 0.0))
@@ -139,4 +140,4 @@ def fit_seat(kinematics: Kinematics, *, below_knee: float) -> Seat:
         over = np.where(skins[..., 0] < front, skins[..., 2], np.inf)
         up = up + height - over.min(axis=1)
     back = skins[0, skins[0, :, 2] < height + _BACKREST_HEIGHT, 0].min()
-    return Seat(height, front, float(back) - _GAP - _BACKREST, _LEANS, hip)
+    return Seat(height, front, float(back) - _BACK_GAP - _BACKREST, _LEANS, hip)

@@ -1,4 +1,4 @@
-"""Steps on the spot: turning about, and up onto a low block and down again."""
+"""Activities "turn" (turning on the spot) and "step" (onto a low block and down again)."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from simharness.world.motion.poses.timing import bump, cycle_time, minimum_jerk
 from simharness.world.motion.registry import activity, solo_activity
 from simharness.world.motion.trajectory import Trajectory
 
-Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: when a foot takes off, when it lands, where
+Steps = Mapping[str, list[tuple[float, float, Footprint]]]  # by side: take-off time, landing time, footprint
 
-_STRAIGHTEST = np.radians(10.0)
+_STRAIGHTEST = np.radians(10.0)  # smallest knee flexion
 _STEP_TIME = 0.5  # seconds
-_LARGEST_TURN = np.radians(32.0)  # of one foot in one step: the hip turns further still
-_FITTED = 240  # instants of a round that the height of the pelvis is fitted to
+_LARGEST_TURN = np.radians(32.0)  # rotation of one foot in one step; the hip rotates further
+_FITTED = 240  # samples per cycle to which the height of the pelvis is fitted
 _OTHER = {"left": "right", "right": "left"}
 
 
 @solo_activity("turn")
 def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float) -> Motion:
-    """Turn on the spot by small steps, three times in a round, and end up facing as at first."""
+    """Turn on the spot with small steps, three times per cycle, ending with the initial facing direction."""
     sense, share, uneven = rng.uniform(size=3)
     sign = 1.0 if sense < 0.5 else -1.0
     first, second = sign * np.radians([60.0 + 80.0 * share, 50.0 + 60.0 * uneven])
@@ -45,23 +45,26 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     lasting = [part for count in counts for part in (0.5, _STEP_TIME * count)]
     u, marks = cycle_time(time, lasting, rng=rng, pace=pace)
 
-    own = {side: stance(kinematics, side, apart=1.05) for side in SIDES}
+    prints = {side: stance(kinematics, side, apart=1.05) for side in SIDES}
     steps: Steps = {side: [] for side in SIDES}
-    shares: list[tuple[float, float, float]] = []  # when each step brings the pelvis along, and how far it turns
-    faced = 0.0
+    shares: list[tuple[float, float, float]] = []  # start, end and angle of the pelvis rotation of each step
+    rotated = 0.0
     for by, count, start, end in zip(turns, counts, marks[1::2], marks[2::2], strict=True):
         lasts = (end - start) / count
-        inner = "left" if by > 0 else "right"  # goes first
+        inner = "left" if by > 0 else "right"  # steps first
         for n in range(count):
             side = inner if n % 2 == 0 else _OTHER[inner]
-            to = _turned(own[side], faced + by * (n // 2 + 1) / (count // 2))
-            begun = start + n * lasts
-            steps[side].append((begun, begun + 0.9 * lasts, to))
-            shares.append((begun - 0.2 * lasts, begun + 1.4 * lasts, by / count))
-        faced += by
+            to = _turned(prints[side], rotated + by * (n // 2 + 1) / (count // 2))
+            start_time = start + n * lasts
+            steps[side].append((start_time, start_time + 0.9 * lasts, to))
+            shares.append((start_time - 0.2 * lasts, start_time + 1.4 * lasts, by / count))
+        rotated += by
 
     def facing(u: Floats) -> Floats:
-        return sum((minimum_jerk(u, (begun, 0.0), (ended, by)) for begun, ended, by in shares), start=np.zeros(len(u)))
+        return sum(
+            (minimum_jerk(u, (start_time, 0.0), (ended, by)) for start_time, ended, by in shares),
+            start=np.zeros(len(u)),
+        )
 
     def stances(u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         bearing = facing(u)
@@ -74,10 +77,10 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
             lean=np.full(len(u), np.radians(1.0)),
             list=0.8 * aside,
         )
-        return pelvis, {side: foot_path(kinematics, spot, u, own[side], steps[side], lift=0.035) for side in SIDES}
+        return pelvis, {side: foot_path(kinematics, spot, u, prints[side], steps[side], lift=0.035) for side in SIDES}
 
     pelvis, feet = stances(u)
-    early = np.degrees(facing(u + 0.25) - facing(u))  # the eyes go first
+    early = np.degrees(facing(u + 0.25) - facing(u))  # the head turns before the body
     curves = relaxed_posture(time, rng)
     curves["neck_rotation"] = curves["neck_rotation"] + np.clip(0.9 * early, -45.0, 45.0)
     curves["thorax_rotation"] = curves["thorax_rotation"] + np.clip(0.25 * early, -15.0, 15.0)
@@ -103,47 +106,57 @@ def step(
     lead = "right" if handed < 0.6 else "left"
     trail = _OTHER[lead]
     length = kinematics.leg_length
-    height, way = (0.13 + 0.09 * tall) * length, 0.57 * length
+    height, forward = (0.13 + 0.09 * tall) * length, 0.57 * length
     u, marks = cycle_time(time, (0.7, 0.75, 0.7, 0.7, 0.75, 0.6), rng=rng, pace=pace)
-    led, up, stood, lowered, down, _ = marks[1:]
+    lead_up, up, stood, lowered, down, _ = marks[1:]
 
-    own = {side: stance(kinematics, side).moved(-way / 2) for side in SIDES}
-    above = {side: own[side].moved(way, floor=height) for side in SIDES}
+    prints = {side: stance(kinematics, side).moved(-forward / 2) for side in SIDES}
+    above = {side: prints[side].moved(forward, floor=height) for side in SIDES}
     steps: Steps = {
-        lead: [(0.15, led, above[lead]), (lowered + 0.3 * (down - lowered), down + 0.05, own[lead])],
-        trail: [(led + 0.3 * (up - led), up, above[trail]), (stood, lowered, own[trail])],
+        lead: [(0.15, lead_up, above[lead]), (lowered + 0.3 * (down - lowered), down + 0.05, prints[lead])],
+        trail: [(lead_up + 0.3 * (up - lead_up), up, above[trail]), (stood, lowered, prints[trail])],
     }
-    # On the floor both knees give a little; forward over the foot on the block first, then up.
-    stands = relaxed_pelvis_height(kinematics) - 0.008
+    # On the floor both knees are slightly bent; the body moves over the foot on the block first, then up.
+    standing = relaxed_pelvis_height(kinematics) - 0.008
     ahead = minimum_jerk(
-        u, (0.1, 0.0), (led, 0.38 * way), (up - 0.1, way), (stood, way), (lowered, 0.45 * way), (down, 0.0)
+        u,
+        (0.1, 0.0),
+        (lead_up, 0.38 * forward),
+        (up - 0.1, forward),
+        (stood, forward),
+        (lowered, 0.45 * forward),
+        (down, 0.0),
     )
-    low, bent = stands - 0.02, stands - 0.06
+    low, bent = standing - 0.02, standing - 0.06
     rise = minimum_jerk(
         u,
-        (0.1, stands),
-        (led, low),
-        (up, stands + height),
-        (stood - 0.1, stands + height),
+        (0.1, standing),
+        (lead_up, low),
+        (up, standing + height),
+        (stood - 0.1, standing + height),
         (lowered, bent + 0.02),
-        (down, stands),
+        (down, standing),
     )
     aside = _over_standing_foot(u, steps, by=0.03)
     lean = np.radians(2.0) + np.radians(9.0) * (bump(u, 0.2, up) + 0.6 * bump(u, stood, down))
     pelvis = Pelvis(
-        ground=spot_to_world(track, np.stack([ahead - way / 2, aside], axis=-1)),
+        ground=spot_to_world(track, np.stack([ahead - forward / 2, aside], axis=-1)),
         bob=np.zeros(len(time)),
         bearing=np.full(len(time), track.bearing),
         lean=lean,
         list=0.8 * aside,
     )
-    # The foot that stays behind on the floor comes up onto its toes, and lands on them when it is the first down.
-    rolled = {lead: 0.0 * u, trail: -np.radians(38.0) * (bump(u, 0.6 * led, up) + bump(u, stood + 0.2, lowered + 0.5))}
+    # The trailing foot rises onto its toes, and lands on them when it steps down first.
+    rolled = {
+        lead: 0.0 * u,
+        trail: -np.radians(38.0) * (bump(u, 0.6 * lead_up, up) + bump(u, stood + 0.2, lowered + 0.5)),
+    }
     feet = {
-        side: foot_path(kinematics, track, u, own[side], steps[side], pitch=rolled[side], lift=0.07) for side in SIDES
+        side: foot_path(kinematics, track, u, prints[side], steps[side], pitch=rolled[side], lift=0.07)
+        for side in SIDES
     }
     curves = relaxed_posture(time, rng)
-    moving = bump(u, 0.1, led + 0.2) - bump(u, led, up + 0.2)
+    moving = bump(u, 0.1, lead_up + 0.2) - bump(u, lead_up, up + 0.2)
     for side, sign in ((lead, -1.0), (trail, 1.0)):
         curves[f"{side}_shoulder_flexion"] = curves[f"{side}_shoulder_flexion"] + sign * (10 + 14 * swing) * moving
     blend(curves, bump(u, 0.1, up) + bump(u, stood, down), neck_flexion=14.0, **limb(lead, elbow_flexion=28.0))
@@ -157,7 +170,7 @@ def step(
 
 
 def _over_standing_foot(u: Floats, steps: Steps, *, by: float) -> Floats:
-    """How far to the left the pelvis is, (T,) metres: it goes over the one foot while the other steps."""
+    """Return the shift of the pelvis to the left, (T,) metres: it is over one foot while the other steps."""
     return sum(
         (
             sign * by * bump(u, start - 0.15, end + 0.15)

@@ -1,4 +1,4 @@
-"""Walking along a loop: footprints beside the way, a pelvis that follows it, arms and trunk that counter the legs."""
+"""Activity "walk": footprints beside a loop, a pelvis that follows it, and arms and trunk that counter the legs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from simharness.world.motion.registry import solo_activity
 _GRAVITY = 9.81
 _STRAIGHTEST = np.radians(4.0)
 _TOE_OUT = np.radians(7.0)
-_STEP_WIDTH = 0.55  # between the feet, as a share of their distance in the neutral stance
-_EVERY, _SHIFTS = 0.03, 9  # seconds, and different phases of the stride, at which the whole way is looked at
+_STEP_WIDTH = 0.55  # lateral distance of the feet relative to the neutral stance
+_EVERY, _SHIFTS = 0.03, 9  # seconds between samples of the loop, and number of stride phases at each
 # Amplitudes at full vigour: pelvis after Perry and Burnfield, "Gait Analysis", 2010; arms (degrees) after Murray, Sepic
 # and Barnard, Phys. Ther. 47, 1967.
 _PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
@@ -30,33 +30,33 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     """Walk round the loop at its speed.
 
     Feet are planted: a footprint lies where the pelvis passes over it, and the foot rolls over it without slipping
-    from heel strike to toe off, so that neither a bend nor the sway of the pelvis drags a foot.
+    from heel strike to toe-off, so that neither a bend nor the sway of the pelvis drags a foot.
 
     Args:
-        kinematics: the body.
-        loop: the way and the speed.
-        time: seconds, (T,).
-        pace: as in ``make_gait``.
-        rng: draws the phase and the manner: how far the arms swing, how the trunk leans.
+        kinematics: body.
+        loop: path and speed.
+        time: times in seconds, (T,).
+        rng: random generator for phase and manner (arm swing, lean of the trunk).
+        pace: as for ``make_gait``.
     """
     gait = make_gait(kinematics, speed=loop.speed, pace=pace)
     offset, swing, manner, droop = rng.uniform(size=4)
     arms = (0.7 + 0.6 * swing) * gait.vigour
     lean_degrees = 1.0 + 4.0 * manner
-    phase = offset + gait.frequency * time  # of the left foot; the right is half a stride later
+    phase = offset + gait.frequency * time  # left foot; the right foot is half a stride later
 
     width = _STEP_WIDTH * kinematics.legs["left"].end[1]
 
     def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         heading, cycle = loop.heading(time), 2 * np.pi * phase
-        aside = _PELVIS_SWAY * np.sin(cycle - 0.05 * np.pi)  # over the standing foot
+        aside = _PELVIS_SWAY * np.sin(cycle - 0.05 * np.pi)  # towards the standing foot
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
         pelvis = Pelvis(
             ground=loop.position(time) + aside[:, None] * left,
             bob=-gait.bob * np.cos(2 * cycle),  # lowest when a heel strikes
-            bearing=heading - _PELVIS_TURN * gait.vigour * np.cos(cycle),  # the side that steps goes forward
+            bearing=heading - _PELVIS_TURN * gait.vigour * np.cos(cycle),  # the swinging side moves forward
             lean=np.full(len(time), np.radians(1.0)),
-            list=_PELVIS_LIST * gait.vigour * np.cos(cycle - 0.30 * np.pi),  # the swinging side drops
+            list=_PELVIS_LIST * gait.vigour * np.cos(cycle - 0.30 * np.pi),  # the swinging side is lower
         )
         feet = {
             side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=_TOE_OUT)
@@ -68,8 +68,8 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     cycle = 2 * np.pi * phase
     bank = np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.25, 0.25)  # into the bend
     turned, listed = -_PELVIS_TURN * gait.vigour * np.cos(cycle), pelvis.list
-    counter = 2.0 * np.degrees(turned)  # the thorax turns as far the other way as the pelvis
-    forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # an arm swings with the leg of the other side
+    counter = 2.0 * np.degrees(turned)  # the thorax rotates opposite to the pelvis
+    forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # each arm swings with the opposite leg
     look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
     angles = pose_angles(
         len(time),
@@ -93,10 +93,10 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
 
 
 def laps(loop: Loop, gait: Gait) -> tuple[Floats, Floats]:
-    """Times (n,) once round the loop, several times over, and the phase of the stride at each, (n,).
+    """Return times (n,) of several rounds of the loop, and the phase of the stride at each, (n,).
 
-    Between them they come near every place on the way in every phase of the stride: what holds for them holds for as
-    long as someone goes on.
+    Together they sample every place of the loop in every phase of the stride, so that what holds for them holds for a
+    walk of any duration.
     """
     once = np.arange(0.0, loop.length / loop.speed, _EVERY)
     shifts = np.arange(_SHIFTS) / _SHIFTS
@@ -104,34 +104,34 @@ def laps(loop: Loop, gait: Gait) -> tuple[Floats, Floats]:
 
 
 def footsteps(loop: Loop, gait: Gait, side: str, phase: Floats, time: Floats, *, width: float, toe_out: float) -> Foot:
-    """One foot's way from print to print.
+    """Return the motion of one foot from footprint to footprint.
 
     Args:
-        loop: the way and the speed.
-        gait: what a foot does in a stride.
-        side: of the foot.
-        phase: counts its strides, (T,).
-        time: seconds, (T,).
-        width: of the prints from the middle of the way, metres.
-        toe_out: how far the toes point outwards, radians.
+        loop: path and speed.
+        gait: motion of a foot during a stride.
+        side: side of the foot.
+        phase: number of strides so far, (T,).
+        time: times in seconds, (T,).
+        width: lateral distance of the footprints from the path, metres.
+        toe_out: outward rotation of the toes, radians.
     """
     outward = 1.0 if side == "left" else -1.0
     stride = np.floor(phase)
     struck = time - (phase - stride) / gait.frequency
 
     def prints(when: Floats) -> tuple[Floats, Floats]:
-        """Ankle (T, 2) over the print, as if flat, and bearing of a foot that lands at ``when``."""
+        """Return ankle (T, 2), as if the foot lay flat, and bearing (T,) of the footprint of a landing at ``when``."""
         passed = when + gait.lead / loop.speed  # the pelvis is over the print
         heading = loop.heading(passed)
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
         return loop.position(passed) + outward * width * left, heading + outward * toe_out
 
-    here, bearing = prints(struck)
-    there, bearing_there = prints(struck + 1.0 / gait.frequency)
+    previous, bearing = prints(struck)
+    following, following_bearing = prints(struck + 1.0 / gait.frequency)
     pitch, lift, progress = gait.foot(phase)
-    swung = np.angle(np.exp(1j * (bearing_there - bearing)))
+    swung = np.angle(np.exp(1j * (following_bearing - bearing)))
     bearing = bearing + progress * swung
     ahead, height = gait.rolling.at(pitch)
     toes = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    ground = here + progress[:, None] * (there - here) + ahead[:, None] * toes
+    ground = previous + progress[:, None] * (following - previous) + ahead[:, None] * toes
     return Foot(ankle=np.column_stack([ground, height + lift]), bearing=bearing, pitch=pitch)

@@ -1,1 +1,1 @@
-"""What two people do together."""
+"""Activities of two people; ``simharness.world.motion.registry`` explains how to add one."""

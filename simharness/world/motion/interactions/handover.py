@@ -1,4 +1,4 @@
-"""Two people hand a thing to and fro: a bottle in one hand, or a box in both."""
+"""Activity "hand_over": two people pass an object back and forth, a bottle with one hand or a box with both."""
 
 from __future__ import annotations
 
@@ -23,21 +23,22 @@ from simharness.world.motion.registry import activity
 from simharness.world.motion.trajectory import Trajectory
 
 _BOX_CHANCE = 0.5
-_INWARD = np.radians(22.0)  # the fingers of the hand around a bottle point a little to the other side
-_HOLDING = np.radians([25.0, 8.0, 20.0, 75.0, 5.0, 0.0])  # an arm that holds something before the belly
-_WAITS = 0.30, 0.10  # where it is held meanwhile: ahead of the pelvis and, a bottle, to the right, metres
-_NEAR = 0.46  # of an arm's length: nearer than that nobody holds a thing
+_INWARD = np.radians(22.0)  # inward rotation of the fingers of the hand around a bottle
+_HOLDING = np.radians([25.0, 8.0, 20.0, 75.0, 5.0, 0.0])  # angles of an arm that holds an object in front of the belly
+_WAITS = 0.30, 0.10  # metres: waiting position of the object ahead of the pelvis and, for a bottle, to the right
+_NEAR = 0.46  # least distance of a held object from the pelvis, in arm lengths
 
 
 @dataclass(frozen=True)
-class _Thing:
-    """What is handed over.
+class _Item:
+    """Object that is handed over.
 
     Attributes:
-        kind: what it is.
-        size: depth, width, height, metres.
-        grips: how high over its underside the first and the second hold it, metres: their hands do not meet.
-        behind: how far from its middle towards oneself one holds it, metres.
+        kind: kind of object.
+        size: depth, width and height, metres.
+        grips: heights above its underside at which the first and the second person hold it, metres; they differ, so
+            that the hands do not touch.
+        behind: distance of the grip from its centre towards the holder, metres.
     """
 
     kind: PropKind
@@ -48,94 +49,112 @@ class _Thing:
 
 @dataclass(frozen=True)
 class _Course:
-    """When, in a round, the thing goes to the second, is there, returns, and is with the first again. Seconds."""
+    """Schedule of a cycle, times in seconds.
+
+    Attributes:
+        go: the object leaves the first person.
+        meet: both people hold it, until ``part``.
+        part: it continues to the second person.
+        handed: it is with the second person.
+        back: it leaves the second person; both hold it after the time from ``go`` to ``meet``.
+        part_back: it continues to the first person.
+        home: it is with the first person again.
+        end: end of the cycle.
+    """
 
     go: float
     meet: float
-    leave: float
-    there: float
+    part: float
+    handed: float
     back: float
-    again: float
+    part_back: float
     home: float
     end: float
 
     def given(self, u: Floats) -> Floats:
-        """Where the thing is, (T,): -1 with the first, 0 in between, 1 with the second."""
-        there = ease((u - self.go) / (self.meet - self.go)) + ease((u - self.leave) / (self.there - self.leave))
-        meets = self.back + (self.meet - self.go)
-        here = ease((u - self.back) / (meets - self.back)) + ease((u - self.again) / (self.home - self.again))
-        return there - here - 1.0
+        """Return the position of the object, (T,): -1 with the first person, 0 between them, 1 with the second."""
+        forth = ease((u - self.go) / (self.meet - self.go)) + ease((u - self.part) / (self.handed - self.part))
+        meet_back = self.back + (self.meet - self.go)
+        back = ease((u - self.back) / (meet_back - self.back))
+        back = back + ease((u - self.part_back) / (self.home - self.part_back))
+        return forth - back - 1.0
 
     def holding(self, person: int, u: Floats) -> Floats:
-        """How far one's hands are with the thing, (T,) from 0 to 1."""
-        meets = self.back + (self.meet - self.go)
-        taken = ease((u - self.go) / (self.meet - self.go)) * (1 - ease((u - self.again) / (self.home - self.again)))
-        lost = ease((u - self.leave) / (self.there - self.leave)) * (1 - ease((u - self.back) / (meets - self.back)))
-        return 1.0 - lost if person == 0 else taken
+        """Return how far the hands of a person hold the object, (T,) from 0 to 1."""
+        meet_back = self.back + (self.meet - self.go)
+        if person == 0:
+            released = ease((u - self.part) / (self.handed - self.part))
+            return 1.0 - released * (1 - ease((u - self.back) / (meet_back - self.back)))
+        taken = ease((u - self.go) / (self.meet - self.go))
+        return taken * (1 - ease((u - self.part_back) / (self.home - self.part_back)))
 
 
 @activity("hand_over", performers=2, clearance=0.5)
 def hand_over(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
-    """The first holds out a thing, the second takes it; then the other way."""
+    """The first person holds out an object and the second takes it; then it is returned the same way."""
     box, bulk = rng.uniform() < _BOX_CHANCE, rng.uniform(size=3)
-    thing = _box(bulk) if box else _bottle(bulk)
+    item = _box(bulk) if box else _bottle(bulk)
     parts = (0.6, 0.9, 0.35, 0.9, 0.6, 1.4, 0.9, 0.4)
     u, marks = cycle_time(time, parts, rng=rng, pace=pace)
     course = _Course(*marks[1:])
     meeting = plan_meeting(performers, spot, raised=0.42, stretched=0.92)
     given = course.given(u)
-    way = _way(performers, meeting, thing, given)
+    path = _item_path(performers, meeting, item, given)
     turn = np.tile(Rotation.from_euler("Z", spot.bearing).as_quat(scalar_first=True), (len(time), 1))
     motions = []
     for person, mover in enumerate(performers):
-        own = meeting.spots[person]
-        motion = look_ahead(gesture("stand", mover, own, time, rng=rng))
+        home_spot = meeting.spots[person]
+        motion = look_ahead(gesture("stand", mover, home_spot, time, rng=rng))
         reaching = 1.0 - np.abs(given)
         motion = lean_forward(motion, ease(reaching) * (3.0 + meeting.lean[person]))
-        motions.append(_hold(mover, motion, own, thing, person, way, course.holding(person, u)))
-    prop = Prop(thing.kind, thing.size, Trajectory(time, np.concatenate([way, turn], axis=1)))
+        motions.append(_hold(mover, motion, home_spot, item, person, path, course.holding(person, u)))
+    prop = Prop(item.kind, item.size, Trajectory(time, np.concatenate([path, turn], axis=1)))
     return Performance(tuple(motions), (prop,))
 
 
-def _bottle(bulk: Floats) -> _Thing:
+def _bottle(bulk: Floats) -> _Item:
     wide, tall = 0.065 + 0.02 * bulk[0], 0.26 + 0.06 * bulk[1]
-    return _Thing("bottle", (wide, wide, tall), (0.25 * tall, 0.7 * tall), 0.0)
+    return _Item("bottle", (wide, wide, tall), (0.25 * tall, 0.7 * tall), 0.0)
 
 
-def _box(bulk: Floats) -> _Thing:
+def _box(bulk: Floats) -> _Item:
     deep, wide, tall = np.array([0.20, 0.26, 0.18]) + np.array([0.08, 0.10, 0.08]) * bulk
-    return _Thing("box", (float(deep), float(wide), float(tall)), (0.25 * tall, 0.75 * tall), 0.3 * deep)
+    return _Item("box", (float(deep), float(wide), float(tall)), (0.25 * tall, 0.75 * tall), 0.3 * deep)
 
 
-def _way(performers: Sequence[Kinematics], meeting: Meeting, thing: _Thing, given: Floats) -> Floats:
-    """The middle of the thing's underside, (T, 3) metres, as it is given."""
-    tall = thing.size[2]
+def _item_path(performers: Sequence[Kinematics], meeting: Meeting, item: _Item, given: Floats) -> Floats:
+    """Return the centre of the underside of the object, (T, 3) metres, from its position ``given`` (T,)."""
+    tall = item.size[2]
     middle = meeting.point - [0.0, 0.0, tall / 2]
     waits = []
-    for mover, own in zip(performers, meeting.spots, strict=True):
-        ahead = max(_WAITS[0], _NEAR * arm_length(mover)) + thing.behind
-        right = 0.0 if thing.kind == "box" else _WAITS[1]
-        # Before the belly, forearms about level.
+    for mover, home_spot in zip(performers, meeting.spots, strict=True):
+        ahead = max(_WAITS[0], _NEAR * arm_length(mover)) + item.behind
+        right = 0.0 if item.kind == "box" else _WAITS[1]
+        # In front of the belly, forearms about horizontal.
         height = mover.standing_height + 0.28 * mover.arms["right"].anchors[0][2] - tall / 2
-        waits.append(np.append(spot_to_world(own, [ahead, -right]), height))
+        waits.append(np.append(spot_to_world(home_spot, [ahead, -right]), height))
     first, second = (np.maximum(sense * given, 0.0)[:, None] for sense in (-1.0, 1.0))
     return middle + first * (waits[0] - middle) + second * (waits[1] - middle)
 
 
 def _hold(
-    mover: Kinematics, motion: Motion, own: Spot, thing: _Thing, person: int, way: Floats, weight: Floats
+    mover: Kinematics, motion: Motion, home_spot: Spot, item: _Item, person: int, path: Floats, weight: Floats
 ) -> Motion:
-    """The same with the hands at the thing as far as ``weight`` says."""
-    grip = way + [0.0, 0.0, thing.grips[person]]
-    sides = ("right",) if thing.kind == "bottle" else ("right", "left")
+    """Return the motion with the hands at the object, blended by ``weight`` (T,)."""
+    grip = path + [0.0, 0.0, item.grips[person]]
+    sides = ("right",) if item.kind == "bottle" else ("right", "left")
     for side in sides:
-        palm_faces = 1.0 if side == "right" else -1.0  # to the left of the own body
-        inward = palm_faces * _INWARD if thing.kind == "bottle" else 0.0
-        turn = handshake_orientation(own.bearing + inward)
-        out = thing.size[1] / 2 * palm_faces
-        place = grip - out * turn[:, 1] - thing.behind * np.array([np.cos(own.bearing), np.sin(own.bearing), 0.0])
-        turns = np.tile(turn, (len(way), 1, 1))
+        palm_faces = 1.0 if side == "right" else -1.0  # +1: to the left of the body
+        inward = palm_faces * _INWARD if item.kind == "bottle" else 0.0
+        turn = handshake_orientation(home_spot.bearing + inward)
+        out = item.size[1] / 2 * palm_faces
+        place = (
+            grip
+            - out * turn[:, 1]
+            - item.behind * np.array([np.cos(home_spot.bearing), np.sin(home_spot.bearing), 0.0])
+        )
+        turns = np.tile(turn, (len(path), 1, 1))
         motion = reach_with(mover, motion, side, place, turn=turns, weight=weight, guess=_HOLDING, turn_weight=0.02)
     return motion

@@ -1,4 +1,4 @@
-"""Two people greet each other: they shake hands, or hug."""
+"""Activity "shake_hands" of two people."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import cycle_time, ease
 from simharness.world.motion.registry import activity
 
-_SHAKEN = (0.015, 0.03)  # metres up and down
+_SHAKEN = (0.015, 0.03)  # metres: amplitude of the shaking
 _SHAKE_RATE = (1.8, 2.6)  # Hz
-_INWARD = np.radians(22.0)  # the fingers of a right hand point a little to the left
-# Of an arm whose hand is held out to be shaken, in the order of ``Kinematics.arm_order``, degrees.
+_INWARD = np.radians(22.0)  # rotation of the fingers of a right hand to the left
+# Angles of an arm held out for a handshake, in the order of ``Kinematics.arm_order``.
 _HELD_OUT = np.radians([40.0, 6.0, 15.0, 50.0, 5.0, 0.0])
 
 
@@ -28,7 +28,7 @@ _HELD_OUT = np.radians([40.0, 6.0, 15.0, 50.0, 5.0, 0.0])
 def shake_hands(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
-    """Both hold out the right hand, take the other's, shake it a few times and let go; again and again."""
+    """Hold out the right hands, shake them a few times and let go, repeatedly."""
     meeting = plan_meeting(performers, spot)
     amplitude, rate, phase = rng.uniform(*_SHAKEN), rng.uniform(*_SHAKE_RATE), rng.uniform(0, 2 * np.pi)
     u, (_, taken, let_go, down, _) = cycle_time(time, (0.9, 2.2, 1.0, 1.0), rng=rng, pace=pace)
@@ -48,5 +48,5 @@ def shake_hands(
 
 
 def handshake_orientation(bearing: float) -> Floats:
-    """Orientation (3, 3) of a hand whose fingers point to ``bearing`` and whose thumb points up."""
+    """Return the orientation (3, 3) of a hand with the fingers towards ``bearing`` (radians) and the thumb up."""
     return (Rotation.from_euler("Z", bearing) * Rotation.from_euler("Y", -np.pi / 2)).as_matrix()

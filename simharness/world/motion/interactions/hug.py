@@ -1,4 +1,4 @@
-"""Two people hug: they step up to each other, close their arms, hold, let go and step back."""
+"""Activity "hug": two people step up to each other, close their arms, hold, let go and step back."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from simharness.world.motion.registry import activity
 
 Role = Literal["over", "under"]
 
-_STEP = 0.17  # of a leg's length: how far each steps forward
-_LIFT = 0.03  # metres: of a foot that steps
-_ASIDE = 0.045  # metres that each stands to the left of the line between them, so that heads pass
-_SHIFT = 0.02  # metres: the weight goes over the standing foot
-_STRAIGHTEST = np.radians(8.0)
-_DEEPEST = 0.012  # metres that clothes and flesh give way where chests touch
-_DISTANCES = np.arange(0.7, 0.2, -0.01)  # metres between pelvises that are tried
-_ON_SKIN = 0.028  # metres from the skin of a back to the skin of the palm that lies on it
+_STEP = 0.17  # forward step of each, in leg lengths
+_LIFT = 0.03  # metres: height of a step
+_ASIDE = 0.045  # metres: offset of each to the left, so that the heads pass each other
+_SHIFT = 0.02  # metres: shift of the weight over the standing foot
+_STRAIGHTEST = np.radians(8.0)  # smallest knee flexion
+_DEEPEST = 0.012  # metres: largest penetration of the chests, allowed by clothes and flesh
+_DISTANCES = np.arange(0.7, 0.2, -0.01)  # metres: distances between the pelvises that are tried
+_ON_SKIN = 0.028  # metres between the skin of a back and the centre of the palm on it
 _TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "LeftShoulder", "RightShoulder")
-_LEVEL = 0.03  # metres up and down that make one level of a trunk
-# How far round arms may reach, at best first; in the end, as with a small child, they stay open.
+_LEVEL = 0.03  # metres: half the height of a cross-section of the trunk
+# How far round the other body the arms reach, best first; None: they stay open, as with a small child.
 _WRAPS: tuple[float | None, ...] = (1.0, 0.75, 0.5, 0.25, 0.0, None)
-_PRESSED, _MOST_PRESSED = 0.02, 0.045  # metres that an arm may press into the other: at ease, and rather than stay open
+_PRESSED, _MOST_PRESSED = 0.02, 0.045  # metres: penetration of an arm that is accepted at once, and the limit
 _ARMS_BACK = limbs(shoulder_flexion=-35.0, shoulder_abduction=12.0, elbow_flexion=5.0)
-_LEAN = 8.0  # degrees; and more for the taller, per metre that the shoulders are higher
+_LEAN = 8.0  # degrees of lean; for the taller person, more per metre of shoulder height difference
 _LEAN_MORE, _MOST_LEAN = 70.0, 36.0
-# Of a palm on the other's back, against one's own pelvis: it faces oneself, the fingers point across, the thumb up.
+# Orientation of a palm on the other's back, relative to the holder's pelvis: fingers across, thumb up.
 _FLAT = {
     "right": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
     "left": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -56,13 +56,15 @@ _FLAT = {
 
 @dataclass(frozen=True)
 class _Hold:
-    """How one holds the other.
+    """Arm posture of one person of a hug; the angles are start values in degrees.
 
     Attributes:
-        raised, out, turned, bent: flexion, abduction and rotation of the shoulders and flexion of the elbows, degrees,
-            that those of closed arms are near.
-        height: of the palms, metres over the other's shoulders.
-        across: of the palms, metres from the other's spine.
+        raised: flexion of the shoulders.
+        out: abduction of the shoulders.
+        turned: rotation of the shoulders.
+        bent: flexion of the elbows.
+        height: height of the palms above the other's shoulders, metres.
+        across: distance of the palms from the other's spine, metres.
     """
 
     raised: float
@@ -73,7 +75,7 @@ class _Hold:
     across: float
 
 
-# The taller one's arms go over the other's shoulders, the other's around the waist.
+# The arms of the taller person go over the shoulders, those of the other around the waist.
 _OPEN = {
     "over": limbs(shoulder_flexion=95.0, shoulder_abduction=50.0, shoulder_rotation=15.0, elbow_flexion=20.0),
     "under": limbs(shoulder_flexion=30.0, shoulder_abduction=50.0, shoulder_rotation=10.0, elbow_flexion=25.0),
@@ -87,9 +89,9 @@ _HOLDS: Mapping[Role, _Hold] = {
 
 @dataclass(frozen=True)
 class _Course:
-    """When, in a round, they are ``close``, ``let_go``, begin to step ``back`` and are ``away`` again; it ends later.
+    """Times in a cycle, in seconds: both are ``close``, ``let_go``, step ``back`` and are ``away``; then the ``end``.
 
-    Seconds. The methods take seconds since the round began, (T,), and say how far something is done, 0 to 1.
+    The methods take seconds since the start of the cycle, (T,), and return progress from 0 to 1.
     """
 
     close: float
@@ -99,36 +101,36 @@ class _Course:
     end: float
 
     def near(self, u: Floats) -> Floats:
-        """How far the pelvis has come up to the other."""
+        """Return the progress of the pelvis towards the other person."""
         return ease(u / self.close) * (1 - ease((u - self.back) / (self.away - self.back)))
 
     def open(self, u: Floats) -> Floats:
-        """How far the arms are held out."""
+        """Return how far the arms are held out."""
         lowered = self.back + 0.4 * (self.away - self.back)
         return ease(u / (0.6 * self.close)) * (1 - ease((u - lowered) / (self.away + 0.25 - lowered)))
 
     def around(self, u: Floats) -> Floats:
-        """How far the arms have closed."""
+        """Return how far the arms are closed."""
         begun = 0.85 * self.close
         return ease((u - begun) / 0.8) * (1 - ease((u - self.let_go) / (self.back + 0.1 - self.let_go)))
 
     def instants(self, count: int) -> Floats:
-        """Instants from coming near to letting go; ``count`` of them while the arms are closed."""
-        there = np.linspace(0.4 * self.close, 0.84 * self.close, 4, endpoint=False)
-        return np.concatenate([there, np.linspace(0.86 * self.close, self.back + 0.1, count)])
+        """Return times from the approach to the release, ``count`` of them while the arms are closed."""
+        approach = np.linspace(0.4 * self.close, 0.84 * self.close, 4, endpoint=False)
+        return np.concatenate([approach, np.linspace(0.86 * self.close, self.back + 0.1, count)])
 
 
 @activity("hug", performers=2, clearance=0.4)
 def hug(
     performers: Sequence[Kinematics], spot: Spot, time: Floats, *, rng: np.random.Generator, pace: float
 ) -> Performance:
-    """Step up to each other, hug, step back; the taller one's arms go over the other's, which go round the waist."""
+    """Step up to each other, hug and step back; the taller person's arms go over the other's shoulders."""
     u, marks = cycle_time(time, (1.5, 2.1, 0.8, 1.5, 0.6), rng=rng, pace=pace)
     course = _Course(*marks[1:])
     taller = int(performers[1].body.stature > performers[0].body.stature)
     roles: tuple[Role, Role] = ("under", "over") if taller else ("over", "under")
     distance, wraps = _fit_pair(performers, roles, course)
-    came = [
+    approached = [
         _approach(mover, home, course, time, u, _attentive(time, rng), lean=lean)
         for mover, home, lean in zip(
             performers, _start_spots(performers, spot, distance), _leans(performers), strict=True
@@ -136,7 +138,7 @@ def hug(
     ]
     return Performance(
         tuple(
-            _embrace(performers[k], came[k], performers[1 - k], came[1 - k], roles[k], wraps[k], course, u)
+            _embrace(performers[k], approached[k], performers[1 - k], approached[1 - k], roles[k], wraps[k], course, u)
             for k in (0, 1)
         )
     )
@@ -145,40 +147,43 @@ def hug(
 def _fit_pair(
     performers: Sequence[Kinematics], roles: tuple[Role, Role], course: _Course
 ) -> tuple[float, tuple[float | None, float | None]]:
-    """How near their pelvises come, metres, when their bodies just touch, and how far round each then reaches.
+    """Return the pelvis distance in metres at which the bodies just touch, and the wrap of each person.
 
-    The second is as of :func:`_palm_on_trunk`: as far as the arms can without going through the other; None: not at all.
+    The wrap, see :func:`_palm_on_trunk`, is the largest at which the arms do not penetrate the other body; None: the
+    arms stay open.
     """
-    crowd, instants = ContactModel(performers), course.instants(30)
+    contacts, instants = ContactModel(performers), course.instants(30)
     homes, leans = _start_spots(performers, Spot(np.zeros(2), 0.0), _DISTANCES[0]), _leans(performers)
-    came = [
+    approached = [
         _approach(mover, home, course, instants, instants, {}, lean=lean)
         for mover, home, lean in zip(performers, homes, leans, strict=True)
     ]
-    bare = [blend_angles(motion, 1.0, **_ARMS_BACK) for motion in came]
-    present = crowd.sample(0, bare[0], instants)
+    bare = [blend_angles(motion, 1.0, **_ARMS_BACK) for motion in approached]
+    present = contacts.sample(0, bare[0], instants)
     for distance in _DISTANCES:
         nearer = _shifted(bare[1], distance - _DISTANCES[0])
-        if crowd.penetration(present, crowd.sample(1, nearer, instants)).max() > _DEEPEST:
+        if contacts.penetration(present, contacts.sample(1, nearer, instants)).max() > _DEEPEST:
             break
-    came[1], bare[1] = _shifted(came[1], distance - _DISTANCES[0]), nearer
+    approached[1], bare[1] = _shifted(approached[1], distance - _DISTANCES[0]), nearer
 
     def around(person: int, wrap: float | None) -> Motion:
         other = 1 - person
         role = roles[person]
-        return _embrace(performers[person], came[person], performers[other], came[other], role, wrap, course, instants)
+        return _embrace(
+            performers[person], approached[person], performers[other], approached[other], role, wrap, course, instants
+        )
 
-    wraps, shown = [], bare
+    wraps, posed = [], bare
     for person in (0, 1):
-        other = crowd.sample(1 - person, shown[1 - person], instants)
+        other = contacts.sample(1 - person, posed[1 - person], instants)
         tried = [around(person, wrap) for wrap in _WRAPS]
-        depths = [crowd.penetration(crowd.sample(person, own, instants), other).max() for own in tried]
+        depths = [contacts.penetration(contacts.sample(person, motion, instants), other).max() for motion in tried]
         free = np.flatnonzero(np.array(depths) < _PRESSED)
         best = int(free[0] if len(free) else np.argmin(depths[:-1]))
         if depths[best] > _MOST_PRESSED:
             best = int(np.argmin(depths))
         wraps.append(_WRAPS[best])
-        shown[person] = tried[best]
+        posed[person] = tried[best]
     return float(distance), (wraps[0], wraps[1])
 
 
@@ -188,21 +193,21 @@ def _shifted(motion: Motion, ahead: float) -> Motion:
 
 
 def _start_spots(performers: Sequence[Kinematics], middle: Spot, distance: float) -> tuple[Spot, Spot]:
-    """Where both stand before they step up to ``distance`` metres."""
+    """Return the spots from which both step up to the pelvis distance ``distance`` in metres."""
     first, second = (_STEP * mover.leg_length for mover in performers)
     apart = distance + first + second
     return face_to_face(middle, apart, share=(distance / 2 + first) / apart, aside=_ASIDE)
 
 
 def _leans(performers: Sequence[Kinematics]) -> list[float]:
-    """How far each bends the trunk, degrees."""
+    """Return the lean of each trunk, degrees."""
     heights = np.array([mover.standing_height + mover.arms["left"].anchors[0][2] for mover in performers])
     higher = np.maximum(heights - heights[::-1], 0.0)
     return [float(lean) for lean in np.minimum(_LEAN + _LEAN_MORE * higher, _MOST_LEAN)]
 
 
 def _attentive(time: Floats, rng: np.random.Generator) -> Curves:
-    """Somebody at ease who looks at the other."""
+    """Draw the relaxed posture of a person who looks at the other."""
     curves = relaxed_posture(time, rng)
     return curves | {name: 0.3 * curves[name] for name in ("neck_rotation", "thorax_rotation")}
 
@@ -210,7 +215,7 @@ def _attentive(time: Floats, rng: np.random.Generator) -> Curves:
 def _approach(
     mover: Kinematics, home: Spot, course: _Course, time: Floats, u: Floats, curves: Curves, *, lean: float
 ) -> Motion:
-    """Step up to the other, and back, with hanging arms."""
+    """Return the motion of stepping up to the other and back, with hanging arms."""
     pelvis, feet = _steps(mover, home, course, u)
     angles = pose_angles(len(u), **curves)
     whole = _steps(mover, home, course, np.linspace(0.0, course.end, 80))
@@ -220,18 +225,18 @@ def _approach(
 
 
 def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
-    """The right foot, then the left one, steps forward, and so they step back."""
+    """Return pelvis and feet: the right foot, then the left, steps forward, and later back."""
     step = _STEP * mover.leg_length
     times: dict[str, list[tuple[float, float]]] = {"right": [], "left": []}
     for start, end in ((0.0, course.close), (course.back, course.away)):
         times["right"].append((start + 0.08 * (end - start), start + 0.52 * (end - start)))
         times["left"].append((start + 0.5 * (end - start), start + 0.96 * (end - start)))
     feet, aside = {}, np.zeros(len(u))
-    for side, (there, back) in times.items():
-        own = stance(mover, side)
-        feet[side] = foot_path(mover, home, u, own, [(*there, own.moved(step)), (*back, own)], lift=_LIFT)
+    for side, (forth, back) in times.items():
+        start = stance(mover, side)
+        feet[side] = foot_path(mover, home, u, start, [(*forth, start.moved(step)), (*back, start)], lift=_LIFT)
         over = _SHIFT if side == "right" else -_SHIFT
-        aside += over * (bump(u, *there) + bump(u, *back))
+        aside += over * (bump(u, *forth) + bump(u, *back))
     pelvis = Pelvis(
         ground=spot_to_world(home, np.stack([step * course.near(u), aside], axis=-1)),
         bob=np.zeros(len(u)),
@@ -252,7 +257,7 @@ def _embrace(
     course: _Course,
     u: Floats,
 ) -> Motion:
-    """Close both arms around the other, the palms on the other's back."""
+    """Return the motion with both arms closed around the other person, palms on the back."""
     hold = _HOLDS[role]
     opened = course.open(u)
     motion = blend_angles(
@@ -261,16 +266,16 @@ def _embrace(
         **_OPEN[role],
         **limbs(forearm_pronation=10.0, wrist_flexion=0.0),
     )
-    if role == "over":  # outside of the other's arms, which come up at the same time
+    if role == "over":  # outside the other's arms, which rise at the same time
         out = _DETOUR * 4 * opened * (1 - opened)
         motion = offset_angles(motion, left_shoulder_abduction=out, right_shoulder_abduction=out)
     if wrap is None:
         return motion
     guess = np.radians([hold.raised, hold.out, hold.turned, hold.bent, 15.0, 0.0])
-    # Nobody reaches up to a back that is higher than the own shoulders.
+    # Palms are not placed higher than the holder's shoulders.
     shoulder = other.arms["left"].anchors[0][2]
-    own = mover.standing_height + mover.arms["left"].anchors[0][2] - other.standing_height
-    height = min(shoulder + hold.height, own)
+    highest = mover.standing_height + mover.arms["left"].anchors[0][2] - other.standing_height
+    height = min(shoulder + hold.height, highest)
     inward = Rotation.from_quat(motion.root[:, 3:], scalar_first=True).as_matrix()
     for side, sign in (("right", 1.0), ("left", -1.0)):
         turn, place = shoulder_girdle(other, others, "left" if sign > 0 else "right")
@@ -290,12 +295,12 @@ def _embrace(
 
 
 def _palm_on_trunk(mover: Kinematics, height: float, left: float, wrap: float) -> Floats:
-    """Where a palm lies on somebody's trunk, just off the skin, in that one's neutral frame, (3,) metres.
+    """Return the position of a palm just above the skin of a trunk, in its neutral pelvis frame, (3,) metres.
 
     Args:
-        mover: the body that it lies on.
-        height: over the pelvis, metres.
-        left: of the spine, metres.
+        mover: body that the palm lies on.
+        height: height above the pelvis, metres.
+        left: distance to the left of the spine, metres.
         wrap: how far round the arm reaches: 1 to the back, 0 to the flank only.
     """
     body = mover.body

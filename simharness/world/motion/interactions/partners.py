@@ -1,4 +1,4 @@
-"""Two people face to face: how far apart they stand, and how each leans, looks and reaches to meet the other."""
+"""Two people face to face: distance, lean, gaze and reach, so that their hands meet."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from simharness.world.motion.poses.foot_placement import spot_to_world
 from simharness.world.motion.poses.inverse_kinematics import shoulder_girdle
 from simharness.world.motion.poses.kinematics import Kinematics
 
-_SAG = 0.02  # metres that standing at ease is lower than standing upright
-_STRETCHED = 0.93  # of an arm's length: a hand that meets another's, comfortably
-_STEEPEST = 0.62  # of an arm's length: how far below the shoulder a hand goes before the trunk bends
-_NEAREST = 0.27  # metres from the pelvis to where hands meet
-_LEAN = {"lumbar_flexion": 0.55, "thorax_flexion": 0.45}  # shares of a trunk's bend
-_MOST_LEAN = 45.0  # degrees
+_SAG = 0.02  # metres: height difference between standing upright and relaxed
+_STRETCHED = 0.93  # comfortable distance of a hand from the shoulder, in arm lengths
+_STEEPEST = 0.62  # largest depth of a hand below the shoulder before the trunk bends, in arm lengths
+_NEAREST = 0.27  # metres: least distance from a pelvis to the meeting point
+_LEAN = {"lumbar_flexion": 0.55, "thorax_flexion": 0.45}  # fractions of the lean of the trunk
+_MOST_LEAN = 45.0  # degrees: largest lean
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Where the hands of two people meet who face each other.
+    """Meeting of the hands of two people who face each other.
 
     Attributes:
-        spots: where each stands, facing the other.
-        point: where their hands meet, metres, (3,).
-        lean: how far each bends the trunk for it, degrees.
+        spots: spot of each person, facing the other.
+        point: meeting point of the hands, (3,) metres.
+        lean: lean of each trunk that this takes, degrees.
     """
 
     spots: tuple[Spot, Spot]
@@ -39,18 +39,18 @@ class Meeting:
     lean: tuple[float, float]
 
     def spot(self, person: int) -> Spot:
-        """The point seen by one of them: its place on the floor, faced as they face it."""
+        """Return the meeting point on the floor as a spot with the bearing of one person."""
         return Spot(self.point[:2], self.spots[person].bearing)
 
 
 def face_to_face(middle: Spot, distance: float, *, share: float = 0.5, aside: float = 0.0) -> tuple[Spot, Spot]:
-    """Two spots ``distance`` metres apart that face each other along the bearing of ``middle``.
+    """Return two spots ``distance`` metres apart that face each other along the bearing of ``middle``.
 
     Args:
-        middle: between them; its bearing leads from the first to the second.
-        distance: metres.
-        share: of the distance that the first has to the middle.
-        aside: how far each is to the left of the line between them, metres.
+        middle: spot between them; its bearing points from the first to the second.
+        distance: distance in metres.
+        share: fraction of the distance between the first spot and the middle.
+        aside: offset of each to the left of the line between them, metres.
     """
     first, second = spot_to_world(middle, [[-share * distance, aside], [(1 - share) * distance, -aside]])
     return Spot(first, middle.bearing), Spot(second, middle.bearing + np.pi)
@@ -59,15 +59,15 @@ def face_to_face(middle: Spot, distance: float, *, share: float = 0.5, aside: fl
 def plan_meeting(
     performers: Sequence[Kinematics], middle: Spot, *, raised: float = 0.5, stretched: float = _STRETCHED
 ) -> Meeting:
-    """Where two stand so that the right hand of each, or both hands, come to one place between them.
+    """Return spots of two people, such that their right hands, or both hands, meet at one point between them.
 
-    The place is as high as is natural for both on average; whoever is too tall for it bends.
+    The height of the point is the mean of the heights that are natural for both; a person too tall for it bends.
 
     Args:
-        performers: the two.
-        middle: of their pelvises; its bearing leads from the first to the second.
-        raised: how far under the shoulder the hand is held by choice, as a share of the arm's length.
-        stretched: distance of hand and shoulder, as a share of the arm's length.
+        performers: the two people.
+        middle: midpoint of their pelvises; its bearing points from the first to the second.
+        raised: preferred depth of the hand below the shoulder, in arm lengths.
+        stretched: distance of the hand from the shoulder, in arm lengths.
     """
     height = float(np.mean([_shoulder(mover, 0.0)[2] - raised * arm_length(mover) for mover in performers]))
     leans, ahead = [], []
@@ -88,13 +88,13 @@ def plan_meeting(
 
 
 def arm_length(mover: Kinematics) -> float:
-    """From the shoulder to the middle of the palm of a straight arm, metres."""
+    """Return the distance from the shoulder to the centre of the palm of a straight arm, metres."""
     arm = mover.arms["right"]
     return float(np.linalg.norm(arm.end - arm.anchors[0]))
 
 
 def _shoulder(mover: Kinematics, lean: float) -> Floats:
-    """The right shoulder of someone who stands at the origin and bends the trunk by ``lean`` degrees, (3,) metres."""
+    """Return the right shoulder of a person at the origin who leans the trunk by ``lean`` degrees, (3,) metres."""
     root = np.array([[0.0, 0.0, mover.standing_height - _SAG, 1.0, 0.0, 0.0, 0.0]])
     upright = Motion(np.zeros(1), root, np.zeros((1, len(DOFS))))
     turn, place = shoulder_girdle(mover, lean_forward(upright, lean), "right")
@@ -102,9 +102,9 @@ def _shoulder(mover: Kinematics, lean: float) -> Floats:
 
 
 def lean_forward(motion: Motion, lean: ArrayLike) -> Motion:
-    """The same motion with the trunk bent forward by ``lean`` degrees more, (T,) or constant.
+    """Return the motion with the trunk leaning forward by ``lean`` degrees more, (T,) or constant.
 
-    The eyes stay half level, and the arms hang down as before.
+    The head compensates half of the lean, and the arms keep their direction in the world.
     """
     lean = np.asarray(lean, float)
     trunk = {name: share * lean for name, share in _LEAN.items()}
@@ -113,7 +113,7 @@ def lean_forward(motion: Motion, lean: ArrayLike) -> Motion:
 
 
 def offset_angles(motion: Motion, **degrees: ArrayLike) -> Motion:
-    """The same motion with these angles changed by so many degrees, (T,) or constant, within their ranges."""
+    """Return the motion with degrees, (T,) or constant, added to the named angles, clipped to their ranges."""
     angles = motion.angles.copy()
     for name, change in degrees.items():
         column = DOFS.index(name)
@@ -122,7 +122,7 @@ def offset_angles(motion: Motion, **degrees: ArrayLike) -> Motion:
 
 
 def blend_angles(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
-    """The same motion gone so far, (T,) from 0 to 1, towards these angles, degrees."""
+    """Return the motion with the named angles blended towards targets in degrees by the weight ``on``, (T,) 0 to 1."""
     angles = motion.angles.copy()
     for name, target in degrees.items():
         column = DOFS.index(name)
@@ -131,7 +131,7 @@ def blend_angles(motion: Motion, on: ArrayLike, **degrees: ArrayLike) -> Motion:
 
 
 def look_ahead(motion: Motion, share: float = 0.35) -> Motion:
-    """The same motion of someone who keeps looking ahead: the head turns only by a share of what it did."""
+    """Return the motion of a person who looks ahead: rotations of head and thorax are scaled by ``share``."""
     angles = motion.angles.copy()
     angles[:, [DOFS.index("neck_rotation"), DOFS.index("thorax_rotation")]] *= share
     return Motion(motion.time, motion.root, angles)

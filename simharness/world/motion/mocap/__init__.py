@@ -1,4 +1,4 @@
-"""Recorded motion: reading AMC and BVH files, and giving what they recorded to bodies of any shape."""
+"""Motion capture: readers for AMC and BVH files, and retargeting to bodies of any shape."""
 
 from simharness.world.motion.mocap.clip import Clip, load_clip
 

@@ -1,8 +1,8 @@
-"""Acclaim's skeleton (ASF) and motion (AMC) files, in which CMU publishes its motion capture.
+"""Readers for Acclaim skeleton (ASF) and motion (AMC) files, the format of the CMU motion capture database.
 
-A bone turns about its beginning, in axes of its own: with C the turn of these axes and M that of its values, both
-applied in the order in which the file lists them and about fixed axes, the bone is turned by C M C^-1 against its
-parent. Source: J. Lander, "Working with Motion Capture File Formats", Game Developer, January 1998.
+A bone rotates about its head in its local axes. With C the rotation of these axes and M that of the bone's values, both
+applied about fixed axes in the order in which the file lists them, the rotation relative to the parent is C M C^-1.
+Source: J. Lander, "Working with Motion Capture File Formats", Game Developer, January 1998.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mvpose.arrays import Floats
 from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
 from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
 
-RATE = 120.0  # Hz: an AMC file does not say; CMU's are recorded so
+RATE = 120.0  # Hz: AMC files do not state the rate; this is the rate of CMU recordings
 _TURNS, _SHIFTS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
 _ROOT = "root"
 _MOST_BONES = 1000
@@ -25,7 +25,7 @@ _MOST_BONES = 1000
 
 @dataclass
 class _Bone:
-    """What the file says of a bone; of the root ``offset`` is its position."""
+    """Bone as given in the file; for the root, ``offset`` is its position."""
 
     line: Line
     offset: Floats
@@ -35,13 +35,13 @@ class _Bone:
 
 @dataclass(frozen=True)
 class Acclaim:
-    """An ASF file: the skeleton, and how an AMC file's values turn it.
+    """Contents of an ASF file: the skeleton, and how the values of an AMC file rotate it.
 
     Attributes:
-        skeleton: joints are the beginnings of the bones of their names, and the tips of the last ones.
-        frames: by the bone's name, its axes.
-        dofs: by the bone's name, what its values are, in order: "rx", "ry", "rz", of the root also "tx", "ty", "tz".
-        origin: what is added to the root's place, (3,).
+        skeleton: skeleton; its joints are the heads of the bones with their names, and the tips of the last bones.
+        frames: local axes by name of the bone.
+        dofs: kinds of the values by name of the bone, in order: "rx", "ry", "rz", for the root also "tx", "ty", "tz".
+        origin: offset added to the position of the root, (3,).
         degrees: whether angles are in degrees.
     """
 
@@ -53,10 +53,10 @@ class Acclaim:
 
 
 def read_asf(path: Path) -> Acclaim:
-    """Read a skeleton.
+    """Read the skeleton of an ASF file.
 
     Raises:
-        ValueError: a file that is not one, naming file and line.
+        ValueError: not a valid ASF file; the message names file and line.
     """
     reader = Reader(path)
     degrees = True
@@ -78,8 +78,8 @@ def read_asf(path: Path) -> Acclaim:
             parents = _hierarchy(reader, bones)
         else:  # version, name, documentation, skin
             _body(reader)
-    for missing, there in ((":root", root), (":bonedata", bones), (":hierarchy", parents)):
-        if not there:
+    for missing, content in ((":root", root), (":bonedata", bones), (":hierarchy", parents)):
+        if not content:
             raise reader.error(f"has no section {missing}; is it an ASF file?")
     assert root is not None
     orphan = next((bone for name, bone in bones.items() if name not in parents), None)
@@ -95,10 +95,10 @@ def read_asf(path: Path) -> Acclaim:
 
 
 def read_amc(path: Path, acclaim: Acclaim) -> Recording:
-    """Read a motion of a skeleton; it is taken to have been recorded at ``RATE``.
+    """Read the motion of an AMC file for a skeleton; its rate is taken to be ``RATE``.
 
     Raises:
-        ValueError: a file that is not one or does not fit the skeleton, naming file and line.
+        ValueError: not a valid AMC file, or not one for this skeleton; the message names file and line.
     """
     reader = Reader(path)
     degrees = acclaim.degrees
@@ -110,7 +110,7 @@ def read_amc(path: Path, acclaim: Acclaim) -> Recording:
     frames = first = 0
     while reader.peek() is not None:
         head = reader.take("")
-        number = head.words[0] if not frames else str(first + frames)  # an excerpt begins anywhere
+        number = head.words[0] if not frames else str(first + frames)  # an excerpt may start at any number
         if head.words != (number,) or not number.isdecimal():
             expected = f"the number of frame {number}" if frames else "the number of the first frame"
             raise head.error(f"expected {expected} alone, got {quoted(' '.join(head.words))}")
@@ -125,7 +125,7 @@ def read_amc(path: Path, acclaim: Acclaim) -> Recording:
 
 
 def _frame(reader: Reader, moving: dict[str, tuple[str, ...]], values: dict[str, list[list[float]]]) -> set[str]:
-    """Read the lines of one frame into ``values``; return the bones that it has."""
+    """Read the lines of one frame into ``values``; return the names of its bones."""
     seen: set[str] = set()
     while (line := reader.peek()) is not None and not line.words[0].isdigit():
         name = line.words[0]
@@ -156,16 +156,16 @@ def _recording(
         turning = [k for k, dof in enumerate(dofs) if dof in _TURNS]
         if turning:
             order = "".join(dofs[k][1] for k in turning)
-            own = Rotation.from_euler(order, table[:, turning], degrees=degrees)
+            rotation = Rotation.from_euler(order, table[:, turning], degrees=degrees)
             frame = acclaim.frames[name]
-            turn = frame * own * frame.inv()
+            turn = frame * rotation * frame.inv()
             turns[:, skeleton.names.index(name)] = turn.as_quat(scalar_first=True)
     return Recording(file=file, skeleton=skeleton, rate=RATE, root=root, turns=turns)
 
 
 def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
     names, above, offsets = [_ROOT], [-1], [np.zeros(3)]
-    for place, name in enumerate(names):  # grows while it is gone through: children after their parents
+    for place, name in enumerate(names):  # grows during the iteration: children follow their parents
         tip = bones[name].offset if name in bones else np.zeros(3)
         children = [child for child, parent in parents.items() if parent == name]
         if not children and name in bones:
@@ -173,14 +173,16 @@ def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
         names += children
         above += [place] * len(children)
         offsets += [tip] * len(children)
-    lost = [bone for name, bone in bones.items() if name not in names]
-    if lost:
-        raise lost[0].line.error(f"bone {quoted(lost[0].line.words[1])} hangs on itself in :hierarchy, not on the root")
+    unconnected = [bone for name, bone in bones.items() if name not in names]
+    if unconnected:
+        raise unconnected[0].line.error(
+            f"bone {quoted(unconnected[0].line.words[1])} is not connected to the root in :hierarchy"
+        )
     return Skeleton(tuple(names), np.array(above), np.array(offsets))
 
 
 def _body(reader: Reader) -> list[Line]:
-    """The lines up to the next section."""
+    """Return the lines up to the next section."""
     lines = []
     while (line := reader.peek()) is not None and not line.words[0].startswith(":"):
         lines.append(reader.take(""))
@@ -188,7 +190,7 @@ def _body(reader: Reader) -> list[Line]:
 
 
 def _units(reader: Reader) -> bool:
-    """Whether angles are in degrees."""
+    """Read the section :units; return whether angles are in degrees."""
     degrees = True
     for line in _body(reader):
         if line.words[0].lower() == "angle":
@@ -227,7 +229,7 @@ def _bones(reader: Reader, degrees: bool) -> dict[str, _Bone]:
             raise begin.error(f"expected begin, got {quoted(begin.words[0])}")
         name, bone = _bone(reader, begin, degrees)
         if name in bones or name == _ROOT:
-            raise bone.line.error(f"there are two bones {quoted(name)}")
+            raise bone.line.error(f"the bone {quoted(name)} is defined twice")
         bones[name] = bone
         if len(bones) > _MOST_BONES:
             raise begin.error(f"more than {_MOST_BONES} bones")
@@ -254,7 +256,7 @@ def _bone(reader: Reader, begin: Line, degrees: bool) -> tuple[str, _Bone]:
         elif key == "direction":
             direction = np.array(line.numbers(rest, 3, "direction"))
             if np.linalg.norm(direction) < 1e-6:
-                raise line.error("expected a direction, got a vector of no length")
+                raise line.error("expected a direction, got a vector of length 0")
             direction /= np.linalg.norm(direction)
         elif key == "length":
             (length,) = line.numbers(rest, 1, "length")
@@ -283,7 +285,7 @@ def _axis(line: Line, words: tuple[str, ...]) -> str:
 
 
 def _hierarchy(reader: Reader, bones: dict[str, _Bone]) -> dict[str, str]:
-    """By name, the parent's name."""
+    """Read the section :hierarchy; return the name of the parent by name of the bone."""
     parents: dict[str, str] = {}
     for line in _body(reader):
         if line.words[0].lower() in ("begin", "end") and len(line.words) == 1:
@@ -294,6 +296,6 @@ def _hierarchy(reader: Reader, bones: dict[str, _Bone]) -> dict[str, str]:
                 raise line.error(f":bonedata has no bone {quoted(name)}")
         for child in children:
             if child in parents or child == _ROOT:
-                raise line.error(f"{child} has a parent already")
+                raise line.error(f"{child} already has a parent")
             parents[child] = parent
     return parents

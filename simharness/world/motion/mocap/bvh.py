@@ -1,8 +1,8 @@
-"""Biovision's BVH files.
+"""Reader for Biovision BVH files.
 
-A joint's channels are turns about its own axes, one after the other as they are listed: v' = R1 R2 R3 v. The position
-channels of the root say where it is, in place of its offset; those of other joints are passed over, for bones do not
-stretch. Source: M. Meredith and S. Maddock, "Motion Capture File Formats Explained", University of Sheffield, 2001.
+The channels of a joint are rotations about its local axes in the listed order: v' = R1 R2 R3 v. The position channels
+of the root replace its offset; those of other joints are ignored, because bones do not stretch.
+Source: M. Meredith and S. Maddock, "Motion Capture File Formats Explained", University of Sheffield, 2001.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class _Joint:
 
 
 def read_bvh(path: Path) -> Recording:
-    """Read a skeleton and its motion.
+    """Read the skeleton and the motion of a BVH file.
 
     Raises:
-        ValueError: a file that is not one, naming file and line.
+        ValueError: not a valid BVH file; the message names file and line.
     """
     reader = Reader(path)
     joints = _hierarchy(reader)
@@ -48,7 +48,7 @@ def read_bvh(path: Path) -> Recording:
     rows = reader.rest()
     if len(rows) != frames:
         where = rows[-1] if rows else None
-        message = f"the file says Frames: {frames} and has {len(rows)}"
+        message = f"Frames: states {frames}, got {len(rows)} lines of values"
         raise where.error(message) if where else reader.error(message)
     table = np.array([line.numbers(line.words, width, f"{len(joints)} joints' channels") for line in rows])
 
@@ -69,7 +69,7 @@ def read_bvh(path: Path) -> Recording:
 
 
 def _hierarchy(reader: Reader) -> list[_Joint]:
-    """The joints, parents before children, read up to the line MOTION."""
+    """Read the joints up to the line MOTION; return them with parents before children."""
     first = reader.take("HIERARCHY")
     if first.words[0].upper() != "HIERARCHY":
         raise first.error(f"expected HIERARCHY, got {quoted(first.words[0])}; is it a BVH file?")
@@ -107,7 +107,7 @@ def _hierarchy(reader: Reader) -> list[_Joint]:
 def _joint(line: Line, key: str, joints: list[_Joint], opened: list[int]) -> _Joint:
     parent = opened[-1] if opened else -1
     if (key == "ROOT") != (parent < 0):
-        raise line.error(f"a {key} {'inside of another joint' if parent >= 0 else 'before the ROOT'}")
+        raise line.error(f"a {key} {'inside another joint' if parent >= 0 else 'before the ROOT'}")
     if len(joints) >= _MOST_JOINTS:
         raise line.error(f"more than {_MOST_JOINTS} joints")
     words = line.words[1:]
@@ -119,7 +119,7 @@ def _joint(line: Line, key: str, joints: list[_Joint], opened: list[int]) -> _Jo
         raise line.error(f"{joints[parent].name!r} is an End Site and carries no joint")
     name = joints[parent].name + END if key == "END" else " ".join(words)
     if any(joint.name == name for joint in joints):
-        raise line.error(f"there are two joints {quoted(name)}")
+        raise line.error(f"the joint {quoted(name)} is defined twice")
     return _Joint(name, line, parent)
 
 
@@ -132,11 +132,11 @@ def _brace(reader: Reader, line: Line) -> None:
 
 def _channels(line: Line, joint: _Joint) -> list[str]:
     if joint.channels:
-        raise line.error(f"{joint.name} has CHANNELS already")
+        raise line.error(f"{joint.name} already has CHANNELS")
     names = [word.lower() for word in line.words[2:]]
     if len(line.words) < 2 or line.words[1] != str(len(names)):
-        said = quoted(line.words[1]) if len(line.words) > 1 else "no number"
-        raise line.error(f"CHANNELS of {joint.name} says {said} and lists {len(names)}")
+        count = quoted(line.words[1]) if len(line.words) > 1 else "no number"
+        raise line.error(f"CHANNELS of {joint.name} states {count} but lists {len(names)}")
     if joint.name.endswith(END) or set(names) - set(_CHANNELS) or len(set(names)) != len(names):
         raise line.error(
             f"expected CHANNELS of {joint.name} to be some of Xposition Yposition Zposition Xrotation Yrotation "
@@ -146,7 +146,7 @@ def _channels(line: Line, joint: _Joint) -> list[str]:
 
 
 def _heading(reader: Reader) -> tuple[int, float]:
-    """How many frames, and frames a second."""
+    """Read the heading of the motion; return the number of frames and the rate in frames per second."""
     line = reader.take("Frames:")
     if line.words[0].lower() != "frames:":
         raise line.error(f"expected Frames: and a count, got {quoted(' '.join(line.words))}")

@@ -1,8 +1,7 @@
-"""A recorded motion as an activity: any body performs it, at any place, for as long as it takes.
+"""Recorded motion as an activity: performed by any body, at any place, for any duration.
 
-The clip begins at time 0 and is played back and forth: people go on moving, come back to where they were, and nothing
-jumps. At either end the motion comes to rest and sets off again within ``TURN`` seconds; so does one that begins with
-the first frame.
+The clip starts at time 0 and is played back and forth, so that people keep moving, return to their start, and nothing
+jumps. At either end, and at a start in the first frame, the motion stops and reverses within ``TURN`` seconds.
 """
 
 from __future__ import annotations
@@ -25,20 +24,20 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, interpolate_poses
 
-TURN = 0.3  # seconds that turning round at an end of the clip takes
+TURN = 0.3  # seconds of the reversal at an end of the clip
 
 
 @dataclass(frozen=True)
 class Clip:
-    """A recorded motion.
+    """Recorded motion that bodies can perform.
 
     Attributes:
-        recording: what the file holds.
-        start: where in it to begin, seconds.
+        recording: contents of the file.
+        start: time in the recording at which the clip starts, seconds.
 
     Raises:
-        ValueError: a start that is not in the clip, a clip too short to turn round in, or a skeleton that is not a
-            person's.
+        ValueError: the start is not within the recording, the recording is too short to reverse, or its skeleton is
+            not that of a person.
     """
 
     recording: Recording
@@ -48,33 +47,33 @@ class Clip:
         file, duration = self.recording.file, self.recording.duration
         if duration < TURN:
             raise ValueError(
-                f"people.motion.file: {file} lasts {duration:.3g} s, {len(self.recording)} frames; a motion takes at "
-                f"least {TURN:g} s"
+                f"people.motion.file: {file} lasts {duration:.3g} s ({len(self.recording)} frames), expected {TURN:g} s "
+                "or more: choose a longer recording"
             )
         if not 0 <= self.start <= duration:
-            raise ValueError(f"people.motion.start = {self.start:g} s is not in {file}, which lasts {duration:.4g} s")
-        _ = self._recorded  # a skeleton that is not understood shows here
+            raise ValueError(
+                f"people.motion.start = {self.start:g} s is not within {file}: expected 0 to {duration:.4g} s"
+            )
+        _ = self._source  # raises if the skeleton cannot be mapped
 
     @cached_property
-    def _recorded(self) -> SourceMotion:
+    def _source(self) -> SourceMotion:
         return source_motion(self.recording, rate=RATE)
 
     @property
     def time(self) -> Floats:
-        """Seconds from the file's first frame, (N,), about ``RATE`` a second."""
-        return self._recorded.time
+        """Times from the first frame of the file in seconds, (N,), about ``RATE`` per second."""
+        return self._source.time
 
     def moment(self, time: ArrayLike) -> Floats:
-        """Seconds into the clip at times (...): back and forth, from ``start`` at time 0."""
+        """Return the time in the recording, (...) seconds, at times (...): back and forth, ``start`` at time 0."""
         return back_and_forth(np.asarray(time, float), start=self.start, end=float(self.time[-1]))
 
     def path(self, kinematics: Kinematics) -> Floats:
-        """Way of the body's pelvis over ``time``, (N, 2) metres, as if it were at the origin and faced +x at
-        ``start``.
-        """
-        turns = Rotation.from_matrix(self._recorded.turns["pelvis"]).as_quat(scalar_first=True)
-        way = pelvis_path(self._recorded, kinematics)
-        place, bearing = self._begin(np.concatenate([way, turns], axis=1))
+        """Return the path of the pelvis over ``time``, (N, 2) metres; at ``start`` it is at the origin, facing +x."""
+        turns = Rotation.from_matrix(self._source.turns["pelvis"]).as_quat(scalar_first=True)
+        way = pelvis_path(self._source, kinematics)
+        place, bearing = self._start_pose(np.concatenate([way, turns], axis=1))
         return Rotation.from_euler("Z", -bearing).apply(way - place)[:, :2]
 
     def perform(
@@ -86,40 +85,40 @@ class Clip:
         bearing: float,
         rng: np.random.Generator | None = None,
     ) -> Motion:
-        """The clip on a body.
+        """Return the motion of the clip, performed by a body.
 
         Args:
-            kinematics: the body.
-            time: seconds, (T,), ascending.
-            place: where the pelvis is at time 0, (2,) metres.
-            bearing: where it then faces, radians from the x axis.
-            rng: not used: a recording leaves nothing to draw.
+            kinematics: body.
+            time: times in seconds, (T,), ascending.
+            place: position of the pelvis at time 0, (2,) metres.
+            bearing: facing direction at time 0, radians from the x axis.
+            rng: not used, because a recording has nothing to draw.
         """
-        whole = retarget(self._recorded, kinematics)
-        origin, facing = self._begin(whole.root)
+        whole = retarget(self._source, kinematics)
+        origin, facing = self._start_pose(whole.root)
         shift = Rotation.from_euler("Z", bearing - facing)
         root, angles = whole.read(self.moment(time))
         position = shift.apply(root[:, :3] - origin) + [*np.asarray(place, float), 0.0]
         turn = (shift * Rotation.from_quat(root[:, 3:], scalar_first=True)).as_quat(scalar_first=True)
         return Motion(np.asarray(time, float), np.concatenate([position, turn], axis=1), angles)
 
-    def _begin(self, root: Floats) -> tuple[Floats, float]:
-        """The point of the floor (x, y, 0) over which a pelvis (N, 7) is at the start, and where it then faces."""
+    def _start_pose(self, root: Floats) -> tuple[Floats, float]:
+        """Return floor position (x, y, 0) and facing direction of a pelvis (N, 7) at the start."""
         pose = interpolate_poses(self.time, root, self.start)
         forward = Rotation.from_quat(pose[3:], scalar_first=True).apply([1.0, 0.0, 0.0])
         return np.array([pose[0], pose[1], 0.0]), float(np.arctan2(forward[1], forward[0]))
 
 
 def back_and_forth(time: Floats, *, start: float, end: float) -> Floats:
-    """From ``start`` at time 0 to ``end``, back to 0 and so on, (...): at the speed of time but for the turns.
+    """Return clip time, (...), that runs from ``start`` at time 0 to ``end``, back to 0 and so on.
 
-    Around a turn speed changes evenly from 1 to -1, which takes ``TURN`` seconds and stays TURN / 4 from the tip that
-    an abrupt turn would reach; the tips are set so that 0 and ``end`` are just reached.
+    The speed is 1, except in reversals, where it changes linearly from 1 to -1 within ``TURN`` seconds. A reversal
+    stays TURN / 4 below the tip of an abrupt one; the tips are set so that 0 and ``end`` are just reached.
     """
     bow = TURN / 4
-    low, high = -bow, end + bow  # tips of the abrupt turns
+    low, high = -bow, end + bow  # tips of the abrupt reversals
     span = high - low
-    # The place on the abrupt zigzag that is eased to ``start``: near a tip solve the parabola, else it is start itself.
+    # Position on the abrupt zigzag that is smoothed to ``start``: near a tip from the parabola, else ``start``.
     begin = start
     if start < low + TURN / 2:
         begin = low + np.sqrt(max(start, 0.0) * TURN)
@@ -133,19 +132,19 @@ def back_and_forth(time: Floats, *, start: float, end: float) -> Floats:
 
 
 def load_clip(mocap: Mocap) -> Clip:
-    """Read the motion that a scenario names.
+    """Load the recorded motion of a scenario.
 
     Args:
-        mocap: the section ``people.motion``.
+        mocap: section ``people.motion``.
 
     Raises:
-        ValueError: a file that is not there or not understood, naming the key or the file and line.
+        ValueError: the file does not exist or is not valid; the message names the key, or file and line.
     """
     file = Path(mocap.file)
     if file.suffix.lower() not in (".amc", ".bvh"):
         raise ValueError(f"people.motion.file = {mocap.file!r}: expected the name of an AMC or a BVH file")
     if not file.is_file():
-        raise ValueError(f"people.motion.file = {mocap.file!r}: there is no such file")
+        raise ValueError(f"people.motion.file = {mocap.file!r}: no such file")
     if file.suffix.lower() == ".bvh":
         return Clip(read_bvh(file), mocap.start)
     return Clip(read_amc(file, read_asf(_skeleton(mocap, file))), mocap.start)
@@ -155,12 +154,12 @@ def _skeleton(mocap: Mocap, file: Path) -> Path:
     if mocap.skeleton:
         skeleton = Path(mocap.skeleton)
         if not skeleton.is_file():
-            raise ValueError(f"people.motion.skeleton = {mocap.skeleton!r}: there is no such file")
+            raise ValueError(f"people.motion.skeleton = {mocap.skeleton!r}: no such file")
         return skeleton
     beside = sorted(path for path in file.parent.iterdir() if path.suffix.lower() == ".asf")
     if len(beside) != 1:
         raise ValueError(
-            f"people.motion.file = {mocap.file!r}: an AMC file needs its skeleton, and there are {len(beside)} ASF "
-            "files beside it: name it by people.motion.skeleton"
+            f"people.motion.file = {mocap.file!r}: expected one ASF file (the skeleton) beside the AMC file, found "
+            f"{len(beside)}: set people.motion.skeleton to its name"
         )
     return beside[0]

@@ -1,9 +1,9 @@
-"""Recorded feet on our floor: when a foot stands, where it then stays, and how it gets from one stand to the next.
+"""Foot contact of recorded motion: detection of stances, and removal of foot skate.
 
-The recorded way of a foot is kept but for a correction. While the foot stands, the correction holds it: one print, one
-bearing, the sole rolling over its edges without slipping. In between the correction
-fades from the one stand's to the next's. Heights are told as the clearance between sole and floor, 0 in a stand, so
-that a foot never sinks; ground that rises and falls under the recorded feet is so made flat.
+The recorded path of a foot is kept, apart from a correction. During a stance the correction holds the foot: one
+footprint, one bearing, and a sole that rolls over its edges without slipping. Between stances the correction is blended
+from one stance to the next. Heights are given as the clearance between sole and floor, 0 in a stance, so that a foot is
+never below the floor; uneven ground under the recorded feet becomes flat.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Bools, Floats
 from simharness.world.motion.poses.timing import smoothstep
 
-_STILL = 0.45  # m/s: a point of the sole that is slower may stand; swinging feet pass 1 m/s at once
-_STAND, _GAP = 0.1, 0.07  # seconds: no stand is shorter, none is interrupted by less
-_SWINGING = 1.0  # m/s: a foot that is faster carries nobody, so the other does
-_RAISED = 0.10  # metres over the lowest foot within a second: such a foot may be held up, however still
-_NOISE = np.radians(4.0)  # pitch within which a standing foot lies flat
-_LEVEL = np.radians(25.0)  # recorded feet whose stands are further from flat are believed
-_STEEP = np.radians(45.0)  # pitch from which a foot does not stand on its sole
-_FADE = 0.15  # seconds in which a correction's own velocity dies away
-_CLEARANCE = 0.015  # metres, the least in the middle of a swing
+_STILL = 0.45  # m/s: slower points of the sole may be in stance; swinging feet exceed 1 m/s at once
+_STAND, _GAP = 0.1, 0.07  # seconds: shortest stance, and shortest gap between stances
+_SWINGING = 1.0  # m/s: a faster foot carries no weight, so the other one does
+_RAISED = 0.10  # metres above the lowest foot within a second: above it a still foot may be held in the air
+_NOISE = np.radians(4.0)  # largest pitch of a stance foot that is taken as flat
+_LEVEL = np.radians(25.0)  # feet with larger pitch or tilt in stance are kept as recorded
+_STEEP = np.radians(45.0)  # pitch above which a foot does not stand on its sole
+_FADE = 0.15  # seconds in which the velocity of a correction decays
+_CLEARANCE = 0.015  # metres: least clearance in the middle of a swing
 
 
 @dataclass(frozen=True)
 class Sole:
-    """The underside of one foot: the corners of its hull relative to the ankle while it lies flat, (n, 3) metres."""
+    """Sole of one foot: corners of its convex hull relative to the ankle of the flat foot, (n, 3) metres."""
 
     points: Floats
 
     def height(self, turn: Floats) -> Floats:
-        """Height of the ankle over the lowest point for orientations (T, 3, 3), (T,) metres."""
+        """Return the height of the ankle above the lowest point for orientations (T, 3, 3), (T,) metres."""
         return -(turn[:, 2, :] @ self.points.T).min(axis=1)
 
     def rolled(self, turn: Floats) -> Floats:
-        """How far the ankle goes, (T, 2) metres from where it is first, while the sole rolls through orientations.
+        """Return the path of the ankle relative to its first position, (T, 2) metres, while the sole rolls.
 
-        From frame to frame the lowest point stays where it is.
+        From frame to frame, through orientations (T, 3, 3), the lowest point stays in place.
         """
         points = turn @ self.points.T
         lowest = points[:, 2].argmin(axis=1)
@@ -55,17 +55,17 @@ class Sole:
 
 @dataclass(frozen=True)
 class FootPath:
-    """The way of one foot on our floor, which is at 0.
+    """Path of one foot on the flat floor at height 0.
 
     Attributes:
-        turn: orientation against the neutral foot that the recording asks for, (T, 3, 3).
-        clearance: between the sole and the floor, (T,) metres, 0 where it stands.
-        ground: height that the recording's floor seems to have under the foot, (T,) metres.
-        recorded: where the ankle is in the recording, (T, 2) metres.
-        stances: first and last-but-one frame of every stand.
-        anchors: of every stand, where the ankle is over the floor but for the sole's rolling, (S, 2) metres.
-        sole: of the foot.
-        rate: frames a second.
+        turn: orientation relative to the neutral foot, (T, 3, 3).
+        clearance: height of the sole above the floor, (T,) metres, 0 in stances.
+        ground: estimated height of the recorded ground under the foot, (T,) metres.
+        recorded: recorded position of the ankle, (T, 2) metres.
+        stances: first frame of every stance, and the frame after its last.
+        anchors: position of the ankle in every stance without the rolling of the sole, (S, 2) metres.
+        sole: sole of the foot.
+        rate: frames per second.
     """
 
     turn: Floats
@@ -78,7 +78,7 @@ class FootPath:
     rate: float
 
     def ankle(self, turn: Floats) -> Floats:
-        """The way of the ankle, (T, 3) metres, of a foot that is turned so, (T, 3, 3), and does not slip."""
+        """Return the path of the ankle, (T, 3) metres, for orientations (T, 3, 3) of a foot that does not slip."""
         held = self.recorded.copy()
         for (start, stop), anchor in zip(self.stances, self.anchors, strict=True):
             held[start:stop] = anchor + self.sole.rolled(turn[start:stop])
@@ -87,7 +87,7 @@ class FootPath:
 
 
 def make_sole(points: Floats) -> Sole:
-    """A sole from skin under a foot (n, 3), as ``Kinematics.soles`` gives it."""
+    """Return the sole for skin vertices under a foot (n, 3), see ``Kinematics.soles``."""
     try:
         corners = points[ConvexHull(points).vertices]
     except QhullError:
@@ -96,16 +96,16 @@ def make_sole(points: Floats) -> Sole:
 
 
 def detect_stances(ankle: Floats, turn: Floats, soles: tuple[Sole, Sole], *, rate: float) -> Bools:
-    """When each foot stands, (2, T).
+    """Return the frames in which each foot is in stance, (2, T).
 
-    A foot stands while its heel or its toes are still, if it is down with the lowest one around that time or if the
-    other one swings meanwhile; else it may be held up in the air.
+    A foot is in stance while its heel or toes are still, if it is about as low as the lowest foot at that time or if
+    the other foot swings; otherwise it may be held in the air.
 
     Args:
-        ankle: of both feet, (2, T, 3) metres; heights may be off by a constant.
-        turn: (2, T, 3, 3).
-        soles: of both feet.
-        rate: frames a second.
+        ankle: positions of both ankles, (2, T, 3) metres; heights may have a constant offset.
+        turn: orientations of both feet, (2, T, 3, 3).
+        soles: soles of both feet.
+        rate: frames per second.
     """
     frames = ankle.shape[1]
     speed, lowest = np.zeros((2, frames, 2)), np.empty((2, frames))
@@ -127,7 +127,7 @@ def detect_stances(ankle: Floats, turn: Floats, soles: tuple[Sole, Sole], *, rat
 
 
 def _tidied(on: Bools, rate: float) -> Bools:
-    """Without gaps and then without stands that are too short."""
+    """Return the stances (T,) with short gaps closed and then short stances removed."""
     on = on.copy()
     for wanted, least in ((False, _GAP), (True, _STAND)):
         for start, stop in runs(on == wanted):
@@ -137,20 +137,20 @@ def _tidied(on: Bools, rate: float) -> Bools:
 
 
 def runs(on: Bools) -> list[tuple[int, int]]:
-    """First and last-but-one index of every run of True in (T,)."""
+    """Return, for every run of True in (T,), its first index and the index after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def plant_foot(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate: float) -> FootPath:
-    """Hold one recorded foot where it stands.
+    """Return the path of one recorded foot, held in place during its stances.
 
     Args:
-        ankle: its recorded way, (T, 3) metres; heights may be off by a constant.
-        turn: its recorded orientation against a foot that lies flat and points forward, (T, 3, 3).
-        standing: (T,).
-        sole: of the foot.
-        rate: frames a second.
+        ankle: recorded path of the ankle, (T, 3) metres; heights may have a constant offset.
+        turn: recorded orientation relative to a flat foot that points forward, (T, 3, 3).
+        standing: frames in stance, (T,).
+        sole: sole of the foot.
+        rate: frames per second.
     """
     turn = _levelled(turn, standing)
     clearance = ankle[:, 2] - sole.height(turn)
@@ -176,7 +176,7 @@ def plant_foot(ankle: Floats, turn: Floats, standing: Bools, sole: Sole, *, rate
 
 
 def _levelled(turn: Floats, standing: Bools) -> Floats:
-    """Turned about the foot's own axes so that it lies flat in the middle of its stands."""
+    """Return orientations rotated in the foot frame so that the foot is flat in its median stance."""
     if not standing.any():
         return turn
     _, pitch, tilt = _angles(turn)
@@ -188,7 +188,7 @@ def _levelled(turn: Floats, standing: Bools) -> Floats:
 
 
 def _angles(turn: Floats) -> tuple[Floats, Floats, Floats]:
-    """Bearing, pitch (toes up positive) and tilt of a foot, each (T,) and continuous."""
+    """Return bearing, pitch (toes up positive) and tilt of a foot, each (T,) and continuous."""
     toes, side = turn[:, :, 0], turn[:, 2, 1]
     level = np.hypot(toes[:, 0], toes[:, 1])
     bearing = np.unwrap(np.arctan2(toes[:, 1], toes[:, 0]))
@@ -197,7 +197,7 @@ def _angles(turn: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _settled(angles: Floats) -> Floats:
-    """Bearing, pitch and tilt (n, 3) of one stand: one bearing, flat within the noise, not tilted.
+    """Return bearing, pitch and tilt (n, 3) of one stance: constant bearing, flat within the noise, no tilt.
 
     A foot on the tips of its toes, as in kneeling, stays as recorded.
     """
@@ -205,13 +205,15 @@ def _settled(angles: Floats) -> Floats:
     if np.median(np.abs(pitch)) > _STEEP:
         return angles
     beyond = np.maximum(np.abs(pitch) - _NOISE, 0.0)
-    flat = np.sign(pitch) * beyond**2 / (beyond + 0.5 * _NOISE)  # nearly as recorded where far from flat, and smooth
+    flat = (
+        np.sign(pitch) * beyond**2 / (beyond + 0.5 * _NOISE)
+    )  # close to the recorded pitch where it is large, and smooth
     bearing = np.full(len(pitch), np.average(bearing, weights=_flatness(pitch)))
     return np.column_stack([bearing, flat, np.zeros(len(pitch))])
 
 
 def _anchor(place: Floats, turn: Floats, sole: Sole) -> Floats:
-    """Where to stand, (2,), so that the rolling foot is nearest to its recorded places (n, 2) while it lies flat."""
+    """Return the anchor, (2,), with the rolling foot nearest to its recorded positions (n, 2) where it is flat."""
     return np.average(place - sole.rolled(turn), axis=0, weights=_flatness(_angles(turn)[1]))
 
 
@@ -220,7 +222,7 @@ def _flatness(pitch: Floats) -> Floats:
 
 
 def _faded(correction: Floats, stances: list[tuple[int, int]], rate: float) -> Floats:
-    """Corrections (T, n) known in stands, carried smoothly through what lies between."""
+    """Return corrections (T, n), given in stances, interpolated smoothly between them."""
     frames = len(correction)
     result = correction.copy()
     if not stances:
@@ -231,7 +233,7 @@ def _faded(correction: Floats, stances: list[tuple[int, int]], rate: float) -> F
             continue
         first = leave > 0
         last = land < frames
-        span = land - leave + 1  # steps from the last frame of a stand to the first of the next
+        span = land - leave + 1  # frames from the end of a stance to the start of the next
         along = np.arange(1, span)
         share = smoothstep(along / span)[:, None]
         before = correction[leave - 1] if first else correction[land]
@@ -247,12 +249,12 @@ def _faded(correction: Floats, stances: list[tuple[int, int]], rate: float) -> F
 
 
 def _dying(steps: NDArray[np.int64], fade: float) -> Floats:
-    """A way that begins with velocity 1 and ends after ``fade`` steps where it began."""
+    """Return a curve that starts at 0 with velocity 1 and is back at 0 after ``fade`` steps."""
     return np.where(steps < fade, steps * (1 - np.minimum(steps / fade, 1.0)) ** 2, 0.0)
 
 
 def _ground(clearance: Floats, stances: list[tuple[int, int]]) -> Floats:
-    """Height of the ground under a foot, (T,): that of its stands, and straight from one to the next."""
+    """Return the height of the ground under a foot, (T,): constant in stances, linear between them."""
     if not stances:
         return np.full(len(clearance), clearance.min())
     levels = [float(np.median(clearance[start:stop])) for start, stop in stances]
@@ -261,7 +263,7 @@ def _ground(clearance: Floats, stances: list[tuple[int, int]]) -> Floats:
 
 
 def _lifted(clearance: Floats, stances: list[tuple[int, int]]) -> Floats:
-    """Clearance (T,) that is 0 in stands and never less, and rises and lands smoothly."""
+    """Return the clearance (T,), 0 in stances and positive otherwise, with smooth take-off and landing."""
     frames = len(clearance)
     result = np.zeros(frames)
     floating = np.ones(frames, bool)
@@ -269,7 +271,7 @@ def _lifted(clearance: Floats, stances: list[tuple[int, int]]) -> Floats:
         floating[start:stop] = False
     for start, stop in runs(floating):
         along = (np.arange(start, stop) - start + 1) / (stop - start + 1)
-        # The power makes a foot that moves leave the floor at once.
+        # The power lets a moving foot leave the floor at once.
         up = smoothstep(along / 0.2) ** 0.7 if start > 0 else np.ones(len(along))
         down = smoothstep((1 - along) / 0.2) ** 0.7 if stop < frames else np.ones(len(along))
         least = _CLEARANCE * up * down

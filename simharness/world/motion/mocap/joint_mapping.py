@@ -1,4 +1,4 @@
-"""Which joint of a recorded skeleton is which of a person's, told by its name and by what hangs on what."""
+"""Mapping of the joints of a recorded skeleton to a person, by joint names and hierarchy."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.mocap.skeleton import Recording, Skeleton, lowest_common_ancestor
 
-# By role the names it goes by, without the side, the best first: CMU's, MotionBuilder's, Biovision's, Poser's, 3ds
-# Max's, Blender's. What follows another in one limb may share its name ("shoulder" is the collar bone of one and the
-# upper arm of another), so the first that is there counts.
+# Joint names by role, without the side, best first: of CMU, MotionBuilder, Biovision, Poser, 3ds Max and Blender. Two
+# roles of a limb may share a name ("shoulder" is the clavicle in one skeleton and the upper arm in another), so the
+# first match counts.
 _NAMES = {
     "thigh": ("upleg", "upperleg", "femur", "thigh", "hip"),
     "shank": ("leg", "tibia", "shin", "calf", "lowerleg", "lowleg", "knee"),
@@ -30,17 +30,19 @@ _LIMBS = (("thigh", "shank", "foot", "toes"), ("collar", "arm", "forearm", "hand
 _SIDE_WORDS = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _PADDING = re.compile(r"^(bip|bip01|mixamorig|bvh|def|jnt|joint|bone|j|b|\d+)$")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_UPRIGHT = 0.75  # cosine between the vertical and each segment of a person who stands, legs astride at most
+_UPRIGHT = 0.75  # least cosine between the vertical and each segment of a standing person, with legs apart
 
 
 @dataclass(frozen=True)
 class JointMap:
-    """The joints of a skeleton that matter to us, as indices; -1 where a skeleton has none.
+    """Indices of the joints of a person in a skeleton; -1 for joints that the skeleton does not have.
 
     Attributes:
-        pelvis: carries both legs. chest: carries both arms. head: the skull.
-        limbs: by side and role ("thigh", "shank", "foot", "toes", "collar", "arm", "forearm", "hand").
-        axes: columns are forward, left and up in the file's coordinates, (3, 3).
+        pelvis: joint that carries both legs.
+        chest: joint that carries both arms.
+        head: joint of the skull.
+        limbs: joints by side and role ("thigh", "shank", "foot", "toes", "collar", "arm", "forearm", "hand").
+        axes: axes of the person in the coordinates of the file, (3, 3); columns are forward, left and up.
     """
 
     pelvis: int
@@ -51,10 +53,10 @@ class JointMap:
 
 
 def map_joints(recording: Recording) -> JointMap:
-    """Find a person in the skeleton of a recording.
+    """Map the skeleton of a recording to the joints of a person.
 
     Raises:
-        ValueError: what is missing, and the joints that are there; or that the zero pose does not stand.
+        ValueError: joints are missing (the message lists the existing ones), or the zero pose does not stand upright.
     """
     skeleton = recording.skeleton
     named = [_side_and_word(name) for name in skeleton.names]
@@ -76,7 +78,7 @@ def map_joints(recording: Recording) -> JointMap:
     if missing:
         raise ValueError(
             f"{recording.file}: this skeleton has no {'; no '.join(missing)}; its joints are "
-            f"{', '.join(skeleton.names[:80])}: rename them, or take another file"
+            f"{', '.join(skeleton.names[:80])}: rename them, or choose another file"
         )
     for side in SIDES:
         for limb in _LIMBS:
@@ -94,7 +96,7 @@ def _above(skeleton: Skeleton, joint: int) -> int:
 
 
 def _side_and_word(name: str) -> tuple[str | None, str]:
-    """A name's side and the rest of it: "mixamorig:LeftUpLeg", "lUpLeg" and "UpLeg.L" are all ("left", "upleg")."""
+    """Split a joint name into side and rest: "mixamorig:LeftUpLeg", "lUpLeg" and "UpLeg.L" are ("left", "upleg")."""
     words = [word.lower() for word in _WORD.findall(re.split(r"[:|]", name)[-1])]
     words = [word for word in words if not _PADDING.match(word)] or [""]
     sides = [word for word in words if word in _SIDE_WORDS]
@@ -109,20 +111,21 @@ def _side_and_word(name: str) -> tuple[str | None, str]:
     return None, joined
 
 
-def _check_limb(recording: Recording, side: str, limb: tuple[str, ...], found: dict[str, int]) -> None:
-    """The joints of a limb hang on each other in its order."""
-    chain = [role for role in limb if found[role] >= 0]
+def _check_limb(recording: Recording, side: str, limb: tuple[str, ...], joints: dict[str, int]) -> None:
+    """Raise ValueError unless the joints of a limb form a chain in their order."""
+    chain = [role for role in limb if joints[role] >= 0]
     names = recording.skeleton.names
     for upper, lower in pairwise(chain):
-        if found[upper] not in recording.skeleton.ancestors(found[lower]):
+        if joints[upper] not in recording.skeleton.ancestors(joints[lower]):
             raise ValueError(
-                f"{recording.file}: {names[found[lower]]!r} was taken for the {side} {lower} and "
-                f"{names[found[upper]]!r} for the {side} {upper}, but the one does not hang on the other: rename them"
+                f"{recording.file}: {names[joints[lower]]!r} was mapped to the {side} {lower} and "
+                f"{names[joints[upper]]!r} to the {side} {upper}, but the first is not a descendant of the second: "
+                "rename them"
             )
 
 
 def _axes(recording: Recording, limbs: dict[str, dict[str, int]]) -> Floats:
-    """The person's axes in the file's coordinates, from how the skeleton stands in its zero pose."""
+    """Return the axes of the person in the coordinates of the file, from the zero pose of the skeleton."""
     zero = recording.skeleton.zero
     thigh, shank, foot, arm = (
         np.array([zero[limbs[side][role]] for side in SIDES]) for role in ("thigh", "shank", "foot", "arm")
@@ -138,9 +141,8 @@ def _axes(recording: Recording, limbs: dict[str, dict[str, int]]) -> Floats:
     standing = lengths.min() > 0 and (segments @ up / np.where(lengths > 0, lengths, 1.0)).min() > _UPRIGHT
     if not standing or np.linalg.norm(left) < 1e-3 * lengths.max():
         raise ValueError(
-            f"{recording.file}: with all angles 0 this skeleton does not stand upright with its hips beside each "
-            "other, so that its joint angles mean nothing to a body that does: export it with a standing zero pose "
-            "(T or A pose)"
+            f"{recording.file}: the zero pose of this skeleton (all angles 0) does not stand upright with its hips "
+            "side by side, so its joint angles cannot be retargeted: export it with a standing zero pose (T or A pose)"
         )
     left /= np.linalg.norm(left)
     return np.stack([np.cross(left, up), left, up], axis=1)

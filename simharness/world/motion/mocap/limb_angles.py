@@ -1,8 +1,8 @@
-"""Joint angles of a limb from the directions of its segments, a whole motion at once and smooth in time.
+"""Joint angles of a limb from the directions of its segments, solved for a whole motion and smooth in time.
 
-Directions are given in the frame of what carries the limb, as a left limb's: those of a right one are mirrored, and so
-are its hinges, so that the same angles come of it. Where directions leave an angle open (the twist of a straight arm)
-or two sets of angles give the same ones (a raised arm), smoothness decides.
+Directions are given in the frame of the parent of the limb, for a left limb; those of a right limb are mirrored, as are
+its hinges, so that the angles are the same. If the directions do not determine an angle (the twist of a straight arm)
+or allow two solutions (a raised arm), the smoother solution is taken.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from simharness.world.humans.mujoco_model import HINGES
 
 _X, _Y, _Z = np.eye(3)
 _ITERATIONS = 12
-_LARGEST_STEP = 0.4  # radians an iteration
-_SMOOTH = 1.5  # weight of an angle's acceleration (radians a frame^2): passes what is slower than about 8 Hz at 60 Hz
-_EASE = 0.03  # weight of an angle's distance from ease: decides where nothing else does
-_LAZY = 0.01  # of two ways to raise an arm equally well, the one with the smaller angles
+_LARGEST_STEP = 0.4  # radians per iteration
+_SMOOTH = 1.5  # weight of angular acceleration (radians per frame²): passes motion below about 8 Hz at 60 Hz
+_EASE = 0.03  # weight of the distance from the relaxed angles: decides where nothing else does
+_LAZY = 0.01  # weight of the angles themselves: prefers the smaller of two equivalent solutions
 ARM: tuple[str, ...] = (
     "shoulder_flexion",
     "shoulder_abduction",
@@ -31,18 +31,18 @@ ARM: tuple[str, ...] = (
     "forearm_pronation",
     "wrist_flexion",
 )
-"""Hinges from the collar bone to the hand, without the side."""
+"""Names of the hinges from the clavicle to the hand, without the side."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """A direction on a limb that shall point somewhere.
+    """Direction on a limb with a target direction.
 
     Attributes:
-        hinges: how many hinges, from the first, move it.
-        neutral: where it points in the neutral pose, (3,).
-        target: where it shall point, (T, 3) unit vectors.
-        weight: of its error against that of others.
+        hinges: number of hinges, from the first, that move it.
+        neutral: direction in the neutral pose, (3,).
+        target: target directions, (T, 3) unit vectors.
+        weight: weight of its error relative to others.
     """
 
     hinges: int
@@ -52,13 +52,13 @@ class Aim:
 
 
 def arm_angles(upper: Floats, fore: Floats, hand: Floats | None, thumb: Floats | None) -> Floats:
-    """Angles (T, 6) of ``ARM``, within their ranges, from directions (T, 3) in the frame of the collar bone.
+    """Return angles (T, 6) of ``ARM``, within their ranges, from directions (T, 3) in the clavicle frame.
 
     Args:
-        upper: from shoulder to elbow.
-        fore: from elbow to wrist.
-        hand: along the hand; None: unknown, it follows the forearm.
-        thumb: from the little finger's side of the palm to the thumb's; None: unknown.
+        upper: direction from shoulder to elbow.
+        fore: direction from elbow to wrist.
+        hand: direction along the hand; None: unknown, follows the forearm.
+        thumb: direction across the palm from the little finger to the thumb; None: unknown.
     """
     aims = [Aim(3, -_Z, upper, 1.0), Aim(4, -_Z, fore, 1.0)]
     if hand is not None and thumb is not None:
@@ -70,25 +70,25 @@ def arm_angles(upper: Floats, fore: Floats, hand: Floats | None, thumb: Floats |
 
 
 def thigh_and_shank(thigh: Floats, shank: Floats) -> Floats:
-    """Flexion, abduction and rotation of the hip and flexion of the knee, (T, 4), from directions (T, 3)."""
+    """Return hip flexion, abduction and rotation and knee flexion, (T, 4), from directions (T, 3)."""
     flexion, abduction = np.arctan2(thigh[:, 0], -thigh[:, 2]), np.arcsin(np.clip(thigh[:, 1], -1, 1))
     inner = _into(_turn(-_Y, flexion) @ _turn(_X, abduction), shank)
     knee = np.arctan2(np.hypot(inner[:, 0], inner[:, 1]), -inner[:, 2])
-    # Of a straight knee the twist is open; it fades in as the knee bends.
+    # The twist of a straight knee is undetermined; it fades in as the knee bends.
     rotation = np.arctan2(inner[:, 1] * np.sin(knee), 0.02 + np.maximum(-inner[:, 0], 0.0) * np.sin(knee))
     return np.stack([flexion, abduction, rotation, knee], axis=-1)
 
 
 def solve_directions(names: list[str], aims: list[Aim], *, start: Floats, ease: Floats) -> Floats:
-    """Angles (T, n) of hinges, within their ranges, that bring directions to their targets smoothly.
+    """Return angles (T, n) of hinges, within their ranges, that bring directions to their targets smoothly.
 
-    Gauss-Newton over all frames together: the normal equations are banded, for only neighbours in time are coupled.
+    Gauss-Newton over all frames together; the normal equations are banded because only neighbours in time are coupled.
 
     Args:
-        names: of n hinges from the trunk outwards, of ``DOFS``.
-        aims: what points where.
-        start: angles (T, n) to start from.
-        ease: angles (n,) that are preferred where the aims leave them open.
+        names: names of n hinges from the trunk outwards, from ``DOFS``.
+        aims: directions and their targets.
+        start: start angles (T, n).
+        ease: relaxed angles (n,), preferred where the aims do not determine them.
     """
     hinges = [HINGES[DOFS.index(name)] for name in names]
     low, high = np.array([hinge.range for hinge in hinges]).T
@@ -127,7 +127,7 @@ def solve_directions(names: list[str], aims: list[Aim], *, start: Floats, ease: 
 
 
 def _second_differences(frames: int) -> Floats:
-    """The lower bands (3, T) of D'D, where D takes second differences."""
+    """Return the lower bands (3, T) of D'D, where D takes second differences."""
     bands = np.zeros((3, frames))
     kernel = (1.0, -2.0, 1.0)
     rows = max(frames - 2, 0)
@@ -138,7 +138,7 @@ def _second_differences(frames: int) -> Floats:
 
 
 def _apply(bands: Floats, values: Floats) -> Floats:
-    """The symmetric matrix of lower bands (3, T) times values (T, n)."""
+    """Return the symmetric matrix with lower bands (3, T) times values (T, n)."""
     result = bands[0][:, None] * values
     for gap in (1, 2):
         weight = bands[gap][: len(values) - gap, None] if len(values) > gap else np.zeros((0, 1))
@@ -149,7 +149,7 @@ def _apply(bands: Floats, values: Floats) -> Floats:
 
 
 def _euler(upper: Floats, fore: Floats) -> Floats:
-    """The two sets of shoulder flexion, abduction, rotation and elbow flexion that give two directions, (2, T, 4)."""
+    """Return the two solutions for shoulder flexion, abduction, rotation and elbow flexion, (2, T, 4)."""
     sets = []
     for over in (False, True):
         flexion, abduction = np.arctan2(upper[:, 0], -upper[:, 2]), np.arcsin(np.clip(upper[:, 1], -1, 1))
@@ -162,12 +162,12 @@ def _euler(upper: Floats, fore: Floats) -> Floats:
 
 
 def _continuous(sets: Floats) -> Floats:
-    """Of several sets of angles (S, T, n) the way through time, (T, n), of least strain and jumps (Viterbi, 1967)."""
+    """Choose among S solutions (S, T, n) the sequence (T, n) with least strain and jumps (Viterbi, 1967)."""
     names = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation", "elbow_flexion")
     low, high = np.array([HINGES[DOFS.index(f"left_{name}")].range for name in names]).T
     middle = (low + high) / 2
     sets = middle + np.angle(np.exp(1j * (sets - middle)))
-    # What the twist of a straight arm is means nothing, nor what the flexion of one that points sideways is.
+    # The twist of a straight arm and the flexion of an arm that points sideways are undetermined: low weight.
     sure = np.stack([np.cos(sets[..., 1]) ** 2, np.ones(sets.shape[:2]), np.sin(sets[..., 3]) ** 2], axis=-1)
     beyond = np.maximum(sets - high, 0) + np.maximum(low - sets, 0)
     beyond[..., 2] *= np.sin(sets[..., 3])
@@ -194,5 +194,5 @@ def _turn(axis: Floats, angle: Floats) -> Floats:
 
 
 def _into(turn: Floats, vector: Floats) -> Floats:
-    """Vectors (T, 3) in turned frames (T, 3, 3)."""
+    """Transform vectors (T, 3) into rotated frames (T, 3, 3)."""
     return (turn.swapaxes(1, 2) @ vector[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""The lines of a motion file, each with its number: whatever is wrong with one is told with file and line."""
+"""Line reader for text files of motion; error messages name file and line."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-_LARGEST = 1e6  # no length in any unit and no angle of a person comes to this
+_LARGEST = 1e6  # larger than any length in any unit or angle of a person
 
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a file.
+    """Line of a file.
 
     Attributes:
         file: name of the file.
-        number: counted from 1.
-        words: what stands on it, split at white space.
+        number: line number, counted from 1.
+        words: words of the line, split at white space.
     """
 
     file: str
@@ -24,19 +24,19 @@ class Line:
     words: tuple[str, ...]
 
     def error(self, message: str) -> ValueError:
-        """An error about this line."""
+        """Return an error about this line."""
         return ValueError(f"{self.file}, line {self.number}: {message}")
 
     def numbers(self, words: tuple[str, ...], count: int | None, what: str) -> list[float]:
-        """``words`` as numbers.
+        """Return ``words`` as numbers.
 
         Args:
-            words: some of the line's.
-            count: how many there must be; None: any.
-            what: they are for, for the message.
+            words: some words of the line.
+            count: required number of words; None: any.
+            what: name of the values, for the message.
 
         Raises:
-            ValueError: another count, or a word that is not a number of moderate size.
+            ValueError: wrong number of words, or a word that is not a number of moderate size.
         """
         if count is not None and len(words) != count:
             raise self.error(f"expected {count} value{'s' * (count != 1)} for {what}, got {len(words)}")
@@ -53,13 +53,13 @@ class Line:
 
 
 class Reader:
-    """Goes through the lines of a text file, leaving out empty ones and what follows a ``#``.
+    """Sequential reader of the lines of a text file; skips empty lines and comments after ``#``.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Raises:
-        ValueError: a file that cannot be read.
+        ValueError: the file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -78,11 +78,11 @@ class Reader:
         self._next = 0
 
     def peek(self) -> Line | None:
-        """The next line, which stays the next; None at the end."""
+        """Return the next line without consuming it; None at the end."""
         return self._lines[self._next] if self._next < len(self._lines) else None
 
     def take(self, expected: str) -> Line:
-        """The next line; at the end of the file a ValueError says what was expected."""
+        """Consume and return the next line; at the end of the file raise ValueError with what was ``expected``."""
         line = self.peek()
         if line is None:
             raise self._end.error(f"the file ends where {expected} was expected")
@@ -90,16 +90,16 @@ class Reader:
         return line
 
     def rest(self) -> list[Line]:
-        """All lines that are left, (n,)."""
+        """Consume and return all remaining lines."""
         lines = self._lines[self._next :]
         self._next = len(self._lines)
         return lines
 
     def error(self, message: str) -> ValueError:
-        """An error about the file as a whole."""
+        """Return an error about the whole file."""
         return ValueError(f"{self.file}: {message}")
 
 
 def quoted(word: str) -> str:
-    """A word of a file for a message, quoted and not too long."""
+    """Return a word of a file for a message, quoted and shortened."""
     return repr(word if len(word) <= 40 else word[:37] + "...")

@@ -1,4 +1,4 @@
-"""What a motion file holds: a skeleton of joints, and how they were turned in every frame."""
+"""Skeleton and joint rotations of a motion file."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
 
-END = " end"  # after the name of a joint: the tip of its bone, a joint that does not turn
+END = " end"  # suffix of a joint name: tip of its bone, a joint without rotation
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """J joints, parents before children, the root first. In the zero pose no joint is turned.
+    """Skeleton of J joints, the root first and parents before children. The zero pose has no rotations.
 
     Attributes:
-        names: of the joints, no two alike.
-        parents: (J,), -1 for the root.
-        offsets: from the parent to the joint in the zero pose, (J, 3), the file's unit of length.
+        names: unique names of the joints.
+        parents: index of each parent, (J,), -1 for the root.
+        offsets: vectors from the parent to the joint in the zero pose, (J, 3), in the length unit of the file.
     """
 
     names: tuple[str, ...]
@@ -31,34 +31,34 @@ class Skeleton:
 
     @property
     def zero(self) -> Floats:
-        """Places of the joints in the zero pose, the root at the origin, (J, 3)."""
+        """Positions of the joints in the zero pose with the root at the origin, (J, 3)."""
         places = np.zeros((len(self), 3))
         for joint in range(1, len(self)):
             places[joint] = places[self.parents[joint]] + self.offsets[joint]
         return places
 
     def ancestors(self, joint: int) -> list[int]:
-        """The joint, its parent and so on to the root."""
+        """Return the joint, its parent and so on to the root."""
         line = [joint]
         while self.parents[line[-1]] >= 0:
             line.append(int(self.parents[line[-1]]))
         return line
 
     def children(self, joint: int) -> list[int]:
-        """The joints whose parent it is."""
+        """Return the children of a joint."""
         return np.flatnonzero(self.parents == joint).tolist()
 
 
 @dataclass(frozen=True)
 class Recording:
-    """N frames of a skeleton.
+    """Recorded motion of a skeleton in N frames.
 
     Attributes:
-        file: its name.
-        skeleton: J joints.
-        rate: frames a second.
-        root: place of the root in every frame, (N, 3), the file's unit of length.
-        turns: of every joint against its parent, (N, J, 4) quaternions w x y z.
+        file: name of the file.
+        skeleton: skeleton with J joints.
+        rate: frames per second.
+        root: position of the root in every frame, (N, 3), in the length unit of the file.
+        turns: rotation of every joint relative to its parent, (N, J, 4) quaternions w x y z.
     """
 
     file: str
@@ -72,11 +72,11 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last."""
+        """Time from the first frame to the last, seconds."""
         return (len(self) - 1) / self.rate
 
     def pose(self) -> tuple[Floats, Floats]:
-        """Forward kinematics: places (N, J, 3) of the joints, and their turns against the zero pose (N, J, 3, 3)."""
+        """Return positions (N, J, 3) of the joints and their rotations relative to the zero pose, (N, J, 3, 3)."""
         count = len(self.skeleton)
         local = Rotation.from_quat(self.turns.reshape(-1, 4), scalar_first=True).as_matrix().reshape(-1, count, 3, 3)
         places, turns = np.empty((len(self), count, 3)), np.empty_like(local)
@@ -89,6 +89,6 @@ class Recording:
 
 
 def lowest_common_ancestor(skeleton: Skeleton, first: int, second: int) -> int:
-    """The joint that carries both."""
+    """Return the nearest joint that is an ancestor of both."""
     above = set(skeleton.ancestors(first))
     return next(joint for joint in skeleton.ancestors(second) if joint in above)

@@ -1,1 +1,1 @@
-"""One body and its limbs: forward and inverse kinematics, feet on the floor, the timing of what is done."""
+"""Poses of one body: forward and inverse kinematics, foot placement, posture curves and timing."""

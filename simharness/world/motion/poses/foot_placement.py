@@ -1,4 +1,4 @@
-"""Where feet stand and step on a spot, and where a bent leg carries the hip."""
+"""Foot placement on a spot: footprints, steps between them, and the hip position over a bent leg."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import bump, ease
 
 TOE_OUT = np.radians(9.0)
-_AT_EASE = np.radians(10.0)  # flexion of the knees
-_LIFT = 0.05  # metres: of a foot that steps
-_PEEL = np.radians(22.0)  # the toes leave the floor last,
-PEELING = 0.12  # and the heel so many seconds before
+_AT_EASE = np.radians(10.0)  # knee flexion when standing relaxed
+_LIFT = 0.05  # metres: height of a step
+_PEEL = np.radians(22.0)  # pitch of a foot that leaves the floor over its toes
+PEELING = 0.12  # seconds from heel-off to toe-off
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Where a foot stands, in the frame of its spot: x ahead, y to the left.
+    """Footprint in the frame of its spot: x ahead, y to the left.
 
     Attributes:
-        place: of the ankle while the foot lies flat, metres.
+        place: position of the ankle over the flat foot, metres.
         bearing: direction of the toes, radians from straight ahead.
-        floor: height of what it stands on, metres.
-        pitch: toes up positive, radians; the foot has rolled from lying flat to there.
+        floor: height of the ground under the foot, metres.
+        pitch: pitch of the foot, toes up positive, radians; the foot has rolled there from lying flat.
     """
 
     place: tuple[float, float]
@@ -38,26 +38,26 @@ class Footprint:
     pitch: float = 0.0
 
     def moved(self, ahead: float = 0.0, left: float = 0.0, *, floor: float | None = None) -> Footprint:
-        """The same, elsewhere."""
+        """Return the footprint shifted by ``ahead`` and ``left`` in metres, on another floor height if given."""
         x, y = self.place
         return replace(self, place=(x + ahead, y + left), floor=self.floor if floor is None else floor)
 
 
 def stance(kinematics: Kinematics, side: str, *, apart: float = 1.0, out: float = TOE_OUT) -> Footprint:
-    """The print of one foot of a person who stands on the spot.
+    """Return the footprint of one foot of a person who stands on the spot.
 
     Args:
-        kinematics: the body.
-        side: of the foot.
-        apart: distance of the feet over that in the neutral stance.
-        out: how far the toes point outwards, radians.
+        kinematics: body.
+        side: side of the foot.
+        apart: distance between the feet relative to the neutral stance.
+        out: outward rotation of the toes, radians.
     """
     ankle = kinematics.legs[side].end
     return Footprint((float(ankle[0]), float(apart * ankle[1])), float(np.sign(ankle[1]) * out))
 
 
 def relaxed_pelvis_height(kinematics: Kinematics) -> float:
-    """Height of the pelvis of someone who stands with knees that give a little, metres."""
+    """Return the pelvis height of a person who stands with slightly bent knees, metres."""
     return kinematics.standing_height - float(1 - np.cos(_AT_EASE / 2)) * kinematics.leg_length
 
 
@@ -72,17 +72,17 @@ def foot_path(
     lift: float = _LIFT,
     peel: float = _PEEL,
 ) -> Foot:
-    """A foot that stands, and steps from print to print.
+    """Return the motion of a foot that stands and steps from footprint to footprint.
 
     Args:
-        kinematics: the body.
-        spot: whose frame the prints are in.
-        time: seconds, (T,).
-        first: where it stands until the first step.
-        steps: when it takes off, when it lands, and where, ascending.
-        pitch: added to that of the prints, (T,) or constant, radians; the foot rolls there.
-        lift: how high a step goes over the higher of its ends, metres.
-        peel: how far the toes point down in a step, radians.
+        kinematics: body.
+        spot: spot that defines the frame of the footprints.
+        time: times in seconds, (T,).
+        first: footprint before the first step.
+        steps: take-off time, landing time and footprint of each step, ascending.
+        pitch: pitch added to that of the footprints, (T,) or constant, radians; the foot rolls there.
+        lift: height of a step above the higher of its ends, metres.
+        peel: downward pitch of the toes during a step, radians.
     """
     ground = np.tile(np.asarray(first.place, float), (len(time), 1))
     bearing, floor = np.full(len(time), first.bearing), np.full(len(time), first.floor)
@@ -113,20 +113,20 @@ def foot_path(
 
 
 def spot_to_world(spot: Spot, place: ArrayLike) -> Floats:
-    """Points (..., 2) or (..., 3) of a spot's frame in the world."""
+    """Transform points (..., 2) or (..., 3) from a spot's frame to the world."""
     place = np.asarray(place, float)
     ground = spot.place + place[..., :2] @ rotation_2d(spot.bearing).T
     return ground if place.shape[-1] == 2 else np.concatenate([ground, place[..., 2:]], axis=-1)
 
 
 def hip_position(kinematics: Kinematics, *, shank: ArrayLike, thigh: ArrayLike, pitch: ArrayLike = 0.0) -> Floats:
-    """Where a leg in its plane carries the hip, (T, 2): ahead of the ankle of the flat foot, and up from its floor.
+    """Return the hip position of a leg in its plane, (T, 2) metres ahead of the flat foot's ankle and above the floor.
 
     Args:
-        kinematics: the body.
-        shank: how far the knee is ahead of the ankle, radians from upright.
-        thigh: how far the hip is behind the knee, radians from upright.
-        pitch: of the foot, which has rolled there, radians.
+        kinematics: body.
+        shank: forward tilt of the shank, radians from upright.
+        thigh: backward tilt of the thigh, radians from upright.
+        pitch: pitch of the foot, which has rolled there, radians.
     """
     upper, lower = kinematics.leg_parts
     shank, thigh, pitch = np.broadcast_arrays(*(np.asarray(x, float) for x in (shank, thigh, pitch)))
@@ -149,15 +149,15 @@ def pelvis_from_hips(
     aside: ArrayLike = 0.0,
     bearing: ArrayLike = 0.0,
 ) -> tuple[Pelvis, Floats]:
-    """The pelvis of which the hips are at places (T, 2), ahead and up in the spot's frame, and its height (T,).
+    """Return the pelvis with the hips at positions (T, 2), ahead and up in the spot's frame, and its height (T,).
 
     Args:
-        kinematics: the body.
-        spot: where.
-        hip: metres, as of :func:`hip_position` and the place of its foot.
-        lean: of the pelvis, forward positive, (T,) radians.
-        aside: of the pelvis, to the left, metres.
-        bearing: of the pelvis against the spot's, radians.
+        kinematics: body.
+        spot: spot that defines the frame.
+        hip: hip positions in metres: :func:`hip_position` plus the position of the foot.
+        lean: forward lean of the pelvis, (T,) radians.
+        aside: shift of the pelvis to the left, metres.
+        bearing: bearing of the pelvis relative to the spot, radians.
     """
     x, _, z = kinematics.legs["left"].anchors[0]
     ahead = hip[:, 0] - (x * np.cos(lean) + z * np.sin(lean))

@@ -1,4 +1,4 @@
-"""A sole on the floor: how the ankle moves while the foot rolls from heel to toes without slipping."""
+"""Foot roll: motion of the ankle while the sole rolls from heel to toes on the floor without slipping."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _STEP, _ROUNDING = 0.25, 5.0  # degrees
 
 @dataclass(frozen=True)
 class FootRoll:
-    """What the pitch of a foot does to its ankle.
+    """Position of the ankle as a function of the pitch of the foot.
 
     Attributes:
-        pitch: toes up positive, (n,) radians, ascending.
-        ahead: how far the ankle is ahead of where it is when the foot lies flat, (n,) metres.
-        height: of the ankle when the lowest point of the sole touches the floor, (n,) metres.
-        passing: the same, rounded where the lowest point goes from toe to heel, and nowhere lower, (n,) metres: for a
-            foot in the air, which does not turn corners.
+        pitch: pitch, toes up positive, (n,) radians, ascending.
+        ahead: forward offset of the ankle from its position over the flat foot, (n,) metres.
+        height: height of the ankle while the lowest point of the sole touches the floor, (n,) metres.
+        passing: as ``height``, but smooth where the lowest point changes from toe to heel, and nowhere lower, (n,)
+            metres; for a foot in the air.
     """
 
     pitch: Floats
@@ -30,19 +30,19 @@ class FootRoll:
     passing: Floats
 
     def at(self, pitch: Floats) -> tuple[Floats, Floats]:
-        """Advance and height of the ankle at pitches (...)."""
+        """Return forward offset and height of the ankle at pitches (...), metres."""
         return np.interp(pitch, self.pitch, self.ahead), np.interp(pitch, self.pitch, self.height)
 
     def spare(self, pitch: Floats) -> Floats:
-        """By how much a foot that passes through pitches (...) in the air clears the floor, metres."""
+        """Return the floor clearance of a swinging foot at pitches (...), metres."""
         return np.interp(pitch, self.pitch, self.passing - self.height)
 
 
 def roll_sole(sole: Floats) -> FootRoll:
-    """Roll a rigid sole over its edges: at each pitch the lowest point touches, and while it touches it stays.
+    """Roll a rigid sole over its edges: at each pitch the lowest point touches the floor and does not slip.
 
     Args:
-        sole: points of the sole relative to the ankle, x forward, z up, while it lies flat, (n, 3) metres.
+        sole: points of the flat sole relative to the ankle, x forward, z up, (n, 3) metres.
     """
     pitch = np.radians(np.arange(-95.0, 95.0, _STEP))
     forward, up = sole[:, 0], sole[:, 2]

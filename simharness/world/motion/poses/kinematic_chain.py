@@ -1,7 +1,7 @@
-"""A serial chain of hinges: where its end goes, and the angles that bring it to a target.
+"""Forward and inverse kinematics of a serial chain of hinges.
 
 Product of exponentials: Lynch and Park, "Modern Robotics", 2017, sections 4.1 (forward kinematics), 5.1.1 (space
-Jacobian) and 6.2 (numerical inverse kinematics). A whole motion is solved at once, one row a frame.
+Jacobian) and 6.2 (numerical inverse kinematics). A whole motion is solved at once, one row per frame.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from numba import njit
 from mvpose.arrays import Floats
 
 _ITERATIONS = 60
-_LARGEST_STEP = 0.3  # radians an iteration: keeps the solver in the basin of its start
+_LARGEST_STEP = 0.3  # radians per iteration: keeps the solver in the basin of its start
 _DAMPING = 1e-7
 _CONVERGED = 1e-9
-_TURN_WEIGHT = 0.1  # metres a radian: a target out of reach costs orientation before position
+_TURN_WEIGHT = 0.1  # metres per radian: a target out of reach costs orientation before position
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Hinges from the base outwards, described in the base's frame while all angles are zero.
+    """Chain of hinges from the base outwards, described in the frame of the base with all angles zero.
 
     Attributes:
         axes: unit axes of the hinges, (n, 3).
-        anchors: a point on each axis, (n, 3), metres.
-        end: the point that the chain carries, (3,), metres; its frame is the identity at zero.
-        ranges: lowest and highest angle of each hinge, (n, 2), radians.
+        anchors: one point on each axis, (n, 3) metres.
+        end: end point of the chain, (3,) metres; its orientation at zero is the identity.
+        ranges: lowest and highest angle of each hinge, (n, 2) radians.
     """
 
     axes: Floats
@@ -37,7 +37,7 @@ class Chain:
     ranges: Floats
 
     def forward(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Orientation (T, 3, 3) and position (T, 3) of the end for angles (T, n)."""
+        """Return orientation (T, 3, 3) and position (T, 3) of the end for angles (T, n)."""
         angles = np.ascontiguousarray(angles, float)
         turn, place = np.empty((len(angles), 3, 3)), np.empty((len(angles), 3))
         _forward_all(self.axes, self.anchors, self.end, angles, turn, place)
@@ -53,21 +53,21 @@ class Chain:
         pull: float = 0.0,
         follow: bool = False,
     ) -> Floats:
-        """Angles (T, n), within the ranges, that bring the end to the orientations (T, 3, 3) and places (T, 3).
+        """Return angles (T, n), within the ranges, that bring the end to orientations (T, 3, 3) and positions (T, 3).
 
-        Damped Gauss-Newton from ``start`` (T, n), each frame on its own; hinges at the end of their range leave the
-        rest of the way to the others. Where the target is out of reach or range the nearest that the chain comes to
-        it; where it leaves the chain free (no ``turn``), angles near those of the start, the more so with ``pull``.
+        Damped Gauss-Newton from ``start`` (T, n), separately for each frame; hinges at a limit of their range are fixed
+        and the others continue. A target out of reach or range gives the nearest pose of the chain. A target that
+        leaves the chain free (no ``turn``) gives angles near those of the start, and nearer with ``pull``.
 
         Args:
-            turn: None: any orientation will do.
-            place: metres.
-            start: radians.
-            turn_weight: what a radian of wrong orientation counts for, metres; less where only the place matters much.
-            pull: what a radian away from the start counts for, metres. A chain with more hinges than it needs then has
-                one solution, which changes smoothly as start and target do; the end is off by about pull² / 0.3 m.
-            follow: begin every frame but the first at the solution of the one before. Then a chain with several
-                solutions does not leap from one to the other, but an instant depends on those before.
+            turn: target orientations; None: any orientation.
+            place: target positions in metres.
+            start: start angles in radians.
+            turn_weight: weight of one radian of orientation error, in metres; small if mainly the position matters.
+            pull: weight of one radian of distance from the start, in metres. A redundant chain then has one solution,
+                which is a smooth function of start and target; the end is off by about pull² / 0.3 m.
+            follow: start every frame except the first at the solution of the previous frame. A chain with several
+                solutions then does not jump between them, but each frame depends on the earlier ones.
         """
         start = np.clip(np.asarray(start, float), *self.ranges.T)
         angles = start.copy()
@@ -91,7 +91,7 @@ class Chain:
 
 @njit(cache=True)
 def _forward(axes, anchors, end, angles, turn, place, moved_axes, moved_anchors):
-    """Orientation (3, 3) and place (3,) of the end, and the hinges' axes and anchors (n, 3), for angles (n,)."""
+    """Compute orientation (3, 3) and position (3,) of the end, axes and anchors (n, 3) of the hinges at angles (n,)."""
     shift, hinge, product = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
@@ -121,7 +121,7 @@ def _forward(axes, anchors, end, angles, turn, place, moved_axes, moved_anchors)
 
 @njit(cache=True)
 def _dot(a, b):
-    """Of two short vectors, for which BLAS is slow."""
+    """Return the dot product of two short vectors, for which BLAS is slow."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -130,7 +130,7 @@ def _dot(a, b):
 
 @njit(cache=True)
 def _forward_all(axes, anchors, end, angles, turn, place):
-    """Orientations (T, 3, 3) and places (T, 3) of the end for angles (T, n)."""
+    """Compute orientations (T, 3, 3) and positions (T, 3) of the end at angles (T, n)."""
     moved_axes, moved_anchors = np.empty_like(axes), np.empty_like(axes)
     for t in range(len(angles)):
         _forward(axes, anchors, end, angles[t], turn[t], place[t], moved_axes, moved_anchors)
@@ -138,7 +138,7 @@ def _forward_all(axes, anchors, end, angles, turn, place):
 
 @njit(cache=True)
 def _solve_all(axes, anchors, end, ranges, turn, place, turn_weight, pull, follow, start, angles):
-    """Bring the end to turn (T, 3, 3) and place (T, 3) by changing angles (T, n), in place."""
+    """Change angles (T, n) in place so that the end reaches turn (T, 3, 3) and place (T, 3)."""
     n = len(axes)
     got_turn, got_place, off = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     spin, at, error = np.empty((n, 3)), np.empty((n, 3)), np.empty(6)
@@ -166,7 +166,7 @@ def _solve_all(axes, anchors, end, ranges, turn, place, turn_weight, pull, follo
                 for i in range(3):
                     jacobian[k, 3 + i] = turn_weight * spin[k, i]
                 stuck[k] = False
-            # Hinges that the step would push out of their range are stuck; the others then take another step.
+            # Hinges that the step would push out of their range are fixed; the step of the others is solved again.
             for _ in range(n):
                 for k in range(n):
                     back = pull * pull * (start[t, k] - angles[t, k])
@@ -194,7 +194,7 @@ def _solve_all(axes, anchors, end, ranges, turn, place, turn_weight, pull, follo
 
 @njit(cache=True)
 def _rotation_vector(turn, out):
-    """Axis times angle (3,) of a rotation (3, 3)."""
+    """Compute the rotation vector, axis times angle (3,), of a rotation (3, 3)."""
     x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
     sine = 0.5 * np.sqrt(x * x + y * y + z * z)
     cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)

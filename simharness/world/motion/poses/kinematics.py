@@ -1,4 +1,4 @@
-"""Forward kinematics of one body, read from the person's own MuJoCo model."""
+"""Forward kinematics of one body, computed with the MuJoCo model of the person."""
 
 from __future__ import annotations
 
@@ -29,26 +29,27 @@ _ARM += ("wrist_flexion",)
 _FEET = {"left": "LeftFoot", "right": "RightFoot"}
 _ORIGIN = np.array([0.0, 0, 0, 1, 0, 0, 0])
 _SOLE = 0.03  # metres: skin this near the floor in the neutral stance belongs to the sole
-_KNEE = 0.04  # metres: half as much of the leg, up and down and across, as makes a knee
-_PALM = 0.02  # metres: half as much of the hand, up and down, as makes the middle of the palm
+_KNEE = 0.04  # metres: half the height and width of the knee region
+_PALM = 0.02  # metres: half the height of the region at the centre of the palm
 
 
 class Kinematics:
-    """One body's skeleton, ready to be posed: the person's MuJoCo model and the addresses in it.
+    """Kinematics of one body: its MuJoCo model and the chains of its limbs.
 
-    All chains are described in one frame, the pelvis's in the neutral pose: x forward, y to the left, z up.
+    All chains are described in the pelvis frame of the neutral pose: x forward, y to the left, z up.
 
     Attributes:
-        body: the body.
-        spec: its MuJoCo model, made once, for it takes long: copies of it can be attached to others.
-        legs: by side, the six hinges from the pelvis to the ankle, which is the end.
-        leg_order: the hinges of a leg, without the side, in the chain's order.
-        trunks: by side, the seven hinges from the pelvis over lumbar spine and thorax to the clavicle. Its end is the
-            origin: ``turn @ x + place`` is where a point x of the shoulder girdle in the neutral pose has gone.
-        arms: by side, the six hinges from the clavicle to the hand, in the frame that the trunk's end carries. The
-            end is the middle of the palm, on the skin; at zero the fingers point to -z, the thumb to +x, and the palm
-            faces the thigh, -y of the left hand and +y of the right one.
-        arm_order: the hinges of an arm, without the side, in the chain's order.
+        body: body.
+        spec: MuJoCo model, made once because that is slow; copies can be attached to other models.
+        legs: by side, chain of the six hinges from the pelvis to the ankle, which is the end.
+        leg_order: names of the hinges of a leg, without the side, in the order of the chain.
+        trunks: by side, chain of the seven hinges from the pelvis over lumbar spine and thorax to the clavicle. Its end
+            is the origin: ``turn @ x + place`` is the new position of a point x of the shoulder girdle in the neutral
+            pose.
+        arms: by side, chain of the six hinges from the clavicle to the hand, in the frame at the end of the trunk. The
+            end is the centre of the palm, on the skin; at zero the fingers point to -z, the thumb to +x, and the palm
+            to the thigh, which is -y for the left hand and +y for the right one.
+        arm_order: names of the hinges of an arm, without the side, in the order of the chain.
         ranges: lowest and highest value of every angle, (D, 2) radians.
     """
 
@@ -69,11 +70,11 @@ class Kinematics:
 
     @staticmethod
     def trunk_order(side: str) -> list[str]:
-        """The hinges of a side's trunk in the chain's order."""
+        """Return the names of the hinges of one side's trunk in the order of the chain."""
         return [*_TRUNK, f"{side}_clavicle_elevation"]
 
     def transforms(self, motion: Motion) -> Floats:
-        """Skinning transforms of the bones, (T, B, 3, 4)."""
+        """Return the skinning transforms of the bones, (T, B, 3, 4)."""
         bones = len(self.body.bones)
         places, turns = np.empty((len(motion), bones, 3)), np.empty((len(motion), bones, 3, 3))
         for frame, (root, angles) in enumerate(zip(motion.root, motion.angles, strict=True)):
@@ -81,46 +82,46 @@ class Kinematics:
         return bone_transforms(self.body, places, turns)
 
     def joints(self, motion: Motion) -> Floats:
-        """The COCO-17 joints, (T, 17, 3) metres."""
+        """Return the COCO-17 joints, (T, 17, 3) metres."""
         return self.body.joints(self.transforms(motion))
 
     @cached_property
     def neutral_skin(self) -> Floats:
-        """The skin in the neutral pose, in the pelvis's frame, (n, 3) metres."""
+        """Skin vertices of the neutral pose in the pelvis frame, (n, 3) metres."""
         return self.body.skin(bone_transforms(self.body, *self._neutral)).astype(float)
 
     @cached_property
     def soles(self) -> dict[str, Floats]:
-        """By side, the skin under the foot relative to the ankle while the foot lies flat, (n, 3) metres."""
+        """By side, skin vertices under the flat foot relative to the ankle, (n, 3) metres."""
         neutral = self.neutral_skin
         floor = neutral[:, 2].min()
         result = {}
         for side in SIDES:
             foot = self._neutral[0][self.body.bones.index(_FEET[side])]
-            own = (np.sign(neutral[:, 1]) == np.sign(foot[1])) & (neutral[:, 2] < floor + _SOLE)
-            result[side] = neutral[own] - foot
+            on_sole = (np.sign(neutral[:, 1]) == np.sign(foot[1])) & (neutral[:, 2] < floor + _SOLE)
+            result[side] = neutral[on_sole] - foot
         return result
 
     @cached_property
     def standing_height(self) -> float:
-        """Height of the pelvis over the floor in the neutral stance, metres."""
+        """Height of the pelvis above the floor in the neutral stance, metres."""
         return -float(self.neutral_skin[:, 2].min())
 
     @cached_property
     def rolling(self) -> FootRoll:
-        """How a foot rolls over the floor; the right one's sole is the mirror image of the left one's."""
+        """Foot roll of the left foot; the sole of the right foot is its mirror image."""
         return roll_sole(self.soles["left"])
 
     @cached_property
     def leg_parts(self) -> tuple[float, float]:
-        """Length of thigh and shank, metres."""
+        """Lengths of thigh and shank, metres."""
         leg = self.legs["left"]
         hip, knee, ankle = leg.anchors[0], leg.anchors[_LEG.index("knee_flexion")], leg.end
         return float(np.linalg.norm(knee - hip)), float(np.linalg.norm(ankle - knee))
 
     @cached_property
     def kneecap(self) -> float:
-        """How far the skin is ahead of the knee's axis, metres."""
+        """Distance from the axis of the knee forward to the skin, metres."""
         leg = self.legs["left"]
         knee = leg.anchors[_LEG.index("knee_flexion")]
         near = (np.abs((self.neutral_skin - knee)[:, 1:]) < _KNEE).all(axis=1)
@@ -128,7 +129,7 @@ class Kinematics:
 
     @property
     def leg_length(self) -> float:
-        """From hip to ankle, metres."""
+        """Distance from hip to ankle, metres."""
         leg = self.legs["left"]
         return float(np.linalg.norm(leg.end - leg.anchors[0]))
 
@@ -141,11 +142,11 @@ class Kinematics:
         return self._chain([f"{side}_{name}" for name in _LEG], end=self._head(_FEET[side]))
 
     def _palm(self, side: str) -> Floats:
-        """The middle of the palm in the neutral pose, on the skin."""
+        """Return the centre of the palm in the neutral pose, on the skin, (3,) metres."""
         body, bones = self.body, [f"{side.capitalize()}{name}" for name in ("Hand", "FingerBase", "HandFinger1")]
         most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
         hand = self.neutral_skin[np.isin(most, [body.index(name) for name in bones])]
-        middle = (self._head(bones[0]) + self._head(bones[-1])) / 2  # of wrist and knuckles
+        middle = (self._head(bones[0]) + self._head(bones[-1])) / 2  # between wrist and knuckles
         slice_ = hand[np.abs(hand[:, 2] - middle[2]) < _PALM]
         inward = -np.sign(middle[1])
         ahead = (slice_[:, 0].min() + slice_[:, 0].max()) / 2
@@ -153,11 +154,11 @@ class Kinematics:
         return np.array([ahead, inward * np.median(core[core > core.mean()]), middle[2]])
 
     def _head(self, bone: str) -> Floats:
-        """Where a bone begins in the neutral pose, (3,) metres."""
+        """Return the head of a bone in the neutral pose, (3,) metres."""
         return self._neutral[0][self.body.index(bone)]
 
     def _chain(self, hinges: Sequence[str], *, end: Floats) -> Chain:
-        """Hinges in the pelvis's frame: what MuJoCo says in the neutral configuration."""
+        """Return the chain of hinges in the pelvis frame, read from MuJoCo in the neutral configuration."""
         self._pose(_ORIGIN, np.zeros(len(DOFS)))
         ids = [self._model.joint(name).id for name in hinges]
         return Chain(
@@ -169,12 +170,12 @@ class Kinematics:
 
 
 class Addresses:
-    """Where one person's configuration and bones lie in the arrays of a MuJoCo model that holds the person.
+    """Indices of one person's configuration and bones in the arrays of a MuJoCo model.
 
     Args:
-        model: the compiled model.
-        body: the person's body.
-        prefix: what the person's names begin with, "person0/".
+        model: compiled model that contains the person.
+        body: body of the person.
+        prefix: prefix of the person's names, such as "person0/".
     """
 
     def __init__(self, model: mujoco.MjModel, body: Body, *, prefix: str) -> None:
@@ -184,10 +185,10 @@ class Addresses:
         self._bones = np.array([model.body(f"{prefix}{name}").id for name in body.bones])
 
     def write(self, qpos: Floats, root: Floats, angles: Floats) -> None:
-        """Set the person's part of ``qpos`` from a root (7,) and angles (D,)."""
+        """Set the person's part of ``qpos`` to a root (7,) and angles (D,)."""
         qpos[self._root] = root
         qpos[self._hinges] = angles
 
     def read(self, data: mujoco.MjData) -> tuple[Floats, Floats]:
-        """Positions (B, 3) and orientations (B, 3, 3) of the bones after ``mj_kinematics``, as copies."""
+        """Return copies of positions (B, 3) and orientations (B, 3, 3) of the bones after ``mj_kinematics``."""
         return data.xpos[self._bones], data.xmat[self._bones].reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""How a person holds trunk, head and arms: curves by degree of freedom, in degrees."""
+"""Posture of trunk, head and arms: curves in degrees by degree of freedom."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HANGING |= {"wrist_flexion": 5.0, "shoulder_flexion": 2.0}
 
 
 def relaxed_posture(time: Floats, rng: np.random.Generator) -> Curves:
-    """Arms hang, the head looks around a little, and nothing is ever quite still."""
+    """Draw the curves of a relaxed standing person: hanging arms, small head motion, and slow noise in every joint."""
     curves = {
         "neck_rotation": 12.0 * smooth_noise(time, rng, 0.15),
         "neck_flexion": 3.0 + 4.0 * smooth_noise(time, rng, 0.25),
@@ -31,22 +31,22 @@ def relaxed_posture(time: Floats, rng: np.random.Generator) -> Curves:
 
 
 def blend(curves: Curves, on: Floats, **targets: ArrayLike) -> None:
-    """Go from what the curves say towards the targets (degrees) as far as ``on`` (T,) says."""
+    """Blend the curves, in place, towards the targets in degrees with the weight ``on`` (T,), 0 to 1."""
     for name, target in targets.items():
         curves[name] = (1 - on) * curves.get(name, np.zeros_like(on)) + on * np.asarray(target, float)
 
 
 def limb(side: str, **targets: ArrayLike) -> dict[str, ArrayLike]:
-    """Targets of one side's joints, named without the side."""
+    """Return targets of the joints of one side, given by names without the side."""
     return {f"{side}_{name}": value for name, value in targets.items()}
 
 
 def limbs(**targets: ArrayLike) -> dict[str, ArrayLike]:
-    """Targets of both sides' joints alike."""
+    """Return the same targets for the joints of both sides, given by names without the side."""
     return {name: value for side in SIDES for name, value in limb(side, **targets).items()}
 
 
 def draw_side(rng: np.random.Generator) -> tuple[str, float]:
-    """The arm that acts, mostly the right one, and its sign: 1 left, -1 right."""
+    """Draw the side of the active arm, right with probability 0.75, and its sign: 1 left, -1 right."""
     side = "right" if rng.uniform() < 0.75 else "left"
     return side, 1.0 if side == "left" else -1.0

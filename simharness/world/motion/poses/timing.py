@@ -1,4 +1,4 @@
-"""Curves of time that movements are made of: eased ways between values, repeated rounds, aimless wandering."""
+"""Time curves of movements: minimum-jerk transitions, cyclic time, gesture envelopes and smooth noise."""
 
 from __future__ import annotations
 
@@ -12,19 +12,25 @@ from mvpose.arrays import Floats
 
 
 def ease(x: ArrayLike) -> Floats:
-    """0 to 1, clipped, with neither velocity nor acceleration at the ends: minimum jerk (Flash and Hogan, 1985)."""
+    """Return the minimum-jerk transition from 0 to 1 (Flash and Hogan, 1985) at x, clipped to 0..1.
+
+    Velocity and acceleration are zero at both ends.
+    """
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10 - 15 * x + 6 * x * x)
 
 
 def smoothstep(x: ArrayLike) -> Floats:
-    """0 to 1, clipped, with no velocity at either end: quicker to set out than :func:`ease`."""
+    """Return the cubic transition from 0 to 1 at x, clipped to 0..1; it starts faster than :func:`ease`.
+
+    Velocity is zero at both ends.
+    """
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)
 
 
 def minimum_jerk(time: Floats, *keys: tuple[float, float]) -> Floats:
-    """From value to value, at rest at each, (T,): minimum-jerk ways between keys (time, value), held beyond them."""
+    """Return minimum-jerk transitions between keys (time, value), (T,); at rest at each key, constant beyond them."""
     result = np.full(len(time), float(keys[0][1]))
     for (start, before), (end, after) in pairwise(keys):
         if before != after:
@@ -33,7 +39,7 @@ def minimum_jerk(time: Floats, *keys: tuple[float, float]) -> Floats:
 
 
 def bump(time: Floats, start: float, end: float) -> Floats:
-    """0 to 1 and back to 0 between two times, smoothly, (T,)."""
+    """Return a smooth pulse, (T,), that rises from 0 to 1 and falls back to 0 between two times."""
     x = np.clip((time - start) / (end - start), 0.0, 1.0)
     return 64 * x**3 * (1 - x) ** 3
 
@@ -41,17 +47,17 @@ def bump(time: Floats, start: float, end: float) -> Floats:
 def cycle_time(
     time: Floats, lasting: Sequence[float], *, rng: np.random.Generator, pace: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Divide time into equal rounds of several parts each.
+    """Divide time into equal cycles of several parts each.
 
     Args:
-        time: seconds, (T,).
-        lasting: about how long each of n parts lasts, seconds.
-        rng: varies the parts by a sixth, and where in a round time 0 falls.
-        pace: how much quicker than that.
+        time: times in seconds, (T,).
+        lasting: mean durations of the n parts in seconds.
+        rng: random generator; varies the durations by up to a sixth, and the phase of time 0.
+        pace: speed relative to these durations.
 
     Returns:
-        Seconds since the round began, (T,), and when in a round its parts begin, the first at 0, and the round ends,
-        (n + 1,).
+        Seconds since the start of the cycle, (T,), and the start times of the parts in a cycle, the first at 0,
+        followed by the end of the cycle, (n + 1,).
     """
     parts = np.asarray(lasting) * rng.uniform(1 - 1 / 6, 1 + 1 / 6, len(lasting)) / pace
     marks = np.concatenate([[0.0], np.cumsum(parts)])
@@ -59,7 +65,7 @@ def cycle_time(
 
 
 def smooth_noise(time: Floats, rng: np.random.Generator, rate: float) -> Floats:
-    """A smooth aimless curve about 0 within -1..1, (T,): three slow waves about ``rate`` hertz."""
+    """Draw smooth noise about 0 within -1..1, (T,): a sum of three sine waves of about ``rate`` hertz."""
     rates = rate * rng.uniform([0.6, 1.0, 1.7], [0.9, 1.5, 2.4])
     phases = rng.uniform(0.0, 2 * np.pi, 3)
     return np.sin(2 * np.pi * time[:, None] * rates + phases) @ np.array([0.5, 0.3, 0.2])
@@ -68,16 +74,16 @@ def smooth_noise(time: Floats, rng: np.random.Generator, rate: float) -> Floats:
 def gesture_envelope(
     time: Floats, rng: np.random.Generator, *, hold: float, rest: float, raised: float = 0.8
 ) -> Floats:
-    """How far a repeated gesture is on, (T,) from 0 (resting) to 1 (held), smoothly up and down.
+    """Draw the envelope of a repeated gesture, (T,), smooth between 0 (rest) and 1 (hold).
 
     Args:
-        time: seconds, (T,).
-        rng: varies the timing, and where in the repetition time 0 falls.
-        hold: about how long it is held, seconds.
-        rest: about how long the arm rests in between, seconds.
-        raised: about how long going up and coming down each take, seconds.
+        time: times in seconds, (T,).
+        rng: random generator; varies the durations, and the phase of time 0.
+        hold: mean duration of the hold in seconds.
+        rest: mean duration of the rest between two gestures in seconds.
+        raised: mean duration of raising and of lowering in seconds.
     """
     up, held, down, still = np.array([raised, hold, 1.1 * raised, rest]) * rng.uniform(0.8, 1.2, 4)
     period = up + held + down + still
-    at = np.mod(time + rng.uniform(0.0, up + 0.5 * held), period)  # never begins with the long rest
+    at = np.mod(time + rng.uniform(0.0, up + 0.5 * held), period)  # time 0 is never in the long rest
     return ease(at / up) * (1 - ease((at - up - held) / down))

@@ -26,16 +26,16 @@ def cast(count):
 def test_activities_are_handed_out_in_turn_and_pairs_take_two():
     one, two = (Activity(name, n, Spot, 0.0, solo(lambda: None)) for name, n in (("one", 1), ("two", 2)))
     spare = Activity("stand", 1, Spot, 0.0, solo(lambda: None))
-    parties = assign_activities([one, two], 7, spare=spare)
-    assert [(party.people, party.activity.name) for party in parties] == [
+    groups = assign_activities([one, two], 7, fallback=spare)
+    assert [(group.people, group.activity.name) for group in groups] == [
         ((0,), "one"),
         ((1, 2), "two"),
         ((3,), "one"),
         ((4, 5), "two"),
         ((6,), "one"),
     ]
-    assert assign_activities([two], 3, spare=spare)[-1].activity.name == "stand"  # nobody is left to greet
-    assert assign_activities([one], 0, spare=spare) == ()
+    assert assign_activities([two], 3, fallback=spare)[-1].activity.name == "stand"  # nobody is left to greet
+    assert assign_activities([one], 0, fallback=spare) == ()
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -224,17 +224,17 @@ def test_where_the_recording_has_its_floor_does_not_matter(perform, height):
     assert last(one)["left_knee_flexion"] == pytest.approx(40, abs=4)
 
 
-def test_what_is_missing_is_told_with_what_is_there(perform):
+def test_missing_joints_are_named_with_the_existing_ones(perform):
     with pytest.raises(
         ValueError, match=r"clip.bvh: this skeleton has no left shank \(leg, tibia.*joints are Hips, .*"
     ):
         perform(bvh().replace("LeftLeg", "LeftWheel"))
-    with pytest.raises(ValueError, match=r"clip.bvh: with all angles 0 this skeleton does not stand upright"):
+    with pytest.raises(
+        ValueError, match=r"clip.bvh: the zero pose of this skeleton \(all angles 0\) does not stand upright"
+    ):
         perform(bvh().replace("OFFSET 0 -42 0", "OFFSET 0 0 -42"))
     swapped = bvh().replace("LeftArm", "X").replace("LeftForeArm", "LeftArm").replace("JOINT X", "JOINT LeftForeArm")
-    with pytest.raises(
-        ValueError, match=r"'LeftForeArm' was taken for the left forearm and 'LeftArm' for the left arm"
-    ):
+    with pytest.raises(ValueError, match=r"'LeftForeArm' was mapped to the left forearm and 'LeftArm' to the left arm"):
         perform(swapped)
 
 

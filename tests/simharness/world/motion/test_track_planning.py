@@ -128,7 +128,7 @@ def test_a_crowd_that_does_not_fit_is_told_what_to_change():
     [(WALK, 0.3, 0.5), (RUN, 1.0, None), (STAND, 0.04, 0.1), (SpotRequest("lie", 1.0), 1.0, 1.05)],
 )
 def test_an_area_too_small_for_one_alone(wish, area, least):
-    with pytest.raises(ValueError, match=rf'people.area = {area:g} m is too small for "{wish.what}"') as error:
+    with pytest.raises(ValueError, match=rf'people.area = {area:g} m is too small for "{wish.activity}"') as error:
         plan_tracks(0, [wish], area=area, spacing=0.5, span=SPAN)
     named = float(str(error.value).split("it takes ")[1].split(" m")[0])
     if least is not None:
