@@ -8,10 +8,10 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from simharness.scenario.extends import read_document
+from simharness.scenario.document import read_document
 from simharness.scenario.layers import leaves
 from simharness.scenario.study_definition import Setting, Study
-from simharness.scenario.toml_writer import toml
+from simharness.scenario.toml_files import toml
 
 _WORD = re.compile(r"[a-z][a-z0-9_-]*")
 _VALUES = ("true", "false", "inf", "nan")  # words that TOML takes for something else

@@ -49,7 +49,7 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 from simharness.trial.arrays import (
     Arrays,
     detection_arrays,

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from simharness.cli import app
 from simharness.runtime.errors import RunError
-from simharness.scenario.profiles import read_profile
+from simharness.scenario.presets import read_profile
 from simharness.trial.provenance import PROVENANCE
 
 QUICKSTART = str(Path(__file__).parents[2] / "scenarios" / "quickstart.toml")

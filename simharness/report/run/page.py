@@ -19,7 +19,7 @@ from simharness.report.run import plots
 from simharness.report.run.film import Animation
 from simharness.report.run.headline import COLUMNS, NOTHING
 from simharness.report.run.pictures import Picture
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.trial.run_folder import Record
 from simharness.types.views import Visibility

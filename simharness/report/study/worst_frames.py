@@ -18,7 +18,7 @@ from simharness.report.study.skeleton_view_3d import SkeletonView3D, skeleton_vi
 from simharness.scenario.named_files import relative_files
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, load_study
-from simharness.scenario.toml_writer import toml
+from simharness.scenario.toml_files import toml
 from simharness.study.result_folder import Results
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
@@ -132,7 +132,7 @@ def show(
 def _command(study: Study, scenario: Scenario) -> str:
     """Return the shell command that renders a trial of a study again."""
     setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
-    files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.said))]
+    files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.data))]
     sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]
     layers = ["--overlay", "truth,detections,estimates"]
     return shlex.join(["simharness", "render", str(study.path), *sets, "--seed", str(scenario.seed), *layers])
