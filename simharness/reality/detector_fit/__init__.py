@@ -1,1 +1,1 @@
-"""A real detector measured against ground truth, and the profile that makes the simulated one err as it does."""
+"""Fit of a detector profile: a real detector measured against ground truth, and the parameters that reproduce it."""

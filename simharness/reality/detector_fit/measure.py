@@ -1,4 +1,4 @@
-"""A detector measured on a sample: every figure with the interval that it lies in."""
+"""Measurement of a detector on a sample: every parameter with its 95 % interval."""
 
 from __future__ import annotations
 
@@ -8,39 +8,40 @@ from typing import Any
 
 import numpy as np
 
-from simharness.reality.detector_fit.frame_sums import SCORED, Sums, count
-from simharness.reality.detector_fit.joint_labels import CLASSES, judge
-from simharness.reality.detector_fit.parameters import figures
+from simharness.reality.detector_fit.frame_sums import SCORED, FrameSums, frame_sums
+from simharness.reality.detector_fit.joint_labels import CLASSES, label_joints
+from simharness.reality.detector_fit.parameters import estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector import KINDS
 from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
 
 RESAMPLES = 500
 
-_NEVER = 3.0
-"""What never happened in n trials has a chance of at most 3 / n, at 95 %. Trials that last count as so many fewer."""
+_RULE_OF_THREE = 3.0
+"""An event that never happened in n independent trials has a probability of at most 3 / n, at 95 %. Correlated trials
+count as fewer."""
 
-_OF = {
+_COUNTED = {
     "keypoints.stray": "miss.n",
     "boxes": "people.n",
-    "boxes.duplicates": "people.found",
+    "boxes.duplicates": "people.detected",
     "phantoms": "false.n",
     "size": "size.n",
     "size.fragments": "fragments.n",
 }
-"""The sums that say of how many a figure is; the others are of all joints in the picture."""
+"""Sums that count the observations behind a parameter; the others are measured on all joints in the picture."""
 
 _SIGHTS = ("visible", "self_occluded", "occluded")
 
 
 @dataclass(frozen=True)
-class Figure:
-    """One measured figure; NaN where nothing is known.
+class MeasuredValue:
+    """One measured parameter; NaN where it is unknown.
 
     Attributes:
-        value: measured on all frames.
-        low, high: of its 95 % interval.
-        count: of how many joints, people or pictures.
+        value: estimate from all frames.
+        low, high: bounds of its 95 % interval.
+        count: number of joints, people or pictures behind it.
     """
 
     value: float
@@ -50,12 +51,14 @@ class Figure:
 
     @property
     def known(self) -> bool:
-        """Whether anything was there to measure it on."""
+        """Whether it could be measured."""
         return bool(np.isfinite(self.value))
 
-    def agrees(self, other: Figure) -> bool:
-        """Whether two figures differ by no more than both intervals allow together, each on the side that faces
-        the other: the interval of the difference of two independent figures.
+    def agrees(self, other: MeasuredValue) -> bool:
+        """Return whether two measured values differ by no more than the interval of their difference.
+
+        That interval is the root of the squared half-widths, each on the side that faces the other value, because the
+        two measurements are independent.
         """
         first, second = (self, other) if self.value <= other.value else (other, self)
         room = np.hypot(first.high - first.value, second.value - second.low)
@@ -64,27 +67,27 @@ class Figure:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of a detector.
+    """Measured parameters of a detector.
 
     Attributes:
-        name: of the sample.
-        frames: how many.
+        name: name of the sample.
+        frames: number of frames.
         people: mean number of known people in a frame.
-        figures: by key of ``[detector]``; beside those ``bias.forward.``, ``bias.outward.`` and ``bias.up.`` with the
-            kind of joint, and ``size.``.
+        values: measured values by key of ``[detector]``; also ``bias.forward.``, ``bias.outward.`` and ``bias.up.``
+            with the kind of joint, ``share.`` and ``size.``.
     """
 
     name: str
     frames: int
     people: float
-    figures: Mapping[str, Figure]
+    values: Mapping[str, MeasuredValue]
 
-    def __getitem__(self, key: str) -> Figure:
-        """The figure of a key."""
-        return self.figures[key]
+    def __getitem__(self, key: str) -> MeasuredValue:
+        """Return the measured value of a key."""
+        return self.values[key]
 
     def summary(self) -> dict[str, Any]:
-        """JSON-ready: what is not known is null."""
+        """Return the measurement ready for JSON; unknown values are null."""
         return {
             "name": self.name,
             "frames": self.frames,
@@ -97,7 +100,7 @@ class Measurement:
                     "high": _number(each.high),
                     "n": each.count,
                 }
-                for key, each in self.figures.items()
+                for key, each in self.values.items()
             },
         }
 
@@ -105,45 +108,44 @@ class Measurement:
 def measure(sample: Sample, *, resamples: int = RESAMPLES, seed: int = 0) -> Measurement:
     """Measure a detector.
 
-    Intervals are of a block bootstrap over time (:mod:`simharness.statistics.bootstrap`). They tell what another
-    recording of the same people at the same work could have given, with the bias as it was measured; not what
-    others would.
+    Intervals come from a block bootstrap over time (:mod:`simharness.statistics.bootstrap`). They cover other
+    recordings of the same people at the same work, at the measured bias; not recordings of other people.
 
     Args:
-        sample: people whose joints are known, and what the detector found of them.
-        resamples: of the bootstrap.
-        seed: of its draws.
+        sample: people with known joints, and the detections.
+        resamples: number of resamples of the bootstrap.
+        seed: seed of the resamples.
 
     Raises:
         ValueError: a sample without a known person, or in which no detection shows one.
     """
     if not sample.known.any():
-        raise ValueError(f"{sample.name}: nobody's joints are known in any of {len(sample)} frames; nothing to measure")
-    judged = judge(sample)
-    if not judged.association.found.any():
+        raise ValueError(f"{sample.name}: expected people with known joints, got none in {len(sample)} frames")
+    labels = label_joints(sample)
+    if not labels.association.detected.any():
         raise ValueError(
             f"{sample.name}: no detection is near any of the known people; expected detections of the same frames and "
             "cameras as the truth. Check that calibration, truth and detections belong together"
         )
-    sums = count(judged)
-    whole = figures({key: each.sum(axis=0, keepdims=True) for key, each in sums.items()}, step=judged.step)
+    sums = frame_sums(labels)
+    whole = estimate_parameters({key: each.sum(axis=0, keepdims=True) for key, each in sums.items()}, step=labels.step)
     weights = block_weights(sample.time, resamples=resamples, seed=seed)
-    drawn = figures({key: resampled(each, weights) for key, each in sums.items()}, step=judged.step)
+    drawn = estimate_parameters({key: resampled(each, weights) for key, each in sums.items()}, step=labels.step)
     independent = blocks(sample.time)
     result = {}
-    design = 1 + 2 * np.nan_to_num(whole["correlation.life"][0]) / judged.step
+    design = 1 + 2 * np.nan_to_num(whole["correlation.life"][0]) / labels.step
     for key, value in whole.items():
         low, high = interval(drawn[key], blocks=independent)
         n = _count(key, sums)
-        if key.split(".")[1] in CLASSES and value[0] < _NEVER * design / max(n, 1):
-            high = np.fmax(high, min(1.0, _NEVER * design / max(n, 1)))
-        # A percentile interval need not hold the figure itself, where a bound such as zero is near.
-        result[key] = Figure(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
+        if key.split(".")[1] in CLASSES and value[0] < _RULE_OF_THREE * design / max(n, 1):
+            high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
+        # A percentile interval need not contain the value itself near a bound such as zero.
+        result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
     return Measurement(sample.name, len(sample), float(sample.known.sum() / len(sample)), result)
 
 
-def _count(key: str, sums: Sums) -> int:
-    """Of how many joints, people or pictures a figure is."""
+def _count(key: str, sums: FrameSums) -> int:
+    """Return the number of joints, people or pictures behind a parameter."""
     section, *rest = key.split(".")
     kind = KINDS.index(rest[-1]) if rest[-1] in KINDS else None
     if rest[0] in CLASSES and kind is not None:
@@ -154,8 +156,9 @@ def _count(key: str, sums: Sums) -> int:
         return int((scores[:, :, SCORED.index(rest[0])] if rest[0] in SCORED else scores).sum())
     if kind is not None:
         return int(sums["scatter.n"][:, kind].sum())
-    return int(sums[_OF.get(key, _OF.get(section, "n.drop"))].sum())
+    return int(sums[_COUNTED.get(key, _COUNTED.get(section, "n.drop"))].sum())
 
 
 def _number(value: float) -> float | None:
+    """Return the value, None where it is not finite."""
     return None if not np.isfinite(value) else float(value)

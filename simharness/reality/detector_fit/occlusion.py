@@ -1,8 +1,8 @@
-"""What hides which joint, guessed from skeletons: recordings say nothing of it.
+"""Occlusion of joints, estimated from skeletons because recordings do not contain it.
 
-People are taken for capsules about their bones, seen in the picture: a joint is hidden by a bone that it projects into
-and whose near side is in front of it, by more than its own flesh if the bone is its own. Things that stand about are
-not known, so what they hide counts as visible. How right that is can be told on simulated people: CONFUSION.
+People are modelled as capsules about their bones. A joint is hidden by a bone into whose capsule it projects and whose
+near side is in front of it; for a bone of the same person, in front by more than the flesh about the joint. Objects are
+unknown, so joints that they hide count as visible. CONFUSION is the accuracy of this on simulated people.
 """
 
 from __future__ import annotations
@@ -29,50 +29,53 @@ CONFUSION = np.array(
         [[0.84, 0.13, 0.03], [0.14, 0.83, 0.03], [0.01, 0.00, 0.99]],  # ankles
     ]
 )
-"""What joints truly are that skeletons tell to be VISIBLE, SELF_OCCLUDED and OCCLUDED, (9, 3, 3): rows of shares by what they tell.
-Counted on simulated, dressed people on the rig of Shelf (:func:`twin.confusion`, seeds 10, 11, 14 and 15).
+"""True occlusion classes given the estimated one, (9, 3, 3): for each kind of joint, rows by the estimated class
+VISIBLE, SELF_OCCLUDED, OCCLUDED, columns the shares of the true ones. Counted on simulated, dressed people and the rig
+of Shelf (:func:`simharness.reality.detector_fit.shelf_twin.count_occlusion`, seeds 10, 11, 14 and 15).
 """
 
-_NEAR = 0.25  # metres from the skull's middle within which a face is believed
-_SKULL = 0.40  # where the skull's middle is above the shoulders, in lengths of the trunk
-# Points of a body: COCO-17, then the middle of the skull, of the shoulders and of the hips. Bones and metres of flesh.
+_NEAR = 0.25  # metres from the middle of the skull within which triangulated joints of the face are accepted
+_SKULL = 0.40  # height of the middle of the skull above the shoulders, in lengths of the trunk
+# Points of a body: COCO-17, then the middles of skull, shoulders and hips. Bones: two points and a radius in metres.
 _HEAD, _NECK, _PELVIS = 17, 18, 19
 _BONES = (
     (_HEAD, _HEAD, 0.095), (_NECK, _HEAD, 0.06), (_NECK, _PELVIS, 0.13), (5, 11, 0.10), (6, 12, 0.10), (5, 6, 0.07),
     (5, 7, 0.05), (6, 8, 0.05), (7, 9, 0.04), (8, 10, 0.04),
     (11, 13, 0.08), (12, 14, 0.08), (13, 15, 0.055), (14, 16, 0.055),
 )  # fmt: skip
-# How far in front of a joint its own skin may be: twice the flesh about it, and 4 cm, as of rendered bodies.
-# Shoulders and hips, which lie in the trunk: as much less as makes them hidden as often as they truly are.
+# Distance by which the person's skin may be in front of a joint: twice the flesh about it and 4 cm, as of rendered
+# bodies. For shoulders and hips, which lie in the trunk, less: so that they are hidden as often as in simulation.
 _SKIN = np.array([0.04] * 5 + [0.14, 0.14, 0.13, 0.13, 0.10, 0.10, 0.19, 0.19, 0.16, 0.16, 0.12, 0.12])
-# The face beside the skull's middle, forward, left and up in metres, where no detections tell where it is.
+# Usual face relative to the middle of the skull, forward, left and up in metres, where detections do not locate it.
 _FACE = np.array([[0.10, 0, 0.0], [0.08, 0.03, 0.03], [0.08, -0.03, 0.03], [0.0, 0.075, 0.01], [0.0, -0.075, 0.01]])
-# Where it looks to, and the cosine of the angle to a camera from which the own head hides it.
-_LOOKS = np.array([[1.0, 0, 0], [0.9, 0.44, 0], [0.9, -0.44, 0], [0, 1.0, 0], [0, -1.0, 0]])
-_TURNED_AWAY = np.array([-0.5, -0.28, -0.28, -0.1, -0.1])
+# Outward directions of the joints of the face, and the cosine to the direction of a camera below which the head hides
+# them.
+_NORMALS = np.array([[1.0, 0, 0], [0.9, 0.44, 0], [0.9, -0.44, 0], [0, 1.0, 0], [0, -1.0, 0]])
+_MIN_COSINE = np.array([-0.5, -0.28, -0.28, -0.1, -0.1])
 _ENDS = np.array([bone[:2] for bone in _BONES])
 _FLESH = np.array([bone[2] for bone in _BONES])
 _OF_HEAD = (_ENDS == _HEAD).any(axis=1)
 
 
-def with_face(reference: Floats, consensus: Floats) -> tuple[Floats, Floats]:
-    """Joints with the face where detections agree that it is, and where it looks to.
+def complete_face(reference: Floats, consensus: Floats) -> tuple[Floats, Floats]:
+    """Return the joints with a face, and the outward directions of the face.
 
-    Where they do not agree, it is a usual face, turned as what they agree on of it is, or else as the trunk.
+    The joints of the face are those on which the detections agree. The others are those of a usual face, turned to fit
+    these joints, or else as the trunk.
 
     Args:
         reference: true limb joints, (T, P, 17, 3) metres.
-        consensus: joints as detections have them, (T, P, 17, 3); NaN where they do not agree.
+        consensus: joints triangulated from detections, (T, P, 17, 3); NaN where detections do not agree.
 
     Returns:
         Joints (T, P, 17, 3), and unit vectors away from the head at the five joints of the face, (T, P, 5, 3).
     """
     joints, axes = reference.copy(), body_axes(reference)
     skull = head(reference, height=_SKULL)[..., None, :]
-    told = np.einsum("tpjc,tpkc->tpjk", consensus[..., :5, :] - skull, axes)  # forward, left, up
-    near = np.linalg.norm(told, axis=-1) < _NEAR
-    # How far the head is turned against the trunk: what brings the usual face nearest to what was found of it.
-    x, y = np.moveaxis(np.where(near[..., None], told, 0.0)[..., :2], -1, 0)
+    in_head = np.einsum("tpjc,tpkc->tpjk", consensus[..., :5, :] - skull, axes)  # forward, left, up
+    near = np.linalg.norm(in_head, axis=-1) < _NEAR
+    # Rotation of the head against the trunk that brings the usual face nearest to the joints found.
+    x, y = np.moveaxis(np.where(near[..., None], in_head, 0.0)[..., :2], -1, 0)
     turn = np.arctan2(
         (_FACE[:, 0] * y - _FACE[:, 1] * x).sum(axis=-1), (_FACE[:, 0] * x + _FACE[:, 1] * y).sum(axis=-1)
     )
@@ -80,20 +83,20 @@ def with_face(reference: Floats, consensus: Floats) -> tuple[Floats, Floats]:
     forward, left, up = np.moveaxis(axes, -2, 0)
     turned = np.stack([cos * forward + sin * left, cos * left - sin * forward, up], axis=-2)
     joints[..., :5, :] = np.where(near[..., None], consensus[..., :5, :], skull + _FACE @ turned)
-    return joints, _LOOKS @ turned
+    return joints, _NORMALS @ turned
 
 
-def seen(joints: Floats, looks: Floats, strangers: Floats, rig: Rig) -> NDArray[np.int8]:
-    """How each joint is seen, (T, V, P, 17): VISIBLE, SELF_OCCLUDED, OCCLUDED or OUTSIDE; OUTSIDE where it is unknown.
+def occlusion_classes(joints: Floats, normals: Floats, unannotated: Floats, rig: Rig) -> NDArray[np.int8]:
+    """Return the occlusion class of each joint, (T, V, P, 17); OUTSIDE also where the joint is unknown.
 
     Args:
-        joints: of the known people, with the face, (T, P, 17, 3) metres; NaN where unknown.
-        looks: where the joints of the face look to, (T, P, 5, 3) unit vectors.
-        strangers: of the others, (T, N, 17, 3).
+        joints: joints of the known people, with the face, (T, P, 17, 3) metres; NaN where unknown.
+        normals: outward unit vectors at the joints of the face, (T, P, 5, 3).
+        unannotated: joints of the other people, (T, N, 17, 3) metres.
         rig: the V cameras.
     """
     people = joints.shape[1]
-    bodies = _points(np.concatenate([joints, strangers], axis=1))
+    bodies = _points(np.concatenate([joints, unannotated], axis=1))
     start, end = (bodies[..., _ENDS[:, side], :] for side in (0, 1))
     present = np.any(np.isfinite(bodies), axis=(2, 3))
     result = np.full((len(joints), len(rig), people, len(COCO17)), VISIBLE, np.int8)
@@ -113,16 +116,16 @@ def seen(joints: Floats, looks: Floats, strangers: Floats, rig: Rig) -> NDArray[
                 away = away - along[..., None] * bone
                 aside = np.hypot(away[..., 0], away[..., 1]) * at / focal
                 front = depth[now, ..., None] - at + np.sqrt(_FLESH**2 - aside**2)  # NaN beside the bone
-            own = np.arange(people) == body
-            hides = front > np.where(own[:, None], _SKIN, 0.0)[..., None]
-            hides[:, own, :5] &= ~_OF_HEAD  # which has a rule of its own
+            same = np.arange(people) == body
+            hides = front > np.where(same[:, None], _SKIN, 0.0)[..., None]
+            hides[:, same, :5] &= ~_OF_HEAD  # the head hides the face by the rule below
             hidden = hides.any(axis=-1)
-            theirs = label[now]
-            theirs[hidden & own[:, None] & (theirs == VISIBLE)] = SELF_OCCLUDED
-            theirs[hidden & ~own[:, None]] = OCCLUDED
-            label[now] = theirs
+            current = label[now]
+            current[hidden & same[:, None] & (current == VISIBLE)] = SELF_OCCLUDED
+            current[hidden & ~same[:, None]] = OCCLUDED
+            label[now] = current
         ray = camera.center - joints[..., :5, :]
-        away = (looks * ray).sum(axis=-1) < _TURNED_AWAY * np.linalg.norm(ray, axis=-1)
+        away = (normals * ray).sum(axis=-1) < _MIN_COSINE * np.linalg.norm(ray, axis=-1)
         face = label[..., :5]
         face[away & (face == VISIBLE)] = SELF_OCCLUDED
         label[~camera.inside(pixels)] = OUTSIDE
@@ -130,7 +133,7 @@ def seen(joints: Floats, looks: Floats, strangers: Floats, rig: Rig) -> NDArray[
 
 
 def _points(joints: Floats) -> Floats:
-    """Joints (..., 17, 3) and the middles that bones hang on, (..., 20, 3)."""
+    """Return joints (..., 17, 3) with the middles of skull, shoulders and hips, (..., 20, 3)."""
     middle = [joints[..., [5, 6], :].mean(axis=-2), joints[..., [11, 12], :].mean(axis=-2)]
     extra = [head(joints, height=_SKULL), *middle]
     return np.concatenate([joints, np.stack(extra, axis=-2)], axis=-2)

@@ -1,4 +1,4 @@
-"""Real beside simulated, per joint and class: the figure of a fitted detector."""
+"""Plot of a fitted detector: real and simulated values side by side, by joint and class."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as Canvas
+from matplotlib.figure import Figure
 
 from simharness.reality.detector_fit.measure import Measurement
 from simharness.reality.detector_fit.parameters import LIMB_KINDS
@@ -35,12 +35,12 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "legend.frameon": False,
 }
-_LEAST = 100  # joints, people or detections that a figure is of: of fewer, its interval says nothing
+_MIN_COUNT = 100  # joints, people or detections behind a value: with fewer, its interval is too wide to plot
 _LIMBS = tuple(KINDS[kind] for kind in LIMB_KINDS)
 _PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
     ("keypoints.drop.visible", "not reported, of visible joints, %", KINDS, 100),
-    ("keypoints.drop.self_occluded", "not reported, behind the own body, %", KINDS, 100),
-    ("keypoints.drop.occluded", "not reported, behind somebody else, %", KINDS, 100),
+    ("keypoints.drop.self_occluded", "not reported, self-occluded, %", KINDS, 100),
+    ("keypoints.drop.occluded", "not reported, occluded, %", KINDS, 100),
     ("keypoints.jitter", "jitter, of visible joints, %", _LIMBS, 100),
     ("keypoints.miss", "miss, of visible joints, %", _LIMBS, 100),
     ("keypoints.inversion", "inversion, %", _LIMBS, 100),
@@ -48,7 +48,7 @@ _PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
     ("keypoints.scatter", "scatter of good keypoints, units", _LIMBS, 1),
     ("bias.up", "bias upwards, mm", _LIMBS, 1000),
     ("bias.outward", "bias outwards, mm", _LIMBS, 1000),
-    ("scores.joint", "score, beside that of elbows", KINDS, 1),
+    ("scores.joint", "score, relative to elbows", KINDS, 1),
 )
 _REST: tuple[tuple[str, str], ...] = (
     ("correlation.life", "life, s"),
@@ -64,40 +64,41 @@ _REST: tuple[tuple[str, str], ...] = (
 
 
 def plot_comparison(measurements: Sequence[Measurement], path: str | Path) -> None:
-    """Write a PNG with up to two measurements beside each other, every figure with its 95 % interval.
+    """Write a PNG with up to two measurements side by side, every value with its 95 % interval.
 
     Raises:
         ValueError: the file cannot be written.
     """
     with mpl.rc_context(_STYLE):
-        canvas = Canvas(figsize=(13.5, 10), layout="constrained", dpi=110)
-        axes = canvas.subplots(4, 3).ravel()
+        figure = Figure(figsize=(13.5, 10), layout="constrained", dpi=110)
+        axes = figure.subplots(4, 3).ravel()
         for ax, (key, title, kinds, scale) in zip(axes, _PANELS, strict=False):
             _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
             ax.set_title(title)
             ax.set_xticks(range(len(kinds)), kinds, fontsize=7.5)
         _draw(axes[-1], measurements, [key for key, _ in _REST])
-        axes[-1].set_title("the rest")
+        axes[-1].set_title("correlation, scores, people")
         axes[-1].set_xticks(range(len(_REST)), [label for _, label in _REST], fontsize=7)
         handles, labels = axes[0].get_legend_handles_labels()
-        canvas.legend(handles, labels, loc="outside upper left", ncols=2, fontsize=10)
-        canvas.supxlabel(
-            f"Bars: 95 % intervals, block bootstrap over time. Figures of fewer than {_LEAST} are left out.",
+        figure.legend(handles, labels, loc="outside upper left", ncols=2, fontsize=10)
+        figure.supxlabel(
+            f"Bars: 95 % intervals, block bootstrap over time. Values of fewer than {_MIN_COUNT} joints are omitted.",
             fontsize=8.5,
         )
         try:
-            FigureCanvasAgg(canvas).print_png(str(path))
+            FigureCanvasAgg(figure).print_png(str(path))
         except OSError as error:
             raise ValueError(f"--figure {path}: cannot be written: {error.strerror}") from None
 
 
 def _draw(ax: Axes, measurements: Sequence[Measurement], keys: Sequence[str], *, scale: float = 1) -> None:
+    """Draw the values of some keys, with their intervals, times ``scale``."""
     ax.set_axisbelow(True)
     ax.grid(axis="y")
     for index, (measurement, color) in enumerate(zip(measurements, _COLORS, strict=False)):
-        figures = [measurement[key] for key in keys]
+        measured = [measurement[key] for key in keys]
         values, low, high = (
-            scale * np.array([getattr(each, end) if each.count >= _LEAST else np.nan for each in figures])
+            scale * np.array([getattr(each, end) if each.count >= _MIN_COUNT else np.nan for each in measured])
             for end in ("value", "low", "high")
         )
         at = np.arange(len(keys)) + 0.22 * (index - (len(measurements) - 1) / 2)

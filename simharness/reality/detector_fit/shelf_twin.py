@@ -1,4 +1,4 @@
-"""A simulated twin of Shelf: its rig, four people who work together in a small space, a shelf among them."""
+"""Simulated twin of the Shelf recording, to check a fit: its rig, four people at work in a small space, shelves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from simharness.capture.film import film
 from simharness.capture.ray_visibility import RayObserver
 from simharness.detector.conditions import OUTSIDE, Conditions
 from simharness.detector.detect import detect
-from simharness.reality.detector_fit.joint_labels import judge
+from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.sample import SHELF_RATE, Sample, of_simulation
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 from simharness.scenario.sections.scenario import Scenario
@@ -25,12 +25,12 @@ from simharness.world.scene.playback import Playback, simulate
 
 
 @dataclass(frozen=True)
-class Twin:
-    """What happens and what the cameras see of it, before any detector.
+class ShelfTwin:
+    """Ground truth of the twin, before any detector.
 
     Attributes:
-        sequence: where everyone is.
-        views: the same in the pictures.
+        sequence: ground truth in space.
+        views: ground truth in the pictures.
         rig: the cameras.
     """
 
@@ -39,25 +39,25 @@ class Twin:
     rig: Rig
 
     def detected(self, config: Detector, *, seed: int = 0, known: NDArray[np.bool_] | None = None) -> Sample:
-        """What a detector finds, and of the truth what Shelf would tell.
+        """Return the sample of a simulated detector, with as little truth as Shelf has.
 
         Args:
-            config: the detector.
-            seed: of its draws.
-            known: who is annotated when, (T, P); None: everybody.
+            config: parameters of the detector.
+            seed: seed of its draws.
+            known: which people are annotated in which frames, (T, P); None: all.
         """
         found = detect(self.sequence, self.views, self.rig, config, seed=seed)
         detections = [each.detections for each in found]
         return of_simulation(self.sequence.joints, self.sequence.time, detections, self.rig, known=known)
 
 
-def film_twin(*, seconds: float = 12.0, seed: int = 0, shelves: int = 0) -> Twin:
-    """Film the twin of Shelf by rays, at its 25 frames a second.
+def film_shelf_twin(*, seconds: float = 12.0, seed: int = 0, shelves: int = 0) -> ShelfTwin:
+    """Simulate and film the twin of Shelf with the renderer of rays, at the 25 Hz of Shelf.
 
     Args:
-        seconds: how long.
-        seed: of who is there, what they do and where the shelf is.
-        shelves: how many stand among them.
+        seconds: duration.
+        seed: seed of the people, their motion and the places of shelves.
+        shelves: number of shelves among the people.
     """
     scenario = Scenario.model_validate(
         {
@@ -76,20 +76,20 @@ def film_twin(*, seconds: float = 12.0, seed: int = 0, shelves: int = 0) -> Twin
     scene = build(scenario, rig)
     exposures = schedule_exposures(rig, scenario.faults, scene.time, seed=seed)
     playback = Playback(scene)
-    return Twin(simulate(scene), film(playback, exposures, RayObserver(playback)), rig)
+    return ShelfTwin(simulate(scene), film(playback, exposures, RayObserver(playback)), rig)
 
 
-def confusion(twin: Twin, sample: Sample) -> NDArray[np.int64]:
-    """How often joints that skeletons tell to be VISIBLE, SELF_OCCLUDED or OCCLUDED truly are, (9, 3, 3): ``sight.CONFUSION``.
+def count_occlusion(twin: ShelfTwin, sample: Sample) -> NDArray[np.int64]:
+    """Count joints by kind, estimated and true occlusion class, (9, 3, 3): the counts behind ``occlusion.CONFUSION``.
 
     Args:
-        twin: what truly happened.
-        sample: what a detector found of it.
+        twin: ground truth.
+        sample: detections of the twin.
     """
-    judged = judge(sample)
-    truly = Conditions.of(twin.views).occlusion
-    counted = judged.risk["drop"] & (truly != OUTSIDE)
+    labels = label_joints(sample)
+    true = Conditions.of(twin.views).occlusion
+    counted = labels.risk["drop"] & (true != OUTSIDE)
     kind = np.broadcast_to(np.array(KIND_OF_JOINT), counted.shape)
     result = np.zeros((len(KINDS), 3, 3), np.int64)
-    np.add.at(result, (kind[counted], judged.seen[counted], truly[counted]), 1)
+    np.add.at(result, (kind[counted], labels.occlusion[counted], true[counted]), 1)
     return result

@@ -1,4 +1,4 @@
-"""How large people are in the pictures, from their joints alone: recordings come without silhouettes."""
+"""Boxes of people in the pictures, estimated from their joints: recordings have no silhouettes."""
 
 from __future__ import annotations
 
@@ -6,38 +6,43 @@ import numpy as np
 
 from mvpose import Rig
 from mvpose.arrays import Bools, Floats
-from simharness.reality.detector_fit.sample import LIMBS
+from simharness.reality.detector_fit.sample import LIMB_JOINTS
 
 FLESH = 0.085
-"""Metres about every joint of the limbs and the crown. With CROWN: widths and heights of the boxes are right to 1 % in
-the median for simulated, dressed people who walk, reach, point and turn; the root of the area is right to 10 % for 90 %
-of them."""
+"""Margin about every limb joint and the crown, metres. With this margin and CROWN, the median error of width and height
+of the boxes is 1 % for simulated, dressed people who walk, reach, point and turn; the error of the root of the area is
+below 10 % for 90 % of them."""
 
 CROWN = 0.6
-"""How far the crown is above the middle of the shoulders, as a share of the trunk's length."""
+"""Height of the crown above the middle of the shoulders, as a share of the trunk's length."""
 
 _CHIN = 0.35
-"""Where the face is, on the same scale."""
+"""Height of the face on the same scale."""
 
 _SHOULDERS, _HIPS = [5, 6], [11, 12]
 
 
 def head(joints: Floats, *, height: float) -> Floats:
-    """A point of the head, (..., 3), above the shoulders of COCO-17 joints (..., 17, 3) by a share of the trunk."""
+    """Return a point of the head, (..., 3), from COCO-17 joints (..., 17, 3).
+
+    Args:
+        joints: metres.
+        height: height above the middle of the shoulders, in lengths of the trunk.
+    """
     shoulders, hips = joints[..., _SHOULDERS, :].mean(axis=-2), joints[..., _HIPS, :].mean(axis=-2)
     return shoulders + height * (shoulders - hips)
 
 
 def boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROWN) -> Floats:
-    """Boxes x, y, width, height of what the pictures show of people, (T, V, P, 4); zeros where they do not.
+    """Return the boxes x, y, width, height of people in the pictures, (T, V, P, 4); zeros where they are not visible.
 
     Args:
-        joints: COCO-17, (T, P, 17, 3) metres; only the limbs are looked at.
+        joints: COCO-17, (T, P, 17, 3) metres; only limb joints are used.
         rig: the V cameras.
-        flesh: metres about every joint.
-        crown: above the shoulders, in lengths of the trunk.
+        flesh: margin about every joint, metres.
+        crown: height of the crown above the shoulders, in lengths of the trunk.
     """
-    points = np.concatenate([joints[..., LIMBS, :], head(joints, height=crown)[..., None, :]], axis=-2)
+    points = np.concatenate([joints[..., LIMB_JOINTS, :], head(joints, height=crown)[..., None, :]], axis=-2)
     result = []
     for camera in rig:
         pixels = camera.project(points)
@@ -45,7 +50,7 @@ def boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROW
         with np.errstate(invalid="ignore", divide="ignore"):
             around = (flesh * focal / camera.depth(points))[..., None]
         limit = np.asarray(camera.size, float) - 1
-        whole = np.all(np.isfinite(pixels), axis=(-1, -2))  # nobody who is partly behind the camera
+        whole = np.all(np.isfinite(pixels), axis=(-1, -2))  # no box for people who are partly behind the camera
         low = np.clip(np.where(whole[..., None], (pixels - around).min(axis=-2), 0.0), 0, limit)
         high = np.clip(np.where(whole[..., None], (pixels + around).max(axis=-2), 0.0), 0, limit)
         result.append(np.concatenate([low, high - low], axis=-1))
@@ -53,7 +58,7 @@ def boxes(joints: Floats, rig: Rig, *, flesh: float = FLESH, crown: float = CROW
 
 
 def in_picture(joints: Floats, rig: Rig) -> Bools:
-    """Which joints fall on the pictures, (T, V, P, 17); of the face, whether the middle of the head does."""
+    """Return which joints lie on the pictures, (T, V, P, 17); for joints of the face, the middle of the head."""
     points = joints.copy()
-    points[..., : LIMBS[0], :] = head(joints, height=_CHIN)[..., None, :]
+    points[..., : LIMB_JOINTS[0], :] = head(joints, height=_CHIN)[..., None, :]
     return np.stack([camera.inside(camera.project(points)) for camera in rig], axis=1)

@@ -1,4 +1,4 @@
-"""A measured detector as tables in the terminal, every figure with its interval."""
+"""Tables of a measured detector for the terminal, every value with its interval."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from rich.text import Text
 
 from simharness.reality.detector_fit.fit import agreement
 from simharness.reality.detector_fit.frame_sums import TERCILES
-from simharness.reality.detector_fit.measure import Figure, Measurement
+from simharness.reality.detector_fit.measure import MeasuredValue, Measurement
 from simharness.scenario.sections.detector import KINDS
 
-_SIGHTS = ("visible", "self_occluded", "occluded")
+_OCCLUSIONS = ("visible", "self_occluded", "occluded")
 _OTHERS = {
-    "What errors have to do with each other": (
+    "Correlation of errors": (
         ("correlation.life", "mean life of an error, s"),
         ("correlation.views", "shared by all views"),
         ("correlation.limb", "shared within the limb"),
-        ("correlation.scatter_life", "time in which scatter forgets, s"),
-        ("correlation.scatter_views", "share of scatter that is one displacement in space"),
-        ("keypoints.self_occluded", "times as many misses and jitter behind the own body"),
-        ("keypoints.occluded", "times as many behind somebody else"),
+        ("correlation.scatter_life", "correlation time of scatter, s"),
+        ("correlation.scatter_views", "share of scatter that views have in common"),
+        ("keypoints.self_occluded", "factor of misses and jitter, self-occluded"),
+        ("keypoints.occluded", "factor of misses and jitter, occluded"),
         ("keypoints.stray", "share of misses anywhere on the box"),
     ),
     "Scores": (
@@ -31,35 +31,36 @@ _OTHERS = {
         ("scores.miss", "miss"),
         ("scores.inversion", "inversion"),
         ("scores.swap", "swap"),
-        ("scores.hidden", "times, not visible"),
+        ("scores.hidden", "factor, not visible"),
         ("scores.deviation", "deviation, logit"),
-        ("scores.overconfident", "over-confident misses"),
-        ("scores.underconfident", "under-confident hits"),
+        ("scores.overconfident", "overconfident misses, share"),
+        ("scores.underconfident", "underconfident good keypoints, share"),
     ),
     "People": (
         ("boxes.missed", "missed, share in a view"),
-        ("boxes.missed_views", "of it shared by all views"),
-        ("boxes.life", "mean life of that, s"),
-        ("boxes.duplicates", "found twice, share"),
-        ("phantoms.rate", "false at most, in a view and frame"),
-        ("phantoms.life", "mean life of those, s"),
+        ("boxes.missed_views", "missed, shared by all views"),
+        ("boxes.life", "mean life of a miss, s"),
+        ("boxes.duplicates", "duplicates, share"),
+        ("phantoms.rate", "false positives per view and frame, at most"),
+        ("phantoms.life", "mean life of false positives, s"),
         ("phantoms.score", "score of their keypoints"),
-        ("size.fragments", "fragments, in a view and frame"),
+        ("size.fragments", "fragments per view and frame"),
     ),
 }
 
 
 def print_measurement(measurement: Measurement, console: Console) -> None:
-    """Print what was measured: classes and bias by kind of joint, drops by visibility, sizes, and the rest."""
+    """Print a measurement: classes and bias by kind of joint, drops by occlusion, sizes, and the other parameters."""
     headline = Text.assemble(
         (measurement.name, "bold"),
         f"  {measurement.frames} frames, {measurement.people:.2f} people with known joints in each; "
         "95 % intervals by a block bootstrap over time",
     )
     notes = Text(
-        "Shares are of what the classes to their left leave. Good: within 1.14 of OKS sigma x sqrt(area); jitter: up "
-        "to 2.35; miss: beyond; inversions and swaps only where they can be told from both. The face has no truth: its "
-        "drops and scores alone are measured. Visibility is told by capsules about the skeletons.",
+        "Each share is of the joints that the classes to its left leave. Good: within 1.14 of OKS sigma x sqrt(area); "
+        "jitter: up to 2.35; miss: beyond; inversions and swaps only where distinguishable from both. The face has "
+        "no truth: only its drops and scores are measured. Visibility is estimated with capsules about the "
+        "skeletons.",
         style="dim",
     )
     blocks: list[RenderableType] = [
@@ -74,10 +75,11 @@ def print_measurement(measurement: Measurement, console: Console) -> None:
 
 
 def print_agreement(real: Measurement, simulated: Measurement, console: Console) -> None:
-    """Print how many of the detector's dials a simulated twin gives back, and which it does not."""
+    """Print how many of the detector's parameters its simulated twin reproduces, and the others."""
     different, compared = agreement(real, simulated)
     table = _table(
-        f"{simulated.name}: {compared - len(different)} of {compared} figures agree within both intervals", "figure"
+        f"{simulated.name}: {compared - len(different)} of {compared} parameters agree within both intervals",
+        "parameter",
     )
     for measurement in (real, simulated):
         table.add_column(measurement.name, justify="right", no_wrap=True)
@@ -97,17 +99,19 @@ def _classes(measurement: Measurement) -> Table:
 
 
 def _drops(measurement: Measurement) -> Table:
-    table = _table("Not reported, % of joints that are", "joint", *(each.replace("_", "-") for each in _SIGHTS))
+    table = _table("Not reported, % of joints by occlusion", "joint", *(each.replace("_", "-") for each in _OCCLUSIONS))
     for kind in KINDS:
-        table.add_row(kind, *(_cell(measurement[f"keypoints.drop.{sight}.{kind}"], 1, scale=100) for sight in _SIGHTS))
+        table.add_row(
+            kind, *(_cell(measurement[f"keypoints.drop.{occlusion}.{kind}"], 1, scale=100) for occlusion in _OCCLUSIONS)
+        )
     return table
 
 
 def _bias(measurement: Measurement) -> Table:
-    ways = ("forward", "outward", "up")
-    table = _table("Bias in the body's frame, mm, and factor of the score", "joint", *ways, "score")
+    directions = ("forward", "outward", "up")
+    table = _table("Bias in the body's frame, mm, and factor of the score", "joint", *directions, "score")
     for kind in KINDS:
-        cells = [_cell(measurement[f"bias.{way}.{kind}"], 0, scale=1000) for way in ways]
+        cells = [_cell(measurement[f"bias.{direction}.{kind}"], 0, scale=1000) for direction in directions]
         table.add_row(kind, *cells, _cell(measurement[f"scores.joint.{kind}"], 2))
     return table
 
@@ -136,12 +140,12 @@ def _table(title: str, first: str, *columns: str) -> Table:
     return table
 
 
-def _cell(figure: Figure, digits: int, *, scale: float = 1.0) -> Text:
-    """The value, and its interval in small."""
-    if not figure.known:
+def _cell(measured: MeasuredValue, digits: int, *, scale: float = 1.0) -> Text:
+    """Return a cell with the value and its interval."""
+    if not measured.known:
         return Text("–", style="dim")
-    # Adding zero turns what is rounded to minus zero into zero.
+    # Adding zero turns minus zero into zero.
     value, low, high = (
-        f"{round(scale * each, digits) + 0:.{digits}f}" for each in (figure.value, figure.low, figure.high)
+        f"{round(scale * each, digits) + 0:.{digits}f}" for each in (measured.value, measured.low, measured.high)
     )
-    return Text.assemble(value, (f"  {low}–{high}" if figure.low >= 0 else f"  {low} to {high}", "dim"))
+    return Text.assemble(value, (f"  {low}–{high}" if measured.low >= 0 else f"  {low} to {high}", "dim"))

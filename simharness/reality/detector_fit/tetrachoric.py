@@ -1,8 +1,9 @@
-"""What errors have to do with each other, from how often they come together.
+"""Tetrachoric correlation and lifetime of errors, from how often they occur together.
 
-The simulated detector draws an error as a standard normal number under a quantile. Two errors of chances p and q whose
-numbers have correlation rho come together with the chance Phi2(Phi^-1(p), Phi^-1(q); rho): so many are expected over
-all pairs, and rho is where as many were seen (the tetrachoric correlation, one for many pairs of chances).
+The simulated detector draws an error as a standard normal number below a quantile. Two errors of probabilities p and q
+whose numbers have the correlation rho occur together with probability Phi2(Phi^-1(p), Phi^-1(q); rho). Summed over all
+pairs this is the expected number of joint occurrences; the estimate is the rho at which it equals the observed number
+(the tetrachoric correlation, one value for many pairs of probabilities).
 """
 
 from __future__ import annotations
@@ -13,56 +14,57 @@ from scipy.special import ndtr, ndtri
 
 from mvpose.arrays import Floats
 
-_TURNS = np.linspace(0.0, np.arcsin(0.9995), 81)  # rho = sin(turn), in which the density is smooth
+_ANGLES = np.linspace(0.0, np.arcsin(0.9995), 81)  # rho = sin(angle), in which the density is smooth
 _LIVES = np.geomspace(0.2, 4000.0, 240)  # frames
 
 
-def together(p: ArrayLike, q: ArrayLike) -> Floats:
-    """Chances that two events of chances ``p`` and ``q`` (...) come together, (..., G), for correlations :func:`grid`.
+def joint_probability(p: ArrayLike, q: ArrayLike) -> Floats:
+    """Return the probability that two events of probabilities ``p`` and ``q`` (...) occur together, (..., G).
 
-    By the derivative of the bivariate normal distribution (Plackett, Biometrika 1954), summed over the correlation.
+    One value for each correlation of :func:`correlation_grid`, by integrating the derivative of the bivariate normal
+    distribution with respect to the correlation (Plackett, Biometrika 1954).
     """
     p, q = np.broadcast_arrays(np.asarray(p, float), np.asarray(q, float))
     with np.errstate(invalid="ignore"):
         h, k = (ndtri(np.clip(each, 1e-12, 1 - 1e-12))[..., None] for each in (p, q))
-        sin, cos = np.sin(_TURNS), np.cos(_TURNS)
+        sin, cos = np.sin(_ANGLES), np.cos(_ANGLES)
         density = np.exp(-(h * h + k * k - 2 * h * k * sin) / (2 * cos**2)) / (2 * np.pi)
-    steps = np.diff(_TURNS) * (density[..., 1:] + density[..., :-1]) / 2
-    grown = np.concatenate([np.zeros((*p.shape, 1)), np.cumsum(steps, axis=-1)], axis=-1)
-    return ndtr(h) * ndtr(k) + grown
+    steps = np.diff(_ANGLES) * (density[..., 1:] + density[..., :-1]) / 2
+    integral = np.concatenate([np.zeros((*p.shape, 1)), np.cumsum(steps, axis=-1)], axis=-1)
+    return ndtr(h) * ndtr(k) + integral
 
 
-def grid() -> Floats:
-    """The correlations of :func:`together`, (G,): 0 to almost 1."""
-    return np.sin(_TURNS)
+def correlation_grid() -> Floats:
+    """Return the correlations of :func:`joint_probability`, (G,): 0 to almost 1."""
+    return np.sin(_ANGLES)
 
 
-def correlation(both: Floats, expected: Floats) -> Floats:
-    """The correlation, 0 to 1, of what lies behind events that come in pairs, (R,); NaN where none is expected.
+def tetrachoric_correlation(both: Floats, expected: Floats) -> Floats:
+    """Return the correlation, 0 to 1, of the latent numbers behind pairs of events, (R,); NaN if no pair is expected.
 
     Args:
-        both: in how many pairs both happened, (R,).
-        expected: in how many they would have for each of :func:`grid`, (R, G), rising.
+        both: observed number of pairs in which both events occurred, (R,).
+        expected: expected number for each correlation of :func:`correlation_grid`, (R, G), rising.
     """
-    found = np.array([np.interp(each, row, grid()) for each, row in zip(both, expected, strict=True)])
-    return np.where(expected[:, -1] > expected[:, 0], found, np.nan)
+    estimate = np.array([np.interp(each, row, correlation_grid()) for each, row in zip(both, expected, strict=True)])
+    return np.where(expected[:, -1] > expected[:, 0], estimate, np.nan)
 
 
-def life(lags: ArrayLike, step: float, remembered: Floats, weight: Floats) -> Floats:
-    """The life, seconds, with which ``exp(-lag / life)`` is nearest to what is remembered, (R,); NaN without weight.
+def fit_life(lags: ArrayLike, step: float, autocorrelation: Floats, weight: Floats) -> Floats:
+    """Return the life, seconds, that fits ``exp(-lag / life)`` to autocorrelations, (R,); NaN without any weight.
 
     Args:
         lags: frames, (L,).
-        step: seconds from one frame to the next.
-        remembered: autocorrelations, (R, L).
-        weight: of each, (R, L).
+        step: seconds between consecutive frames.
+        autocorrelation: autocorrelations at the lags, (R, L).
+        weight: weights of the least squares, (R, L).
     """
     lags = np.asarray(lags, float)
     lives = np.concatenate([[0.0], _LIVES])
     with np.errstate(divide="ignore"):
         curves = np.exp(-lags / lives[:, None])
-    weight = np.where(np.isfinite(remembered), weight, 0.0)
-    values = np.nan_to_num(remembered)
-    # sum of w (r - e)², without the (R, lives, L) array; the first term is the same for all lives.
+    weight = np.where(np.isfinite(autocorrelation), weight, 0.0)
+    values = np.nan_to_num(autocorrelation)
+    # Sum of w (r - e)² without an (R, lives, L) array; the term w r² is left out, as it is the same for all lives.
     cost = weight @ (curves**2).T - 2 * (weight * values) @ curves.T
     return np.where(weight.sum(axis=-1) > 0, lives[cost.argmin(axis=-1)] * step, np.nan)

@@ -1,9 +1,9 @@
 import pytest
 
-from simharness.reality.detector_fit.shelf_twin import Twin, film_twin
+from simharness.reality.detector_fit.shelf_twin import ShelfTwin, film_shelf_twin
 
 
 @pytest.fixture(scope="session")
-def twin() -> Twin:
-    """Four people at work on the rig of Shelf, 12 s of them."""
-    return film_twin(seed=0)
+def twin() -> ShelfTwin:
+    """Twin of Shelf: four people at work, 12 s."""
+    return film_shelf_twin(seed=0)

@@ -6,7 +6,7 @@ import pytest
 from mvpose import Detections
 from simharness.reality.detector_fit import sizes
 from simharness.reality.detector_fit.association import associate
-from simharness.reality.detector_fit.sample import LIMBS, Sample, of_shelf, of_simulation
+from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample, of_shelf, of_simulation
 from simharness.scenario.sections.detector import Detector
 
 
@@ -19,13 +19,13 @@ def told(twin, *, frames=20, known=None, **dials):
 
 def test_perfect_detections_go_to_their_own_person(twin):
     _, found = told(twin)
-    there = (np.isfinite(found.keypoints[..., LIMBS, 0]).sum(axis=-1) >= 3) & found.found
+    there = (np.isfinite(found.keypoints[..., LIMB_JOINTS, 0]).sum(axis=-1) >= 3) & found.detected
     assert there.mean() > 0.9
     np.testing.assert_allclose(found.keypoints[there], np.where(
         np.isfinite(found.keypoints[there]), twin.views.pixels[:20][there], np.nan
     ))  # fmt: skip
-    assert found.false.sum() == found.repeated.sum() == 0
-    assert found.strangers.shape[1] == 0
+    assert found.false.sum() == found.duplicates.sum() == 0
+    assert found.unannotated.shape[1] == 0
     seen = np.isfinite(found.consensus).all(axis=-1)
     assert seen.mean() > 0.9
     np.testing.assert_allclose(found.consensus[seen], twin.sequence.joints[:20][seen], atol=1e-3)
@@ -35,17 +35,17 @@ def test_people_whom_nobody_annotated_are_strangers_and_not_false(twin):
     known = np.ones((len(twin.sequence), 4), bool)
     known[:, 2] = False
     _, found = told(twin, known=known)
-    assert not found.found[:, :, 2].any()
+    assert not found.detected[:, :, 2].any()
     assert found.false.sum() <= 2  # of 100 pictures
-    near = np.linalg.norm(found.strangers - twin.sequence.joints[:20, 2, None], axis=-1)
+    near = np.linalg.norm(found.unannotated - twin.sequence.joints[:20, 2, None], axis=-1)
     assert (np.nanmin(np.nanmean(near, axis=-1), axis=1) < 0.01).all()
 
 
 def test_phantoms_are_false_and_repetitions_are_not(twin):
     _, found = told(twin, frames=100, phantoms={"rate": 0.5}, boxes={"duplicates": 0.2})
     assert found.false.mean() == pytest.approx(0.5, abs=5 * np.sqrt(0.5 / 500))
-    share = found.repeated.sum() / found.found.sum()
-    assert share == pytest.approx(0.2, abs=5 * np.sqrt(0.16 / found.found.sum()))
+    share = found.duplicates.sum() / found.detected.sum()
+    assert share == pytest.approx(0.2, abs=5 * np.sqrt(0.16 / found.detected.sum()))
     assert ((found.false_scores > 0).any(axis=-1).sum(axis=-1) == found.false).all()
 
 
@@ -59,7 +59,7 @@ def test_too_few_joints_are_a_fragment(twin):
     found = associate(replace(sample, detections=frames), pixels, sizes.boxes(sample.reference, twin.rig))
     assert found.fragments.tolist() == [[0, 1, 0, 0, 0]] * 3
     assert found.false.sum() == 0
-    assert not found.found.any()
+    assert not found.detected.any()
 
 
 def test_a_simulation_tells_no_more_than_shelf(twin):
@@ -75,7 +75,9 @@ def test_a_simulation_tells_no_more_than_shelf(twin):
 def test_half_a_person_is_refused(twin):
     joints = twin.sequence.joints[:2].copy()
     joints[1, 3, 7] = np.nan
-    with pytest.raises(ValueError, match="of person 3 in frame 1 11 of 12 limb joints are known; expected all or none"):
+    with pytest.raises(
+        ValueError, match=r"expected all or none of the 12 limb joints .* got 11 for person 3 in frame 1"
+    ):
         Sample("bad", twin.rig, twin.sequence.time[:2], joints, [Detections.empty()] * 2)
     with pytest.raises(ValueError, match="expected detections of 2 frames, got 1"):
         Sample("bad", twin.rig, twin.sequence.time[:2], twin.sequence.joints[:2], [Detections.empty()])

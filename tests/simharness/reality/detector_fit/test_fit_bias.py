@@ -2,7 +2,7 @@ import numpy as np
 
 from simharness.detector.bias import world_offsets
 from simharness.detector.conditions import oks_units
-from simharness.reality.detector_fit.bias_fit import Linear, fit_offsets, moved
+from simharness.reality.detector_fit.bias_fit import LinearisedBias, apply_bias, fit_bias
 from simharness.reality.detector_fit.sizes import boxes
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Bias
 
@@ -19,12 +19,12 @@ def seen(twin):
 
 def test_moved_is_what_the_detector_does(twin):
     joints = twin.sequence.joints[:5]
-    np.testing.assert_allclose(moved(joints, EXPECTED), joints + world_offsets(joints, BIAS), atol=1e-12)
+    np.testing.assert_allclose(apply_bias(joints, EXPECTED), joints + world_offsets(joints, BIAS), atol=1e-12)
 
 
 def test_offsets_are_found_without_noise(twin):
     joints, keypoints, unit = seen(twin)
-    np.testing.assert_allclose(fit_offsets(Linear.of(joints, keypoints, unit, twin.rig)), EXPECTED, atol=2e-4)
+    np.testing.assert_allclose(fit_bias(LinearisedBias.of(joints, keypoints, unit, twin.rig)), EXPECTED, atol=2e-4)
 
 
 def test_and_among_misses_and_scatter(twin):
@@ -34,12 +34,12 @@ def test_and_among_misses_and_scatter(twin):
     noise[rng.random(unit.shape) < 0.2] *= 20  # these are far off, all ways alike
     noisy = keypoints + unit[..., None] * noise
     noisy[rng.random(unit.shape) < 0.1] = np.nan
-    np.testing.assert_allclose(fit_offsets(Linear.of(joints, noisy, unit, twin.rig)), EXPECTED, atol=0.004)
+    np.testing.assert_allclose(fit_bias(LinearisedBias.of(joints, noisy, unit, twin.rig)), EXPECTED, atol=0.004)
 
 
 def test_a_kind_that_nobody_reports_has_no_offset(twin):
     joints, keypoints, unit = seen(twin)
     keypoints[..., np.array(KIND_OF_JOINT) == KINDS.index("knees"), :] = np.nan
-    found = fit_offsets(Linear.of(joints, keypoints, unit, twin.rig))
+    found = fit_bias(LinearisedBias.of(joints, keypoints, unit, twin.rig))
     assert (found[KINDS.index("knees")] == 0).all()
     np.testing.assert_allclose(found[KINDS.index("hips")], BIAS.hips, atol=2e-4)

@@ -6,11 +6,11 @@ import pytest
 
 from mvpose import Detections
 from simharness.reality.detector_fit.fit import agreement, fit, twin_of, write_profile
-from simharness.reality.detector_fit.measure import Figure, measure
+from simharness.reality.detector_fit.measure import MeasuredValue, measure
 from simharness.reality.detector_fit.profile import settings
 from simharness.reality.detector_fit.sample import of_shelf
 from simharness.reality.shelf import read_shelf
-from simharness.scenario.profiles import read_profile
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.detector import KINDS, Detector
 
 ALONE = {
@@ -47,7 +47,7 @@ TOGETHER = {
     "phantoms": {"rate": 0.3, "life": 0.4},
 }
 
-LIMBS = KINDS[3:]
+LIMB_KINDS = KINDS[3:]
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def together(twin):
     return measure(twin.detected(Detector.model_validate(TOGETHER), seed=1), resamples=100)
 
 
-def mean(measurement, key, kinds=LIMBS):
+def mean(measurement, key, kinds=LIMB_KINDS):
     return np.mean([measurement[f"{key}.{kind}"].value for kind in kinds])
 
 
@@ -140,12 +140,12 @@ def test_what_lasts_has_wider_intervals(alone, together):
         figure = measurement[f"keypoints.jitter.{kind}"]
         return (figure.high - figure.low) * np.sqrt(figure.count / figure.value)
 
-    assert np.mean([width(together, kind) / width(alone, kind) for kind in LIMBS]) > 1.5
+    assert np.mean([width(together, kind) / width(alone, kind) for kind in LIMB_KINDS]) > 1.5
 
 
 def test_a_perfect_detector_has_no_errors(twin):
     found = measure(twin.detected(Detector()), resamples=50)
-    for kind in LIMBS:
+    for kind in LIMB_KINDS:
         for key in ("swap", "inversion", "miss", "jitter"):
             assert found[f"share.{key}.{kind}"].value == 0
         assert found[f"keypoints.scatter.{kind}"].value <= 0.05
@@ -167,11 +167,11 @@ def test_misses_are_not_taken_for_inversions_and_swaps(twin):
 
 
 def test_figures_agree_as_far_as_both_intervals_go():
-    one = Figure(0.10, 0.07, 0.14, 100)
-    assert one.agrees(Figure(0.15, 0.12, 0.2, 100))  # 0.05 = the hypotenuse of 0.04 and 0.03
-    assert not one.agrees(Figure(0.1501, 0.12, 0.2, 100))
-    assert one.agrees(Figure(0.05, 0.0, 0.09, 100))
-    assert Figure(0.15, 0.12, 0.2, 100).agrees(one)
+    one = MeasuredValue(0.10, 0.07, 0.14, 100)
+    assert one.agrees(MeasuredValue(0.15, 0.12, 0.2, 100))  # 0.05 = the hypotenuse of 0.04 and 0.03
+    assert not one.agrees(MeasuredValue(0.1501, 0.12, 0.2, 100))
+    assert one.agrees(MeasuredValue(0.05, 0.0, 0.09, 100))
+    assert MeasuredValue(0.15, 0.12, 0.2, 100).agrees(one)
 
 
 def test_the_profile_says_what_was_measured(twin, tmp_path):
@@ -202,7 +202,7 @@ def test_the_profile_says_what_was_measured(twin, tmp_path):
 def test_nothing_to_measure_is_said(twin):
     sample = twin.detected(Detector())
     nobody = replace(sample, reference=np.full(sample.reference.shape, np.nan))
-    with pytest.raises(ValueError, match="nobody's joints are known in any of 300 frames"):
+    with pytest.raises(ValueError, match="expected people with known joints, got none in 300 frames"):
         measure(nobody)
     blind = replace(sample, detections=tuple(Detections.empty() for _ in sample.detections))
     with pytest.raises(ValueError, match="no detection is near any of the known people"):

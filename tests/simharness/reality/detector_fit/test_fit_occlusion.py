@@ -1,8 +1,8 @@
 import numpy as np
 
 from simharness.detector.conditions import OUTSIDE
-from simharness.reality.detector_fit import sizes
-from simharness.reality.detector_fit.shelf_twin import confusion
+from simharness.reality.detector_fit import occlusion, sizes
+from simharness.reality.detector_fit.shelf_twin import count_occlusion
 from simharness.scenario.sections.detector import Detector
 
 
@@ -25,25 +25,25 @@ def test_who_is_behind_the_camera_or_unknown_has_no_box(twin):
 
 def test_what_skeletons_tell_is_as_right_as_CONFUSION_says(twin):
     sample = twin.detected(Detector.model_validate({"keypoints": {"scatter": 0.3, "drop": {"self_occluded": 0.3}}}))
-    counted = confusion(twin, sample)
+    counted = count_occlusion(twin, sample)
     shares = counted / counted.sum(axis=-1, keepdims=True)
     assert counted.sum(axis=(0, 2)).min() > 1000
     # Another scene than those that CONFUSION is of: it differs by a few per cent, and is right nine times of ten.
-    told = counted.sum(axis=-1, keepdims=True) + 0 * counted
-    assert np.average(abs(shares - occlusion.CONFUSION), weights=told) < 0.035
+    labels = counted.sum(axis=-1, keepdims=True) + 0 * counted
+    assert np.average(abs(shares - occlusion.CONFUSION), weights=labels) < 0.035
     assert np.trace(counted.sum(axis=0)) / counted.sum() > 0.9
     np.testing.assert_allclose(occlusion.CONFUSION.sum(axis=-1), 1.0)
 
 
 def test_a_face_that_detections_agree_on_turns_the_rest(twin):
     joints = twin.sequence.joints[:50]
-    whole, looks = occlusion.with_face(joints, joints)
+    whole, normals = occlusion.complete_face(joints, joints)
     np.testing.assert_allclose(whole, joints)
-    np.testing.assert_allclose(np.linalg.norm(looks, axis=-1), 1.0, atol=0.01)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=0.01)
     partly = joints.copy()
     partly[..., 1:5, :] = np.nan
-    guessed, _ = occlusion.with_face(joints, partly)
-    trunk, _ = occlusion.with_face(joints, np.full(joints.shape, np.nan))
+    guessed, _ = occlusion.complete_face(joints, partly)
+    trunk, _ = occlusion.complete_face(joints, np.full(joints.shape, np.nan))
     error, worse = (np.linalg.norm(each - joints, axis=-1)[..., 1:5].mean() for each in (guessed, trunk))
     assert error < 0.07  # metres: a head is three times as large
     assert worse < 0.1
@@ -51,7 +51,7 @@ def test_a_face_that_detections_agree_on_turns_the_rest(twin):
 
 def test_what_is_off_the_picture_is_outside(twin):
     joints = twin.sequence.joints[:5] + [50.0, 0, 0]
-    told = occlusion.seen(*occlusion.with_face(joints, joints), np.zeros((5, 0, 17, 3)), twin.rig)
+    labels = occlusion.occlusion_classes(*occlusion.complete_face(joints, joints), np.zeros((5, 0, 17, 3)), twin.rig)
     inside = np.stack([camera.inside(camera.project(joints)) for camera in twin.rig], axis=1)
     assert not inside.all()
-    assert ((told == OUTSIDE) == ~inside).all()
+    assert ((labels == OUTSIDE) == ~inside).all()

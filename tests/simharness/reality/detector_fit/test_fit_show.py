@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from simharness.reality.detector_fit.measure import Figure, measure
+from simharness.reality.detector_fit.measure import MeasuredValue, measure
 from simharness.reality.detector_fit.plot import plot_comparison
 from simharness.reality.detector_fit.table import print_agreement, print_measurement
 from simharness.scenario.sections.detector import KINDS, Detector
@@ -39,8 +39,8 @@ def test_the_table_has_every_kind_of_joint_with_its_interval(measured):
 
 
 def test_what_differs_is_named(measured):
-    other = replace(measured, figures={**measured.figures, "boxes.missed": Figure(0.9, 0.8, 1.0, 10)})
-    assert "figures agree" in printed(print_agreement, measured, measured)
+    other = replace(measured, values={**measured.values, "boxes.missed": MeasuredValue(0.9, 0.8, 1.0, 10)})
+    assert "parameters agree" in printed(print_agreement, measured, measured)
     assert "boxes.missed" not in printed(print_agreement, measured, measured)
     assert "boxes.missed" in printed(print_agreement, measured, other)
 

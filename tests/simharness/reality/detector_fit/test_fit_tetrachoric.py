@@ -2,16 +2,21 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
-from simharness.reality.detector_fit.tetrachoric import correlation, grid, life, together
+from simharness.reality.detector_fit.tetrachoric import (
+    correlation_grid,
+    fit_life,
+    joint_probability,
+    tetrachoric_correlation,
+)
 
 
 @pytest.mark.parametrize(("p", "q"), [(0.5, 0.5), (0.1, 0.1), (0.02, 0.3), (0.9, 0.6)])
 def test_events_that_come_together_as_of_a_bivariate_normal(p, q):
     h, k = norm.ppf([p, q])
-    chances = together(p, q)
+    chances = joint_probability(p, q)
     assert chances[0] == pytest.approx(p * q)
     for index in (10, 25, 40, 50):
-        rho = grid()[index]
+        rho = correlation_grid()[index]
         exact = multivariate_normal([0, 0], [[1, rho], [rho, 1]]).cdf([h, k])
         assert chances[index] == pytest.approx(exact, rel=2e-3)
     assert (np.diff(chances) >= 0).all()
@@ -21,22 +26,22 @@ def test_events_that_come_together_as_of_a_bivariate_normal(p, q):
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.8])
 def test_the_correlation_behind_events_of_different_chances(rho):
     rng = np.random.default_rng(0)
-    both, expected = 0.0, np.zeros(len(grid()))
+    both, expected = 0.0, np.zeros(len(correlation_grid()))
     for p, q in ((0.05, 0.05), (0.1, 0.3), (0.02, 0.2)):
         normal = rng.multivariate_normal([0, 0], [[1, rho], [rho, 1]], 60000)
         happens = normal < norm.ppf([p, q])
         both += happens.all(axis=1).sum()
-        expected += 60000 * together(*happens.mean(axis=0))
-    assert correlation(np.array([both]), expected[None])[0] == pytest.approx(rho, abs=0.03)
-    assert np.isnan(correlation(np.zeros(1), np.zeros((1, len(grid()))))[0])
+        expected += 60000 * joint_probability(*happens.mean(axis=0))
+    assert tetrachoric_correlation(np.array([both]), expected[None])[0] == pytest.approx(rho, abs=0.03)
+    assert np.isnan(tetrachoric_correlation(np.zeros(1), np.zeros((1, len(correlation_grid()))))[0])
 
 
 def test_lives_of_what_forgets_exponentially():
     lags, step = np.array([1, 2, 4, 8, 16]), 0.04
     lives = np.array([0.1, 0.5, 2.0])
-    remembered = np.exp(-lags * step / lives[:, None])
-    np.testing.assert_allclose(life(lags, step, remembered, np.ones((3, 5))), lives, rtol=0.03)
+    autocorrelation = np.exp(-lags * step / lives[:, None])
+    np.testing.assert_allclose(fit_life(lags, step, autocorrelation, np.ones((3, 5))), lives, rtol=0.03)
     nothing = np.array([[0.0] * 5, [np.nan] * 5])
-    found = life(lags, step, nothing, np.array([[1.0] * 5, [1.0] * 5]))
+    found = fit_life(lags, step, nothing, np.array([[1.0] * 5, [1.0] * 5]))
     assert found[0] < step / 3
     assert np.isnan(found[1])
