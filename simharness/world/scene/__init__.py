@@ -1,1 +1,1 @@
-"""The scene: room, clutter and moving people in one MuJoCo model, and its playback."""
+"""Scene: room, objects and moving people in one MuJoCo model, and its playback."""

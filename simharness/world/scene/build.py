@@ -1,4 +1,4 @@
-"""From a scenario to a scene: who is there, how they move, what stands around them, all in one MuJoCo model."""
+"""Construction of a scene from a scenario: people, motions, room and objects in one MuJoCo model."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpa
 from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.room import make_room
 
-CLOCK_MARGIN = 1.0  # seconds that motions go on before and after: clocks of cameras are off by less
+CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a sequence and its pictures are made from.
+    """People, objects, motions and lighting from which a sequence and its pictures are made.
 
     Attributes:
-        model: people ("person0/..."), room and things in one MuJoCo model; what stands has geoms of its name, what
-            moves is a mocap body of its name.
-        bodies: P bodies.
-        figures: what is seen of each body, at rest.
-        motions: their motions, to be read at any time.
-        solids: the room, then the things in it.
-        lighting: the light.
-        time: seconds of the frames, (T,).
+        model: MuJoCo model of people ("person0/..."), room and objects; solids at rest have geoms of their name, moving
+            ones are mocap bodies of their name.
+        bodies: bodies of the P people.
+        figures: visible meshes of the people (body and clothing) in the rest pose.
+        motions: motions of the people, which can be sampled at any time.
+        solids: room, then objects.
+        lighting: lighting of the scene.
+        time: times of the frames, (T,), seconds.
     """
 
     model: mujoco.MjModel
@@ -62,12 +62,12 @@ class Scene:
 
     @property
     def moving(self) -> tuple[Solid, ...]:
-        """The solids that move."""
+        """Moving solids."""
         return tuple(solid for solid in self.solids if solid.trajectory is not None)
 
     @cached_property
     def mirrors(self) -> dict[int, Mirror]:
-        """The glass of those that are mirrors, by their place among the people and solids."""
+        """Glass of the solids that are mirrors, by their mesh index among people and solids."""
         first = len(self.bodies)
         return {first + k: solid.mirror for k, solid in enumerate(self.solids) if solid.mirror is not None}
 
@@ -75,15 +75,15 @@ class Scene:
 def build(scenario: Scenario, rig: Rig) -> Scene:
     """Build the scene of a scenario.
 
-    Person i's body, look, path and manner come from streams of person i, so one more person changes none of the
-    others; things are placed around the people's paths and the cameras and change nobody.
+    Body, appearance, path and movement style of person i come from streams of person i, so one more person changes none
+    of the others; objects are placed around the paths of the people and the cameras, and do not change the people.
 
     Args:
-        scenario: what is asked for.
-        rig: the cameras, which nothing may stand close to.
+        scenario: scenario of the scene.
+        rig: true cameras, which objects must not be close to.
 
     Raises:
-        ValueError: people, things or cameras do not fit, naming the keys of the scenario to change.
+        ValueError: people, objects or cameras do not fit; the message names the keys of the scenario to change.
     """
     seed, people = scenario.seed, scenario.people
     _check_area(scenario)
@@ -135,7 +135,7 @@ def _figure(body: Body, look: Look) -> Mesh:
 
 
 def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco.MjModel:
-    """One MuJoCo model of everything: see :class:`Scene`."""
+    """Compile people and solids to one MuJoCo model: see :class:`Scene`."""
     spec = mujoco.MjSpec()
     spec.modelname = "scene"
     for solid in solids:
@@ -154,6 +154,6 @@ def _check_area(scenario: Scenario) -> None:
     largest = _largest_area(scenario)
     if scenario.people.count and scenario.people.area > largest:
         raise ValueError(
-            f"people.area = {scenario.people.area:g} m reaches into the walls of room.size = "
-            f"{list(scenario.room.size)}: take people.area at most {largest:.2f}, or a larger room"
+            f"people.area = {scenario.people.area:g} m does not fit between the walls of room.size = "
+            f"{list(scenario.room.size)}: use people.area of at most {largest:.2f} or a larger room.size"
         )

@@ -1,4 +1,4 @@
-"""Where cameras may hang."""
+"""Clearance of cameras from floor, walls and objects."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.world.scene.objects.solids import Solid
 
 WALL_MARGIN = 0.1  # metres between a camera and a wall
-_ROUNDING = 1e-6  # metres: positions on a limit may exceed it by rounding, which differs between processors
+_ROUNDING = 1e-6  # metres: tolerance at limits, because processors round differently
 
 
 def check_rig(scenario: Scenario, solids: Sequence[Solid], rig: Rig) -> None:
-    """Check that every camera hangs freely.
+    """Check that every camera has clearance.
 
     Args:
-        scenario: names the room.
-        solids: what stands in it.
-        rig: the true cameras.
+        scenario: scenario with the room.
+        solids: solids in the scene.
+        rig: true cameras.
 
     Raises:
-        ValueError: a camera under the floor or inside of a thing; where there are walls also one behind a wall, within
-            0.1 m of one, or above them. The message names the camera, where it is, what it is in, and how to mend it.
+        ValueError: a camera under the floor or inside an object, or, if there are walls, behind a wall, less than 0.1 m
+            from one, or above them. The message names the camera, its position, the obstacle, and the keys to change.
     """
     for camera in rig:
         place = camera.center
         where = f"camera {camera.name!r} at ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f}) m"
         if place[2] <= 0.0:
-            raise ValueError(f"{where} is under the floor: take cameras.height above 0")
+            raise ValueError(f"{where} is not above the floor: use cameras.height above 0")
         if scenario.room.walls:
             _check_walls(scenario, rig, place, where)
         for solid in solids:
             if solid.kind != "room" and solid.trajectory is None and solid.hull.distance(place) == 0.0:
                 raise ValueError(
-                    f"{where} is inside of {solid.name}, which stands at ({solid.hull.center[0]:.2f}, "
+                    f"{where} is inside {solid.name}, which stands at ({solid.hull.center[0]:.2f}, "
                     f"{solid.hull.center[1]:.2f}) and is {solid.hull.corners[:, 2].max():.2f} m high: change "
                     "cameras.height, cameras.radius or cameras.start, or the clutter"
                 )
@@ -47,7 +47,7 @@ def _check_walls(scenario: Scenario, rig: Rig, place: NDArray[np.float64], where
     x, y, z = scenario.room.size
     if place[2] > z + _ROUNDING:
         raise ValueError(
-            f"{where} is above the walls, which are {z:g} m high: take cameras.height at most {z:g}, a higher "
+            f"{where} is above the walls, which are {z:g} m high: use cameras.height of at most {z:g}, a higher "
             "room.size, or room.walls = false"
         )
     limits = np.array([x / 2, y / 2]) - WALL_MARGIN
@@ -61,13 +61,13 @@ def _check_walls(scenario: Scenario, rig: Rig, place: NDArray[np.float64], where
         ring = scenario.cameras.layout in ("ring", "arc")
         smaller = f"cameras.radius at most {_largest_radius(rig, limits):.2f}, or " if ring else ""
         raise ValueError(
-            f"{where} is {how} {name} of the room, {x:g} by {y:g} m; it must stay {WALL_MARGIN:g} m inside: take "
+            f"{where} is {how} {name} of the room, {x:g} by {y:g} m; expected at least {WALL_MARGIN:g} m inside: use "
             f"{smaller}a larger room.size, {needed[0]:.1f} by {needed[1]:.1f} m or more, or room.walls = false"
         )
 
 
 def _largest_radius(rig: Rig, limits: NDArray[np.float64]) -> float:
-    """The largest ring radius, rounded down to a centimetre, at which all cameras keep within the limits (2,)."""
+    """Return the largest ring radius, rounded down to a centimetre, with all cameras within limits (2,)."""
     centers = rig.centers[:, :2]
     radius = np.linalg.norm(centers, axis=1, keepdims=True)
     reach = np.abs(centers) / np.maximum(radius, 1e-9)

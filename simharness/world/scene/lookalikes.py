@@ -1,4 +1,4 @@
-"""What looks like a person and is none: figures on things (``Solid.figure``), and everyone in every mirror."""
+"""Lookalikes: objects with a human figure (``Solid.figure``), and mirror images of people."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from simharness.world.scene.build import Scene
 
 
-OWN_SURFACE = 0.3  # metres: a figure's own surface may lie so far in front of its joints
-_GLASS = 0.03  # metres: the same of a mirror's glass, whose frame stands out a little
-_FLAT = 0.01  # metres, the thickness of a figure below which it is a picture
+SURFACE_DEPTH = 0.3  # metres: largest distance of the surface of a figure in front of its joints
+_GLASS_DEPTH = 0.03  # metres: the same for the glass of a mirror; its frame stands out slightly
+_FLAT = 0.01  # metres: thickness below which a figure is a flat picture
 
 
 @dataclass(frozen=True)
 class Lookalikes:
-    """The D things of a scene that look like people: F figures, then the P people in one mirror after the other.
+    """The D lookalikes of a scene: F figures, then for each mirror the images of the P people.
 
-    In a mirror left and right change sides, as they do to a detector.
+    In a mirror image left and right joints are exchanged, because a detector labels them so.
 
     Attributes:
-        names: "poster0", "mirror0/person2", (D,).
-        mesh: index of the thing among people and solids, as ``Image.ids`` has it, (D,).
-        figures: COCO-17 joints in the world, (F, 17, 3), metres.
-        fronts: horizontal vectors to the front of figures that are seen from there alone, (F, 3); zeros of the others.
-        mirrors: the glass of the mirrors.
+        names: names such as "poster0" and "mirror0/person2", (D,).
+        mesh: mesh index of the object among people and solids, as in ``Image.ids``, (D,).
+        figures: COCO-17 joints of the figures in the world, (F, 17, 3), metres.
+        fronts: horizontal vectors to the front of flat figures, visible only from there, (F, 3); zeros for the others.
+        mirrors: glass of the mirrors.
     """
 
     names: tuple[str, ...]
@@ -43,14 +43,17 @@ class Lookalikes:
 
     @classmethod
     def of(cls, scene: Scene) -> Lookalikes:
-        """Those of a scene."""
+        """Return the lookalikes of a scene."""
         people = len(scene.bodies)
-        found = [(people + k, s.name, s.figure) for k, s in enumerate(scene.solids) if s.figure is not None]
+        with_figure = [(people + k, s.name, s.figure) for k, s in enumerate(scene.solids) if s.figure is not None]
         glass = [(people + k, s.name, s.mirror) for k, s in enumerate(scene.solids) if s.mirror is not None]
-        figures = np.reshape([figure for *_, figure in found], (-1, len(COCO17), 3))
+        figures = np.reshape([figure for *_, figure in with_figure], (-1, len(COCO17), 3))
         return cls(
-            names=(*(name for _, name, _ in found), *(f"{n}/person{p}" for _, n, _ in glass for p in range(people))),
-            mesh=np.array([*(index for index, *_ in found), *np.repeat([i for i, *_ in glass], people)], int),
+            names=(
+                *(name for _, name, _ in with_figure),
+                *(f"{name}/person{p}" for _, name, _ in glass for p in range(people)),
+            ),
+            mesh=np.array([*(index for index, *_ in with_figure), *np.repeat([i for i, *_ in glass], people)], int),
             figures=figures,
             fronts=np.reshape([_front(figure) for figure in figures], (-1, 3)),
             mirrors=tuple(mirror for *_, mirror in glass),
@@ -61,18 +64,18 @@ class Lookalikes:
 
     @property
     def allowed(self) -> Floats:
-        """How far in front of a target its own surface may be, (D,), metres."""
+        """Largest distance of the surface of each lookalike in front of its targets, (D,), metres."""
         figures = len(self.figures)
-        return np.repeat([OWN_SURFACE, _GLASS], [figures, len(self) - figures])
+        return np.repeat([SURFACE_DEPTH, _GLASS_DEPTH], [figures, len(self) - figures])
 
     def joints(self, people: Floats) -> Floats:
-        """Where their joints appear to be.
+        """Return the apparent positions of the joints of all lookalikes.
 
         Args:
-            people: joints of everyone in n moments, (n, P, 17, 3), metres.
+            people: joints of all people at n times, (n, P, 17, 3), metres.
 
         Returns:
-            (n, D, 17, 3) metres; of people in mirrors behind the glass.
+            Positions, (n, D, 17, 3), metres; those of mirror images are behind the glass.
         """
         if not len(self):
             return people[:, :0]
@@ -80,35 +83,36 @@ class Lookalikes:
         turned = people[:, :, COCO17.mirror]
         return np.concatenate([still, *(mirror.reflect(turned) for mirror in self.mirrors)], axis=1)
 
-    def targets(self, eye: Floats, joints: Floats) -> tuple[Floats, Bools]:
-        """What of them an eye could see, and where it must look unhindered for it.
+    def targets(self, viewpoint: Floats, joints: Floats) -> tuple[Floats, Bools]:
+        """Return the points to which lines of sight from a viewpoint must be free, and whether they exist.
 
-        Whom and what a person's reflection is hidden by in the mirror, between person and glass, is not looked at.
+        Occlusion of a person's reflection between the person and the glass is not considered.
 
         Args:
-            eye: metres, (3,).
-            joints: where they appear to be, (D, 17, 3), metres.
+            viewpoint: position, (3,), metres.
+            joints: apparent positions of the joints, (D, 17, 3), metres.
 
         Returns:
-            Points (D, 17, 3): the joints of figures, and where the ways to reflected joints meet the glass; and whether
-            there is anything to see, (D, 17): not from behind a picture or a mirror, nor beside the glass.
+            Points, (D, 17, 3): joints of figures, and intersections with the glass of lines to reflected joints; and
+            whether the joint could be visible, (D, 17): false from behind a picture or mirror, and beside the glass.
         """
         count = len(self.figures)
         points, shown = joints.copy(), np.ones(joints.shape[:2], bool)
         if not len(self):
             return points, shown
         flat = np.any(self.fronts, axis=-1)
-        ahead = ((eye - self.figures) * self.fronts[:, None]).sum(axis=-1)
+        ahead = ((viewpoint - self.figures) * self.fronts[:, None]).sum(axis=-1)
         shown[:count] = (ahead > 0) | ~flat[:, None]
-        for mirror, (image, point, there) in zip(self.mirrors, self._in_mirrors(joints, points, shown), strict=True):
-            there[:] = mirror.shows(eye, mirror.reflect(image))
-            mine, theirs = mirror.in_front(eye), -mirror.in_front(image)
-            share = np.where(there, mine / np.where(there, mine + theirs, 1.0), 1.0)
-            point[:] = eye + (image - eye) * share[..., None]
+        for mirror, (image, point, on_glass) in zip(self.mirrors, self._in_mirrors(joints, points, shown), strict=True):
+            on_glass[:] = mirror.shows(viewpoint, mirror.reflect(image))
+            viewer_distance, image_distance = mirror.in_front(viewpoint), -mirror.in_front(image)
+            whole = np.where(on_glass, viewer_distance + image_distance, 1.0)
+            share = np.where(on_glass, viewer_distance / whole, 1.0)
+            point[:] = viewpoint + (image - viewpoint) * share[..., None]
         return points, shown
 
     def _in_mirrors(self, *arrays: NDArray) -> list[tuple[NDArray, ...]]:
-        """For each mirror its part of arrays (D, ...), to be written to."""
+        """Return for each mirror its writable part of arrays (D, ...)."""
         first, mirrors = len(self.figures), len(self.mirrors)
         people = (len(self) - first) // max(mirrors, 1)
         parts = [slice(first + m * people, first + (m + 1) * people) for m in range(mirrors)]
@@ -116,8 +120,8 @@ class Lookalikes:
 
 
 def _front(figure: Floats) -> Floats:
-    """Of a figure (17, 3) on a sheet a vector (3,) to its front; zeros of one in the round."""
-    across = figure[5] - figure[6]  # to the left
+    """Return the vector (3,) to the front of a flat figure (17, 3); zeros for a solid one."""
+    across = figure[5] - figure[6]  # from the right to the left shoulder
     front = np.cross(across, [0.0, 0.0, 1.0])
     front /= np.linalg.norm(front)
     return front if np.ptp(figure @ front) < _FLAT else np.zeros(3)

@@ -1,4 +1,4 @@
-"""Kinematic playback: the motions drive the MuJoCo model, and its bodies tell where everything is at any moment."""
+"""Kinematic playback: the motions drive the MuJoCo model, which gives positions of people and objects at any time."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from simharness.world.scene.build import Scene
 
 @dataclass(frozen=True)
 class State:
-    """Where everyone and everything is at one moment.
+    """Positions of all people and moving solids at one time.
 
     Attributes:
-        time: seconds.
-        landmarks: of ``simharness.types.landmarks.LANDMARKS`` in the world, (P, L, 3), metres.
-        bones: skinning transforms, rest pose to world, (P, B, 3, 4).
-        placements: poses of the scene's moving solids in their order, (M, 7): metres, quaternion w x y z.
+        time: time in seconds.
+        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (P, L, 3), metres.
+        bones: skinning transforms from rest pose to world, (P, B, 3, 4).
+        placements: poses of the moving solids of the scene in their order, (M, 7): metres, quaternion w x y z.
     """
 
     time: float
@@ -42,11 +42,11 @@ class State:
 
 
 class Playback:
-    """A scene that can be looked at at any time. Holds one state of MuJoCo's, so it is not for sharing.
+    """Playback of a scene at any time. It holds one MuJoCo state, so it must not be shared between threads.
 
     Attributes:
-        scene: what is played.
-        data: MuJoCo's state, that of the last :class:`State` given.
+        scene: scene to play.
+        data: MuJoCo state, that of the last :class:`State` returned.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -57,16 +57,16 @@ class Playback:
         self._empty = np.zeros((0, len(body_model().bones), 3, 4))
 
     def at(self, time: float) -> State:
-        """The scene at one time, seconds."""
+        """Return the state of the scene at one time in seconds."""
         return next(self.over([time]))
 
     def over(self, times: ArrayLike) -> Iterator[State]:
-        """The scene at times (n,), one after the other."""
+        """Yield the states of the scene at times (n,) in seconds."""
         times = np.asarray(times, float)
         motions = [motion.read(times) for motion in self.scene.motions]
         placements = np.empty((len(times), len(self._mocap), 7))
         for k, solid in enumerate(self.scene.moving):
-            assert solid.trajectory is not None  # or it would not be among the moving
+            assert solid.trajectory is not None  # all moving solids have one
             placements[:, k] = solid.trajectory.at(times)
         for n, time in enumerate(times):
             for address, (root, angles) in zip(self._people, motions, strict=True):

@@ -1,9 +1,9 @@
-"""What a planned motion asks of the muscles: inverse dynamics, with the ground carrying what floats.
+"""Feedforward joint torques of a planned motion: inverse dynamics of a floating base with contacts.
 
-A servo that is to carry weight alone must first give way. So the torques that a plan needs are reckoned beforehand:
-accelerations and gravity ask for a wrench on the pelvis, which nothing holds but the contacts of feet, hands or seat;
-their forces are shared out so that they are small (weighted least squares; Featherstone, "Rigid Body Dynamics
-Algorithms", 2008, section 9), and passed on through the joints.
+A servo alone carries weight only after it deviates from the plan. So the torques that a plan needs are computed in
+advance: accelerations and gravity require a wrench on the pelvis, which only the contacts of feet, hands or seat can
+provide; the contact forces are distributed to be small (weighted least squares; Featherstone, "Rigid Body Dynamics
+Algorithms", 2008, section 9) and transmitted through the joints.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 
-_NEAR = 0.02  # metres: what is this near begins to carry, and so nothing is loaded at a blow
-_LOOSE = 0.03  # regularises: a wrench that the contacts could hold only by great opposed forces is not asked of them
-_LEVER = 0.3  # metres, which make a torque comparable with a force
+_NEAR = 0.02  # metres: contacts carry from this distance on, so that loads change gradually
+_REGULARISATION = 0.03  # avoids wrenches that contacts could provide only by large opposed forces
+_LEVER = 0.3  # metres: scale between torques and forces
 
 
 class InverseDynamics:
-    """Reckons with plans for all people of one model.
+    """Inverse dynamics of the planned motions of all people in one model.
 
     Args:
-        model: everybody and everything; it is copied.
-        root_dofs, hinge_dofs: of every person, in ``qvel``, (6,) and (D,).
+        model: MuJoCo model of all people and solids; it is copied.
+        root_dofs, hinge_dofs: indices of the degrees of freedom of each person in ``qvel``, (6,) and (D,).
     """
 
     def __init__(self, model: mujoco.MjModel, root_dofs: Sequence[Integers], hinge_dofs: Sequence[Integers]) -> None:
@@ -38,7 +38,7 @@ class InverseDynamics:
         owner = {int(model.body_rootid[pelvis]): i for i, pelvis in enumerate(pelvises)}
         self._owner = np.array([owner.get(int(root), -1) for root in model.body_rootid])
         self._all = np.empty(model.nv)
-        # Which velocities move which body: those of its own joints and of its ancestors'.
+        # Degrees of freedom that move each body: those of its joints and of the joints of its ancestors.
         self._moves = np.zeros((model.nbody, model.nv))
         for body in range(1, model.nbody):
             self._moves[body] = self._moves[model.body_parentid[body]]
@@ -46,13 +46,13 @@ class InverseDynamics:
         self._dofs = [np.concatenate([root, hinges]) for root, hinges in zip(root_dofs, hinge_dofs, strict=True)]
 
     def torques(self, qpos: Floats, qvel: Floats, qacc: Floats, mocap: Sequence[tuple[int, Floats]]) -> Floats:
-        """What the hinges must do at one instant, (P, D) N m.
+        """Return the hinge torques at one time, (P, D), N m.
 
         Args:
             qpos: planned configuration of the whole model.
-            qvel: its velocity.
-            qacc: its acceleration.
-            mocap: index and pose (7,) of what moves by itself.
+            qvel: planned velocity.
+            qacc: planned acceleration.
+            mocap: mocap index and pose (7,) of each moving solid.
         """
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos, qvel, qacc
@@ -68,26 +68,26 @@ class InverseDynamics:
         bodies = model.geom_bodyid[contact.geom]
         carries = np.clip(1 - contact.dist / _NEAR, 0.0, 1.0) ** 2
         for i, root in enumerate(self._root_dofs):
-            theirs, side = np.nonzero((self._owner[bodies] == i) & (carries > 0)[:, None])
-            if len(theirs):
-                jacobian = self._jacobians(i, contact.pos[theirs], bodies[theirs, side])
-                forces = _shared_out(self._all[root], jacobian[..., :6], carries[theirs])
+            contacts, side = np.nonzero((self._owner[bodies] == i) & (carries > 0)[:, None])
+            if len(contacts):
+                jacobian = self._jacobians(i, contact.pos[contacts], bodies[contacts, side])
+                forces = _contact_forces(self._all[root], jacobian[..., :6], carries[contacts])
                 result[i] -= np.einsum("mk,mkd->d", forces, jacobian[..., 6:])
         return result
 
-    def _jacobians(self, person: int, places: Floats, bodies: Integers) -> Floats:
-        """How points (m, 3) of bodies (m,) move with a person's pelvis and hinges, (m, 3, 6 + D)."""
+    def _jacobians(self, person: int, points: Floats, bodies: Integers) -> Floats:
+        """Return the Jacobians of points (m, 3) on bodies (m,) by pelvis and hinges of a person, (m, 3, 6 + D)."""
         data, dofs = self._data, self._dofs[person]
-        spin, drift = data.cdof[dofs, :3], data.cdof[dofs, 3:]  # about the person's centre of mass
-        lever = places - data.subtree_com[self._model.body_rootid[bodies[0]]]
+        spin, drift = data.cdof[dofs, :3], data.cdof[dofs, 3:]  # about the centre of mass of the person
+        lever = points - data.subtree_com[self._model.body_rootid[bodies[0]]]
         moved = drift + np.cross(spin, lever[:, None])  # (m, 6 + D, 3)
         return (moved * self._moves[bodies][:, dofs, None]).swapaxes(1, 2)
 
 
-def _shared_out(wanted: Floats, jacobian: Floats, carries: Floats) -> Floats:
-    """Forces (m, 3) at contacts of jacobians (m, 3, 6) that together are a wrench (6,) on the pelvis."""
+def _contact_forces(wrench: Floats, jacobian: Floats, carries: Floats) -> Floats:
+    """Return forces (m, 3) at contacts with Jacobians (m, 3, 6) that together exert a wrench (6,) on the pelvis."""
     scale = np.array([1.0, 1.0, 1.0, 1 / _LEVER, 1 / _LEVER, 1 / _LEVER])
-    hold = (jacobian * scale).reshape(-1, 6)  # (3 m, 6)
+    transmission = (jacobian * scale).reshape(-1, 6)  # (3 m, 6)
     weight = np.repeat(carries, 3)
-    share = np.linalg.solve(hold.T @ (weight[:, None] * hold) + _LOOSE * np.eye(6), scale * wanted)
-    return (weight * (hold @ share)).reshape(-1, 3)
+    normal_matrix = transmission.T @ (weight[:, None] * transmission) + _REGULARISATION * np.eye(6)
+    return (weight * (transmission @ np.linalg.solve(normal_matrix, scale * wrench))).reshape(-1, 3)

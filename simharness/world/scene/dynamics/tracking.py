@@ -1,9 +1,9 @@
-"""Dynamic playback: people carry out their planned motions with muscles, under gravity and contact.
+"""Dynamic playback: people track their planned motions with joint servos, under gravity and contact.
 
-Every hinge has a proportional-derivative servo with the strength of a human joint. Servos alone lose their balance (a
-planned walk falls after 1.5 s), so the pelvis is helped along by a force and a torque towards where it is planned to
-be, both bounded: a collision or a push that is stronger has consequences. Servos and help act at 480 Hz; what comes of
-it is given at the rate of the plans.
+Every hinge has a proportional-derivative servo with the strength of a human joint. Servos alone lose balance (a planned
+walk falls after 1.5 s), so an assisting force and torque pull the pelvis towards its planned pose. Both are bounded, so
+a stronger collision or push has consequences. Servos and assistance act at 480 Hz; the resulting motion is returned at
+the rate of the plans.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from simharness.world.scene.dynamics.inverse_dynamics import InverseDynamics
 from simharness.world.scene.objects.solids import Solid
 
 STEP_RATE = 480.0  # Hz, at least
-LEVER = 0.5  # metres: the helping torque is bounded by the greatest helping force at this lever
+LEVER = 0.5  # metres: the assisting torque is bounded by the largest assisting force at this lever
 
-# By joint: stiffness (N m / rad) and greatest torque (N m) of an adult of 70 kg and 1.7 m. Torques are about those that
-# adults exert at most (Anderson, Madigan and Nussbaum, J. Biomech. 40, 2007, for the leg) and that simulated people
-# are given (Peng et al., "DeepMimic", SIGGRAPH 2018). Servos are about half as stiff as theirs: what a plan needs is
-# reckoned beforehand (``efforts.py``), and soft legs get over a stumble that stiff ones turn into a fall.
-_MUSCLES = {
+# By joint: stiffness (N m / rad) and maximum torque (N m) of an adult of 70 kg and 1.7 m. Torques are about the maximum
+# of adults (Anderson, Madigan and Nussbaum, J. Biomech. 40, 2007, for the leg) and those of simulated people (Peng et
+# al., "DeepMimic", SIGGRAPH 2018). Stiffness is about half of that in DeepMimic: torques of the plan are fed forward
+# (``inverse_dynamics.py``), and compliant legs recover from a stumble that makes stiff ones fall.
+_JOINT_STRENGTHS = {
     "lumbar": (600.0, 200.0),
     "thorax": (600.0, 200.0),
     "neck": (90.0, 50.0),
@@ -42,25 +42,26 @@ _MUSCLES = {
     "forearm": (36.0, 15.0),
     "wrist": (36.0, 15.0),
 }
-_DAMPING = 0.1  # s: of a servo, as a share of its stiffness
-_ADULT = 70.0 * 1.7  # kg m: torques go with mass and length
-_HELP_RATE = 2 * np.pi * 2.0  # rad/s: how quickly the pelvis is brought back, were the help unbounded
-_REACH = (0.4, 1.0)  # metres from the planned pelvis: where help begins to fail, and where there is none; who is
-# further away has fallen or been carried off, and is not dragged along the floor
-_GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the helping torque
-_BAR = 0.018  # metres: radius of the bars that people stand on
-_CONTACT_TIME = 0.006  # s, in which contacts are resolved; MuJoCo wants at least two steps
-_CHUNK = 120  # planned instants that are read at a time: plans may be long
+_DAMPING = 0.1  # s: damping of a servo divided by its stiffness
+_ADULT = 70.0 * 1.7  # kg m: torques scale with mass and length
+_ASSIST_RATE = 2 * np.pi * 2.0  # rad/s: rate at which unbounded assistance would correct the pelvis
+# Metres from the planned pelvis: distances at which assistance begins to decrease and at which it is 0. A person
+# farther away has fallen or been pushed away, and is not dragged along the floor.
+_REACH = (0.4, 1.0)
+_GYRATION = 0.3  # metres: radius of gyration of a body about its pelvis, for the assisting torque
+_BAR = 0.018  # metres: radius of the bars that represent the soles
+_CONTACT_TIME = 0.006  # s: time constant of contacts; MuJoCo requires at least two steps
+_CHUNK = 120  # frames of the plan sampled at a time, because plans may be long
 
 
 @dataclass(frozen=True)
 class Push:
-    """A force on one person's pelvis.
+    """Force on the pelvis of one person.
 
     Attributes:
-        person: index.
-        start, duration: seconds.
-        force: newtons, (3,), in the world.
+        person: index of the person.
+        start, duration: start and duration in seconds.
+        force: force in the world, (3,), newtons.
     """
 
     person: int
@@ -78,18 +79,19 @@ def track(
     solids: Sequence[Solid] = (),
     pushes: Sequence[Push] = (),
 ) -> tuple[Motion, ...]:
-    """Let people carry out their planned motions, and see what comes of it.
+    """Simulate people that track their planned motions, and return the resulting motions.
 
     Args:
-        model: everybody ("person0/...") and everything; it is not changed.
-        bodies: P bodies.
-        motions: their plans, on one clock.
-        assist: the largest force that helps a pelvis along, newtons; the torque is bounded by ``assist * LEVER``.
-        solids: of the scene; the moving ones go their way and push who is in it, but for props that are carried.
-        pushes: forces from outside.
+        model: MuJoCo model of people ("person0/...") and solids; it is not changed.
+        bodies: bodies of the P people.
+        motions: planned motions, all at the same times.
+        assist: largest force that assists a pelvis, newtons; the torque is bounded by ``assist * LEVER``.
+        solids: solids of the scene; moving ones follow their trajectories and push people, except props that are
+            carried.
+        pushes: external forces.
 
     Returns:
-        The motions as they happened, at the plans' times.
+        Resulting motions, at the times of the plans.
     """
     if not motions:
         return ()
@@ -103,14 +105,14 @@ def track(
 
 @dataclass(frozen=True)
 class _Person:
-    """Where one person is in MuJoCo's arrays, and how strong.
+    """Indices of one person in the arrays of MuJoCo, and strength of the joints.
 
     Attributes:
-        pelvis: its body.
-        mass: kilograms.
-        root, hinges: in ``qpos``, (7,) and (D,).
-        root_dofs, hinge_dofs: in ``qvel``, (6,) and (D,).
-        stiffness, strength: of the hinges, (D,).
+        pelvis: body index of the pelvis.
+        mass: mass in kilograms.
+        root, hinges: indices in ``qpos``, (7,) and (D,).
+        root_dofs, hinge_dofs: indices in ``qvel``, (6,) and (D,).
+        stiffness, strength: stiffness and maximum torque of the hinges, (D,).
     """
 
     pelvis: int
@@ -124,13 +126,13 @@ class _Person:
 
 
 class Tracker:
-    """Plans being carried out. It goes through its time once.
+    """Simulation of people that track their plans; it can be run once.
 
     Attributes:
-        time: of the plans, (T,) seconds.
-        people: where everyone is in MuJoCo's arrays.
-        model: a copy, with the servos' damping.
-        data: MuJoCo's state; ``xfrc_applied`` of the pelvises is the help that acts, and the pushes.
+        time: times of the plans, (T,), seconds.
+        people: indices of the people in the arrays of MuJoCo.
+        model: copy of the model, with the damping of the servos.
+        data: MuJoCo state; ``xfrc_applied`` of the pelvises is the sum of assistance and pushes.
     """
 
     def __init__(
@@ -157,12 +159,12 @@ class Tracker:
         for solid in self._moving:
             if solid.kind == "prop" and _is_moved(solid):
                 _without_contact(self.model, solid.name)
-        _stand_on_soles(self.model)
-        # Contact forces are scaled to the inertia at the contact, which is little at a foot that carries a body: at
-        # MuJoCo's defaults it sinks in by a centimetre.
+        _replace_foot_capsules(self.model)
+        # MuJoCo scales contact forces with the inertia at the contact, which is small at a foot that carries a body:
+        # with default parameters the foot sinks in by a centimetre.
         self.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_OVERRIDE
         self.model.opt.o_solref[:] = _CONTACT_TIME, 1.0
-        self.model.opt.impratio = 10.0  # or feet creep
+        self.model.opt.impratio = 10.0  # otherwise feet slide slowly
         self.model.opt.o_solimp[:3] = 0.95, 0.99, 0.001
         for person in self.people:
             self.model.dof_damping[person.hinge_dofs] = _DAMPING * person.stiffness
@@ -175,14 +177,14 @@ class Tracker:
         self._stiffness = np.concatenate([person.stiffness for person in self.people])
         self._strength = np.concatenate([person.strength for person in self.people])
         self.data = mujoco.MjData(self.model)
-        self._efforts = InverseDynamics(
+        self._inverse_dynamics = InverseDynamics(
             self.model,
             [person.root_dofs for person in self.people],
             [person.hinge_dofs for person in self.people],
         )
 
     def run(self) -> Iterator[Floats]:
-        """The configuration, ``qpos``, at each of the times: as planned at the first, then as it comes."""
+        """Yield the configuration ``qpos`` at each time: as planned at the first, then as simulated."""
         last = len(self.time) - 1
         step = self.model.opt.timestep
         for start in range(0, max(last, 1), _CHUNK):
@@ -190,12 +192,12 @@ class Tracker:
             times = self.time[start] + step * np.arange((stop - start) * self._substeps + 2)
             plan = _Plan([motion.at(times) for motion in self._motions], step)
             placements = [solid.trajectory.at(times) for solid in self._moving if solid.trajectory is not None]
-            efforts = self._foreseen(times[:: self._substeps], plan, placements)
+            feedforward = self._feedforward(times[:: self._substeps], plan, placements)
             if start == 0:
                 self._begin(plan, placements)
                 yield self.data.qpos.copy()
             for k in range((stop - start) * self._substeps):
-                self._step(plan, placements, efforts[k + 1], k + 1, float(times[k]))
+                self._step(plan, placements, feedforward[k + 1], k + 1, float(times[k]))
                 if (k + 1) % self._substeps == 0:
                     yield self.data.qpos.copy()
 
@@ -205,7 +207,7 @@ class Tracker:
         mujoco.mj_forward(self.model, self.data)
 
     def _configuration(self, plan: _Plan, k: int) -> tuple[Floats, Floats]:
-        """Everybody's planned ``qpos`` and ``qvel`` at the plan's instant of index ``k``."""
+        """Return the planned ``qpos`` and ``qvel`` of all people at index ``k`` of the plan."""
         qpos, qvel = np.empty(self.model.nq), np.empty(self.model.nv)
         for i, person in enumerate(self.people):
             qpos[person.root], qpos[person.hinges] = plan.roots[k, i], plan.angles[k, i]
@@ -213,16 +215,16 @@ class Tracker:
             qvel[person.hinge_dofs] = plan.speeds[k, i]
         return qpos, qvel
 
-    def _foreseen(self, frames: Floats, plan: _Plan, placements: list[Floats]) -> Floats:
-        """Torques that the plan asks of all hinges at its instants, (n, P D); reckoned at some, straight between."""
+    def _feedforward(self, frames: Floats, plan: _Plan, placements: list[Floats]) -> Floats:
+        """Return hinge torques of the plan, (n, P D); computed at the times ``frames``, interpolated in between."""
         count, every = len(plan.angles), self._substeps
         states = [self._configuration(plan, k) for k in range(0, count, every)]
         speeds = np.array([qvel for _, qvel in states])
         accelerations = np.gradient(speeds, frames, axis=0) if len(frames) > 1 else np.zeros_like(speeds)
         known = np.array(
             [
-                self._efforts.torques(*states[k], accelerations[k], self._placed(placements, k * every)).ravel()
-                for k in range(len(states))
+                self._inverse_dynamics.torques(*state, accelerations[k], self._placed(placements, k * every)).ravel()
+                for k, state in enumerate(states)
             ]
         )
         at = np.minimum(np.arange(count) / every, len(known) - 1)
@@ -235,54 +237,55 @@ class Tracker:
             self.data.mocap_pos[mocap], self.data.mocap_quat[mocap] = pose[:3], pose[3:]
 
     def _placed(self, placements: list[Floats], k: int) -> list[tuple[int, Floats]]:
-        """Index and pose (7,) of what moves by itself."""
+        """Return the mocap index and pose (7,) of each moving solid."""
         return [(mocap, pose[k]) for mocap, pose in zip(self._mocap, placements, strict=True)]
 
-    def _step(self, plan: _Plan, placements: list[Floats], effort: Floats, k: int, time: float) -> None:
-        """From one instant towards that of index ``k`` of the plan."""
+    def _step(self, plan: _Plan, placements: list[Floats], feedforward: Floats, k: int, time: float) -> None:
+        """Advance by one step to index ``k`` of the plan."""
         data = self.data
         self._place(placements, k)
         speed = data.qvel[self._hinge_dofs]
         off = plan.angles[k].ravel() - data.qpos[self._hinges] - self.model.opt.timestep * speed
-        hold = self._hold(plan, k)
-        wanted = np.repeat(hold, len(DOFS)) * effort + self._stiffness * (
+        adherence = self._adherence(plan, k)
+        wanted = np.repeat(adherence, len(DOFS)) * feedforward + self._stiffness * (
             off + _DAMPING * (plan.speeds[k].ravel() - speed)
         )
         torque = np.clip(wanted, -self._strength, self._strength)
-        # The model's own damping, which MuJoCo integrates implicitly, is part of the servo: give back what it takes.
+        # The damping of the model, which MuJoCo integrates implicitly, is part of the servo: compensate for it here.
         data.qfrc_applied[self._hinge_dofs] = torque + _DAMPING * self._stiffness * speed
-        data.xfrc_applied[self._pelvises] = self._help(plan, hold, k)
+        data.xfrc_applied[self._pelvises] = self._assistance(plan, adherence, k)
         for push in self._pushes:
             if push.start <= time < push.start + push.duration:
                 data.xfrc_applied[self.people[push.person].pelvis, :3] += push.force
         mujoco.mj_step(self.model, data)
 
-    def _hold(self, plan: _Plan, k: int) -> Floats:
-        """How far people still keep to their plan, (P,): 1 near it, 0 where they are out of its reach."""
+    def _adherence(self, plan: _Plan, k: int) -> Floats:
+        """Return the weight of the plan of each person, (P,): 1 near the planned pelvis, 0 out of reach of it."""
         off = np.linalg.norm(plan.roots[k, :, :3] - self.data.qpos[self._roots[:, :3]], axis=1)
         near, far = _REACH
         return np.clip((far - off) / (far - near), 0.0, 1.0)
 
-    def _help(self, plan: _Plan, hold: Floats, k: int) -> Floats:
-        """Forces and torques (P, 6) that bring the pelvises to where they are planned, within the bounds."""
+    def _assistance(self, plan: _Plan, adherence: Floats, k: int) -> Floats:
+        """Return bounded forces and torques (P, 6) that pull the pelvises towards their planned poses."""
         root, speed = self.data.qpos[self._roots], self.data.qvel[self._root_dofs]  # (P, 7), (P, 6)
         force = self._masses * _pull(plan.roots[k, :, :3] - root[:, :3], plan.velocities[k] - speed[:, :3])
-        # Turns and spins are about the pelvis's own axes, as MuJoCo's are; the torque acts in the world.
+        # Rotations and spins are about the axes of the pelvis, as in MuJoCo; the torque acts in world axes.
         turn = _between(root[:, 3:], plan.roots[k, :, 3:])
         torque = self._masses * _GYRATION**2 * _pull(turn, plan.spins[k] - speed[:, 3:])
         torque = (self.data.xmat[self._pelvises].reshape(-1, 3, 3) @ torque[..., None])[..., 0]
         return np.concatenate(
-            [_bounded(force, hold * self._assist), _bounded(torque, hold * self._assist * LEVER)], axis=1
+            [_bounded(force, adherence * self._assist), _bounded(torque, adherence * self._assist * LEVER)], axis=1
         )
 
 
 class _Plan:
-    """Everybody's plan at n instants ``step`` seconds apart.
+    """Plans of all people at n times ``step`` seconds apart.
 
     Attributes:
-        roots: of the pelvises, (n, P, 7).
-        velocities: of the pelvises in the world, (n, P, 3) m/s. spins: about their own axes, (n, P, 3) rad/s.
-        angles, speeds: of the hinges, (n, P, D), radians and rad/s.
+        roots: poses of the pelvises, (n, P, 7).
+        velocities: velocities of the pelvises in the world, (n, P, 3), m/s.
+        spins: angular velocities of the pelvises about their axes, (n, P, 3), rad/s.
+        angles, speeds: angles and angular velocities of the hinges, (n, P, D), radians and rad/s.
     """
 
     def __init__(self, motions: Sequence[Motion], step: float) -> None:
@@ -294,13 +297,13 @@ class _Plan:
         self.spins = np.concatenate([turns, turns[-1:]]) / step
 
 
-def _pull(off: Floats, slow: Floats) -> Floats:
-    """The acceleration of a critically damped spring, from what is lacking in place and in velocity."""
-    return _HELP_RATE**2 * off + 2 * _HELP_RATE * slow
+def _pull(position_error: Floats, velocity_error: Floats) -> Floats:
+    """Return the acceleration of a critically damped spring."""
+    return _ASSIST_RATE**2 * position_error + 2 * _ASSIST_RATE * velocity_error
 
 
 def _between(first: Floats, second: Floats) -> Floats:
-    """The turn (..., 3), radians about its own axes, that takes orientation ``first`` to ``second``, both (..., 4)."""
+    """Return the rotation vector (..., 3), radians in body axes, from orientation ``first`` to ``second``, (..., 4)."""
     w, v = first[..., :1], first[..., 1:]
     u, x = second[..., :1], second[..., 1:]
     real = w * u + (v * x).sum(axis=-1, keepdims=True)
@@ -312,7 +315,7 @@ def _between(first: Floats, second: Floats) -> Floats:
 
 
 def _bounded(vectors: Floats, most: Floats) -> Floats:
-    """Vectors (P, 3), none longer than ``most`` (P,)."""
+    """Return vectors (P, 3) shortened to a length of at most ``most`` (P,)."""
     length = np.sqrt((vectors**2).sum(axis=1))
     return np.asarray(vectors * np.minimum(1.0, most / np.maximum(length, 1e-12))[:, None])
 
@@ -323,7 +326,7 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
     pelvis = int(model.body(f"{prefix}{body.bones[0]}").id)
     mass = float(model.body_subtreemass[pelvis])
     size = mass * body.stature / _ADULT
-    stiffness, strength = size * np.array([_MUSCLES[_joint(name)] for name in DOFS]).T
+    stiffness, strength = size * np.array([_JOINT_STRENGTHS[_joint(name)] for name in DOFS]).T
     return _Person(
         pelvis=pelvis,
         mass=mass,
@@ -337,17 +340,17 @@ def _person(model: mujoco.MjModel, body: Body, prefix: str) -> _Person:
 
 
 def _joint(dof: str) -> str:
-    """The key of ``_MUSCLES`` for a degree of freedom: of "left_knee_flexion" it is "knee"."""
-    return next(word for word in dof.split("_") if word in _MUSCLES)
+    """Return the key of ``_JOINT_STRENGTHS`` for a degree of freedom: "knee" for "left_knee_flexion"."""
+    return next(word for word in dof.split("_") if word in _JOINT_STRENGTHS)
 
 
-def _stand_on_soles(model: mujoco.MjModel) -> None:
-    """Make the capsules of the feet bars that lead from beside the ankle down to the floor under the ball.
+def _replace_foot_capsules(model: mujoco.MjModel) -> None:
+    """Replace the capsules of the feet by bars from beside the ankle down to the floor under the ball of the foot.
 
-    A capsule is round and a sole is flat: those that fit a foot best meet the floor elsewhere than the skin, of which
-    the plan is made, does, and whoever steps on them is pushed off the plan. The heel, over which a planned foot rolls
-    within a tenth of a stride, touches nothing: a bar there would roll otherwise than the skin, and trip. In the
-    initial configuration everyone stands on z = 0.
+    A capsule is round and a sole is flat: capsules that fit a foot best touch the floor at other points than the skin,
+    from which the plan is made, and push a person off the plan. The heel, over which a planned foot rolls within a
+    tenth of a stride, touches nothing: a bar there would roll differently from the skin and cause a stumble. In the
+    initial configuration all people stand on z = 0.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -366,7 +369,7 @@ def _stand_on_soles(model: mujoco.MjModel) -> None:
         model.geom_size[geom, :2] = _BAR, half
         model.geom_rbound[geom] = half + _BAR
         model.geom_aabb[geom] = 0.0, 0.0, 0.0, _BAR, _BAR, half + _BAR
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the capsules as they were
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # its boxes are those of the original capsules
 
 
 def _is_moved(solid: Solid) -> bool:

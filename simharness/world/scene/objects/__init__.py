@@ -1,1 +1,1 @@
-"""Things: what they are made of, how they look, and how each kind is drawn."""
+"""Objects: geometry for physics, meshes for pictures, and drawing of each kind."""

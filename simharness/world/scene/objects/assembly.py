@@ -1,4 +1,4 @@
-"""Putting things together piece by piece, each piece with its looks and its geom."""
+"""Assembly of object models from parts, each with a mesh and a geom."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from simharness.world.scene.objects.solids import ObjectModel
 
 
 class Assembly:
-    """A thing in the making. It stands on z = 0 around the origin, its front towards +x."""
+    """Builder of an object model, which stands on z = 0 around the origin with its front towards +x."""
 
     def __init__(self) -> None:
         self._meshes: list[Mesh] = []
         self._geoms: list[Geom] = []
 
     def box(self, center: Sequence[float], size: Sequence[float], color: ArrayLike, *, yaw: float = 0.0) -> Self:
-        """Add a box of ``size`` x, y, z metres; ``color`` of all of it (3,) or of its six sides (6, 3)."""
+        """Add a box of ``size`` x, y, z in metres; ``color`` (3,) of the box or (6, 3) of its six sides."""
         x, y, z = (float(v) for v in center)
         dx, dy, dz = (float(v) / 2 for v in size)
         return self.boxes([Box((x, y, z), (dx, dy, dz), yaw)], np.asarray([color], float))
 
     def boxes(self, boxes: Sequence[Box], colors: ArrayLike) -> Self:
-        """Add boxes; ``colors`` as those of :func:`simharness.world.scene.objects.shapes.box_mesh`."""
+        """Add boxes; ``colors`` as for :func:`simharness.world.scene.objects.shapes.box_mesh`."""
         self._meshes.append(box_mesh(boxes, colors))
         self._geoms += boxes
         return self
@@ -49,11 +49,11 @@ class Assembly:
         return self
 
     def mesh(self, mesh: Mesh) -> Self:
-        """Add a mesh as it is."""
+        """Add a mesh."""
         self._meshes.append(mesh)
         self._geoms.append(surface(mesh))
         return self
 
     def model(self, *, figure: Floats | None = None, mirror: Mirror | None = None) -> ObjectModel:
-        """What has been put together."""
+        """Return the object model of all parts."""
         return ObjectModel(joined(*self._meshes), tuple(self._geoms), figure=figure, mirror=mirror)

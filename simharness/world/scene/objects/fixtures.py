@@ -19,7 +19,7 @@ _WHEEL = 0.06  # metres: radius
 
 
 def draw_pillar(rng: np.random.Generator, height: float) -> ObjectModel:
-    """A round or square pillar from the floor to ``height`` metres, with a base and a capital."""
+    """Draw a round or square pillar from the floor to ``height`` metres, with a base and a capital."""
     is_round, width = rng.uniform() < 0.5, rng.uniform(0.30, 0.45)
     stone = _STONE[rng.integers(len(_STONE))]
     base = min(0.12, height / 4)
@@ -35,7 +35,7 @@ def draw_pillar(rng: np.random.Generator, height: float) -> ObjectModel:
 
 
 def draw_partition(rng: np.random.Generator) -> ObjectModel:
-    """A free-standing screen 1.5 to 1.9 m tall: one panel, or two or three that stand in a zigzag."""
+    """Draw a free-standing partition 1.5 to 1.9 m tall: one panel, or two or three in a zigzag."""
     panels = int(rng.integers(1, 4))
     width, height = rng.uniform(0.75, 1.0), rng.uniform(1.5, 1.9)
     fold, sense = rng.uniform(0.35, 0.7), rng.choice([-1.0, 1.0])
@@ -53,7 +53,7 @@ def draw_partition(rng: np.random.Generator) -> ObjectModel:
 
 
 def _panel(assembly: Assembly, middle: Floats, yaw: float, size: tuple[float, float], fabric: Floats) -> None:
-    """One panel across its own x axis: cloth in a frame on two feet."""
+    """Add one panel perpendicular to its x axis: cloth in a frame on two feet."""
     (width, height), post, under = size, 0.03, 0.09
     parts = [
         (Box((0.0, 0.0, (height + under) / 2), (0.014, width / 2 - post, (height - under) / 2 - post)), fabric),
@@ -69,7 +69,7 @@ def _panel(assembly: Assembly, middle: Floats, yaw: float, size: tuple[float, fl
 
 
 def draw_cart(rng: np.random.Generator) -> ObjectModel:
-    """A service cart, two trays between four posts on wheels, with cartons on it; it goes along its x axis."""
+    """Draw a service cart that moves along its x axis: two trays between four posts on wheels, with cartons."""
     length, width, height = rng.uniform(0.75, 0.95), rng.uniform(0.45, 0.55), rng.uniform(0.82, 0.95)
     sizes, places = rng.uniform([0.22, 0.2, 0.15], [0.34, 0.32, 0.3], (3, 3)), rng.uniform(-1, 1, (3, 2))
     colors, turns = BOX_COLORS[rng.integers(len(BOX_COLORS), size=3)], rng.uniform(-0.25, 0.25, 3)

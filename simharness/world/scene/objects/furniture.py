@@ -1,4 +1,4 @@
-"""Chairs and tables: as clutter of any size, and as props of a given one."""
+"""Chairs and tables: clutter of random size, and props of given size."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from simharness.world.scene.objects.storage import BOOK_COLORS, WOOD
 
 _TOP = 0.03  # metres: thickness of a table's top
 _SEAT = 0.045
-_BACK = 0.40  # metres: how far a chair's back rises over its seat
-_LEAN = 0.07  # metres: how far the top of the back is behind its foot
+_BACK = 0.40  # metres: height of the back of a chair over its seat
+_LEAN = 0.07  # metres: distance by which the back leans backwards at its top
 _METAL = np.array([0.30, 0.31, 0.33])
 _FABRIC = np.array([[0.20, 0.38, 0.44], [0.62, 0.27, 0.22], [0.80, 0.60, 0.24], [0.35, 0.37, 0.40], [0.36, 0.46, 0.33]])
 _PORCELAIN = np.array([0.93, 0.92, 0.90])
 
 
 def draw_table(rng: np.random.Generator) -> ObjectModel:
-    """A table of usual height, square-cornered or round, with a few things on it."""
+    """Draw a table of usual height, rectangular or round, with a few objects on it."""
     depth, width, height = rng.uniform(0.70, 0.85), rng.uniform(1.1, 1.5), rng.uniform(0.71, 0.76)
     is_round = rng.uniform() < 0.35
     wood = WOOD[rng.integers(len(WOOD))]
@@ -32,11 +32,11 @@ def draw_table(rng: np.random.Generator) -> ObjectModel:
     else:
         assembly = _table((depth, width, height), wood)
         reach = 0.7 * np.array([depth, width]) / 2
-    return _laid(rng, assembly, height, reach).model()
+    return _with_tabletop_objects(rng, assembly, height, reach).model()
 
 
 def table(size: tuple[float, float, float], *, tint: int = 0) -> ObjectModel:
-    """A plain table of depth x, width y and height z, metres."""
+    """Return a plain table of depth x, width y and height z, metres."""
     return _table(size, WOOD[tint % len(WOOD)]).model()
 
 
@@ -63,23 +63,23 @@ def _round_table(diameter: float, height: float, wood: Floats) -> Assembly:
     )
 
 
-def _laid(rng: np.random.Generator, assembly: Assembly, height: float, reach: Floats) -> Assembly:
-    """Books, a mug and a laptop, each perhaps, in a corner of its own."""
-    there, offset, turn = rng.uniform(size=3), rng.uniform(-0.3, 0.3, (3, 2)), rng.uniform(-0.5, 0.5, 3)
+def _with_tabletop_objects(rng: np.random.Generator, assembly: Assembly, height: float, reach: Floats) -> Assembly:
+    """Add books, a mug and a laptop, each by chance and in a separate corner."""
+    chance, offset, turn = rng.uniform(size=3), rng.uniform(-0.3, 0.3, (3, 2)), rng.uniform(-0.5, 0.5, 3)
     thick, tint = rng.uniform(0.018, 0.04, 3), rng.integers(len(BOOK_COLORS), size=4)
     corners = np.array([[-0.5, -0.75], [0.4, 0.8], [0.0, 0.05]]) + 0.3 * offset
     places = corners * reach
-    if there[0] < 0.8:
+    if chance[0] < 0.8:
         z = height
         for k in range(3):
             x, y = places[0] + 0.01 * offset[k]
             size = (0.21 - 0.015 * k, 0.155 - 0.01 * k, thick[k])
             assembly.box((x, y, z + thick[k] / 2), size, BOOK_COLORS[tint[k]], yaw=turn[k])
             z += thick[k]
-    if there[1] < 0.7:
+    if chance[1] < 0.7:
         profile = [(0.0, 0.0), (0.036, 0.0), (0.041, 0.095), (0.036, 0.095), (0.034, 0.02), (0.0, 0.02)]
         assembly.mesh(shifted(lathe(profile, _PORCELAIN, sides=12), (*places[1], height)))
-    if there[2] < 0.6:
+    if chance[2] < 0.6:
         x, y = places[2]
         assembly.box((x, y, height + 0.009), (0.23, 0.33, 0.018), 2.2 * _METAL, yaw=turn[2])
         c, s = np.cos(turn[2]), np.sin(turn[2])
@@ -88,13 +88,13 @@ def _laid(rng: np.random.Generator, assembly: Assembly, height: float, reach: Fl
 
 
 def draw_chair(rng: np.random.Generator) -> ObjectModel:
-    """A chair with an upholstered or a wooden seat."""
+    """Draw a chair with an upholstered or a wooden seat."""
     size = (rng.uniform(0.42, 0.48), rng.uniform(0.42, 0.48), rng.uniform(0.43, 0.47))
     return chair(size, tint=int(rng.integers(len(_FABRIC) + len(WOOD))))
 
 
 def chair(size: tuple[float, float, float], *, tint: int = 0) -> ObjectModel:
-    """A chair of depth x and width y whose seat is at z, metres; it faces +x, its back leans away at -x."""
+    """Return a chair of depth x and width y with its seat at z, metres; it faces +x, its back at -x leans backwards."""
     depth, width, height = size
     colors = np.concatenate([_FABRIC, WOOD])
     color = colors[tint % len(colors)]
@@ -113,7 +113,7 @@ def chair(size: tuple[float, float, float], *, tint: int = 0) -> ObjectModel:
 
 
 def _slat(x: float, width: float, seat: float, span: tuple[float, float], color: Floats) -> Mesh:
-    """A board across a chair's leaning back from one height over the seat to another."""
+    """Return a board across the leaning back of a chair, between two heights over the seat."""
     corners = np.array(
         [
             [x + side * 0.013 - (_LEAN - 0.01) * (up + _SEAT) / (_BACK + _SEAT), y, seat + up]

@@ -1,4 +1,4 @@
-"""What things are made of, for rays and contacts: boxes, cylinders and surfaces, each a geom of MuJoCo's."""
+"""Geoms of objects for rays and contacts: boxes, cylinders and surfaces, each added to MuJoCo as one geom."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 
 
 class Geom(Protocol):
-    """A part of a thing."""
+    """Interface of the geoms of an object."""
 
     def moved(self, place: ArrayLike, yaw: float) -> Self:
-        """The same turned about the world's z axis and then carried to ``place`` (2,) on the floor."""
+        """Return the geom rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
         ...
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """Add it to a body of a MuJoCo model, under a name that is unique there."""
+        """Add the geom to a body of a MuJoCo model, under a name that is unique in the model."""
         ...
 
 
 @dataclass(frozen=True)
 class Box:
-    """A cuboid that stands upright, turned about the vertical.
+    """Upright cuboid, rotated about the vertical axis.
 
     Attributes:
-        center: metres, (3,).
-        half: half its sides along its own axes, metres, (3,).
-        yaw: its turn about z, radians.
+        center: centre, (3,), metres.
+        half: half sides along the axes of the box, (3,), metres.
+        yaw: rotation about z, radians.
     """
 
     center: Point
@@ -48,28 +48,28 @@ class Box:
 
     @cached_property
     def axes(self) -> Floats:
-        """Its own axes as columns, (3, 3)."""
+        """Axes of the box as columns, (3, 3)."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
     @cached_property
     def corners(self) -> Floats:
-        """The eight corners, (8, 3) metres; x changes slowest and z fastest, low before high."""
+        """The eight corners, (8, 3), metres; x changes slowest and z fastest, low before high."""
         return np.array(self.center) + (_SIGNS * self.half) @ self.axes.T
 
     @classmethod
     def around(cls, points: ArrayLike) -> Box:
-        """The smallest box along the axes that holds points (n, 3)."""
+        """Return the axis-aligned bounding box of points (n, 3)."""
         points = np.asarray(points, float)
         low, high = points.min(axis=0), points.max(axis=0)
         return cls(_point((low + high) / 2), _point((high - low) / 2))
 
     def distance(self, points: ArrayLike) -> Floats:
-        """Distance of points (..., 3) to the box, (...) metres; 0 inside."""
+        """Return the distance of points (..., 3) to the box, (...), metres; 0 inside."""
         return np.linalg.norm(self._outside(points), axis=-1)
 
     def distance_on_floor(self, points: ArrayLike) -> Floats:
-        """Horizontal distance of points (..., 3) to the box's ground plan, (...) metres; 0 over it."""
+        """Return the horizontal distance of points (..., 3) to the footprint of the box, (...), metres; 0 above it."""
         return np.linalg.norm(self._outside(points)[..., :2], axis=-1)
 
     def _outside(self, points: ArrayLike) -> Floats:
@@ -77,18 +77,18 @@ class Box:
         return np.maximum(np.abs(local) - self.half, 0.0)
 
     def gap_on_floor(self, other: Box) -> float:
-        """Horizontal distance between two boxes' ground plans by separating axes, metres; 0 where they overlap.
+        """Return the horizontal distance between the footprints of two boxes, metres; 0 if they overlap.
 
-        Corner to corner the true distance is larger; never smaller.
+        It is computed by separating axes: a lower bound, exact except from corner to corner.
         """
-        away = (other.center[0] - self.center[0], other.center[1] - self.center[1])
+        offset = (other.center[0] - self.center[0], other.center[1] - self.center[1])
         c, s = abs(math.cos(other.yaw - self.yaw)), abs(math.sin(other.yaw - self.yaw))
         best = 0.0
         for one, two in ((self, other), (other, self)):
             cos, sin = math.cos(one.yaw), math.sin(one.yaw)
             (x, y, _), (u, v, _) = one.half, two.half
-            along = abs(cos * away[0] + sin * away[1]) - x - (c * u + s * v)
-            across = abs(cos * away[1] - sin * away[0]) - y - (s * u + c * v)
+            along = abs(cos * offset[0] + sin * offset[1]) - x - (c * u + s * v)
+            across = abs(cos * offset[1] - sin * offset[0]) - y - (s * u + c * v)
             best = max(best, along, across)
         return best
 
@@ -97,7 +97,7 @@ class Box:
         return Box(_carried(self.center, place, yaw), self.half, self.yaw + yaw)
 
     def raised(self, height: float) -> Box:
-        """The box carried up by ``height`` metres."""
+        """Return the box raised by ``height`` metres."""
         x, y, z = self.center
         return Box((x, y, float(z + height)), self.half, self.yaw)
 
@@ -111,12 +111,12 @@ class Box:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A round bar or disc.
+    """Round bar or disc.
 
     Attributes:
-        center: metres, (3,).
-        radius, half: its radius and half its length, metres.
-        axis: unit vector along it, (3,).
+        center: centre, (3,), metres.
+        radius, half: radius and half the length, metres.
+        axis: unit vector along the axis, (3,).
     """
 
     center: Point
@@ -141,10 +141,10 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles as they are: rays meet every one of them, contacts their convex hull.
+    """Triangle mesh as a geom: rays test every triangle, contacts use the convex hull.
 
     Attributes:
-        vertices: metres, (n, 3).
+        vertices: positions, (n, 3), metres.
         faces: vertex indices, (k, 3).
     """
 
@@ -156,20 +156,20 @@ class Surface:
         return Surface(carried(self.vertices, place, yaw), self.faces)
 
     def add_to(self, spec: mujoco.MjSpec, body: Any, name: str) -> None:
-        """See :class:`Geom`; the mesh that it needs takes its name."""
+        """See :class:`Geom`; the mesh asset gets the same name."""
         import mujoco
 
         spec.add_mesh(
             name=name,
             uservert=self.vertices.ravel(),
             userface=np.asarray(self.faces, np.int32).ravel(),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a surface may be open; nothing here is weighed
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a surface may be open; its mass is not used
         )
         body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
 
 
 def carried(points: ArrayLike, place: ArrayLike, yaw: float) -> Floats:
-    """Points (..., 3) turned about the world's z axis and then carried to ``place`` (2,) on the floor."""
+    """Return points (..., 3) rotated by ``yaw`` about the world z axis, then moved by ``place`` (2,) on the floor."""
     c, s = np.cos(yaw), np.sin(yaw)
     turned = np.asarray(points, float) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     return turned + np.append(np.asarray(place, float), 0.0)

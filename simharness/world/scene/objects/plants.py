@@ -14,11 +14,11 @@ _POTS = np.array([[0.72, 0.42, 0.30], [0.90, 0.89, 0.86], [0.28, 0.30, 0.33], [0
 _SOIL = np.array([0.24, 0.18, 0.14])
 _STEM = np.array([0.42, 0.40, 0.24])
 _GREENS = np.array([[0.22, 0.44, 0.22], [0.30, 0.50, 0.26], [0.18, 0.38, 0.27], [0.40, 0.54, 0.28]])
-_GOLDEN = np.pi * (3 - 5**0.5)  # the angle at which leaves follow each other around a stem
+_GOLDEN = np.pi * (3 - 5**0.5)  # golden angle between successive leaves around a stem
 
 
 def draw_plant(rng: np.random.Generator) -> ObjectModel:
-    """A plant 1 to 1.8 m tall in a pot."""
+    """Draw a potted plant 1 to 1.8 m tall."""
     kind = rng.integers(3)
     pot = rng.uniform(0.15, 0.20), rng.uniform(0.28, 0.40)
     color, green = _POTS[rng.integers(len(_POTS))], _GREENS[rng.integers(len(_GREENS))]
@@ -37,7 +37,7 @@ def _pot(radius: float, height: float, color: Floats) -> Mesh:
 
 
 def _broad_leaves(rng: np.random.Generator, ground: float, green: Floats) -> Mesh:
-    """Leaves as large as hands around a few stems, as a rubber plant has them."""
+    """Draw leaves as large as hands around a few stems, as of a rubber plant."""
     parts = []
     lean, tall = rng.uniform(0.08, 0.22, 3), rng.uniform(0.75, 1.3, 3)
     shade = rng.uniform(0.82, 1.18, (3, 16))
@@ -57,7 +57,7 @@ def _broad_leaves(rng: np.random.Generator, ground: float, green: Floats) -> Mes
 
 
 def _leaf(base: Floats, bearing: float, length: float, width: float, rise: float, color: Floats) -> Mesh:
-    """One oval leaf that leaves its stem rising by ``rise`` radians and bends down."""
+    """Return one oval leaf that starts at an elevation of ``rise`` radians and bends down."""
     t = np.linspace(0, 1, 6)
     pitch = rise - 1.3 * t
     step = length / 5 * np.stack([np.cos(pitch), np.sin(pitch)], axis=1)
@@ -68,7 +68,7 @@ def _leaf(base: Floats, bearing: float, length: float, width: float, rise: float
 
 
 def _fronds(rng: np.random.Generator, ground: float, green: Floats) -> Mesh:
-    """Long arching fronds with leaflets on either side, as a parlour palm has them."""
+    """Draw long arching fronds with leaflets on both sides, as of a parlour palm."""
     parts = []
     count = 11
     reach, tall, jitter = rng.uniform(0.28, 0.5, count), rng.uniform(0.7, 1.25, count), rng.uniform(-0.3, 0.3, count)
@@ -95,7 +95,7 @@ def _fronds(rng: np.random.Generator, ground: float, green: Floats) -> Mesh:
 
 
 def _blades(rng: np.random.Generator, ground: float, green: Floats) -> Mesh:
-    """Stiff upright blades with pale edges, as a snake plant has them."""
+    """Draw stiff upright blades with pale edges, as of a snake plant."""
     parts = []
     count = 15
     tall, lean, at = rng.uniform(0.65, 1.15, count), rng.uniform(0.03, 0.3, count), rng.uniform(0.01, 0.10, count)
@@ -114,15 +114,15 @@ def _blades(rng: np.random.Generator, ground: float, green: Floats) -> Mesh:
 def _strip(
     spine: Floats, half: Floats, color: Floats | list[float], *, facing: float, fold: float = 0.0, offset: float = 0.0
 ) -> Mesh:
-    """A ribbon along a curve (m, 3), level across, ``half`` (m,) wide to each side; both its sides are seen.
+    """Return a ribbon along a curve, horizontal across the curve, visible from both sides.
 
     Args:
-        spine: from root to tip, metres.
-        half: half its width there, metres.
-        color: albedo.
-        facing: bearing to which its broad side looks, radians.
-        fold: how far its edges rise over the spine, as a share of their distance from it.
-        offset: metres by which the ribbon stands out from the curve to where it faces.
+        spine: points of the curve from root to tip, (m, 3), metres.
+        half: half widths, (m,), metres.
+        color: albedo, (3,).
+        facing: bearing of the normal of the ribbon, radians.
+        fold: rise of the edges over the spine, as a share of their distance from it.
+        offset: shift of the ribbon from the curve in the direction of ``facing``, metres.
     """
     across = np.array([-np.sin(facing), np.cos(facing), 0.0])
     spine = spine + offset * np.array([np.cos(facing), np.sin(facing), 0.0])

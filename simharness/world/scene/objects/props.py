@@ -1,4 +1,4 @@
-"""Shapes for the things that activities use."""
+"""Props: shapes of the objects that activities use."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from simharness.world.scene.objects.storage import BOX_COLORS, taped
 
 Size = tuple[float, float, float]
 
-_STILL = 1e-9  # metres and quaternion units: less is no motion
+_STILL = 1e-9  # metres and quaternion units: smaller changes are no motion
 _GLASS = np.array([[0.24, 0.46, 0.36], [0.30, 0.42, 0.62], [0.62, 0.30, 0.26]])
 _LABEL = np.array([0.93, 0.92, 0.86])
 _CAP = np.array([0.85, 0.85, 0.84])
 
 
 def make_prop(prop: Prop, name: str) -> Solid:
-    """Give a prop its shape; its colours go by its name.
+    """Return the solid of a prop; its colours are drawn by its name.
 
     Returns:
-        A solid of kind "prop": at rest where its trajectory stands still and upright, moving otherwise.
+        A solid of kind "prop": at rest if its trajectory is constant and upright, else moving.
     """
     tint = int(stream(0, "prop", name).integers(1000))
-    thing = _SHAPES[prop.kind](prop.size, tint)
+    model = _SHAPES[prop.kind](prop.size, tint)
     start = prop.trajectory.pose[0]
     x, y, z, w, i, j, k = start.tolist()
     if np.ptp(prop.trajectory.pose, axis=0).max() < _STILL and max(abs(z), abs(i), abs(j)) < _STILL:
-        return thing.at((x, y), float(2 * np.arctan2(k, w)), kind="prop", name=name)
-    return thing.along(prop.trajectory, kind="prop", name=name)
+        return model.at((x, y), float(2 * np.arctan2(k, w)), kind="prop", name=name)
+    return model.along(prop.trajectory, kind="prop", name=name)
 
 
 def _box(size: Size, tint: int) -> ObjectModel:
@@ -44,7 +44,7 @@ def _box(size: Size, tint: int) -> ObjectModel:
 
 
 def _step(size: Size, tint: int) -> ObjectModel:
-    """An exercise step: a dark tread on a coloured block."""
+    """Return an exercise step: a dark tread on a coloured block."""
     depth, width, height = size
     color = np.array([[0.25, 0.42, 0.58], [0.62, 0.36, 0.28], [0.42, 0.44, 0.47]])[tint % 3]
     tread = min(0.02, height / 4)

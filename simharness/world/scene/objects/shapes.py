@@ -1,7 +1,7 @@
-"""Meshes of simple shapes, to build things from: quadrilaterals, boxes, bars, and what comes off a lathe.
+"""Meshes of simple shapes: quadrilaterals, boxes, bars, bodies of revolution, lofted skins.
 
-Faces are counter-clockwise seen from outside. Creases have vertices of their own on either side, so that a smooth mesh
-may hold flat sides and sharp edges.
+Faces are counter-clockwise as seen from outside. Creases have separate vertices on both sides, so a smooth mesh may
+have flat sides and sharp edges.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from simharness.world.scene.objects.geoms import Box, Cylinder, Surface
 
 # Corners of each side of a Box in the order of its corners, counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
 _QUADS = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-TOP = 5  # of a box's sides
-_CREASE = np.cos(np.radians(40))  # a profile that bends more has an edge there
+TOP = 5  # index of the upper side of a box
+_CREASE = np.cos(np.radians(40))  # a profile that bends more has a sharp edge
 
 
 def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh:
-    """Quadrilaterals (k, 4), counter-clockwise from outside, each with a colour (k, 3), as triangles."""
+    """Return the triangle mesh of quadrilaterals (k, 4), counter-clockwise from outside, with colours (k, 3)."""
     faces = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return Mesh(
         vertices=vertices.astype(np.float32),
@@ -34,11 +34,11 @@ def quad_mesh(vertices: Floats, quads: NDArray[np.int_], colors: Floats) -> Mesh
 
 
 def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
-    """Boxes as one mesh.
+    """Return one mesh of several boxes.
 
     Args:
         boxes: n boxes.
-        colors: albedo 0..1 of each box (n, 3) or of each of its sides -x, +x, -y, +y, -z, +z (n, 6, 3).
+        colors: albedo 0..1 of each box (n, 3), or of each of its sides -x, +x, -y, +y, -z, +z (n, 6, 3).
     """
     colors = np.asarray(colors, float)
     if colors.ndim == 2:
@@ -48,13 +48,13 @@ def box_mesh(boxes: Sequence[Box], colors: ArrayLike) -> Mesh:
 
 
 def hexahedron(corners: ArrayLike, color: ArrayLike) -> Mesh:
-    """Six flat sides over eight corners (8, 3) in the order of those of a ``Box``."""
+    """Return a mesh of six flat sides over eight corners (8, 3), in the order of the corners of a ``Box``."""
     vertices = np.asarray(corners, float)[_QUADS].reshape(-1, 3)
     return quad_mesh(vertices, np.arange(24).reshape(-1, 4), np.broadcast_to(np.asarray(color, float), (6, 3)))
 
 
 def bar_mesh(bar: Cylinder, color: ArrayLike, *, sides: int = 14) -> Mesh:
-    """A cylinder with its ends."""
+    """Return the mesh of a cylinder with its ends."""
     profile = [(0.0, -bar.half), (bar.radius, -bar.half), (bar.radius, bar.half), (0.0, bar.half)]
     upright = lathe(profile, color, sides=sides)
     along = np.array(bar.axis)
@@ -65,13 +65,13 @@ def bar_mesh(bar: Cylinder, color: ArrayLike, *, sides: int = 14) -> Mesh:
 
 
 def lathe(profile: ArrayLike, colors: ArrayLike, *, sides: int = 16, squash: float = 1.0) -> Mesh:
-    """A body of revolution about the z axis, smooth around and along, with edges where the profile bends sharply.
+    """Return a body of revolution about the z axis, smooth except for edges where the profile bends sharply.
 
     Args:
-        profile: radius and height of m points from the bottom up, (m, 2) metres; radius 0 closes an end.
-        colors: albedo of all of it (3,), or of each of the m - 1 bands (m - 1, 3).
-        sides: how many make the round.
-        squash: extent in x over that in y.
+        profile: radius and height of m points from bottom to top, (m, 2), metres; radius 0 closes an end.
+        colors: albedo of the body (3,), or of each of the m - 1 bands (m - 1, 3).
+        sides: number of sides of the circumference.
+        squash: ratio of the extent in x to that in y.
     """
     profile = np.asarray(profile, float)
     bands = np.diff(profile, axis=0)
@@ -87,13 +87,13 @@ def lathe(profile: ArrayLike, colors: ArrayLike, *, sides: int = 16, squash: flo
 
 
 def loft(rings: ArrayLike, colors: ArrayLike, *, edges: Sequence[int] = ()) -> Mesh:
-    """A smooth skin over closed outlines, each joined to the next.
+    """Return a smooth skin over closed outlines, each connected to the next.
 
     Args:
-        rings: m outlines of s points, counter-clockwise seen from the last one's side, (m, s, 3) metres; an outline
-            may be a point.
-        colors: albedo of all of it (3,), of each of the m - 1 bands (m - 1, 3), or of each quadrilateral (m - 1, s, 3).
-        edges: outlines at which the skin has a sharp edge.
+        rings: m outlines of s points, counter-clockwise as seen from the side of the last one, (m, s, 3), metres; an
+            outline may be a single point.
+        colors: albedo of the skin (3,), of each of the m - 1 bands (m - 1, 3), or of each quadrilateral (m - 1, s, 3).
+        edges: indices of outlines at which the skin has a sharp edge.
     """
     rings = np.asarray(rings, float)
     count, sides = rings.shape[:2]
@@ -110,17 +110,17 @@ def loft(rings: ArrayLike, colors: ArrayLike, *, edges: Sequence[int] = ()) -> M
         quads.append(np.column_stack([low + k, low + after, high + after, high + k]))
     mesh = quad_mesh(np.concatenate(skin), np.concatenate(quads), colors.reshape(-1, 3))
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces].astype(float), 1, 0)
-    there = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10  # at a point, quadrilaterals are triangles
-    return replace(mesh, faces=mesh.faces[there], colors=mesh.colors[there], smooth=True)
+    kept = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10  # at a point, quadrilaterals are triangles
+    return replace(mesh, faces=mesh.faces[kept], colors=mesh.colors[kept], smooth=True)
 
 
 def shifted(mesh: Mesh, offset: ArrayLike) -> Mesh:
-    """The mesh carried by ``offset`` (3,) metres."""
+    """Return the mesh moved by ``offset`` (3,) metres."""
     return replace(mesh, vertices=(mesh.vertices + np.asarray(offset, float)).astype(np.float32))
 
 
 def joined(*meshes: Mesh) -> Mesh:
-    """Several meshes as one, smooth if any is; none may have a texture."""
+    """Return one mesh of several, smooth if any is; none may have a texture."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return Mesh(
         vertices=np.concatenate([mesh.vertices for mesh in meshes]),
@@ -133,5 +133,5 @@ def joined(*meshes: Mesh) -> Mesh:
 
 
 def surface(mesh: Mesh) -> Surface:
-    """The geom that is exactly a mesh."""
+    """Return the geom with exactly the triangles of a mesh."""
     return Surface(mesh.vertices.astype(float), mesh.faces)

@@ -1,4 +1,4 @@
-"""Things in the scene, each with its looks for pictures and its geoms for rays and contacts."""
+"""Objects and solids of a scene, each with a mesh for pictures and geoms for rays and contacts."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Kind = Literal["room", "clutter", "prop", "decoy"]
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """Something that has no place yet: it stands on z = 0 around the origin, its front towards +x.
+    """Model of an object before it is placed: it stands on z = 0 around the origin, its front towards +x.
 
     Attributes:
-        mesh: how it looks.
-        geoms: what it is made of.
-        figure: COCO-17 joints (17, 3), metres, where a detector may take it for a person.
-        mirror: its glass, where it is one.
+        mesh: mesh for pictures.
+        geoms: geoms for rays and contacts.
+        figure: COCO-17 joints, (17, 3), metres, if a detector may take the object for a person.
+        mirror: glass, if the object is a mirror.
     """
 
     mesh: Mesh
@@ -39,15 +39,15 @@ class ObjectModel:
 
     @cached_property
     def extent(self) -> Box:
-        """The box around all of it."""
+        """Bounding box."""
         return Box.around(self.mesh.vertices)
 
     def hull(self, place: ArrayLike, yaw: float) -> Box:
-        """The box around all of it when it stands at ``place`` (2,) turned by ``yaw``."""
+        """Return the bounding box of the object at ``place`` (2,), rotated by ``yaw``."""
         return self.extent.moved(place, yaw)
 
     def at(self, place: ArrayLike, yaw: float, *, kind: Kind, name: str) -> Solid:
-        """The thing at ``place`` (2,), turned by ``yaw``."""
+        """Return the solid at ``place`` (2,), rotated by ``yaw``."""
         return Solid(
             kind,
             name,
@@ -59,25 +59,25 @@ class ObjectModel:
         )
 
     def along(self, trajectory: Trajectory, *, kind: Kind, name: str) -> Solid:
-        """The thing on its way."""
+        """Return the solid that moves along a trajectory."""
         corners = np.concatenate([transform_points(self.extent.corners, pose) for pose in trajectory.pose])
         return Solid(kind, name, self.mesh, self.geoms, Box.around(corners), trajectory=trajectory)
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A thing in the room, at rest or moving.
+    """Solid object in the scene, at rest or moving.
 
     Attributes:
-        kind: "room" (floor, walls), "clutter", "prop" (people use it) or "decoy" (may be taken for a person).
-        name: what messages and the MuJoCo model call it.
-        mesh: how it looks; in the world, of a moving thing in its own frame.
-        geoms: what it is made of, in the same frame.
-        hull: a box in the world around all of it, and of a moving thing around all of its way; the space between
-            the boards of a shelf is inside.
-        trajectory: where the frame of a moving thing is; None of one at rest.
-        figure: COCO-17 joints (17, 3) in the world, metres, that a detector may find on a decoy.
-        mirror: the glass of a mirror, in the world.
+        kind: "room" (floor, walls), "clutter", "prop" (used by people) or "decoy" (may be taken for a person).
+        name: name in messages and in the MuJoCo model.
+        mesh: mesh for pictures, in the world; in the frame of the trajectory if the solid moves.
+        geoms: geoms for rays and contacts, in the same frame as the mesh.
+        hull: bounding box in the world, over the whole trajectory of a moving solid; it includes empty space, such as
+            that between the boards of a shelf.
+        trajectory: poses of the frame of a moving solid; None at rest.
+        figure: COCO-17 joints in the world, (17, 3), metres, that a detector may find on a decoy.
+        mirror: glass of a mirror, in the world.
     """
 
     kind: Kind
@@ -90,7 +90,7 @@ class Solid:
     mirror: Mirror | None = None
 
     def hull_at(self, time: float) -> Box:
-        """A box in the world around all of it at one moment, seconds; of one that is tilted, along the world's axes."""
+        """Return the bounding box in the world at one time in seconds; axis-aligned if the solid is tilted."""
         if self.trajectory is None:
             return self.hull
         pose = self.trajectory.at(time)
@@ -103,10 +103,10 @@ class Solid:
         return Box.around(self.mesh.vertices)
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
-        """Add it to a MuJoCo model.
+        """Add the solid to a MuJoCo model.
 
-        At rest its geoms belong to the world; a moving one is a mocap body of its name. A single geom has its name,
-        several have a number after it: "box0 0", "box0 1".
+        Geoms of a solid at rest belong to the world body; a moving solid is a mocap body of its name. A single geom has
+        the name of the solid, several have a number appended: "box0 0", "box0 1".
         """
         body = spec.worldbody if self.trajectory is None else spec.worldbody.add_body(name=self.name, mocap=True)
         for k, geom in enumerate(self.geoms):

@@ -1,4 +1,4 @@
-"""Storage that stands in the way: boxes, stacked or not, open bookshelves with things on their boards, bare racks."""
+"""Storage objects: boxes, single or stacked, open bookshelves with contents, empty racks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BOX_COLORS = np.array(
         [0.50, 0.56, 0.46],
     ]
 )
-_TAPE = 0.06  # metres
+_TAPE = 0.06  # metres: width
 _SHELF_WIDTH, _SHELF_HEIGHT, _SHELF_DEPTH = (0.9, 1.2), (1.7, 1.9), (0.28, 0.36)
 _BOARD = 0.025
 _RACK_WIDTH, _RACK_HEIGHT, _RACK_DEPTH = (0.6, 0.8), (1.0, 1.3), (0.30, 0.38)
@@ -46,21 +46,21 @@ BOOK_COLORS = np.array(
 
 
 def draw_box(rng: np.random.Generator) -> ObjectModel:
-    """A box of 0.4 to 1.1 m with a strip of tape over it, sometimes with a smaller one on top."""
+    """Draw a box of 0.4 to 1.1 m with a strip of tape, sometimes with a smaller box on top."""
     size = np.array([rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_SIDE), rng.uniform(*_BOX_HEIGHT)])
     upper = np.array([*(size[:2] * rng.uniform(0.55, 0.85, 2)), rng.uniform(*_STACK_HEIGHT)])
     turn = rng.uniform(-0.4, 0.4)
     stacked = rng.uniform() < _STACKED and size[2] + upper[2] < _BOX_HEIGHT[1]
     colors = BOX_COLORS[rng.integers(len(BOX_COLORS), size=2)]
-    boxes, painted = taped(size, colors[0], base=0.0, yaw=0.0)
+    boxes, sides = taped(size, colors[0], base=0.0, yaw=0.0)
     if stacked:
-        more, more_painted = taped(upper, colors[1], base=size[2], yaw=turn)
-        boxes, painted = boxes + more, painted + more_painted
-    return Assembly().boxes(boxes, painted).model()
+        upper_boxes, upper_sides = taped(upper, colors[1], base=size[2], yaw=turn)
+        boxes, sides = boxes + upper_boxes, sides + upper_sides
+    return Assembly().boxes(boxes, sides).model()
 
 
 def taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list[Box], list[Floats]]:
-    """A box in three slices side by side, the middle one with a paler top: a strip of packing tape."""
+    """Return a box as three slices side by side, the middle one with a paler top as packing tape, and their colours."""
     c, s = np.cos(yaw), np.sin(yaw)
     edges = np.array([-size[1] / 2, -_TAPE / 2, _TAPE / 2, size[1] / 2])
     boxes, painted = [], []
@@ -76,7 +76,7 @@ def taped(size: Floats, color: Floats, *, base: float, yaw: float) -> tuple[list
 
 
 def draw_shelf(rng: np.random.Generator) -> ObjectModel:
-    """An open bookshelf about 1.8 m tall: two sides, boards, a cross brace low at the back, books and cartons."""
+    """Draw an open bookshelf about 1.8 m tall: two sides, boards, books and cartons."""
     width, height, depth = rng.uniform(*_SHELF_WIDTH), rng.uniform(*_SHELF_HEIGHT), rng.uniform(*_SHELF_DEPTH)
     boards = int(rng.integers(5, 7))
     wood = WOOD[rng.integers(len(WOOD))]
@@ -89,13 +89,13 @@ def draw_shelf(rng: np.random.Generator) -> ObjectModel:
     for z in levels:
         parts.append((Box((0.0, 0.0, float(z)), (depth / 2, inner / 2, _BOARD / 2)), 0.94 * wood))
     for z, above in pairwise(levels):
-        parts += _things(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
+        parts += _contents(rng, z + _BOARD / 2, above - z - _BOARD, inner, depth)
     boxes, colors = zip(*parts, strict=True)
     return Assembly().boxes(boxes, np.array(colors)).model()
 
 
 def draw_rack(rng: np.random.Generator) -> ObjectModel:
-    """A rack of thin posts and boards, bare and as high as a chest: it stands in the way, and hides little."""
+    """Draw an empty rack of thin posts and boards, 1.0 to 1.3 m high: an obstacle that occludes little."""
     width, height, depth = rng.uniform(*_RACK_WIDTH), rng.uniform(*_RACK_HEIGHT), rng.uniform(*_RACK_DEPTH)
     levels = np.linspace(0.12, height - 0.06, int(rng.integers(3, 5)))
     metal = _METAL[rng.integers(len(_METAL))]
@@ -109,10 +109,10 @@ def draw_rack(rng: np.random.Generator) -> ObjectModel:
     return Assembly().boxes(boxes, np.array([metal] * len(posts) + [0.9 * metal] * len(boards))).model()
 
 
-def _things(
+def _contents(
     rng: np.random.Generator, floor: float, room: float, inner: float, depth: float
 ) -> list[tuple[Box, Floats]]:
-    """What stands on one board: a row of books from one end and perhaps a carton, with air between."""
+    """Draw the contents of one board: a row of books from one end, and by chance a carton at the other end."""
     parts: list[tuple[Box, Floats]] = []
     end = rng.choice([-1.0, 1.0])
     filled = inner * rng.uniform(0.25, 0.7)

@@ -1,1 +1,1 @@
-"""Where things stand: out of everyone's way, in the cameras', by kind, amount and coverage."""
+"""Placement of objects: clear of people and cameras, by kind, number and coverage of the views."""

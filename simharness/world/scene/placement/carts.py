@@ -1,4 +1,4 @@
-"""Carts that move about: each to and fro on a line, or round and round, with people never in its way."""
+"""Moving carts: each oscillates on a line or circulates on an ellipse, always clear of people."""
 
 from __future__ import annotations
 
@@ -14,54 +14,53 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Solid
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB, FreeSpace, Site
 
-_SPEED = (0.35, 0.7)  # m/s, the most on the way
+_SPEED = (0.35, 0.7)  # m/s: largest speed on the path
 _LINE = (0.4, 2.5)  # metres from the middle of a line to its ends
-_ROUND = 0.7  # metres, the least radius
-_ON_A_LINE = 0.6  # chance
-_ASKEW = 0.2  # radians, standard deviation of a way's bearing about that of a wall
+_MIN_RADIUS = 0.7  # metres
+_LINE_CHANCE = 0.6
+_BEARING_SPREAD = 0.2  # radians: standard deviation of the bearing of a path about that of a wall
 _TRIES = 2000
-_PHASES = 24  # of one period, at which what stands is kept clear of
-_COARSE = 6  # every sixth moment tells most meetings with people
-_LIMBS_REACH = 1.6  # metres from a pelvis to any joint, at most
+_PHASES = 24  # phases of one period at which clearance from objects is checked
+_COARSE = 6  # every sixth time step shows most encounters with people
+_LIMBS_REACH = 1.6  # metres: largest distance from a pelvis to a joint
 
 
 def place_cart(seed: int, k: int, site: Site) -> Solid:
-    """Draw cart k and a way for it.
+    """Draw cart k and a path for it.
 
-    At all times for which people are planned it is as far from them as things at rest are, and clear of what stands
-    there, of the ways of other carts, of walls and of lenses.
+    At all times for which people are planned it keeps the same distance from them as objects at rest, and is clear of
+    objects, of the paths of other carts, of walls and of cameras.
 
     Raises:
-        ValueError: no way is free.
+        ValueError: no path is free.
     """
-    thing = draw_cart(stream(seed, "clutter", "cart", k))
+    cart = draw_cart(stream(seed, "clutter", "cart", k))
     rng = stream(seed, "clutter", "cart", k, "way")
     space = site.space
     for _ in range(_TRIES):
-        way = _draw_way(rng, space)
-        period = way.at(way.period * np.arange(_PHASES) / _PHASES)
-        if not all(site.clear(thing.extent.moved(pose[:2], _yaw(pose))) for pose in period):
+        path = _draw_path(rng, space)
+        period = path.at(path.period * np.arange(_PHASES) / _PHASES)
+        if not all(site.clear(cart.extent.moved(pose[:2], _yaw(pose))) for pose in period):
             continue
-        pose = way.at(space.time)
-        if not (_meets_people(thing.extent, pose, space, _COARSE) or _meets_people(thing.extent, pose, space, 1)):
-            return thing.along(Trajectory(space.time, pose), kind="clutter", name=f"cart{k}")
+        pose = path.at(space.time)
+        if not (_meets_people(cart.extent, pose, space, _COARSE) or _meets_people(cart.extent, pose, space, 1)):
+            return cart.along(Trajectory(space.time, pose), kind="clutter", name=f"cart{k}")
     raise ValueError(
-        f"clutter.carts: no way is free for cart {k} in {_TRIES} tries, among the people, the things and the cameras "
-        f"in room.size = {list(space.room.size)}: lower clutter.carts, people.area or people.count, or enlarge "
-        "room.size"
+        f"clutter.carts: found no free path for cart {k} in {_TRIES} tries, clear of people, objects and cameras in "
+        f"room.size = {list(space.room.size)}: lower clutter.carts, people.area or people.count, or enlarge room.size"
     )
 
 
 @dataclass(frozen=True)
-class _Way:
-    """A harmonic way about a middle: an ellipse, whose second radius is 0 for a line.
+class _Path:
+    """Harmonic path: an ellipse, whose second radius is 0 for a line.
 
     Attributes:
-        middle: (2,) metres.
-        bearing: of the first radius, radians.
-        radii: metres, (2,).
-        period: seconds; negative for clockwise.
-        phase: where on it time 0 is, radians.
+        middle: centre, (2,), metres.
+        bearing: bearing of the first radius, radians.
+        radii: radii, (2,), metres.
+        period: period in seconds; negative for clockwise.
+        phase: phase at time 0, radians.
     """
 
     middle: Floats
@@ -71,7 +70,7 @@ class _Way:
     phase: float
 
     def at(self, time: Floats) -> Floats:
-        """Poses (n, 7) at times (n,): on a line the cart keeps facing one way, on a round it faces ahead."""
+        """Return poses (n, 7) at times (n,); the cart keeps its orientation on a line and faces ahead on an ellipse."""
         angle = 2 * np.pi * time / self.period + self.phase
         c, s = np.cos(self.bearing), np.sin(self.bearing)
         turn = np.array([[c, s], [-s, c]])
@@ -82,32 +81,32 @@ class _Way:
         return np.column_stack([place, flat, np.cos(yaw / 2), flat, flat, np.sin(yaw / 2)])
 
 
-def _draw_way(rng: np.random.Generator, space: FreeSpace) -> _Way:
-    on_a_line, speed, sense = rng.uniform() < _ON_A_LINE, rng.uniform(*_SPEED), rng.choice([-1.0, 1.0])
-    quarter, askew, phase = rng.integers(4), rng.normal(0.0, _ASKEW), rng.uniform(0, 2 * np.pi)
+def _draw_path(rng: np.random.Generator, space: FreeSpace) -> _Path:
+    on_a_line, speed, sense = rng.uniform() < _LINE_CHANCE, rng.uniform(*_SPEED), rng.choice([-1.0, 1.0])
+    quarter, deviation, phase = rng.integers(4), rng.normal(0.0, _BEARING_SPREAD), rng.uniform(0, 2 * np.pi)
     share, reach = rng.uniform(-1, 1, 2), rng.uniform(0, 1, 2)
-    bearing = float(quarter * np.pi / 2 + askew)
+    bearing = float(quarter * np.pi / 2 + deviation)
     if on_a_line:
         radii = np.array([_LINE[0] + (_LINE[1] - _LINE[0]) * reach[0] ** 2, 0.0])
         middle = share * space.half
     else:
-        radii = _ROUND + np.maximum(space.half - _ROUND, 0) * reach
+        radii = _MIN_RADIUS + np.maximum(space.half - _MIN_RADIUS, 0) * reach
         middle = share * np.maximum(space.half - radii, 0)
-    return _Way(middle, bearing, radii, float(sense * 2 * np.pi * radii.max() / speed), phase)
+    return _Path(middle, bearing, radii, float(sense * 2 * np.pi * radii.max() / speed), phase)
 
 
 def _meets_people(extent: Box, pose: Floats, space: FreeSpace, stride: int) -> bool:
-    """Whether anyone comes too near to a thing of this extent on its way; every ``stride``-th moment is looked at."""
+    """Return whether a person comes too close to an object on its path, checked at every ``stride``-th time."""
     pose, pelvises = pose[::stride], space.pelvises[::stride]
     apart = np.linalg.norm(pelvises[..., :2] - pose[:, None, :2], axis=-1)
     n, p = np.nonzero(apart < np.hypot(*extent.half[:2]) + _LIMBS_REACH)
-    if _least(extent, pose[n], pelvises[n, p][:, None]) < BODY_HALF_WIDTH:
+    if _least_distance(extent, pose[n], pelvises[n, p][:, None]) < BODY_HALF_WIDTH:
         return True
-    return _least(extent, pose[n], space.joints[::stride][n, p]) < LIMB
+    return _least_distance(extent, pose[n], space.joints[::stride][n, p]) < LIMB
 
 
-def _least(extent: Box, pose: Floats, points: Floats) -> float:
-    """Least distance on the floor between a thing in poses (n, 7) and points (n, J, 3)."""
+def _least_distance(extent: Box, pose: Floats, points: Floats) -> float:
+    """Return the least horizontal distance between an object in poses (n, 7) and points (n, J, 3), metres."""
     yaw = np.arctan2(pose[:, 6], pose[:, 3]) * 2
     c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     x, y = np.moveaxis(points[..., :2] - pose[:, None, :2], -1, 0)

@@ -1,4 +1,4 @@
-"""Things added until a given share of the joints in the pictures is hidden."""
+"""Objects added until a given share of the joints in the pictures is occluded."""
 
 from __future__ import annotations
 
@@ -15,68 +15,68 @@ from simharness.world.scene.placement.sight_lines import SightLines, lines_of_si
 
 Draw = Callable[[np.random.Generator, Room], ObjectModel]
 
-WITHIN = 0.05  # of the share asked for
-_AIM = 0.02  # how near to get while things still help: the sample is not everything
-_LINES = 24_000  # lines of sight, about, on which the share is measured
-_MOMENTS = (6, 48)  # least and most of them
-_CANDIDATES = 16  # tried for each thing that is added
+WITHIN = 0.05  # accepted deviation from the requested share
+_AIM = 0.02  # targeted deviation on the sample of lines, smaller because the sample is not complete
+_LINES = 24_000  # approximate number of lines of sight on which the share is measured
+_TIMES = (6, 48)  # least and largest number of times
+_CANDIDATES = 16  # candidates for each added object
 _TRIES = 40
 _ROUNDS = 60
-_BARREN = 6  # rounds without any gain after which it is given up
-_ALONG = (0.12, 0.88)  # of a line of sight: where on it a thing is put
-_ASKEW = 0.25  # radians, standard deviation of how far its front turns from that line
+_MAX_FAILED_ROUNDS = 6  # rounds without gain after which the search ends
+_ALONG = (0.12, 0.88)  # position of an object on a line of sight, as a share of its length
+_YAW_SPREAD = 0.25  # radians: standard deviation of the angle between its front and that line
 _LEAST_GAIN = 0.002
-# What one thing may hide, where there is a choice: many things that hide a little look more like a room than a few
-# that hide much, but where those have no place left, these do it.
+# Largest gain of one object, in the order of attempts: many objects that each hide a little are more like a real room
+# than a few that hide much; the latter are used only if there is no place for the former.
 _MOST_GAIN = (0.07, 1.0)
 
 
 def lines_in(space: FreeSpace) -> SightLines:
-    """Lines of sight at moments spread evenly over the time that is filmed.
+    """Return lines of sight at times spread evenly over the filmed sequence.
 
-    People are planned for as long before time 0 as after the end, so that time is known.
+    People are planned for equally long before time 0 and after the end, so the end of the sequence is known.
     """
     shown = np.flatnonzero((space.time >= 0) & (space.time <= space.time[-1] + min(space.time[0], 0)))
     each = max(1, len(space.rig) * int(np.prod(space.joints.shape[1:3])))
-    count = int(np.clip(_LINES / each, *_MOMENTS))
+    count = int(np.clip(_LINES / each, *_TIMES))
     chosen = shown[np.unique(np.linspace(0, len(shown) - 1, min(count, len(shown))).round().astype(int))]
     return lines_of_sight(space.rig, space.time[chosen], space.joints[chosen])
 
 
 def share_hidden(space: FreeSpace, solids: Sequence[Solid]) -> float:
-    """Share of the joints in the pictures, of all people, cameras and moments, that things hide."""
+    """Return the share of joints in the pictures, over people, cameras and times, that solids occlude."""
     lines = lines_in(space)
     return float(lines.hidden(solids).mean()) if len(lines) else 0.0
 
 
 def cover(seed: int, share: float, fillers: Mapping[str, Draw], site: Site) -> None:
-    """Add things until they hide the share asked for, within 5 points, together with those that stand there.
+    """Add objects until they and the present solids occlude the requested share of joints, within 5 points.
 
-    In each round several things of one kind are drawn, each by a stream of its own, and put between a camera and a
-    joint; the one that hides most, if not too much at once, stays. Only near the end the one is taken that comes
-    nearest to the share, so that asking for more adds to the same things.
+    In each round several objects of one kind are drawn, each by a separate stream, and placed between a camera and a
+    joint; the one with the largest gain below a limit is kept. Only in the last step the one with the share nearest to
+    the request is taken, so a larger request adds to the same objects.
 
     Args:
-        seed: of the scenario.
-        share: of the joints in the pictures, 0 to 1.
-        fillers: draws of the kinds of things to add, by name.
-        site: where they are added.
+        seed: seed of the scenario.
+        share: requested share of the joints in the pictures, 0 to 1.
+        fillers: functions that draw objects to add, by kind.
+        site: site to which they are added.
 
     Raises:
-        ValueError: things hide more already, or cannot hide so much; the message says what was reached and what
-            limits it.
+        ValueError: present solids occlude more already, or the share cannot be reached; the message gives the share
+            that was reached and the limits.
     """
     lines = lines_in(site.space)
     if not len(lines):
         raise ValueError(
-            f"clutter.coverage = {share:g} asks for hidden joints, but no joint is in any picture: take people.count "
-            "above 0 and cameras that look at them, or leave clutter.coverage out"
+            f"clutter.coverage = {share:g} cannot be reached, because no joint is in any picture: use people.count "
+            "above 0 and cameras that look at them, or remove clutter.coverage"
         )
     hidden = lines.hidden(site.solids)
     if hidden.mean() > share + WITHIN:
         raise ValueError(
-            f"clutter.coverage = {share:g} is less than what the things that were asked for hide by themselves, "
-            f"{hidden.mean():.2f} of the joints in the pictures: ask for fewer things or more coverage"
+            f"clutter.coverage = {share:g} is less than the share of joints that the requested objects occlude "
+            f"already, {hidden.mean():.2f}: request fewer objects or a higher clutter.coverage"
         )
     reached = 0.0
     for most in _MOST_GAIN:
@@ -86,30 +86,31 @@ def cover(seed: int, share: float, fillers: Mapping[str, Draw], site: Site) -> N
                 site.add(solid)
             return
     raise ValueError(
-        f"clutter.coverage = {share:g} cannot be reached: {len(added)} more things hide {reached:.2f} of the joints in "
-        "the pictures, and others would stand in people's way, within 0.5 m of a lens, or fill more than 60 % of a "
-        "picture; lower clutter.coverage, cameras.height, people.count or people.area, or enlarge room.size"
+        f"clutter.coverage = {share:g} cannot be reached: with {len(added)} added objects {reached:.2f} of the joints "
+        "in the pictures are occluded, and further ones would obstruct people, stand within 0.5 m of a camera, or fill "
+        "more than 60 % of a picture; lower clutter.coverage, cameras.height, people.count or people.area, or enlarge "
+        "room.size"
     )
 
 
 def _fill(
     seed: int, share: float, fillers: Mapping[str, Draw], site: Site, lines: SightLines, hidden: Bools, most: float
 ) -> tuple[list[Solid], float]:
-    """Add things until they hide the share, or nothing helps, none of them more than ``most`` if it can be helped.
+    """Add objects until they occlude the share or no candidate helps, with gains of at most ``most`` if possible.
 
     Returns:
-        What was added, and the share of the joints that are hidden then.
+        Added objects, and the share of joints that are occluded then.
     """
     added: list[Solid] = []
-    barren = 0
+    failed = 0
     order = stream(seed, "clutter", "coverage").permutation(list(fillers)).tolist()
-    for turn in range(_ROUNDS):
-        if abs(hidden.mean() - share) <= _AIM or barren == _BARREN:
+    for attempt in range(_ROUNDS):
+        if abs(hidden.mean() - share) <= _AIM or failed == _MAX_FAILED_ROUNDS:
             break
-        barren += 1
-        name = order[turn % len(order)]
-        found = list(_candidates(seed, turn, fillers[name], site, lines, f"cover {name}{len(added)}"))
-        cut = [hidden | lines.cut_by(solid) for solid in found]
+        failed += 1
+        name = order[attempt % len(order)]
+        candidates = list(_candidates(seed, attempt, fillers[name], site, lines, f"cover {name}{len(added)}"))
+        cut = [hidden | lines.cut_by(solid) for solid in candidates]
         gain = np.array([each.mean() for each in cut]) - hidden.mean()
         if gain.max(initial=0.0) < _LEAST_GAIN:
             continue
@@ -119,22 +120,22 @@ def _fill(
             best = int(np.abs(gain - missing).argmin())
             if abs(gain[best] - missing) >= missing:
                 continue
-        barren, hidden = 0, cut[best]
-        added.append(found[best])
-        site.add(found[best])
+        failed, hidden = 0, cut[best]
+        added.append(candidates[best])
+        site.add(candidates[best])
     return added, float(hidden.mean())
 
 
-def _candidates(seed: int, turn: int, draw: Draw, site: Site, lines: SightLines, name: str) -> Iterator[Solid]:
-    """Things of one kind that could be added, each across a line of sight."""
+def _candidates(seed: int, attempt: int, draw: Draw, site: Site, lines: SightLines, name: str) -> Iterator[Solid]:
+    """Yield objects of one kind that could be added, each across a line of sight."""
 
-    def across(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-        chosen, along, askew = int(rng.integers(len(lines))), rng.uniform(*_ALONG), rng.normal(0.0, _ASKEW)
+    def sample_place(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+        chosen, along, turn = int(rng.integers(len(lines))), rng.uniform(*_ALONG), rng.normal(0.0, _YAW_SPREAD)
         way = lines.ends[chosen] - lines.starts[chosen]
-        return (lines.starts[chosen] + along * way)[:2], float(np.arctan2(way[1], way[0]) + askew)
+        return (lines.starts[chosen] + along * way)[:2], float(np.arctan2(way[1], way[0]) + turn)
 
     for k in range(_CANDIDATES):
-        rng = stream(seed, "clutter", "coverage", turn, k)
-        solid = site.find(rng, draw(rng, site.space.room), across, kind="clutter", name=name, tries=_TRIES)
+        rng = stream(seed, "clutter", "coverage", attempt, k)
+        solid = site.find(rng, draw(rng, site.space.room), sample_place, kind="clutter", name=name, tries=_TRIES)
         if solid is not None:
             yield solid

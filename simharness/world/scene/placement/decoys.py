@@ -1,7 +1,7 @@
-"""Things that a detector may take for people: posters, mannequins, coat stands, mirrors.
+"""Decoys, objects that a detector may take for people: posters, mannequins, coat stands, mirrors.
 
-Each but the mirror knows the joints that would be found on it (``Solid.figure``); a mirror knows its glass
-(``Solid.mirror``), and shows whoever stands before it.
+Each except the mirror has the joints that a detector would find on it (``Solid.figure``); a mirror has its glass
+(``Solid.mirror``) and shows the people in front of it.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import box_mesh, joined, lathe, loft, shifted
 from simharness.world.scene.objects.solids import ObjectModel, Solid
 from simharness.world.scene.objects.storage import WOOD
-from simharness.world.scene.placement.free_space import TRIES, FreeSpace, Site, about, inwards
+from simharness.world.scene.placement.free_space import TRIES, FreeSpace, Site, inward_yaw, near_people
 
-_POSTER_GRAIN = 320  # pixels a metre
-_ON_WALL = 0.7  # chance, where there are walls
+_POSTER_RESOLUTION = 320  # pixels per metre
+_ON_WALL = 0.7  # chance of a place at a wall, if there are walls
 _ALUMINIUM = np.array([0.74, 0.75, 0.77])
 _FRAMES = np.array([[0.20, 0.20, 0.22], [0.85, 0.84, 0.81], [0.62, 0.47, 0.33], [0.40, 0.30, 0.24]])
 _GLASS = np.array([0.78, 0.84, 0.85])
 _SHOP_COLORS = np.array([[0.90, 0.88, 0.85], [0.80, 0.69, 0.58], [0.30, 0.31, 0.33], [0.74, 0.75, 0.77]])
 _CLOTHS = np.array([[0.29, 0.31, 0.36], [0.62, 0.50, 0.36], [0.34, 0.40, 0.32], [0.46, 0.26, 0.26], [0.24, 0.32, 0.44]])
 
-_ARM_OUT = 0.2  # radians from the vertical, of a mannequin's upper arms
+_ARM_OUT = 0.2  # angle of the upper arms of a mannequin from the vertical, radians
 
-# Of a coat on a stand: how high, how wide to each side, how deep to each side; metres.
+# Profile of a coat on a stand: height, half width, half depth; metres.
 _COAT = np.array(
     [
         *((0.48, 0.265, 0.165), (0.70, 0.250, 0.155), (0.95, 0.225, 0.140), (1.15, 0.215, 0.130)),
@@ -50,45 +50,45 @@ _FOLDS = 7
 
 
 def place_decoys(seed: int, decoys: Decoys, space: FreeSpace) -> tuple[Solid, ...]:
-    """Draw the decoys and find a place for each: on a wall, or about where people are.
+    """Draw the decoys and find a place for each: on a wall, or near the paths of people.
 
-    Each is drawn and placed by a stream of its own: one more moves none that stood before it.
+    Each is drawn and placed by a separate stream, so one more moves none of those placed before it.
 
     Raises:
-        ValueError: a decoy finds no place.
+        ValueError: no place is found for a decoy.
     """
     site = Site(space)
     for plural, (name, draw) in _DECOYS.items():
         for k in range(getattr(decoys, plural)):
             rng = stream(seed, "decoys", name, k)
             on_wall = rng.uniform() < _ON_WALL and space.room.walls and plural in ("posters", "mirrors")
-            thing = draw(rng, on_wall)
-            where = stream(seed, "decoys", name, k, "place")
-            place = _at_wall if on_wall else about
-            solid = site.find(where, thing, place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
+            model = draw(rng, on_wall)
+            place_rng = stream(seed, "decoys", name, k, "place")
+            sample_place = _at_wall if on_wall else near_people
+            solid = site.find(place_rng, model, sample_place, kind="decoy", name=f"{name}{k}", at_wall=on_wall)
             if solid is None:
                 raise ValueError(
-                    f"decoys.{plural}: {name} {k} finds no place in {TRIES} tries beside {len(site.solids)} other "
-                    f"things, the people's paths and the cameras in room.size = {list(space.room.size)}; lower "
-                    f"decoys.{plural} or people.count, or enlarge room.size"
+                    f"decoys.{plural}: found no place for {name} {k} in {TRIES} tries, clear of {len(site.solids)} "
+                    f"other objects, of the paths of people and of the cameras, in room.size = "
+                    f"{list(space.room.size)}: lower decoys.{plural} or people.count, or enlarge room.size"
                 )
             site.add(solid)
     return tuple(site.solids[len(space.taken) :])
 
 
 def _at_wall(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-    """Somewhere along a wall, facing into the room."""
+    """Draw a place along a wall and the yaw that faces into the room."""
     side, sense, along = rng.integers(2), rng.choice([-1.0, 1.0]), rng.uniform(-0.85, 0.85)
     unit = np.array([sense, along]) if side == 0 else np.array([along, sense])
     outward = np.array([sense, 0.0]) if side == 0 else np.array([0.0, sense])
-    return unit * space.half, inwards(outward)
+    return unit * space.half, inward_yaw(outward)
 
 
 def draw_poster(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
-    """A picture of a person, nearly as large as life: framed on a wall, or on a banner that stands by itself."""
+    """Draw a poster of a person, almost life-size: framed on a wall, or on a free-standing banner."""
     width, height = rng.uniform(0.72, 0.85), rng.uniform(1.75, 1.95)
     frame = _FRAMES[rng.integers(len(_FRAMES))]
-    size = (round(width * _POSTER_GRAIN), round(height * _POSTER_GRAIN))
+    size = (round(width * _POSTER_RESOLUTION), round(height * _POSTER_RESOLUTION))
     texture, joints = draw_person(rng, size, tall=0.82)
     low = 0.12 if on_wall else 0.09
     sheet = Box((0.018, 0.0, low + height / 2), (0.006, width / 2, height / 2))
@@ -108,8 +108,8 @@ def draw_poster(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
 
 
 def _printed(mesh: Mesh, texture: NDArray[np.uint8]) -> Mesh:
-    """Put a picture on the front of a mesh's first box; what else it has keeps its colours."""
-    # Beside the picture a white column, which colours nothing, for all other faces.
+    """Return the mesh with a picture on the front of its first box; other faces keep their colours."""
+    # A white column beside the picture, which leaves colours unchanged, serves as texture of all other faces.
     wide = np.concatenate([texture, np.full((len(texture), 4, 3), 255, np.uint8)], axis=1)
     uv = np.full((len(mesh.faces), 3, 2), 0.5)
     uv[..., 0] = 1 - 2 / wide.shape[1]
@@ -123,7 +123,7 @@ def _printed(mesh: Mesh, texture: NDArray[np.uint8]) -> Mesh:
 
 
 def _rim(sheet: Box, width: float) -> list[Box]:
-    """Four bars around a sheet that stands across x, a little thicker than it."""
+    """Return four bars around a sheet perpendicular to x, slightly thicker than the sheet."""
     (x, y, z), (depth, wide, tall) = sheet.center, sheet.half
     bars = []
     for side in (-1.0, 1.0):
@@ -133,7 +133,7 @@ def _rim(sheet: Box, width: float) -> list[Box]:
 
 
 def draw_mirror(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
-    """A framed mirror as tall as a person: on a wall, or on two feet."""
+    """Draw a framed mirror as tall as a person: on a wall, or on two feet."""
     width, height = rng.uniform(0.65, 1.0), rng.uniform(1.55, 1.8)
     frame = _FRAMES[rng.integers(len(_FRAMES))]
     low, rim = 0.14, 0.05
@@ -149,7 +149,7 @@ def draw_mirror(rng: np.random.Generator, on_wall: bool) -> ObjectModel:
 
 
 def draw_mannequin(rng: np.random.Generator, on_wall: bool = False) -> ObjectModel:
-    """A bare body of one plain colour, as shops have them, on a round base."""
+    """Draw a shop mannequin: an unclothed body of one colour on a round base."""
     body = make_body(
         Shape(
             gender=float(rng.choice([0.05, 0.95])),
@@ -184,7 +184,7 @@ def draw_mannequin(rng: np.random.Generator, on_wall: bool = False) -> ObjectMod
 
 
 def _posed(body: Body, turns: Mapping[str, Floats]) -> Floats:
-    """Bone transforms (B, 3, 4) of the rest body with some bones turned about their heads by rotation vectors (3,)."""
+    """Return bone transforms (B, 3, 4) of the rest pose with bones rotated about their heads by rotation vectors."""
     transforms = np.empty((len(body.bones), 3, 4))
     for bone, (name, parent) in enumerate(zip(body.bones, body.parents, strict=True)):
         rest = np.eye(3, 4) if parent < 0 else transforms[parent]
@@ -196,7 +196,7 @@ def _posed(body: Body, turns: Mapping[str, Floats]) -> Floats:
 
 
 def draw_coat_stand(rng: np.random.Generator, on_wall: bool = False) -> ObjectModel:
-    """A pole on a round foot with a coat over its arms and a hat on top, as tall as a person."""
+    """Draw a coat stand as tall as a person: a pole on a round foot with a coat and a hat."""
     tall, wide = rng.uniform(0.94, 1.10), rng.uniform(0.92, 1.08)
     cloth, wood = _CLOTHS[rng.integers(len(_CLOTHS))], WOOD[rng.integers(len(WOOD))]
     felt, phase = 0.75 * _CLOTHS[rng.integers(len(_CLOTHS))], rng.uniform(0, 2 * np.pi, 2)
@@ -209,11 +209,11 @@ def draw_coat_stand(rng: np.random.Generator, on_wall: bool = False) -> ObjectMo
     hat = np.array([*brim, (0.095, 0.06), (0.092, 0.105), (0.078, 0.130), (0.04, 0.128), (0.0, 0.118)])
     bands = np.array([felt, felt, felt, 0.4 * felt, felt, felt, felt, felt])
     assembly.mesh(shifted(lathe(hat, bands, sides=20, squash=1.1), (0, 0, crown)))
-    return assembly.model(figure=_stood(shape, crown, tall))
+    return assembly.model(figure=_coat_figure(shape, crown, tall))
 
 
 def _coat(shape: Floats, cloth: Floats, phase: float) -> Mesh:
-    """The body of a coat, closed below, with folds that deepen downwards."""
+    """Return the body of a coat, closed below, with folds that deepen downwards."""
     sides = 36
     turn = 2 * np.pi * np.arange(sides) / sides
     depth = np.linspace(1, 0, len(shape))[:, None] ** 1.5
@@ -224,12 +224,12 @@ def _coat(shape: Floats, cloth: Floats, phase: float) -> Mesh:
     )
     hem, collar = rings[:1] * [0.0, 0.0, 1.0], rings[-1:] * [0.0, 0.0, 1.0]
     colors = np.tile(cloth, (len(rings) + 1, sides, 1))
-    colors[1:-1, 0] *= 0.72  # the edge of the flap that closes it
+    colors[1:-1, 0] *= 0.72  # edge of the front flap
     return loft(np.concatenate([hem, rings, collar]), colors, edges=(1,))
 
 
 def _sleeve(shape: Floats, side: float, cloth: Floats) -> Mesh:
-    """An empty sleeve that hangs from a shoulder."""
+    """Return an empty sleeve that hangs from a shoulder."""
     top, wide = shape[5, 0], shape[5, 1]
     path = np.array(
         [[0.0, 0.80, 0.01], [0.0, 0.98, -0.04], [0.01, 1.13, -0.20], [0.02, 1.20, -0.42], [0.02, 1.22, -0.60]]
@@ -245,8 +245,8 @@ def _sleeve(shape: Floats, side: float, cloth: Floats) -> Mesh:
     return loft(np.concatenate([ends[1], rings[::-1], ends[0]]), 0.93 * cloth, edges=(1,))
 
 
-def _stood(shape: Floats, crown: float, tall: float) -> Floats:
-    """The joints of the person that one may see in it, (17, 3)."""
+def _coat_figure(shape: Floats, crown: float, tall: float) -> Floats:
+    """Return the COCO-17 joints of the apparent person, (17, 3)."""
     shoulder, wide = shape[5, 0], 0.8 * shape[5, 1]
     face = [
         (0.09, 0.0, -0.05),
@@ -273,4 +273,4 @@ _DECOYS: MappingProxyType[str, tuple[str, Callable[[np.random.Generator, bool], 
         "coat_stands": ("coat stand", draw_coat_stand),
     }
 )
-"""By the key of the scenario: what one is called, and what draws it, knowing whether it hangs on a wall."""
+"""Name of one decoy and its drawing function, which is given whether it hangs on a wall; by key of the scenario."""

@@ -1,4 +1,4 @@
-"""Where things can stand: out of everyone's way, clear of the cameras and of each other."""
+"""Free space for objects: clear of the paths of people, of cameras and of other objects."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.solids import Kind, ObjectModel, Solid
 from simharness.world.scene.placement.sight_lines import PictureFill
 
-BODY_HALF_WIDTH = 0.42  # metres: what a trunk with its arms needs to pass by
-LIMB = 0.15  # metres around every joint: an outstretched arm does not go through a shelf
-LENS = 0.5  # metres kept free around each camera
-GAP = 0.08  # metres between things, and to the walls
+BODY_HALF_WIDTH = 0.42  # metres: clearance that a trunk with arms needs to pass
+LIMB = 0.15  # metres: clearance around every joint, so that an outstretched arm does not pass through a shelf
+LENS = 0.5  # metres: clearance around each camera
+GAP = 0.08  # metres: gap between objects, and to the walls
 TRIES = 2000
-MOST_OF_A_PICTURE = 0.6  # share of any one picture that all things together may fill
-_CELL = 0.02  # metres: people's places are thinned to one in each cell of the floor
-_BESIDE = (0.6, 1.4)  # metres from a person to a thing close by
+MAX_PICTURE_FILL = 0.6  # share of any picture that all objects together may fill
+_CELL = 0.02  # metres: positions of people are thinned to one per cell of the floor
+_NEAR_PEOPLE = (0.6, 1.4)  # metres from a person to an object placed near people
 _ROUNDING = 1e-6  # metres
-_HULL_RATE = 4.0  # Hz at which the way of a moving thing is kept free
+_HULL_RATE = 4.0  # Hz: sampling rate of the path of a moving object
 
 
-Where = Callable[[np.random.Generator, "FreeSpace"], tuple[Floats, float]]
-"""Draws a place (2,) and a turn for a thing."""
+PlaceSampler = Callable[[np.random.Generator, "FreeSpace"], tuple[Floats, float]]
+"""Function that draws a place (2,) and a yaw for an object."""
 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """What things must stay clear of.
+    """Space that objects can use: room, paths of people, cameras and present solids.
 
     Attributes:
-        room: the room; without walls, things stay within its size all the same.
-        area: half the side of the square that people stay in, metres.
-        time: seconds, (N,), all the time for which people are planned.
-        pelvises: where pelvises are then, (N, P, 3) metres.
-        joints: where joints are then, (N, P, J, 3) metres.
-        rig: the cameras.
-        taken: what stands there already.
-        around: radius about the origin that people keep free, metres.
+        room: the room; objects stay within its size even without walls.
+        area: half the side of the square in which people stay, metres.
+        time: times for which people are planned, (N,), seconds.
+        pelvises: positions of the pelvises, (N, P, 3), metres.
+        joints: positions of the joints, (N, P, J, 3), metres.
+        rig: true cameras.
+        taken: solids that are already present.
+        around: radius around the origin that people keep free, metres.
     """
 
     room: Room
@@ -58,23 +58,23 @@ class FreeSpace:
 
     @cached_property
     def half(self) -> Floats:
-        """Half the room's sides, (2,) metres."""
+        """Half sides of the room, (2,), metres."""
         return np.array(self.room.size[:2]) / 2
 
     @cached_property
     def stations(self) -> Floats:
-        """Where pelvises ever are on the floor, (n, 2) metres, thinned."""
+        """Thinned positions of pelvises on the floor over all times, (n, 2), metres."""
         return _thinned(self.pelvises)
 
     @cached_property
     def _people(self) -> tuple[tuple[cKDTree, float], ...]:
-        """Trees of places on the floor, and how far hulls keep from them."""
+        """Search trees of floor positions of pelvises and joints, each with the clearance of objects from them."""
         slack = _CELL / np.sqrt(2)
         pairs = ((self.stations, BODY_HALF_WIDTH + slack), (_thinned(self.joints), LIMB + slack))
         return tuple((cKDTree(places), margin) for places, margin in pairs if len(places))
 
     def fits(self, hull: Box, *, at_wall: bool = False) -> bool:
-        """Whether a thing with this hull keeps within the walls and off the lenses; ``at_wall`` it may touch a wall."""
+        """Return whether a hull is inside the walls and clear of the cameras; with ``at_wall`` it may touch a wall."""
         limits = self.half - (0.0 if at_wall else GAP) + _ROUNDING
         corners = hull.corners
         return bool(
@@ -84,7 +84,7 @@ class FreeSpace:
         )
 
     def obstructed(self, hull: Box) -> bool:
-        """Whether a thing with this hull is ever in anyone's way."""
+        """Return whether an object with this hull obstructs a person at any time."""
         return any(_comes_near(hull, tree, margin) for tree, margin in self._people)
 
 
@@ -95,18 +95,18 @@ def _comes_near(hull: Box, tree: cKDTree, margin: float) -> bool:
 
 
 def _thinned(points: Floats) -> Floats:
-    """Places (n, 2) on the floor of points (..., 3), one in each cell: no other there is farther than its diagonal."""
+    """Return floor positions (n, 2) of points (..., 3), one per cell; all points are within a cell diagonal of one."""
     places = points[..., :2].reshape(-1, 2)
     _, first = np.unique(np.floor(places / _CELL).astype(int), axis=0, return_index=True)
     return places[first]
 
 
 class Site:
-    """A room that is being furnished.
+    """Room to which solids are added one by one.
 
     Attributes:
-        space: what is kept free.
-        solids: what stands there, in the order in which it came.
+        space: free space of the room.
+        solids: present solids, in the order in which they were added.
     """
 
     def __init__(self, space: FreeSpace) -> None:
@@ -118,92 +118,92 @@ class Site:
             self.add(solid)
 
     def copy(self) -> Site:
-        """The same as it is now, to try things out on."""
+        """Return a copy for trial placements."""
         other = Site(replace(self.space, taken=()))
         other.space, other.solids, other._boxes = self.space, list(self.solids), list(self._boxes)
         other._pictures.filled[:] = self._pictures.filled
         return other
 
     def add(self, solid: Solid) -> None:
-        """Put a thing where it says it is."""
+        """Add a solid at its position."""
         self.solids.append(solid)
-        self._boxes += standing(solid)
-        if solid.trajectory is None:  # one that moves is never for long in a picture's way
+        self._boxes += occupied(solid)
+        if solid.trajectory is None:  # a moving one fills a picture only for a short time
             self._pictures.add(solid)
 
     def clear(self, hull: Box, *, at_wall: bool = False) -> bool:
-        """Whether a thing with this hull fits into the room beside what stands there; people apart."""
+        """Return whether a hull fits into the room without touching present solids; people are not considered."""
         return self.space.fits(hull, at_wall=at_wall) and all(hull.gap_on_floor(box) >= GAP for box in self._boxes)
 
     def find(
         self,
         rng: np.random.Generator,
-        thing: ObjectModel,
-        where: Where,
+        model: ObjectModel,
+        sample_place: PlaceSampler,
         *,
         kind: Kind,
         name: str,
         tries: int = TRIES,
         at_wall: bool = False,
     ) -> Solid | None:
-        """Draw places until the thing can stand in one; None where none of so many will do.
+        """Draw places until the object can stand at one; return None if there is none after ``tries`` draws.
 
-        It can where it is :meth:`clear`, in nobody's way, and leaves enough of every picture.
+        A place is valid if it is :meth:`clear`, obstructs no person, and leaves enough of every picture free.
         """
         for _ in range(tries):
-            place, yaw = where(rng, self.space)
-            hull = thing.hull(place, yaw)
+            place, yaw = sample_place(rng, self.space)
+            hull = model.hull(place, yaw)
             if self.clear(hull, at_wall=at_wall) and not self.space.obstructed(hull):
-                solid = thing.at(place, yaw, kind=kind, name=name)
-                if self._pictures.bear(solid, MOST_OF_A_PICTURE):
+                solid = model.at(place, yaw, kind=kind, name=name)
+                if self._pictures.allows(solid, MAX_PICTURE_FILL):
                     return solid
         return None
 
 
-def standing(solid: Solid) -> list[Box]:
-    """Where nothing else can stand: the hull of a thing, of a moving one all along its way."""
+def occupied(solid: Solid) -> list[Box]:
+    """Return the boxes that a solid occupies: its hull, or its hulls along the path of a moving one."""
     if solid.trajectory is None:
         return [solid.hull]
-    time = solid.trajectory.time
-    moments = np.arange(time[0], time[-1] + 1 / _HULL_RATE, 1 / _HULL_RATE)
-    cells = np.round(solid.trajectory.at(moments) * [10, 10, 10, 20, 20, 20, 20]).astype(int)
+    start, end = solid.trajectory.time[[0, -1]]
+    times = np.arange(start, end + 1 / _HULL_RATE, 1 / _HULL_RATE)
+    cells = np.round(solid.trajectory.at(times) * [10, 10, 10, 20, 20, 20, 20]).astype(int)
     _, first = np.unique(cells, axis=0, return_index=True)
-    return [solid.hull_at(moment) for moment in moments[first]]
+    return [solid.hull_at(time) for time in times[first]]
 
 
-def middle(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-    """At the origin, or as near as may be: within the disc that people keep free."""
+def near_origin(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+    """Draw a place near the origin, within the disc that people keep free, and any yaw."""
     share, bearing, yaw = rng.uniform(), *rng.uniform(0.0, 2 * np.pi, 2)
     return 0.5 * space.around * share * np.array([np.cos(bearing), np.sin(bearing)]), float(yaw)
 
 
-def about(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-    """Close to where someone stands or walks, on any side, at any angle: it hides legs from the cameras beyond."""
-    share, distance = rng.uniform(), rng.uniform(*_BESIDE)
+def near_people(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+    """Draw a place near a path of a person, on any side, and any yaw: there an object occludes legs."""
+    share, distance = rng.uniform(), rng.uniform(*_NEAR_PEOPLE)
     bearing, yaw = rng.uniform(0.0, 2 * np.pi, 2)
     if len(space.stations):
-        someone = space.stations[int(share * len(space.stations))]
-        place = someone + distance * np.array([np.cos(bearing), np.sin(bearing)])
+        person = space.stations[int(share * len(space.stations))]
+        place = person + distance * np.array([np.cos(bearing), np.sin(bearing)])
     else:
-        place = ring(rng, share * np.minimum(space.area, space.half))
+        place = on_rectangle(rng, share * np.minimum(space.area, space.half))
     return place, float(yaw)
 
 
-def beside(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
-    """From within the people's area out to the wall, rather near than far, its back outwards."""
+def towards_walls(rng: np.random.Generator, space: FreeSpace) -> tuple[Floats, float]:
+    """Draw a place between the area of the people and the walls, more often near the people, with inward yaw."""
     edge = np.minimum(0.6 * space.area, space.half)
-    place = ring(rng, edge + rng.uniform() ** 2 * np.maximum(space.half - 0.25 - edge, 0.0))
-    return place, inwards(place / space.half)
+    place = on_rectangle(rng, edge + rng.uniform() ** 2 * np.maximum(space.half - 0.25 - edge, 0.0))
+    return place, inward_yaw(place / space.half)
 
 
-def inwards(outward: Floats) -> float:
-    """The turn, a multiple of a right angle, that faces away from the wall in direction ``outward`` (2,)."""
+def inward_yaw(outward: Floats) -> float:
+    """Return the yaw, a multiple of a right angle, that faces away from the wall in direction ``outward`` (2,)."""
     side = int(np.abs(outward).argmax())
     return float((np.pi if outward[0] > 0 else 0.0) if side == 0 else (-np.pi / 2 if outward[1] > 0 else np.pi / 2))
 
 
-def ring(rng: np.random.Generator, reach: Floats) -> Floats:
-    """A point on the outline of the rectangle of half sides ``reach`` (2,)."""
+def on_rectangle(rng: np.random.Generator, half: Floats) -> Floats:
+    """Draw a point on the outline of the rectangle with half sides ``half`` (2,)."""
     side, sense, along = rng.integers(2), rng.choice([-1.0, 1.0]), rng.uniform(-1.0, 1.0)
     unit = np.array([sense, along]) if side == 0 else np.array([along, sense])
-    return unit * reach
+    return unit * half

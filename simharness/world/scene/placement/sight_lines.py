@@ -1,4 +1,4 @@
-"""Lines of sight: which of them a thing cuts, how much of a picture it fills, which joints it hides."""
+"""Lines of sight from cameras to joints: occlusion by solids, and share of the pictures that solids fill."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mvpose.camera import Camera, Rig
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.solids import Solid
 
-_COLUMNS, _ROWS = 20, 15  # rays that stand for a picture
-_FAR = 100.0  # metres
+_COLUMNS, _ROWS = 20, 15  # grid of rays that samples a picture
+_FAR = 100.0  # metres: length of these rays
 
 
 def cuts(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
-    """Which of the lines from ``starts`` (n, 3) to ``ends`` (n, 3) meet a mesh, (n,)."""
+    """Return whether the lines from ``starts`` (n, 3) to ``ends`` (n, 3) intersect a mesh, (n,)."""
     starts, ends = np.ascontiguousarray(starts, float), np.ascontiguousarray(ends, float)
     result = np.zeros(len(starts), bool)
     if len(mesh.faces) and len(starts):
@@ -29,7 +29,7 @@ def cuts(mesh: Mesh, starts: ArrayLike, ends: ArrayLike) -> Bools:
 
 @njit(cache=True, error_model="numpy")
 def _cut(starts, ends, triangles, result):
-    """Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997, behind a test of the box around."""
+    """Intersect by Möller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997, after a box test."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for t in range(len(triangles)):
         for i in range(3):
@@ -74,11 +74,11 @@ def _cut(starts, ends, triangles, result):
 
 @dataclass(frozen=True)
 class SightLines:
-    """Lines of sight from lenses to joints.
+    """Lines of sight from cameras to joints.
 
     Attributes:
-        starts, ends: metres, (n, 3).
-        time: when the joint is there, seconds, (n,).
+        starts, ends: end points, (n, 3), metres.
+        time: time at which the joint is at the end point, (n,), seconds.
     """
 
     starts: Floats
@@ -89,14 +89,14 @@ class SightLines:
         return len(self.starts)
 
     def cut_by(self, solid: Solid) -> Bools:
-        """Which lines a thing cuts, where it is at their times, (n,)."""
+        """Return whether a solid, at its positions at their times, cuts the lines, (n,)."""
         if solid.trajectory is None:
             return cuts(solid.mesh, self.starts, self.ends)
         pose = solid.trajectory.at(self.time)
         return cuts(solid.mesh, _into(pose, self.starts), _into(pose, self.ends))
 
     def hidden(self, solids: Iterable[Solid]) -> Bools:
-        """Which joints are hidden by any of the things, (n,)."""
+        """Return whether any of the solids cuts the lines, (n,)."""
         result = np.zeros(len(self), bool)
         for solid in solids:
             result |= self.cut_by(solid)
@@ -104,12 +104,12 @@ class SightLines:
 
 
 def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> SightLines:
-    """The lines from every lens to every joint that falls on its image.
+    """Return the lines from every camera to every joint inside its image.
 
     Args:
-        rig: the cameras.
-        time: seconds, (N,).
-        joints: metres, (N, P, J, 3).
+        rig: cameras.
+        time: times, (N,), seconds.
+        joints: positions of the joints, (N, P, J, 3), metres.
     """
     points = joints.reshape(-1, 3)
     when = np.repeat(time, joints.shape[1] * joints.shape[2])
@@ -122,10 +122,10 @@ def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> SightLines:
 
 
 class PictureFill:
-    """How much of each camera's picture is filled by things.
+    """Share of each picture that solids fill.
 
     Attributes:
-        filled: which of the rays that stand for the pictures meet something, (V, n).
+        filled: whether each ray that samples a picture hits a solid, (V, n).
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -133,11 +133,11 @@ class PictureFill:
         self.filled = np.zeros((len(rig), _COLUMNS * _ROWS), bool)
 
     def add(self, solid: Solid) -> None:
-        """Let a thing stand there."""
+        """Add a solid."""
         self.filled |= self._of(solid)
 
-    def bear(self, solid: Solid, most: float) -> bool:
-        """Whether a thing more leaves every picture filled up to the share ``most``, or as it was."""
+    def allows(self, solid: Solid, most: float) -> bool:
+        """Return whether one more solid leaves every picture filled up to a share of ``most``, or unchanged."""
         more = self.filled | self._of(solid)
         return bool((more.mean(axis=1) <= np.maximum(most, self.filled.mean(axis=1))).all())
 
@@ -146,17 +146,17 @@ class PictureFill:
 
 
 def _grid(camera: Camera) -> tuple[Floats, Floats]:
-    """Rays through points spread evenly over the picture."""
+    """Return starts and ends of rays through points spread evenly over the picture."""
     width, height = camera.size
     u, v = np.meshgrid((np.arange(_COLUMNS) + 0.5) / _COLUMNS, (np.arange(_ROWS) + 0.5) / _ROWS)
     rays = camera.rays(np.column_stack([u.ravel() * width, v.ravel() * height]) - 0.5)
-    rays = np.where(np.isfinite(rays), rays, 0.0)  # beyond the lens's reach: a line of no length, which meets nothing
+    rays = np.where(np.isfinite(rays), rays, 0.0)  # not imaged by the lens: a line of length 0, which hits nothing
     starts = np.tile(camera.center, (len(rays), 1))
     return starts, starts + _FAR * rays
 
 
 def _into(pose: Floats, points: Floats) -> Floats:
-    """Points (n, 3) of the world in frames of poses (n, 7)."""
+    """Return world points (n, 3) in the frames of poses (n, 7)."""
     w, x, y, z = pose[:, 3], -pose[:, 4], -pose[:, 5], -pose[:, 6]
     vector = np.column_stack([x, y, z])
     local = points - pose[:, :3]

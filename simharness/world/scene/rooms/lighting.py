@@ -1,4 +1,4 @@
-"""The light of a room, by its name in the scenario."""
+"""Lighting of a room by its name in the scenario."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ LIGHTS: Mapping[str, Lighting] = MappingProxyType(
         ),
     }
 )
-"""By name: as usual; lamps in the evening; a low sun from one side; hardly any."""
+"""Lightings by name: daylight; lamps in the evening; a low sun from one side; little light."""
 
 
 def room_lighting(room: Room, seed: int) -> Lighting:
-    """The light of a room; "any" is one of them from any side, drawn by the seed."""
+    """Return the lighting of a room; for "any" one of ``LIGHTS`` with a random bearing, drawn by the seed."""
     if room.light != "any":
         return LIGHTS[room.light]
     rng = stream(seed, "room", "light")

@@ -1,7 +1,7 @@
-"""The room: a floor and four walls, open above; or the floor alone.
+"""Room: floor and four walls without ceiling, or a floor alone.
 
-The floor's faces look up and the walls' faces look into the room: counter-clockwise as seen from inside, which is
-the outside of the wall as a thing.
+The faces of the floor look up and those of the walls look into the room: counter-clockwise as seen from inside the
+room, which is the outside of a wall as a solid.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ from simharness.world.scene.rooms.textures import FLOORS, WALLS, Finish
 
 Choice = TypeVar("Choice")
 
-_CELL = 1.0  # metres, about: of the grids of floor and walls
-_THICK = 0.1  # metres: of the floor and the walls as solids, away from the room
+_CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
+_THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
 _AROUND = 4.0  # metres of ground around an open floor
-_RIM = 0.25  # metres, about: cells of that ground, which fades into the background
-# Facing walls share a tone, so that the corners read and a picture tells where one looks.
+_RIM = 0.25  # metres: approximate cell size of that ground, which fades into the background
+# Opposite walls share a tone, so that corners are visible and pictures show the direction of view.
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
 
 
 def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
-    """Floor and walls of a room around the origin, its floor at z = 0; without walls, floor and ground around it.
+    """Return floor and walls of a room around the origin, floor at z = 0; without walls, floor and ground around it.
 
-    Looks are drawn by streams of the room's own: the size changes none, and one look not the other.
+    Finishes of floor and walls are drawn by separate streams: the size of the room changes neither, and neither changes
+    the other.
     """
     x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
     rng = stream(seed, "room", "floor")
@@ -46,7 +47,7 @@ def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
         return floor, _ground(room, seed, finish)
     rng = stream(seed, "room", "wall")
     paper = _chosen(WALLS, room.wall, rng)(rng, z)
-    # Each wall from its left corner to its right corner as seen from inside.
+    # Each wall from its left to its right corner as seen from inside.
     runs = {
         "wall +x": ((x, y), (x, -y)),
         "wall -x": ((-x, -y), (-x, y)),
@@ -56,16 +57,16 @@ def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
     return floor, *(_wall(name, np.array(left), np.array(right), z, paper) for name, (left, right) in runs.items())
 
 
-def _chosen(looks: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
-    """A look by its name; drawn for "any". The draw is made in any case, so that what follows is not shifted."""
-    drawn = list(looks)[rng.integers(len(looks))]
-    return looks[drawn if name == "any" else name]
+def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
+    """Return a finish by name, or a drawn one for "any". It is always drawn, so that later draws do not shift."""
+    drawn = list(finishes)[rng.integers(len(finishes))]
+    return finishes[drawn if name == "any" else name]
 
 
 def _floor(x: float, y: float, finish: Finish) -> Mesh:
     columns, rows = _ticks(-x, x, _CELL), _ticks(-y, y, _CELL)
     grid = np.stack([*np.meshgrid(columns, rows, indexing="ij"), np.zeros((len(columns), len(rows)))], axis=-1)
-    return _papered(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
+    return _textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
 
 
 def _wall(name: str, left: Floats, right: Floats, height: float, finish: Finish) -> Solid:
@@ -83,11 +84,11 @@ def _wall(name: str, left: Floats, right: Floats, height: float, finish: Finish)
     grid[..., :2] = (left + columns[:, None] * along)[:, None]
     grid[..., 2] = rows
     place = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1)
-    return Solid("room", name, _papered(grid, place, finish, _TONES[name[-1]]), (block,), block)
+    return Solid("room", name, _textured_grid(grid, place, finish, _TONES[name[-1]]), (block,), block)
 
 
 def _ground(room: Room, seed: int, finish: Finish) -> Solid:
-    """A plain ring around an open floor, of the floor's mean colour and paler and paler outwards, as haze would."""
+    """Return the ground around an open floor, in the mean colour of the floor and fading outwards as in haze."""
     half = np.array(room.size[:2]) / 2
     light = room_lighting(room, seed)
     shown = np.array(light.background) / np.sqrt((light.key * light.direction[2] + light.sky) * np.array(light.tint))
@@ -110,7 +111,7 @@ def _ground(room: Room, seed: int, finish: Finish) -> Solid:
 
 
 def _outline(half: Floats, each: int = 8) -> Floats:
-    """The outline (n, 3) on the floor of a rectangle, counter-clockwise from above, in equal parts."""
+    """Return the outline (n, 3) of a rectangle on the floor, counter-clockwise from above, in equal parts."""
     corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half
     share = np.arange(each)[:, None] / each
     sides = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
@@ -121,15 +122,15 @@ def _ticks(low: float, high: float, step: float) -> Floats:
     return np.linspace(low, high, max(1, round((high - low) / step)) + 1)
 
 
-def _papered(grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float]) -> Mesh:
-    """A grid of vertices (c, r, 3) that shows a texture.
+def _textured_grid(grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float]) -> Mesh:
+    """Return the textured mesh of a grid of vertices (c, r, 3).
 
     Args:
-        grid: column by column; right, then up, is counter-clockwise.
-        place: where the vertices are on the surface, metres to the right and up, (c, r, 2); the texture's lower edge
-            is at height 0.
-        finish: the texture.
-        tone: what multiplies it.
+        grid: vertices by column; right, then up, is counter-clockwise.
+        place: position of the vertices on the surface, metres to the right and up, (c, r, 2); the lower edge of the
+            texture is at height 0.
+        finish: texture and its size.
+        tone: colour that multiplies the texture.
     """
     columns, rows = grid.shape[:2]
     i, j = np.meshgrid(np.arange(columns - 1), np.arange(rows - 1), indexing="ij")

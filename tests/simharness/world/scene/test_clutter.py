@@ -11,7 +11,7 @@ from simharness.world.scene.objects.fixtures import draw_cart
 from simharness.world.scene.objects.storage import draw_box, draw_shelf
 from simharness.world.scene.placement.clutter import CLUTTER_KINDS, place_clutter
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, LIMB
-from simharness.world.scene.placement.sight_lines import Pictures, cuts
+from simharness.world.scene.placement.sight_lines import PictureFill, cuts
 
 ROOM = Room()
 DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in CLUTTER_KINDS} | {"cart": draw_cart}
@@ -131,7 +131,7 @@ def test_nothing_stands_in_anything_else_or_in_a_wall(furnished):
 
 def test_lenses_and_pictures_stay_clear(furnished):
     free, placed = furnished
-    pictures = Pictures(free.rig)
+    pictures = PictureFill(free.rig)
     for solid in placed:
         for moment in free.time[::40]:
             assert solid.hull_at(moment).distance(free.rig.centers).min() >= LENS - 1e-6
@@ -144,7 +144,7 @@ def test_a_picture_is_never_filled():
     """Twelve partitions around people whom one low camera sees from close by: its picture stays open."""
     low = ring(3, radius=2.6, height=1.2)
     placed = place_clutter(0, Clutter(partitions=9), space(1, area=0.8, rig=low))
-    pictures = Pictures(low)
+    pictures = PictureFill(low)
     for solid in placed:
         pictures.add(solid)
     assert 0.2 < pictures.filled.mean(axis=1).max() <= 0.6
@@ -160,9 +160,9 @@ def test_one_more_changes_nothing_that_stood_before():
 
 
 def test_what_finds_no_place_is_told():
-    with pytest.raises(ValueError, match=r"clutter.tables: table \d+ finds no place.*lower clutter.tables"):
+    with pytest.raises(ValueError, match=r"clutter.tables: found no place for table \d+.*lower clutter.tables"):
         place_clutter(0, Clutter(tables=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
-    with pytest.raises(ValueError, match=r"clutter.carts: no way is free for cart \d+.*lower clutter.carts"):
+    with pytest.raises(ValueError, match=r"clutter.carts: found no free path for cart \d+.*lower clutter.carts"):
         place_clutter(0, Clutter(carts=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
 
 

@@ -51,11 +51,11 @@ def test_zero_adds_nothing():
     assert place_clutter(0, Clutter(coverage=0.0), space()) == ()
 
 
-def test_what_cannot_be_reached_is_told():
-    high = ring(3, radius=1.2, height=5.0)  # they look down on everybody
-    with pytest.raises(ValueError, match=r"clutter.coverage = 0.8 cannot be reached: \d+ more things hide 0\.\d\d of"):
+def test_unreachable_coverage_is_refused():
+    high = ring(3, radius=1.2, height=5.0)  # they look down on all people
+    with pytest.raises(ValueError, match=r"clutter.coverage = 0.8 cannot be reached: with \d+ added objects 0\.\d\d"):
         place_clutter(0, Clutter(coverage=0.8), space(2, duration=2.0, rig=high))
-    with pytest.raises(ValueError, match=r"clutter.coverage = 0.02 is less than what the things that were asked for"):
+    with pytest.raises(ValueError, match=r"clutter.coverage = 0.02 is less than the share of joints that the"):
         place_clutter(0, Clutter(shelves=3, pillars=3, coverage=0.02), space())
-    with pytest.raises(ValueError, match=r"no joint is in any picture: take people.count above 0"):
+    with pytest.raises(ValueError, match=r"no joint is in any picture: use people.count above 0"):
         place_clutter(0, Clutter(coverage=0.2), space(0))

@@ -133,5 +133,5 @@ def test_one_more_changes_none_that_stood_before(placed):
 
 def test_what_finds_no_place_is_told():
     tight = space(2, room=Room(size=(4.0, 4.0, 3.0)), area=1.5, rig=ring(radius=1.8))
-    with pytest.raises(ValueError, match=r"decoys.coat_stands: coat stand \d+ finds no place.*lower decoys.coat"):
+    with pytest.raises(ValueError, match=r"decoys.coat_stands: found no place for coat stand \d+.*lower decoys.coat"):
         place_decoys(0, Decoys(coat_stands=30), tight)

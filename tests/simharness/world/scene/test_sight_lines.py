@@ -58,12 +58,12 @@ def test_a_wall_before_one_camera_fills_its_picture():
         .at((0, 0), 0.0, kind="clutter", name="w")
     )
     pictures = PictureFill(rig)
-    assert not pictures.bear(wall, 0.6)
+    assert not pictures.allows(wall, 0.6)
     pictures.add(wall)
     filled = pictures.filled.mean(axis=1)
     assert filled[0] > 0.9
     assert filled[1:].max() < 0.4
-    assert pictures.bear(wall, 0.6)  # once more hides no more
+    assert pictures.allows(wall, 0.6)  # once more hides no more
 
 
 def test_the_share_of_a_picture_is_that_of_its_area():
