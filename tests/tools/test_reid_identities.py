@@ -12,27 +12,27 @@ from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
-from tools.reid.identities import CHILDREN, SPLITS, Group, figures, groups, split_of
-from tools.reid.poses import bearing, placed, plan_poses, upright
+from tools.reid.identities import CHILDREN, SPLITS, Group, dressed_people, groups, split_of
+from tools.reid.poses import bearing, place_body, plan_poses, vertical_rotation
 
 runs, counts = st.integers(0, 10**6 - 1), st.integers(1, 50)
 
 
 @given(runs, runs, counts, counts)
-def test_no_two_splits_share_a_seed_nor_any_with_scenarios(run, other, count, more):
+def test_seeds_differ_between_splits_runs_and_ordinary_scenarios(run, other, count, more):
     seeds = [{group.seed for group in groups(split, run, count, size=4)} for split in SPLITS]
     seeds += [{group.seed for group in groups(split, other, more, size=2)} for split in SPLITS if other != run]
     assert sum(map(len, seeds)) == len(set().union(*seeds))
-    assert min(set().union(*seeds)) >= 10**9  # nobody writes such a seed into a scenario
+    assert min(set().union(*seeds)) >= 10**9  # larger than the seeds of scenario files
 
 
 @given(runs, counts, st.sampled_from(SPLITS))
-def test_a_seed_tells_its_split(run, count, split):
+def test_the_split_of_a_seed(run, count, split):
     assert {split_of(group.seed) for group in groups(split, run, count, size=1)} == {split}
     assert split_of(0) is split_of(run) is None
 
 
-def test_more_groups_change_none_and_dials_go_round():
+def test_more_groups_keep_the_first_ones_and_values_of_look_alike_repeat():
     few, many = (groups("training", 3, count, size=4, look_alike=(0.0, 0.5, 1.0)) for count in (4, 9))
     assert many[:4] == few
     assert [group.look_alike for group in many] == [0.0, 0.5, 1.0] * 3
@@ -42,7 +42,7 @@ def test_more_groups_change_none_and_dials_go_round():
 
 @pytest.mark.parametrize(("run", "count"), [(-1, 1), (10**6, 1), (0, 10**6 + 1)])
 def test_runs_and_counts_out_of_range_are_refused(run, count):
-    with pytest.raises(ValueError, match=r"seed from 0 to 999999 and at most 1000000 groups"):
+    with pytest.raises(ValueError, match=r"from 0 to 999999 and its groups at most 1000000, got"):
         groups("training", run, count, size=4)
 
 
@@ -51,14 +51,14 @@ def test_identities_are_the_people_of_a_scenario_of_that_seed():
     scenario = Scenario(name="same", seed=41, duration=0.1, people=people)
     scene = build(scenario, build_rig(Cameras(count=2)))
     for size in (3, 5):
-        for figure in figures(Group(41, size, look_alike=0.6), range(3)):
-            there, shown = scene.bodies[figure.person], scene.figures[figure.person]
-            np.testing.assert_array_equal(figure.body.vertices, there.vertices)
-            np.testing.assert_array_equal(figure.mesh.colors, shown.colors)
-            assert (figure.mesh.texture is None) == (shown.texture is None)
+        for person in dressed_people(Group(41, size, look_alike=0.6), range(3)):
+            body, shown = scene.bodies[person.person], scene.figures[person.person]
+            np.testing.assert_array_equal(person.body.vertices, body.vertices)
+            np.testing.assert_array_equal(person.mesh.colors, shown.colors)
+            assert (person.mesh.texture is None) == (shown.texture is None)
 
 
-def test_poses_lent_to_the_body_that_they_were_planned_on_are_the_planned_ones():
+def test_a_pose_on_its_original_body_is_the_planned_pose():
     body = make_body(Shape())
     mover = Kinematics(body)
     activity = activities()["dance"]
@@ -67,23 +67,23 @@ def test_poses_lent_to_the_body_that_they_were_planned_on_are_the_planned_ones()
     )
     motion = performance.motions[0].at(np.array([0.2, 0.9]))
     for bones, joints in zip(mover.transforms(motion), mover.joints(motion), strict=True):
-        ours, skin = placed(body, bones[:, :, :3], np.array([1.0, -2.0]), 0.0)
-        apart = body.joints(ours) - joints
-        assert np.ptp(apart, axis=0).max() < 1e-6  # shifted as a whole
+        transforms, skin = place_body(body, bones[:, :, :3], np.array([1.0, -2.0]), 0.0)
+        apart = body.joints(transforms) - joints
+        assert np.ptp(apart, axis=0).max() < 1e-6  # only a translation
         assert skin[:, 2].min() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_poses_face_along_x_and_bodies_where_they_are_put():
+def test_poses_face_along_x_and_placed_bodies_have_the_given_position_and_direction():
     poses = plan_poses(5, frames=2, takes=1)
     assert len(poses) >= 2 * len(activities())
     np.testing.assert_allclose(bearing(poses.turns), 0.0, atol=1e-9)
-    body = figures(Group(7, 1), [0])[0].body
+    body = dressed_people(Group(7, 1), [0])[0].body
     rest = np.linalg.norm(body.heads - body.heads[np.maximum(body.parents, 0)], axis=1)
     for k in range(0, len(poses), 7):
-        bones, skin = placed(body, poses.turns[k], np.array([0.4, 0.3]), 1.1)
+        bones, skin = place_body(body, poses.turns[k], np.array([0.4, 0.3]), 1.1)
         heads = np.einsum("brc,bc->br", bones, np.column_stack([body.heads, np.ones(len(rest))]))
         np.testing.assert_allclose(np.linalg.norm(heads - heads[np.maximum(body.parents, 0)], axis=1), rest, atol=1e-9)
         np.testing.assert_allclose(heads[0, :2], [0.4, 0.3], atol=1e-9)
         assert bearing(bones[..., :3]) == pytest.approx(1.1)
         assert skin[:, 2].min() == pytest.approx(0.0, abs=1e-6)
-    np.testing.assert_allclose(upright(0.3) @ upright(-0.3), np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(vertical_rotation(0.3) @ vertical_rotation(-0.3), np.eye(3), atol=1e-15)

@@ -1,4 +1,4 @@
-"""The network that comes with mvpose, and the command that makes one."""
+"""Re-ID network that is shipped with mvpose, and the command that trains one."""
 
 import json
 import sys
@@ -11,14 +11,14 @@ from mvpose.networks.reid import DEFAULT, ReId
 from mvpose.networks.session import Session
 from tools.reid import card, evaluation, scores
 from tools.reid.__main__ import main
-from tools.reid.crops import SIZE, Recipe, picture_group
-from tools.reid.crops import Crops as All
+from tools.reid.crops import SIZE, Crops, Recipe, crops_of_group
 from tools.reid.identities import groups, split_of
+from tools.reid.metrics import euclidean_distances
 from tools.reid.plan import Plan
 from tools.reid.poses import plan_poses
-from tools.reid.rendering import rendered
+from tools.reid.rendering import render_crops
 
-ELSEWHERE = 999  # seed of a run whose people nobody has trained on or judged by
+UNUSED_RUN = 999  # seed of a run whose people were used neither for training nor for evaluation
 
 TIME = "milliseconds_a_crop_in_batches_of_20_on_one_thread"
 
@@ -28,7 +28,7 @@ def content():
     return card.read(DEFAULT)
 
 
-def test_the_file_is_small(content):
+def test_the_model_file_is_small(content):
     assert DEFAULT.stat().st_size < 6_000_000
     assert DEFAULT.stat().st_size == content["network"]["bytes"]
     onnx = pytest.importorskip("onnx")
@@ -36,7 +36,7 @@ def test_the_file_is_small(content):
     assert 10_000 < numbers < 1_500_000
 
 
-def test_the_card_says_how_it_is_fed_and_what_distances_mean(content):
+def test_the_card_agrees_with_the_metadata_of_the_model(content):
     network = ReId()
     assert network.session.size == SIZE[::-1] == tuple(content["network"]["input_width_height"])
     assert network.dimensions == content["network"]["dimensions"]
@@ -47,7 +47,7 @@ def test_the_card_says_how_it_is_fed_and_what_distances_mean(content):
     assert 0.0 < network.affinity.slope < 0.4
 
 
-def test_the_card_is_of_this_file_and_of_people_kept_apart(content):
+def test_the_card_belongs_to_the_model_and_its_splits_are_disjoint(content):
     assert content["sha256"] == card.digest(DEFAULT)
     assert content["command"].startswith("python -m tools.reid --seed ")
     data = content["data"]
@@ -57,54 +57,54 @@ def test_the_card_is_of_this_file_and_of_people_kept_apart(content):
     assert data["held_out"]["identities"] >= 290
 
 
-def test_strangers_of_a_scene_were_told_apart(content):
-    """Asked are rank-1 of 95 % and mAP of 90 % under casts and partial occlusion."""
+def test_scores_among_held_out_people_of_a_scene(content):
+    """Required: rank-1 of 95 % and mAP of 90 % with colour casts and partial occlusion."""
     curve = [content["results"]["look_alike"][f"{dial:g}"] for dial in (0.0, 0.25, 0.5, 0.75, 1.0)]
     distinct = curve[0]
     assert distinct["identities"] >= 290
-    assert distinct["people_in_a_scene"] == 12  # as many as scenes have
+    assert distinct["people_in_a_scene"] == 12
     assert distinct["hidden"]["0.3"]["rank1"] >= 95.0
     assert distinct["network"]["rank1"] >= 94.0  # with up to half of the joints hidden
     assert distinct["network"]["mAP"] >= 90.0
-    ours = [row["network"]["mAP"] for row in curve]
-    assert (np.diff(ours) < 0).all()  # the dial is felt
+    precision = [row["network"]["mAP"] for row in curve]
+    assert (np.diff(precision) < 0).all()  # retrieval becomes harder as look_alike grows
     for row in curve:
         assert all(row["network"]["mAP"] > row[name]["mAP"] + 20 for name in ("histogram", "histogram_balanced"))
 
 
-def test_strangers_among_three_hundred_were_told_apart_better_than_by_colours(content):
-    found = content["results"]["held_out"]
-    assert min(found["identities"]) >= 290
-    assert all(found["network"]["mAP"] > found[name]["mAP"] + 30 for name in ("histogram", "histogram_balanced"))
-    hidden = [found["hidden"][most]["rank1"] for most in ("0", "0.15", "0.3", "0.5")]
+def test_scores_among_three_hundred_held_out_people_are_above_those_of_histograms(content):
+    held_out = content["results"]["held_out"]
+    assert min(held_out["identities"]) >= 290
+    assert all(held_out["network"]["mAP"] > held_out[name]["mAP"] + 30 for name in ("histogram", "histogram_balanced"))
+    hidden = [held_out["hidden"][most]["rank1"] for most in ("0", "0.15", "0.3", "0.5")]
     assert (np.diff(hidden) < 0).all()
 
 
 @pytest.mark.slow
-def test_crops_rendered_now_are_those_that_the_card_judges_by(content, tmp_path):
-    """Where this fails what is rendered has changed: judge anew (python -m tools.reid --judge FILE)."""
+def test_crops_rendered_now_are_those_of_the_evaluation_in_the_card(content, tmp_path):
+    """If this fails, the rendering has changed: evaluate again (python -m tools.reid --judge FILE)."""
     plan = Plan(**{field.name: content["data"]["plan"][field.name] for field in fields(Plan)})
-    found, stated = card.of_sample(rendered(plan.sample_order, tmp_path)), content["data"]["held_out_sample"]
-    assert [found[key] for key in ("identities", "group_seeds")] == [
-        stated[key] for key in ("identities", "group_seeds")
+    sample, in_card = card.of_sample(render_crops(plan.sample_job, tmp_path)), content["data"]["held_out_sample"]
+    assert [sample[key] for key in ("identities", "group_seeds")] == [
+        in_card[key] for key in ("identities", "group_seeds")
     ]
-    # Another machine rounds otherwise, which may move a pixel here and there.
-    assert found["crops"] == pytest.approx(stated["crops"], abs=1)
-    assert found["hidden_mean"] == pytest.approx(stated["hidden_mean"], abs=1e-3)
-    np.testing.assert_allclose(found["mean_color"], stated["mean_color"], atol=0.3)
+    # Rounding differs between machines, which may change single pixels.
+    assert sample["crops"] == pytest.approx(in_card["crops"], abs=1)
+    assert sample["hidden_mean"] == pytest.approx(in_card["hidden_mean"], abs=1e-3)
+    np.testing.assert_allclose(sample["mean_color"], in_card["mean_color"], atol=0.3)
 
 
-def test_a_crop_is_described_in_time(content):
-    assert content["results"]["milliseconds_a_crop_in_batches_of_20_on_one_thread"] < 4.0
+def test_the_time_per_crop_is_below_4_ms(content):
+    assert content["results"][TIME] < 4.0
     assert scores.milliseconds(Session(DEFAULT), rounds=1) > 0.0
 
 
-def test_distances_grow_with_the_difference_of_views_and_with_what_is_hidden(content):
-    kept = content["distances"]["look_alike"]["0"]
-    bins = kept["same"]["bins"]
+def test_distances_grow_with_occlusion_and_shrink_with_look_alike(content):
+    distinct = content["distances"]["look_alike"]["0"]
+    bins = distinct["same"]["bins"]
     assert bins[0][0]["mean"] < bins[0][-1]["mean"]
-    assert bins[0][0]["mean"] < kept["other"]["all"]["mean"]
-    means = {dial: rows["other"]["all"]["mean"] for dial, rows in content["distances"]["look_alike"].items()}
+    assert bins[0][0]["mean"] < distinct["other"]["all"]["mean"]
+    means = {value: rows["other"]["all"]["mean"] for value, rows in content["distances"]["look_alike"].items()}
     assert means["0"] > means["0.5"] > means["1"]
 
 
@@ -119,24 +119,24 @@ def test_the_card_of_another_file_is_refused(tmp_path, content):
 
 
 @pytest.mark.slow
-def test_strangers_are_told_apart_in_crops_rendered_anew():
-    poses, recipe = plan_poses(ELSEWHERE, frames=4, takes=1), Recipe(moments=1, views=4)
-    people = groups("held-out", ELSEWHERE, 10, size=4, at_a_site=10)
-    crops = All.joined([picture_group(group, recipe, poses=poses) for group in people])
+def test_scores_on_newly_rendered_people():
+    poses, recipe = plan_poses(UNUSED_RUN, frames=4, takes=1), Recipe(moments=1, views=4)
+    people = groups("held-out", UNUSED_RUN, 10, size=4, at_a_site=10)
+    crops = Crops.joined([crops_of_group(group, recipe, poses=poses) for group in people])
     assert len(crops) > 100
     session = Session(DEFAULT)
-    found = scores.held_out(session, [crops])
-    assert found["network"]["rank1"] >= 90.0  # of some 130 queries: 95 less two standard errors
-    assert found["network"]["mAP"] >= 85.0
-    assert found["network"]["mAP"] > found["histogram"]["mAP"] + 10
-    met = scores.met(scores.euclidean(scores.describe(session, crops)), crops)
-    kept = session.card.midpoint
-    assert (met.distance[met.same] < kept).mean() > 0.85
-    assert (met.distance[~met.same] > kept).mean() > 0.85
+    result = scores.score_sites(session, [crops])
+    assert result["network"]["rank1"] >= 90.0  # about 130 queries: 95 minus two standard errors
+    assert result["network"]["mAP"] >= 85.0
+    assert result["network"]["mAP"] > result["histogram"]["mAP"] + 10
+    pairs = scores.pairs_of_crops(euclidean_distances(scores.network_descriptors(session, crops)), crops)
+    midpoint = session.card.midpoint
+    assert (pairs.distance[pairs.same] < midpoint).mean() > 0.85
+    assert (pairs.distance[~pairs.same] > midpoint).mean() > 0.85
 
 
 @pytest.mark.slow
-def test_one_command_trains_a_toy(tmp_path, capsys):
+def test_the_command_trains_a_minimal_network(tmp_path, capsys):
     pytest.importorskip("torch")
     pytest.importorskip("onnx")
     model = tmp_path / "new" / "toy.onnx"
@@ -149,8 +149,8 @@ def test_one_command_trains_a_toy(tmp_path, capsys):
     network = ReId(model)
     rng = np.random.default_rng(0)
     pictures = [rng.integers(0, 256, (120, 90, 3), np.uint8) for _ in range(2)]
-    found = network.descriptors(pictures, [0, 1], [[5, 5, 60, 100], [0, 0, 80, 110]])
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-6)
+    descriptors = network.descriptors(pictures, [0, 1], [[5, 5, 60, 100], [0, 0, 80, 110]])
+    np.testing.assert_allclose(np.linalg.norm(descriptors, axis=1), 1.0, atol=1e-6)
     assert "epoch 4 of 4" in capsys.readouterr().out
 
 
@@ -164,7 +164,7 @@ def test_training_twice_gives_the_same_network():
     assert not all(torch.equal(one[key], other[key]) for key in one)
 
 
-def test_training_learns_colours_that_tell_people_apart():
+def test_training_on_uniform_colours_lowers_the_loss():
     pytest.importorskip("torch")
     from tools.reid.training import train
 
@@ -174,7 +174,7 @@ def test_training_learns_colours_that_tell_people_apart():
 
 
 def toy_crops():
-    """Sixteen people of plain colours, four crops each."""
+    """Return crops of sixteen people in uniform colours, four crops each."""
     rng = np.random.default_rng(0)
     count = 64
     person = np.arange(count) // 4
@@ -182,7 +182,7 @@ def toy_crops():
     images = np.clip(colors + rng.integers(-20, 21, (count, *SIZE, 3)), 0, 255).astype(np.uint8)
     zeros, none = np.zeros(count), np.zeros(count, int)
     moment, site = np.arange(count) % 4, person // 4
-    return All(images, person // 2, person % 2, zeros, site, moment, none, zeros, zeros, zeros + 100)
+    return Crops(images, person // 2, person % 2, zeros, site, moment, none, zeros, zeros, zeros + 100)
 
 
 def test_batches_hold_several_people_of_a_group_and_several_crops_of_each():
@@ -201,26 +201,26 @@ def test_batches_hold_several_people_of_a_group_and_several_crops_of_each():
     np.testing.assert_array_equal(rows, again)
 
 
-def test_losses_of_descriptors_worked_by_hand():
+def test_triplet_loss_by_hand():
     torch = pytest.importorskip("torch")
     from tools.reid.training import triplet_loss
 
     apart = torch.tensor([[1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [-1.0, 0.0]])
-    who = torch.tensor([0, 0, 1, 1])
-    assert float(triplet_loss(apart, who)) == pytest.approx(0.0, abs=1e-6)
-    mixed = torch.tensor([0, 1, 0, 1])  # one's own is 2 away, another's 0: 2 - 0 and the margin
+    labels = torch.tensor([0, 0, 1, 1])
+    assert float(triplet_loss(apart, labels)) == pytest.approx(0.0, abs=1e-6)
+    mixed = torch.tensor([0, 1, 0, 1])  # distance 2 within a person and 0 to the other: 2 - 0 plus the margin 0.3
     assert float(triplet_loss(apart, mixed)) == pytest.approx(2.3, abs=2e-3)
 
 
-def test_a_plan_for_a_toy_is_less_of_everything():
-    toy, whole = Plan.quick(seed=2), Plan(seed=2)
-    assert toy.training < whole.training / 50
-    assert toy.epochs < whole.epochs
+def test_the_quick_plan_is_smaller():
+    quick, whole = Plan.quick(seed=2), Plan(seed=2)
+    assert quick.training < whole.training / 50
+    assert quick.epochs < whole.epochs
 
 
 @pytest.fixture
 def small(tmp_path, content):
-    """The network that comes with mvpose, with the card of a toy's plan, whose figures are none."""
+    """Path of a copy of the shipped network with a card of a quick plan and without scores."""
     model = tmp_path / "models" / "reid.onnx"
     model.parent.mkdir()
     model.write_bytes(DEFAULT.read_bytes())
@@ -233,14 +233,14 @@ def small(tmp_path, content):
 
 
 @pytest.mark.slow
-def test_judging_again_renews_the_figures_and_leaves_the_training(small, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "torch", None)  # nothing is trained
+def test_a_new_evaluation_replaces_the_scores_and_keeps_the_training(small, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "torch", None)  # not needed without training
     monkeypatch.setitem(sys.modules, "onnx", None)
-    monkeypatch.setattr(evaluation, "DIALS", (0.0, 1.0))
+    monkeypatch.setattr(evaluation, "LOOK_ALIKE", (0.0, 1.0))
     before, bytes_before = card.read(small), small.read_bytes()
     command = ["--judge", str(small), "--cache", str(tmp_path / "cache")]
     assert main(command) == 0
-    after = card.read(small)  # it is still the card of this file
+    after = card.read(small)  # still the card of this file
     assert small.read_bytes() == bytes_before
     for key in ("name", "command", "sha256", "network", "training", "affinity"):
         assert after[key] == before[key]
@@ -248,29 +248,31 @@ def test_judging_again_renews_the_figures_and_leaves_the_training(small, tmp_pat
     assert after["results"][TIME] == 1.25
     assert after["judged"]["command"] == f"python -m tools.reid --judge {small.as_posix()}"
     assert after["results"]["held_out"]["identities"] == [after["data"]["held_out"]["identities"]]
-    assert after["data"]["held_out_sample"]["crops"] == after["data"]["held_out"]["crops"]  # of all, as they are few
+    assert (
+        after["data"]["held_out_sample"]["crops"] == after["data"]["held_out"]["crops"]
+    )  # the sample is everything here
     assert set(after["results"]["look_alike"]) == set(after["distances"]["look_alike"]) == {"0", "1"}
     assert main(command) == 0
     assert card.read(small) == after
     assert "midpoint and slope" in capsys.readouterr().out
 
 
-def test_what_cannot_be_judged_again_is_said_in_a_line(tmp_path, capsys):
+def test_errors_of_a_new_evaluation_have_one_line(tmp_path, capsys):
     model = tmp_path / "reid.onnx"
     command = ["--judge", str(model), "--cache", str(tmp_path / "cache")]
 
-    def said():
+    def error():
         assert main(command) == 2
         (line,) = capsys.readouterr().err.splitlines()
         return line
 
-    assert f"no network at {model}" in said()
+    assert f"no network file at {model}" in error()
     model.write_bytes(DEFAULT.read_bytes())
-    assert "no card at" in said()
+    assert "no card at" in error()
     card.write(model, {"sha256": card.digest(model)})
-    assert "states no plan" in said()
+    assert "has no training plan" in error()
     card.write(model, {"sha256": "0"})
-    assert "card of another file" in said()
+    assert "card of another file" in error()
 
 
 @pytest.mark.parametrize(
@@ -286,7 +288,7 @@ def test_what_cannot_be_judged_again_is_said_in_a_line(tmp_path, capsys):
         (["--cache", "{folder}/file"], "--cache: cannot write to"),
     ],
 )
-def test_what_cannot_be_is_said_in_a_line_before_anything_is_rendered(tmp_path, capsys, arguments, message):
+def test_wrong_arguments_give_an_error_of_one_line_before_rendering(tmp_path, capsys, arguments, message):
     (tmp_path / "file").touch()
     given = [argument.format(folder=tmp_path) for argument in arguments]
     assert main(["--output", str(tmp_path / "a.onnx"), "--cache", str(tmp_path / "cache"), "--quick", *given]) == 2
@@ -294,8 +296,8 @@ def test_what_cannot_be_is_said_in_a_line_before_anything_is_rendered(tmp_path, 
     assert message in line
 
 
-def test_folders_that_are_not_there_are_made_before_anything_is_rendered(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "torch", None)  # it ends there
+def test_missing_folders_are_made_before_rendering(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "torch", None)  # main ends at this import
     output, cache = tmp_path / "new" / "models" / "reid.onnx", tmp_path / "also" / "new"
     assert main(["--output", str(output), "--cache", str(cache)]) == 2
     assert "simharness[train]" in capsys.readouterr().err
@@ -303,7 +305,7 @@ def test_folders_that_are_not_there_are_made_before_anything_is_rendered(tmp_pat
     assert list(cache.iterdir()) == []
 
 
-def test_without_torch_the_command_says_what_to_install(monkeypatch, capsys):
+def test_the_error_without_torch_names_the_extra_to_install(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "torch", None)
     assert main(["--quick"]) == 2
     assert "simharness[train]" in capsys.readouterr().err

@@ -1,6 +1,6 @@
-"""The person re-identification network: ``python -m tools.reid``.
+"""Training of the person re-identification network: ``python -m tools.reid``.
 
-    identities, poses, stages -> crops (rendered) -> training (PyTorch) -> ONNX -> evaluation (onnxruntime) -> card
+    identities, poses, moments -> crops (rendered) -> training (PyTorch) -> ONNX -> evaluation (onnxruntime) -> card
 
 Only ``network`` and ``training`` need PyTorch.
 """

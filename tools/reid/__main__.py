@@ -1,4 +1,4 @@
-"""The command line: ``python -m tools.reid --help``."""
+"""Command line: ``python -m tools.reid --help``."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tools.reid.card import card_path
-from tools.reid.evaluation import judge
+from tools.reid.evaluation import evaluate_again
 from tools.reid.identities import RUNS
-from tools.reid.plan import DIALS, Plan
+from tools.reid.plan import LOOK_ALIKE, Plan
 
 _PROGRAM = "python -m tools.reid"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Render, train, export, judge and write the card; 2 where PyTorch or an argument is missing or cannot be."""
+    """Render, train, export, evaluate and write the card; return 2 for wrong arguments or without PyTorch."""
     options = _parser().parse_args(arguments)
     try:
         _check(options)
         if options.judge is not None:
             command = f"{_PROGRAM} --judge {options.judge.as_posix()}"
-            judge(options.judge, cache=options.cache, workers=options.workers, command=command, say=_say())
+            evaluate_again(
+                options.judge, cache=options.cache, workers=options.workers, command=command, log=_timed_log()
+            )
             return 0
     except ValueError as error:
         print(f"{_PROGRAM}: {error}", file=sys.stderr)
@@ -45,22 +47,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         workers=options.workers,
         threads=options.threads,
         command=" ".join([_PROGRAM, f"--seed {options.seed}", *(["--quick"] if options.quick else [])]),
-        say=_say(),
+        log=_timed_log(),
     )
     return 0
 
 
-def _say() -> Callable[[str], None]:
-    """Prints lines with the seconds since now before them."""
+def _timed_log() -> Callable[[str], None]:
+    """Return a function that prints a line with the seconds since this call."""
     start = time.perf_counter()
     return lambda text: print(f"{time.perf_counter() - start:7.0f} s  {text}", flush=True)
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse at once what would fail after an hour, and make the folders that are written to.
+    """Check the arguments before any rendering, and make the output folders.
 
     Raises:
-        ValueError: with one line for the terminal.
+        ValueError: an argument is wrong; the message has one line.
     """
     if not 0 <= options.seed < RUNS:
         raise ValueError(f"--seed must be 0 to {RUNS - 1}, got {options.seed}")
@@ -71,11 +73,14 @@ def _check(options: argparse.Namespace) -> None:
     if options.judge is not None:
         return
     if options.output.is_dir() or card_path(options.output) == options.output:
-        raise ValueError(f"--output must be an ONNX file, with its card beside it, got {options.output}")
+        raise ValueError(
+            f"--output must be an ONNX file, because its card is a .json file beside it, got {options.output}"
+        )
     _make_folder("--output", options.output.parent)
 
 
 def _make_folder(option: str, folder: Path) -> None:
+    """Make a folder and check that it is writable."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -87,28 +92,35 @@ def _make_folder(option: str, folder: Path) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=_PROGRAM,
-        description="Train the person re-identification network on rendered people, and judge it on others.",
-        epilog=f"The people are judged dressed at look_alike = {', '.join(f'{dial:g}' for dial in DIALS)}.",
+        description="Train the person re-identification network on rendered people and evaluate it on held-out people.",
+        epilog=f"The evaluation uses look_alike = {', '.join(f'{value:g}' for value in LOOK_ALIKE)}.",
     )
-    parser.add_argument("--output", type=Path, default=Path("reid.onnx"), help="the ONNX file; its card goes beside it")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("reid.onnx"),
+        help="path of the ONNX file; its card is written beside it (default: %(default)s)",
+    )
     parser.add_argument(
         "--judge",
         type=Path,
         metavar="FILE",
-        help="do not train: judge this ONNX file again, on people rendered by the code as it is now, and write the "
-        "figures into its card",
+        help="do not train; evaluate this ONNX file again on people rendered by the present code, and update its card",
     )
     parser.add_argument(
         "--cache",
         type=Path,
         default=Path(tempfile.gettempdir()) / "simharness-reid",
-        help="folder of the rendered crops (about 1.2 GB), which are not rendered again by the same code "
-        "(default: %(default)s)",
+        help="folder of the rendered crops (about 1.2 GB), used again by the same code (default: %(default)s)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of people, pictures and training")
-    parser.add_argument("--workers", type=int, default=1, help="processes that render")
-    parser.add_argument("--threads", type=int, default=1, help="of PyTorch, where there is no CUDA")
-    parser.add_argument("--quick", action="store_true", help="a toy, in less than a minute")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of people, pictures and training (default: %(default)s)"
+    )
+    parser.add_argument("--workers", type=int, default=1, help="number of rendering processes (default: %(default)s)")
+    parser.add_argument(
+        "--threads", type=int, default=1, help="number of threads of PyTorch without CUDA (default: %(default)s)"
+    )
+    parser.add_argument("--quick", action="store_true", help="train a minimal network as a test, in less than a minute")
     return parser
 
 

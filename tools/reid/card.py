@@ -1,4 +1,4 @@
-"""The card of a trained network: what it was made from and what it is worth, beside the file and within it."""
+"""Card of a trained network: training data, settings and scores, in a JSON file and in the metadata of the model."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from tools.reid.plan import Plan
 
 NAME = "simharness re-ID"
 PREFIX = "simharness."
-"""Before keys of ``metadata_props`` that :class:`mvpose.networks.card.Card` does not read."""
+"""Prefix of the keys of ``metadata_props`` that :class:`mvpose.networks.card.Card` does not read."""
 
 
 def card_path(model: Path) -> Path:
-    """Where the card of a model file lies: beside it."""
+    """Return the path of the card of a model file, beside it."""
     return model.with_suffix(".json")
 
 
-def stamp(model: Path, *, midpoint: float, slope: float, plan: Plan, command: str) -> None:
-    """Write into a model file how it is fed and what its distances mean, and where it comes from."""
+def write_metadata(model: Path, *, midpoint: float, slope: float, plan: Plan, command: str) -> None:
+    """Write the input format, the affinity, the plan and the command into the metadata of a model file."""
     import onnx
 
     network = onnx.load(model)
     card = Card(name=NAME, size=SIZE[::-1], midpoint=round(midpoint, 4), slope=round(slope, 4))
-    # The field's defaults are stated too: whoever reads the file need not know them.
+    # Default values are written too, so that other programs that read the file need not know them.
     entries = card.to_metadata() | {
         "mvpose.mean": json.dumps(card.mean),
         "mvpose.std": json.dumps(card.std),
@@ -45,9 +45,9 @@ def stamp(model: Path, *, midpoint: float, slope: float, plan: Plan, command: st
 
 
 def write(model: Path, content: Mapping[str, object]) -> None:
-    """Write the card of a model."""
+    """Write the card of a model as JSON."""
     text = json.dumps(content, indent=1)
-    text = re.sub(r"\[[^][{}]*\]", lambda row: " ".join(row[0].split()), text)  # lists of numbers in one line
+    text = re.sub(r"\[[^][{}]*\]", lambda row: " ".join(row[0].split()), text)  # lists of numbers on one line
     card_path(model).write_text(text + "\n", encoding="utf-8")
 
 
@@ -55,34 +55,34 @@ def read(model: Path) -> dict[str, object]:
     """Read the card of a model.
 
     Raises:
-        ValueError: there is none, or it is another file's.
+        ValueError: the card does not exist, or belongs to another model file.
     """
     path = card_path(model)
     if not path.is_file():
-        raise ValueError(f"no card at {path}: train again, or take it from where {model.name} came from")
+        raise ValueError(f"no card at {path}: copy it from the source of {model.name}, or train again")
     content: dict[str, object] = json.loads(path.read_text(encoding="utf-8"))
     if content.get("sha256") != digest(model):
-        raise ValueError(f"{path} is the card of another file than {model.name}: take both from one training")
+        raise ValueError(f"{path} is the card of another file, not of {model.name}: use both from the same training")
     return content
 
 
 def digest(model: Path) -> str:
-    """SHA-256 of a model file."""
+    """Return the SHA-256 of a model file."""
     return hashlib.sha256(model.read_bytes()).hexdigest()
 
 
 def of_plan(plan: Plan) -> dict[str, object]:
-    """The plan and how its crops are made."""
+    """Return the entries of a plan and of the parameters of its crops."""
     return {
         **asdict(plan),
-        "training_recipe": asdict(plan.training_order.recipe),
+        "training_recipe": asdict(plan.training_job.recipe),
         "recipe": asdict(Recipe()),
-        "sensor": filming_sites.USUAL.model_dump(),
+        "sensor": filming_sites.SENSOR_SPREAD.model_dump(),
     }
 
 
 def of_crops(crops: Crops) -> dict[str, object]:
-    """How many of whom."""
+    """Return numbers and ranges that describe crops: identities, crops, seeds, hidden joints, box height."""
     return {
         "identities": len({*zip(crops.seed.tolist(), crops.person.tolist(), strict=True)}),
         "crops": len(crops),
@@ -93,12 +93,12 @@ def of_crops(crops: Crops) -> dict[str, object]:
 
 
 def of_sample(crops: Crops) -> dict[str, object]:
-    """What a few crops are like, for whoever renders them again to see whether they are the same."""
+    """Describe a sample of crops, with their mean colour, so that a later rendering can be compared."""
     return {**of_crops(crops), "mean_color": [round(float(level), 2) for level in crops.images.mean(axis=(0, 1, 2))]}
 
 
 def bins() -> dict[str, object]:
-    """Edges of the bins of the distances."""
+    """Return the edges of the bins of the distance distributions."""
     return {
         "pairs": "crops of one moment in two views",
         "view_difference_degrees": VIEW_EDGES,
@@ -108,7 +108,7 @@ def bins() -> dict[str, object]:
 
 
 def machine(threads: int) -> dict[str, object]:
-    """What it ran on."""
+    """Return the machine and the software versions of a training."""
     import torch
 
     cuda = torch.cuda.get_device_name(0) if torch.cuda.is_available() else None
@@ -123,6 +123,7 @@ def machine(threads: int) -> dict[str, object]:
 
 
 def _processor() -> str:
+    """Return the name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text(encoding="utf-8").splitlines():

@@ -1,4 +1,4 @@
-"""The code that crops come from: what is rendered with one version of it is not taken for that of another."""
+"""Digest of the code that renders crops: part of the key of the cache, so that other code does not use its files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import mvpose
 import simharness
 
 START = "tools.reid.rendering"
-"""The module whose imports, and theirs, make crops."""
+"""Module that renders crops; its imports, direct and indirect, belong to the digest."""
 
 _ROOTS = {
     "mvpose": Path(mvpose.__file__).parent,
@@ -21,42 +21,43 @@ _ROOTS = {
     "tools": Path(__file__).parents[1],
 }
 _PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "pillow")
-_DATA = "data"  # the folder beside a module that has what it reads
+_DATA = "data"  # folder beside a module with the data that it reads
 
 
 @functools.cache
 def digest() -> str:
-    """Of the sources and their data, as they lie on disk when first asked for, and of the packages' versions."""
+    """Return the digest of the source files and data, as on disk at the first call, and of the package versions."""
     versions = {package: importlib.metadata.version(package) for package in _PACKAGES}
-    whole = hashlib.blake2b(repr(versions).encode(), digest_size=8)
+    result = hashlib.blake2b(repr(versions).encode(), digest_size=8)
     for name, file in sorted(files().items()):
         content = file.read_bytes()
-        whole.update(f"{name}\0{len(content)}\0".encode())
-        whole.update(content)
-    return whole.hexdigest()
+        result.update(f"{name}\0{len(content)}\0".encode())
+        result.update(content)
+    return result.hexdigest()
 
 
 def files() -> dict[str, Path]:
-    """By name, the modules of both packages that :data:`START` imports, wherever in them, and the data beside them.
+    """Return, by name, the files of all modules that :data:`START` imports at any level, and the data beside them.
 
-    More than is run to render: a package's ``__init__`` imports modules that no crop needs. Changing those renders
-    anew, too, which costs minutes; the other way round a card would state figures of crops that nobody can make.
+    This includes modules that are not needed for rendering, such as those that the ``__init__`` of a package imports.
+    A change in them causes an unnecessary rendering, which takes minutes. A missing module would be worse: a card could
+    have scores of crops that cannot be rendered again.
     """
     modules: dict[str, Path] = {}
-    left = [START]
-    while left:
-        name = left.pop()
+    pending = [START]
+    while pending:
+        name = pending.pop()
         file = _file(name)
         if file is None or name in modules:
             continue
         modules[name] = file
-        left += _imported(file)
-    data = {_name(each): each for file in modules.values() for each in _beside(file)}
+        pending += _imported(file)
+    data = {_name(each): each for file in modules.values() for each in _data_beside(file)}
     return {_name(file): file for file in modules.values()} | data
 
 
 def _imported(file: Path) -> Iterator[str]:
-    """Names that may be modules, and the packages they are in."""
+    """List the imported names that may be modules, and the packages that contain them."""
     for node in ast.walk(ast.parse(file.read_bytes())):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -70,24 +71,26 @@ def _imported(file: Path) -> Iterator[str]:
 
 
 def _file(module: str) -> Path | None:
-    """Where a module of ours lies; None of others and of what is no module."""
+    """Return the file of a module of this project, or None for other modules and for names of no module."""
     top, *rest = module.split(".")
     if top not in _ROOTS:
         return None
-    place = _ROOTS[top].joinpath(*rest)
-    for file in (place / "__init__.py", place.with_suffix(".py")):
+    path = _ROOTS[top].joinpath(*rest)
+    for file in (path / "__init__.py", path.with_suffix(".py")):
         if file.is_file():
             return file
     return None
 
 
-def _beside(file: Path) -> Iterator[Path]:
+def _data_beside(file: Path) -> Iterator[Path]:
+    """List the data files beside a module."""
     folder = file.parent / _DATA
-    # Networks are no part of a crop, and a card that is written anew must not make its own crops stale.
+    # Crops do not depend on networks, and an updated card must not invalidate the crops that it describes.
     if folder.is_dir() and file.parent != _ROOTS["mvpose"] / "networks":
         yield from (each for each in folder.iterdir() if each.is_file() and not each.name.startswith("."))
 
 
 def _name(file: Path) -> str:
+    """Return the path of a file from the parent of its package, with slashes."""
     root = next(root for root in _ROOTS.values() if file.is_relative_to(root))
     return file.relative_to(root.parent).as_posix()

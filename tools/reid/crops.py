@@ -1,4 +1,4 @@
-"""Crops of people out of rendered pictures: cut by noisy boxes, developed by cameras of different characters."""
+"""Crops of people from rendered pictures: noisy boxes and cameras with different sensor responses."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ from simharness.detector.view_geometry import hidden_shares
 from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
 from tools.reid.filming_sites import Site, make_site
-from tools.reid.identities import Figure, Group, figures
+from tools.reid.identities import DressedPerson, Group, dressed_people
 from tools.reid.moments import Moment, make_moment
 from tools.reid.poses import Poses
 
 Rgb = NDArray[np.uint8]
 
 SIZE = (128, 64)  # rows and columns of a crop
-CAST = 4  # people in one picture
-FILL = (124, 116, 104)  # beyond the picture: ImageNet's mean, so that a normalised crop is 0 there
+PEOPLE_PER_PICTURE = 4
+FILL = (124, 116, 104)  # colour outside the picture: the mean of ImageNet, so that a normalised crop is 0 there
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """How crops are made.
+    """Parameters of the crops.
 
     Attributes:
-        moments: pictures are taken in, of everyone.
-        views: cameras of a site.
-        casts: strength of the cameras' characters at a site, from least to most
-            (:data:`tools.reid.filming_sites.USUAL`).
-        jitter: of every side of the boxes, as a share of their size: standard deviation, from least to most.
-        truncated: share of boxes that end at the thighs or higher, as where a detector saw no more.
-        most_hidden: share of the joints hidden by others or by the picture's edge, beyond which there is no crop.
-        least_height: of boxes, pixels.
+        moments: number of moments of every group.
+        views: number of cameras of a site.
+        casts: range of the factor on the differences between sensors,
+            :data:`tools.reid.filming_sites.SENSOR_SPREAD`.
+        jitter: range of the standard deviation of every side of a box, as a fraction of the size of the box.
+        truncated: fraction of boxes that end at the thighs or higher, as when a detector sees the upper body only.
+        most_hidden: greatest fraction of hidden joints of a crop, by other people, objects or the edge of the picture.
+        least_height: least height of a box, pixels.
     """
 
     moments: int = 3
@@ -58,19 +58,22 @@ class Recipe:
 
 @dataclass(frozen=True)
 class Crops:
-    """N crops, and what is known of them.
+    """N crops with their labels.
 
     Attributes:
-        images: (N, 128, 64, 3) uint8, sRGB.
-        seed: of the group, (N,) int64; together with ``person`` the identity.
-        person: (N,) int64.
-        look_alike: the group's dial, (N,).
-        site: where it was filmed, (N,) int64.
-        moment: which of the group's, (N,) int64.
-        view: camera of the site, (N,) int64.
-        azimuth: bearing of the camera from the person, from where the pelvis faces to the left, radians, (N,).
-        hidden: share of the joints that another person, a thing or the picture's edge hides, (N,).
-        height: of the box, pixels, (N,).
+        images: sRGB, (N, 128, 64, 3) uint8.
+        seed: seed of the group, (N,) int64. Seed and person give the identity.
+        person: index of the person in the group, (N,) int64.
+        look_alike: ``look_alike`` of the group, (N,).
+        site: seed of the filming site, (N,) int64.
+        moment: index of the moment of the group, (N,) int64.
+        view: index of the camera of the site, (N,) int64.
+        azimuth: bearing of the camera from the person relative to the pelvis, positive to the left, radians, (N,).
+        hidden: fraction of the joints hidden by another person, an object or the edge of the picture, (N,).
+        height: height of the box, pixels, (N,).
+
+    Raises:
+        ValueError: a wrong shape.
     """
 
     images: Rgb
@@ -90,7 +93,7 @@ class Crops:
         for entry in fields(self):
             if entry.name != "images" and np.shape(getattr(self, entry.name)) != (len(self),):
                 raise ValueError(
-                    f"crops: {entry.name} must be ({len(self)},) as there are images, "
+                    f"crops: {entry.name} must be ({len(self)},), one for each image, "
                     f"got {np.shape(getattr(self, entry.name))}"
                 )
 
@@ -99,98 +102,102 @@ class Crops:
 
     @property
     def identity(self) -> NDArray[np.int64]:
-        """Number of the identity from 0, (N,)."""
-        return _numbered(self.seed, self.person)
+        """Index of the identity, from 0, (N,)."""
+        return _row_index(self.seed, self.person)
 
     @property
-    def scene(self) -> NDArray[np.int64]:
-        """Number from 0 of what was pictured at once, (N,)."""
-        return _numbered(self.seed, self.person // CAST, self.moment)
+    def shot(self) -> NDArray[np.int64]:
+        """Index of the shot, from 0, (N,): the people in one picture at one moment."""
+        return _row_index(self.seed, self.person // PEOPLE_PER_PICTURE, self.moment)
 
     @property
-    def take(self) -> NDArray[np.int64]:
-        """Number from 0 of the group's moment, (N,): all casts of a group together."""
-        return _numbered(self.seed, self.moment)
+    def group_moment(self) -> NDArray[np.int64]:
+        """Index of the group and moment, from 0, (N,), over all shots of the group."""
+        return _row_index(self.seed, self.moment)
 
     def __getitem__(self, rows: NDArray | slice) -> Crops:
         return Crops(*(getattr(self, entry.name)[rows] for entry in fields(self)))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Crops:
-        """All in one; a ValueError without any."""
+        """Concatenate crops.
+
+        Raises:
+            ValueError: ``parts`` is empty.
+        """
         if not parts:
-            raise ValueError("there are no crops to join")
+            raise ValueError("no crops to concatenate: at least one part is needed")
         return Crops(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)))
 
     def save(self, path: Path) -> None:
-        """Write an .npz."""
+        """Write an .npz file."""
         np.savez(path, **{entry.name: getattr(self, entry.name) for entry in fields(self)})
 
     @classmethod
     def load(cls, path: Path) -> Crops:
-        """Read what :meth:`save` wrote."""
+        """Read a file written by :meth:`save`."""
         with np.load(path) as data:
             return Crops(**{entry.name: data[entry.name] for entry in fields(cls)})
 
 
-def _numbered(*columns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number from 0 of every different row, (N,)."""
+def _row_index(*columns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the index of every row among the unique rows of the columns, (N,)."""
     return np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].reshape(-1)
 
 
-def picture_group(group: Group, recipe: Recipe, *, poses: Poses) -> Crops:
-    """Crops of everyone of a group at its site, :data:`CAST` people at a time; none of those who were not seen."""
+def crops_of_group(group: Group, recipe: Recipe, *, poses: Poses) -> Crops:
+    """Render the crops of a group at its site, :data:`PEOPLE_PER_PICTURE` people at a time, of all who are visible."""
     renderer = RasterRenderer()
     site = make_site(group.site, views=recipe.views, casts=recipe.casts)
     parts = []
-    for first in range(0, group.size, CAST):
-        cast = figures(group, range(first, min(first + CAST, group.size)))
-        if cast:
-            filming = _Filming(group, first, cast, site, recipe, renderer)
-            parts += [filming.shot(number, poses) for number in range(recipe.moments)]
+    for first in range(0, group.size, PEOPLE_PER_PICTURE):
+        people = dressed_people(group, range(first, min(first + PEOPLE_PER_PICTURE, group.size)))
+        if people:
+            filming = _Filming(group, first, people, site, recipe, renderer)
+            parts += [filming.crops(number, poses) for number in range(recipe.moments)]
     return Crops.joined(parts)
 
 
 @dataclass(frozen=True)
 class _Filming:
-    """Some people of a group at a site."""
+    """People of a group in front of the cameras of a site; ``first`` is the index of the first of them."""
 
     group: Group
     first: int
-    cast: tuple[Figure, ...]
+    people: tuple[DressedPerson, ...]
     site: Site
     recipe: Recipe
     renderer: RasterRenderer
 
-    def shot(self, number: int, poses: Poses) -> Crops:
-        """Crops of all who are seen in the pictures of one moment."""
+    def crops(self, number: int, poses: Poses) -> Crops:
+        """Return the crops of all visible people in the pictures of one moment."""
         key = (self.group.site, self.first, number)
-        moment = make_moment((self.group.seed, *key), self.cast, poses=poses, site=self.site)
+        moment = make_moment((self.group.seed, *key), self.people, poses=poses, site=self.site)
         return Crops.joined(
             [
-                self._cut(moment, number, view, stream(self.group.seed, "train", "shot", *key, view))
+                self._crops_of_view(moment, number, view, stream(self.group.seed, "train", "shot", *key, view))
                 for view in range(self.recipe.views)
             ]
         )
 
-    def _cut(self, moment: Moment, number: int, view: int, rng: np.random.Generator) -> Crops:
-        """Crops of all who are seen in one picture."""
-        camera, people, recipe = self.site.cameras[view], len(self.cast), self.recipe
+    def _crops_of_view(self, moment: Moment, number: int, view: int, rng: np.random.Generator) -> Crops:
+        """Return the crops of all visible people in one picture."""
+        camera, people, recipe = self.site.cameras[view], len(self.people), self.recipe
         image = self.renderer.render(camera, moment.meshes, lighting=self.site.lighting)
-        radii = np.stack([figure.body.joint_radii for figure in self.cast])
+        radii = np.stack([person.body.joint_radii for person in self.people])
         seen = label_joints(image, camera, joints=moment.joints, radii=radii)
         hidden = hidden_shares(seen)
         framed = boxes([[mesh.vertices for mesh in moment.meshes[:people]]], [NO_EDGES] * people, [camera])[0]
-        noisy = jittered(framed, rng, recipe)
+        noisy = jitter_boxes(framed, rng, recipe)
         noise = rng.integers(2**31, size=people).tolist()
         kept = np.flatnonzero((hidden <= recipe.most_hidden) & (framed[:, 3] >= recipe.least_height))
         sensor, seed = self.site.sensors[view], self.site.seed
-        images = [developed(image.rgb, noisy[k], sensor, seed=seed, view=view, frame=noise[k]) for k in kept]
+        images = [develop_crop(image.rgb, noisy[k], sensor, seed=seed, view=view, frame=noise[k]) for k in kept]
         count = len(kept)
         return Crops(
             images=np.stack(images) if images else np.zeros((0, *SIZE, 3), np.uint8),
             seed=np.full(count, self.group.seed),
-            person=np.array([figure.person for figure in self.cast], np.int64)[kept],
+            person=np.array([each.person for each in self.people], np.int64)[kept],
             look_alike=np.full(count, self.group.look_alike),
             site=np.full(count, self.group.site),
             moment=np.full(count, number),
@@ -202,15 +209,15 @@ class _Filming:
 
 
 def azimuths(moment: Moment, camera: Camera) -> Floats:
-    """Bearing of a camera from each person, from where the pelvis faces, radians in -pi..pi, (P,)."""
+    """Return the bearing of a camera from each person, relative to the pelvis, radians in -pi..pi, (P,)."""
     hips = moment.joints[:, 11:13, :2].mean(axis=1)
     toward = camera.center[:2] - hips
     turn = np.arctan2(toward[:, 1], toward[:, 0]) - moment.facing
     return (turn + np.pi) % (2 * np.pi) - np.pi
 
 
-def jittered(framed: Floats, rng: np.random.Generator, recipe: Recipe) -> Floats:
-    """Boxes x, y, width, height (P, 4) as a detector may give them: every side off, some of them cut short."""
+def jitter_boxes(framed: Floats, rng: np.random.Generator, recipe: Recipe) -> Floats:
+    """Add the noise of a detector to boxes x, y, width, height (P, 4): every side moves, some boxes are truncated."""
     count = len(framed)
     spread = rng.uniform(*recipe.jitter, (count, 1))
     low, high = framed[:, :2], framed[:, :2] + framed[:, 2:]
@@ -221,10 +228,10 @@ def jittered(framed: Floats, rng: np.random.Generator, recipe: Recipe) -> Floats
     return np.concatenate([low, high - low], axis=1)
 
 
-def developed(rgb: Rgb, box: Floats, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rgb:
-    """What lies in a box x, y, width, height as the camera delivers it and the network is fed, (128, 64, 3).
+def develop_crop(rgb: Rgb, box: Floats, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rgb:
+    """Return the crop of a box x, y, width, height after the sensor, resized for the network, (128, 64, 3).
 
-    Only the part of the picture that is needed is developed: the camera's character is the same for all of it.
+    The sensor is applied to the needed part of the picture only, because its effects do not depend on the position.
     """
     height, width = rgb.shape[:2]
     left, top = np.clip(np.floor(box[:2]) - 1, 0, (width - 2, height - 2)).astype(int)

@@ -1,4 +1,4 @@
-"""Judging a network on people who are held out: after its training, or again when the simulation has changed."""
+"""Evaluation of a network on held-out people: after training, or again when the simulation has changed."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from mvpose.networks.session import Session
 from tools.reid import card, scores
 from tools.reid.crops import Crops, Recipe
 from tools.reid.metrics import Pairs, distributions
-from tools.reid.plan import DIALS, Plan
-from tools.reid.rendering import rendered
+from tools.reid.plan import LOOK_ALIKE, Plan
+from tools.reid.rendering import render_crops
 
-_DIGITS = 4  # of the affinity
+_DIGITS = 4  # decimal places of the affinity
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """What a card says of a network on people who are held out, block by block.
+class Evaluation:
+    """Scores of a network on held-out people, as blocks of its card.
 
     Attributes:
-        data: how many crops, of whom.
-        results: retrieval among all at a site, and among those of a scene at each value of the dial.
-        distances: of pairs in scenes.
+        data: numbers of identities and crops.
+        results: retrieval among all people of a site, and among those of a scene for every value of ``look_alike``.
+        distances: distributions of the distances of pairs in scenes.
     """
 
     data: dict[str, object]
@@ -34,98 +34,99 @@ class Judgement:
     distances: dict[str, object]
 
 
-def judged(
-    session: Session, plan: Plan, *, cache: Path, workers: int = 1, say: Callable[[str], None] = print
-) -> Judgement:
-    """Judge a network.
+def evaluate(
+    session: Session, plan: Plan, *, cache: Path, workers: int = 1, log: Callable[[str], None] = print
+) -> Evaluation:
+    """Evaluate a network on the held-out people of a plan.
 
     Args:
-        session: the network, opened as anyone opens it.
-        plan: whose people are held out.
+        session: network, loaded from its file.
+        plan: plan of its training.
         cache: folder of the rendered crops.
-        workers: processes that render.
-        say: called with a line of progress now and then.
+        workers: number of rendering processes.
+        log: called with lines of progress.
     """
-    strangers = [rendered(plan.held_out_order(site), cache, workers=workers) for site in range(plan.sites)]
-    found = scores.held_out(session, strangers)
-    say(f"held out: {found['network']}")
-    say(f"by colours alone: {found['histogram_balanced']}")
-    curve, met = {}, {}
-    for dial in DIALS:
-        alike = rendered(plan.curve_order(dial), cache, workers=workers)
-        curve[f"{dial:g}"], met[f"{dial:g}"] = scores.in_scenes(session, alike)
-        say(f"look_alike {dial:g}: {curve[f'{dial:g}']}")
-    few = np.isin(strangers[0].seed, [group.seed for group in plan.sample_order.groups])
-    return Judgement(
+    sites = [render_crops(plan.held_out_job(site), cache, workers=workers) for site in range(plan.sites)]
+    at_sites = scores.score_sites(session, sites)
+    log(f"held-out people, network: {at_sites['network']}")
+    log(f"held-out people, colour histograms: {at_sites['histogram_balanced']}")
+    curve, pairs = {}, {}
+    for value in LOOK_ALIKE:
+        crops = render_crops(plan.curve_job(value), cache, workers=workers)
+        curve[f"{value:g}"], pairs[f"{value:g}"] = scores.score_scenes(session, crops)
+        log(f"look_alike {value:g}: {curve[f'{value:g}']}")
+    sample = np.isin(sites[0].seed, [group.seed for group in plan.sample_job.groups])
+    return Evaluation(
         data={
-            "held_out": card.of_crops(Crops.joined(strangers)),
-            "held_out_sample": card.of_sample(strangers[0][few]),
+            "held_out": card.of_crops(Crops.joined(sites)),
+            "held_out_sample": card.of_sample(sites[0][sample]),
         },
-        results={"held_out": found, "look_alike": curve},
+        results={"held_out": at_sites, "look_alike": curve},
         distances={
             **card.bins(),
-            "all": distributions(Pairs.joined(list(met.values()))),
-            "look_alike": {dial: distributions(pairs) for dial, pairs in met.items()},
+            "all": distributions(Pairs.joined(list(pairs.values()))),
+            "look_alike": {value: distributions(each) for value, each in pairs.items()},
         },
     )
 
 
-def judge(
-    model: Path, *, cache: Path, workers: int = 1, command: str = "", say: Callable[[str], None] = print
+def evaluate_again(
+    model: Path, *, cache: Path, workers: int = 1, command: str = "", log: Callable[[str], None] = print
 ) -> dict[str, object]:
-    """Judge a trained network again, write that into its card and return the card.
+    """Evaluate a trained network again, write the scores into its card and return the card.
 
-    The file stays as it is, and so does all that the card says of its training: of the training crops, of the machine
-    and the time a crop took there. The affinity stays, too, for the file itself states it; it is only compared.
+    The model file is not changed, nor the parts of the card about the training: training crops, machine and time per
+    crop. The affinity is part of the model file and is not changed either; it is fitted again and logged only.
 
     Args:
-        model: the ONNX file; its card lies beside it.
+        model: ONNX file with its card beside it.
         cache: folder of the rendered crops.
-        workers: processes that render.
-        command: that judged, for the card.
-        say: called with a line of progress now and then.
+        workers: number of rendering processes.
+        command: command line of the evaluation, for the card.
+        log: called with lines of progress.
 
     Raises:
-        ValueError: there is no such file or no card of it, or the card states no plan.
+        ValueError: the file or its card does not exist, or the card has no plan.
     """
     if not model.is_file():
-        raise ValueError(f"no network at {model}: correct the path")
+        raise ValueError(f"no network file at {model}: correct the path")
     content: dict[str, Any] = card.read(model)
     plan = _plan(content, card.card_path(model))
     session = Session(model)
-    validation = rendered(plan.validation_order, cache, workers=workers)
-    again = [round(value, _DIGITS) for value in scores.scale(session, validation)]
-    stated = [content["affinity"]["midpoint"], content["affinity"]["slope"]]
-    say(f"midpoint and slope of the affinity: {again} now, {stated} in the card, which stay")
-    judgement = judged(session, plan, cache=cache, workers=workers, say=say)
-    account = {"command": command, "affinity_midpoint_slope": again}
-    new = _with_judgement(content, account, {"validation": card.of_crops(validation), **judgement.data}, judgement)
+    validation = render_crops(plan.validation_job, cache, workers=workers)
+    affinity = [round(value, _DIGITS) for value in scores.fit_affinity(session, validation)]
+    in_card = [content["affinity"]["midpoint"], content["affinity"]["slope"]]
+    log(f"midpoint and slope of the affinity: {affinity} fitted now, {in_card} in the card, which are kept")
+    evaluation = evaluate(session, plan, cache=cache, workers=workers, log=log)
+    entry = {"command": command, "affinity_midpoint_slope": affinity}
+    new = _updated_card(content, entry, {"validation": card.of_crops(validation), **evaluation.data}, evaluation)
     card.write(model, new)
-    say(f"{card.card_path(model)} is written anew")
+    log(f"updated {card.card_path(model)}")
     return new
 
 
-def _with_judgement(
-    content: Mapping[str, Any], account: Mapping[str, object], crops: Mapping[str, object], judgement: Judgement
+def _updated_card(
+    content: Mapping[str, Any], entry: Mapping[str, object], crops: Mapping[str, object], evaluation: Evaluation
 ) -> dict[str, object]:
-    """The card with its judgement in place of the former one."""
+    """Return a card with its evaluation replaced."""
     data = {**content["data"], **crops}
-    data["plan"] = {**data["plan"], "recipe": asdict(Recipe())}  # of the crops judged by; the training's is beside it
-    blocks = {"judged": account, "data": data, "results": {**content["results"], **judgement.results}}
+    data["plan"] = {**data["plan"], "recipe": asdict(Recipe())}  # recipe of the evaluation; training_recipe is kept
+    blocks = {"judged": entry, "data": data, "results": {**content["results"], **evaluation.results}}
     new: dict[str, object] = {}
     for key, value in content.items():
         new[key] = blocks.get(key, value)
         if key == "command":
-            new["judged"] = account  # beside that of the training
-    return new | {"distances": judgement.distances}
+            new["judged"] = entry  # next to the command of the training
+    return new | {"distances": evaluation.distances}
 
 
 def _plan(content: Mapping[str, Any], path: Path) -> Plan:
-    """The plan that a card states."""
+    """Return the plan in a card."""
     try:
-        stated = content["data"]["plan"]
-        return Plan(**{field.name: stated[field.name] for field in fields(Plan)})
+        plan = content["data"]["plan"]
+        return Plan(**{field.name: plan[field.name] for field in fields(Plan)})
     except (KeyError, TypeError):
         raise ValueError(
-            f"{path} states no plan (data.plan) of a training: judged again are networks of python -m tools.reid"
+            f"the card {path} has no training plan (data.plan): only networks made by python -m tools.reid can be "
+            "evaluated again"
         ) from None

@@ -1,6 +1,6 @@
-"""Where people are filmed: a room, its light, and cameras of different characters in it.
+"""Filming sites of the re-ID data set: a room, its light, and cameras with different sensor responses.
 
-Everyone of many groups comes by, so walls and light tell nobody from anybody else, as in a real installation.
+Many groups are filmed at the same site, so walls and light do not identify people, as in a real installation.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from simharness.world.rigs.lenses import intrinsics
 from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.room import make_room
 
-SIZE = (512, 384)  # pixels of every picture: people are 150 high in the middle
-USUAL = Sensor(gain=0.10, white_balance=0.12, exposure=0.35)
-"""How cameras of one site differ: in contrast by 10 %, in red and blue by 12 %, in exposure by a third of a stop."""
+SIZE = (512, 384)  # width and height of the pictures, pixels: people have a median height of about 150 pixels
+SENSOR_SPREAD = Sensor(gain=0.10, white_balance=0.12, exposure=0.35)
+"""Differences between cameras of one site: contrast 10 %, red and blue 12 %, exposure a third of a stop."""
 
-_DISTANCE, _HEIGHT, _FOV = (2.6, 7.0), (0.7, 3.0), (42.0, 75.0)  # of cameras: metres, metres, degrees
-_HALF = (4.0, 7.5)  # metres: half the sides of rooms
-_OPEN = 0.3  # share of rooms without walls
-_TINTED = 0.5  # share of rooms painted in a colour of their own
-_WALL = 0.25  # metres from a camera to the walls
+_DISTANCE, _HEIGHT, _FOV = (2.6, 7.0), (0.7, 3.0), (42.0, 75.0)  # ranges of the cameras: metres, metres, degrees
+_HALF = (4.0, 7.5)  # half the sides of rooms, metres
+_OPEN = 0.3  # fraction of rooms without walls
+_TINTED = 0.5  # fraction of rooms painted in a random colour
+_WALL = 0.25  # distance from a camera to the walls, metres
 _NOISE, _JPEG = (0.0, 6.0), (50, 95)
 
 
 @dataclass(frozen=True)
 class Site:
-    """A place with V cameras.
+    """Filming site with V cameras.
 
     Attributes:
-        seed: of the cameras' characters.
-        room: its configuration.
+        seed: seed of the site and of its sensors.
+        room: configuration of the room.
         meshes: floor and walls.
-        lighting: the light.
-        cameras: V.
-        sensors: of the cameras, V.
+        lighting: light of the room.
+        cameras: V cameras.
+        sensors: sensors of the V cameras.
     """
 
     seed: int
@@ -55,12 +55,12 @@ class Site:
 
 
 def make_site(seed: int, *, views: int, casts: tuple[float, float] = (1.0, 1.0)) -> Site:
-    """Draw a place.
+    """Draw a filming site.
 
     Args:
-        seed: of all of it.
-        views: how many cameras.
-        casts: least and greatest strength of the cameras' characters, in those of :data:`USUAL`.
+        seed: seed of the site.
+        views: number of cameras.
+        casts: least and greatest factor on :data:`SENSOR_SPREAD`.
     """
     rng = stream(seed, "train", "site")
     x, y = rng.uniform(*_HALF, 2)
@@ -82,7 +82,7 @@ def make_site(seed: int, *, views: int, casts: tuple[float, float] = (1.0, 1.0))
 
 
 def _coarser(mesh: Mesh) -> Mesh:
-    """A mesh with half as many texels each way, which small pictures do not tell, and which come four times sooner."""
+    """Halve the resolution of a mesh's texture: invisible in small pictures, and four times as fast to make."""
     if mesh.texture is None:
         return mesh
     height, width = mesh.texture.shape[:2]
@@ -91,14 +91,14 @@ def _coarser(mesh: Mesh) -> Mesh:
 
 
 def _light(rng: np.random.Generator, room: Room, seed: int) -> Lighting:
-    """The light of a room, as strong as it happens."""
+    """Draw the light of a room with random brightness."""
     light = room_lighting(room, seed)
     key, sky, fill = (np.exp(rng.normal(0.0, 0.15, 3)) * (light.key, light.sky, light.fill)).tolist()
     return replace(light, key=key, sky=sky, fill=fill)
 
 
 def _cameras(rng: np.random.Generator, room: Room, views: int) -> tuple[Camera, ...]:
-    """Cameras in all directions, as far apart as it happens, within the walls."""
+    """Draw cameras in independent directions around the centre, within the walls."""
     bearing = rng.uniform(-np.pi, np.pi, views)
     distance, height, fov = (rng.uniform(*span, views) for span in (_DISTANCE, _HEIGHT, _FOV))
     aim = np.column_stack([rng.normal(0.0, 0.25, (views, 2)), rng.uniform(0.6, 1.1, views)])
@@ -112,10 +112,11 @@ def _cameras(rng: np.random.Generator, room: Room, views: int) -> tuple[Camera, 
 
 
 def _sensor(rng: np.random.Generator, strength: float) -> Sensor:
+    """Draw a sensor with random noise and JPEG quality and ``strength`` times :data:`SENSOR_SPREAD`."""
     return Sensor(
-        gain=strength * USUAL.gain,
-        white_balance=strength * USUAL.white_balance,
-        exposure=strength * USUAL.exposure,
+        gain=strength * SENSOR_SPREAD.gain,
+        white_balance=strength * SENSOR_SPREAD.white_balance,
+        exposure=strength * SENSOR_SPREAD.exposure,
         noise=float(rng.uniform(*_NOISE)),
         jpeg=int(rng.integers(_JPEG[0], _JPEG[1] + 1)),
     )

@@ -1,7 +1,8 @@
-"""Who is to be told apart: people as scenarios draw them, in splits whose seeds no scenario has.
+"""Identities of the re-ID data set: people drawn as in scenarios, in splits with separate ranges of seeds.
 
-An identity is person ``person`` of the scenario seed ``seed``: the same streams give it the same body and the same look
-here as there. Groups are the people of one such scenario, so a group has its own value of ``look_alike``.
+An identity is person ``person`` of the scenario seed ``seed``. The random streams are those of scenarios, so the
+identity has the same body and look as in a scenario with that seed. A group is the set of people of one such scenario,
+and has one value of ``look_alike``. Ordinary scenarios use none of these seeds.
 """
 
 from __future__ import annotations
@@ -20,22 +21,22 @@ from simharness.world.humans.wardrobe import Look, draw_looks
 Split = Literal["training", "validation", "held-out"]
 
 SPLITS: tuple[Split, ...] = ("training", "validation", "held-out")
-CHILDREN = 0.1  # share of people
+CHILDREN = 0.1  # fraction of people who are children
 RUNS = 10**6
-"""Seeds of runs: they are less than this."""
-_GROUPS = 10**6  # of a split in a run
+"""Upper bound of the seeds of runs, exclusive."""
+_GROUPS = 10**6  # greatest number of groups in a split of a run
 _SPAN = RUNS * _GROUPS
 
 
 @dataclass(frozen=True)
 class Group:
-    """People who may be in one scene.
+    """People of one scene.
 
     Attributes:
-        seed: of a scenario that has them.
-        size: how many they are.
-        look_alike: the dial of that scenario.
-        site: seed of the place where they are filmed (:mod:`tools.reid.filming_sites`).
+        seed: seed of the scenario.
+        size: number of people.
+        look_alike: parameter ``look_alike`` of the scenario.
+        site: seed of the filming site (:mod:`tools.reid.filming_sites`).
     """
 
     seed: int
@@ -45,14 +46,14 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Figure:
-    """One identity to be pictured.
+class DressedPerson:
+    """Body and surface of one identity.
 
     Attributes:
-        seed: of its group.
-        person: index in it.
-        body: dressed.
-        mesh: how it looks, at rest.
+        seed: seed of the group.
+        person: index in the group.
+        body: dressed body.
+        mesh: coloured mesh of the rest body.
     """
 
     seed: int
@@ -64,45 +65,47 @@ class Figure:
 def groups(
     split: Split, run: int, count: int, *, size: int, look_alike: Sequence[float] = (0.0,), at_a_site: int = 1
 ) -> tuple[Group, ...]:
-    """The first groups of a split.
+    """Return the first groups of a split.
 
-    Group k of a split and run always has the same people, however many groups there are, and whatever its dial: only
-    their clothes come nearer to each other with it. The seeds of two splits or runs never meet, and are beyond
-    those that people write into scenarios.
+    Group k of a split and run always has the same people, for any number of groups and any value of ``look_alike``,
+    which changes their clothes only. The seeds of two splits or runs are always different, and larger than those
+    written in scenario files.
 
     Args:
-        split: what they are for.
-        run: the seed of the run, 0 to 999999.
-        count: how many groups, at most 1000000.
-        size: people in each.
-        look_alike: values of the dial, that the groups take in turn.
-        at_a_site: how many groups are filmed in one place, one after the other.
+        split: split of the data set.
+        run: seed of the run, 0 to 999999.
+        count: number of groups, at most 1000000.
+        size: number of people in each group.
+        look_alike: values of ``look_alike``, which the groups take in turn.
+        at_a_site: number of successive groups filmed at the same site.
 
     Raises:
-        ValueError: a run or a count out of range.
+        ValueError: ``run`` or ``count`` is out of range.
     """
     if not 0 <= run < RUNS or not 0 <= count <= _GROUPS:
-        raise ValueError(f"a run has a seed from 0 to {RUNS - 1} and at most {_GROUPS} groups, got {run} and {count}")
+        raise ValueError(
+            f"the seed of a run must be from 0 to {RUNS - 1} and its groups at most {_GROUPS}, got {run} and {count}"
+        )
     first = (1 + SPLITS.index(split)) * _SPAN + run * _GROUPS
     return tuple(Group(first + k, size, look_alike[k % len(look_alike)], first + k // at_a_site) for k in range(count))
 
 
 def split_of(seed: int) -> Split | None:
-    """The split that a scenario's seed belongs to; None for the seeds of ordinary scenarios."""
+    """Return the split of a scenario seed, or None for the seed of an ordinary scenario."""
     index = seed // _SPAN - 1
     return SPLITS[index] if 0 <= index < len(SPLITS) else None
 
 
-def figures(group: Group, people: Iterable[int]) -> tuple[Figure, ...]:
-    """Some people of a group, as :func:`simharness.world.scene.build.build` makes them for a scenario of its seed."""
-    wanted = list(people)
-    looks = draw_looks(group.seed, max(wanted, default=-1) + 1, look_alike=group.look_alike)
-    return tuple(_figure(group.seed, person, looks[person]) for person in wanted)
+def dressed_people(group: Group, people: Iterable[int]) -> tuple[DressedPerson, ...]:
+    """Make people of a group, equal to those that :func:`simharness.world.scene.build.build` makes for its seed."""
+    indices = list(people)
+    looks = draw_looks(group.seed, max(indices, default=-1) + 1, look_alike=group.look_alike)
+    return tuple(_dressed_person(group.seed, person, looks[person]) for person in indices)
 
 
-def _figure(seed: int, person: int, look: Look) -> Figure:
+def _dressed_person(seed: int, person: int, look: Look) -> DressedPerson:
     shape = draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, CHILDREN))
     body = dress(make_body(shape), look)
-    coat = paint(body, look)
-    mesh = Mesh(body.vertices, body.faces, coat.colors, smooth=True, texture=coat.texture, uv=coat.uv)
-    return Figure(seed, person, body, mesh)
+    surface = paint(body, look)
+    mesh = Mesh(body.vertices, body.faces, surface.colors, smooth=True, texture=surface.texture, uv=surface.uv)
+    return DressedPerson(seed, person, body, mesh)

@@ -1,4 +1,4 @@
-"""How well descriptors tell people apart: retrieval across cameras, and the distances behind it."""
+"""Metrics of re-ID descriptors: retrieval across cameras, and distances of pairs of crops."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ QUANTILES = (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95,
 
 @dataclass(frozen=True)
 class Retrieval:
-    """How well a gallery answers queries.
+    """Retrieval scores.
 
     Attributes:
-        ranks: share of queries whose nearest one, five and ten have the person among them, by their number.
-        mean_average_precision: mean over queries of the area under precision over recall.
-        queries: how many had an answer in the gallery.
+        ranks: cumulative match characteristic at k = 1, 5, 10: fraction of queries with their person among the k
+            nearest crops of the gallery.
+        mean_average_precision: mean over queries of the area under the precision-recall curve.
+        queries: number of queries with their person in the gallery.
     """
 
     ranks: Mapping[int, float]
@@ -35,38 +36,38 @@ class Retrieval:
 
     @property
     def rank1(self) -> float:
-        """Share of queries that are answered rightly at once."""
+        """Fraction of queries whose nearest crop shows their person."""
         return self.ranks[1]
 
 
 def retrieve(distances: Floats, identity: Integers, camera: Integers, *, within: Integers | None = None) -> Retrieval:
-    """Let each of N crops look for its person among those of other cameras.
+    """Retrieve each of N crops among those of the other cameras.
 
-    Crops of a query's own camera are not in its gallery, whoever they show (Zheng et al., "Scalable person
-    re-identification", ICCV 2015, leave out only those of the same person; here a camera is one picture).
+    The gallery of a query has no crop of the query's camera. (Zheng et al., "Scalable person re-identification", ICCV
+    2015, leave out only those of the same person; here all crops of a camera are from one picture.)
 
     Args:
-        distances: between the crops' descriptors, (N, N).
-        identity: who they show, (N,).
-        camera: which camera took them, (N,).
-        within: where given, galleries hold only crops with the query's number, (N,).
+        distances: distances between the descriptors of the crops, (N, N).
+        identity: identities of the crops, (N,).
+        camera: cameras of the crops, (N,).
+        within: if given, the gallery has only crops with the same number as the query, (N,).
 
     Raises:
-        ValueError: no crop has its person elsewhere.
+        ValueError: no crop has its person in another camera.
     """
     ranks, precisions = [], []
     for query, row in enumerate(distances):
         others = camera != camera[query]
         if within is not None:
             others &= within == within[query]
-        mine = identity[others] == identity[query]
-        if not mine.any():
+        same = identity[others] == identity[query]
+        if not same.any():
             continue
-        found = np.flatnonzero(mine[np.argsort(row[others], kind="stable")])
-        ranks.append(found[0])
-        precisions.append(np.mean((np.arange(len(found)) + 1) / (found + 1)))
+        hits = np.flatnonzero(same[np.argsort(row[others], kind="stable")])
+        ranks.append(hits[0])
+        precisions.append(np.mean((np.arange(len(hits)) + 1) / (hits + 1)))
     if not ranks:
-        raise ValueError("no crop has its person in another camera: nothing can be retrieved")
+        raise ValueError("retrieval needs at least one person in two cameras, got none")
     first = np.array(ranks)
     return Retrieval(
         ranks=MappingProxyType({k: float((first < k).mean()) for k in (1, 5, 10)}),
@@ -75,8 +76,8 @@ def retrieve(distances: Floats, identity: Integers, camera: Integers, *, within:
     )
 
 
-def euclidean(descriptors: ArrayLike) -> Floats:
-    """Distances between unit descriptors, (N, N) of (N, D)."""
+def euclidean_distances(descriptors: ArrayLike) -> Floats:
+    """Return the Euclidean distances (N, N) between unit descriptors (N, D)."""
     values = np.asarray(descriptors, np.float32)
     return np.sqrt(np.maximum(2.0 - 2.0 * (values @ values.T), 0.0)).astype(float)
 
@@ -86,76 +87,79 @@ class Pairs:
     """Pairs of crops of different cameras.
 
     Attributes:
-        distance: (n,).
-        same: whether both show one person, (n,).
-        turn: angle between the bearings from which the two see their person, degrees 0 to 180, (n,).
-        hidden: share of joints that is hidden in the crop that shows less, (n,).
-        people: identities of the two, the lesser number first, (n, 2).
+        distance: distances of the descriptors, (n,).
+        same: whether both crops show the same person, (n,).
+        angle: difference of the bearings from which the two cameras see their person, degrees 0 to 180, (n,).
+        hidden: the larger fraction of hidden joints of the two crops, (n,).
+        people: identities of the two crops, the smaller index first, (n, 2).
     """
 
     distance: Floats
     same: NDArray[np.bool_]
-    turn: Floats
+    angle: Floats
     hidden: Floats
     people: Integers
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """All in one, each part's people told from those of the others."""
+        """Concatenate pairs; the people of every part get separate indices."""
         starts = np.cumsum([0, *(1 + part.people.max(initial=-1) for part in parts)])
         columns = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _MEASURED}
         people = [part.people + start for part, start in zip(parts, starts, strict=False)]
         return cls(**columns, people=np.concatenate(people))
 
 
-_MEASURED = ("distance", "same", "turn", "hidden")
+_MEASURED = ("distance", "same", "angle", "hidden")
 
 
-def pairs(
-    distances: Floats, identity: Integers, moment: Integers, view: Integers, azimuth: Floats, hidden: Floats
+def pairs_in_shots(
+    distances: Floats, identity: Integers, shot: Integers, view: Integers, azimuth: Floats, hidden: Floats
 ) -> Pairs:
-    """All pairs of crops of one moment in different views: those that a matcher has before it.
+    """Return all pairs of crops of one shot in different views: the pairs that a matcher has to decide.
 
     Args:
-        distances: (N, N).
-        identity: (N,).
-        moment: number of the moment, of no other scene, (N,).
-        view: camera in it, (N,).
+        distances: distances of the descriptors, (N, N).
+        identity: identities, (N,).
+        shot: index of the shot, unique over all groups, (N,).
+        view: camera, (N,).
         azimuth: bearing of the camera from the person, radians, (N,).
-        hidden: share of hidden joints, (N,).
+        hidden: fraction of hidden joints, (N,).
     """
     one, two = np.triu_indices(len(identity), 1)
-    met = (moment[one] == moment[two]) & (view[one] != view[two])
-    one, two = one[met], two[met]
-    turn = np.degrees(np.abs((azimuth[one] - azimuth[two] + np.pi) % (2 * np.pi) - np.pi))
+    paired = (shot[one] == shot[two]) & (view[one] != view[two])
+    one, two = one[paired], two[paired]
+    angle = np.degrees(np.abs((azimuth[one] - azimuth[two] + np.pi) % (2 * np.pi) - np.pi))
     people = np.sort(np.column_stack([identity[one], identity[two]]), axis=1)
-    return Pairs(distances[one, two], people[:, 0] == people[:, 1], turn, np.maximum(hidden[one], hidden[two]), people)
+    return Pairs(distances[one, two], people[:, 0] == people[:, 1], angle, np.maximum(hidden[one], hidden[two]), people)
 
 
-def fitted_sigmoid(met: Pairs) -> tuple[float, float]:
-    """Midpoint and slope of the sigmoid of distance that best tells the chance of one person.
+def fit_sigmoid(pairs: Pairs) -> tuple[float, float]:
+    """Fit a sigmoid of distance to the probability that a pair shows the same person; return midpoint and slope.
 
-    Both kinds of pairs weigh the same in all, so at the midpoint a pair is as likely of one person as of two where
-    those are equally common (Platt scaling; Platt, "Probabilistic outputs for support vector machines", 1999).
+    Pairs of the same person and of two people have equal total weight. So at the midpoint both are equally likely if
+    both are equally frequent (Platt scaling; Platt, "Probabilistic outputs for support vector machines", 1999).
+
+    Raises:
+        ValueError: the pairs are all of one kind.
     """
-    if met.same.all() or not met.same.any():
-        raise ValueError("a sigmoid needs pairs of one person and pairs of two")
-    weight = np.where(met.same, 0.5 / met.same.sum(), 0.5 / (~met.same).sum())
+    if pairs.same.all() or not pairs.same.any():
+        raise ValueError(
+            "the sigmoid needs pairs of the same person and pairs of two people, "
+            f"got {pairs.same.sum()} and {(~pairs.same).sum()}"
+        )
+    weight = np.where(pairs.same, 0.5 / pairs.same.sum(), 0.5 / (~pairs.same).sum())
 
     def loss(at: Floats) -> float:
-        chance = expit((at[0] - met.distance) / np.exp(at[1]))
-        return float(-(weight * np.log(np.maximum(np.where(met.same, chance, 1 - chance), 1e-9))).sum())
+        chance = expit((at[0] - pairs.distance) / np.exp(at[1]))
+        return float(-(weight * np.log(np.maximum(np.where(pairs.same, chance, 1 - chance), 1e-9))).sum())
 
-    start = np.array([(met.distance[met.same].mean() + met.distance[~met.same].mean()) / 2, np.log(0.1)])
+    start = np.array([(pairs.distance[pairs.same].mean() + pairs.distance[~pairs.same].mean()) / 2, np.log(0.1)])
     midpoint, slope = minimize(loss, start, method="Nelder-Mead").x
     return float(midpoint), float(np.exp(slope))
 
 
 def summary(distance: Floats) -> dict[str, object]:
-    """What distances (n,) are like; None where there are none.
-
-    How many, mean, deviation, the mean cosine that goes with them, and the values at ``QUANTILES``.
-    """
+    """Return count, mean, deviation, mean cosine similarity and the ``QUANTILES`` of distances (n,); None for n = 0."""
     if not len(distance):
         return {"pairs": 0, "mean": None, "deviation": None, "cosine": None, "quantiles": None}
     return {
@@ -167,30 +171,30 @@ def summary(distance: Floats) -> dict[str, object]:
     }
 
 
-def distributions(met: Pairs) -> dict[str, object]:
-    """Distances of one person's and of two people's pairs: of all, and by view difference and occlusion.
+def distributions(pairs: Pairs) -> dict[str, object]:
+    """Return the distributions of distance for the same person and for two people, by view difference and occlusion.
 
     Under "same" and under "other":
 
     - "all": the :func:`summary` of all pairs;
-    - "between": deviation of the means of pairs of one and the same two people (of one, for "same"), and "within": the
-      root mean square deviation from those means: how much of the spread lasts, and how much is the crops';
+    - "between": standard deviation of the mean distances of the pairs of people (of the people, for "same");
+    - "within": root mean square deviation from those means, which is due to the crops;
     - "bins": ``[v][h]``, the summary of pairs in bin v of ``VIEW_EDGES`` and bin h of ``HIDDEN_EDGES``.
 
-    A uniform draw put through the quantiles, between which one may interpolate, is a distance.
+    Distances can be drawn from a summary by inverse transform sampling, with interpolation between its quantiles.
     """
     views, covers = len(VIEW_EDGES) - 1, len(HIDDEN_EDGES) - 1
-    v = np.clip(np.digitize(met.turn, VIEW_EDGES) - 1, 0, views - 1)
-    h = np.clip(np.digitize(met.hidden, HIDDEN_EDGES) - 1, 0, covers - 1)
+    v = np.clip(np.digitize(pairs.angle, VIEW_EDGES) - 1, 0, views - 1)
+    h = np.clip(np.digitize(pairs.hidden, HIDDEN_EDGES) - 1, 0, covers - 1)
     result: dict[str, object] = {}
-    for name, kind in (("same", met.same), ("other", ~met.same)):
-        between, within = _spread(met.distance[kind], met.people[kind])
+    for name, kind in (("same", pairs.same), ("other", ~pairs.same)):
+        between, within = _spread(pairs.distance[kind], pairs.people[kind])
         result[name] = {
-            "all": summary(met.distance[kind]),
+            "all": summary(pairs.distance[kind]),
             "between": between,
             "within": within,
             "bins": [
-                [summary(met.distance[kind & (v == row) & (h == column)]) for column in range(covers)]
+                [summary(pairs.distance[kind & (v == row) & (h == column)]) for column in range(covers)]
                 for row in range(views)
             ],
         }
@@ -198,7 +202,7 @@ def distributions(met: Pairs) -> dict[str, object]:
 
 
 def _spread(distance: Floats, people: Integers) -> tuple[float | None, float | None]:
-    """Deviation of the means of each two people, and root mean square deviation from them."""
+    """Return the deviation of the mean distances of pairs of people, and the root mean square deviation from them."""
     if not len(distance):
         return None, None
     pair = np.unique(people, axis=0, return_inverse=True)[1].reshape(-1)

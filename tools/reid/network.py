@@ -1,7 +1,7 @@
-"""The network: residual blocks on small pictures, pooled over bands of the body, one unit descriptor a crop.
+"""Re-ID network: residual blocks on crops, pooling over horizontal bands, one unit descriptor per crop.
 
-Plain 3 x 3 convolutions of few channels rather than depthwise ones: on a CPU they do more work a millisecond, in
-training above all.
+The convolutions are plain 3 x 3 ones with few channels instead of depthwise ones: on a CPU they do more operations per
+millisecond, mainly in training.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from torch.nn import functional
 
 DIMENSIONS = 192
 CHANNELS = (32, 64, 128)
-BANDS = 4  # of the body, from the top
+BANDS = 4  # horizontal bands of the crop
 
 
 class Block(nn.Module):
-    """Two convolutions and a way around them (He et al., "Deep residual learning", CVPR 2016)."""
+    """Residual block: two convolutions and a shortcut (He et al., "Deep residual learning", CVPR 2016)."""
 
     def __init__(self, before: int, channels: int, stride: int) -> None:
         super().__init__()
@@ -26,15 +26,15 @@ class Block(nn.Module):
         self.around = nn.Identity() if same else _convolution(before, channels, size=1, stride=stride)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Features (n, before, h, w) to (n, channels, h / stride, w / stride)."""
+        """Map features (n, before, h, w) to (n, channels, h / stride, w / stride)."""
         return functional.relu(self.second(functional.relu(self.first(x))) + self.around(x))
 
 
 class Network(nn.Module):
-    """Crops (n, 3, 128, 64), normalised, to unit descriptors (n, 192).
+    """Network from normalised crops (n, 3, 128, 64) to unit descriptors (n, 192).
 
-    The mean of each band tells what is worn where (Sun et al., "Beyond part models", ECCV 2018), the maximum over all
-    what is there at all, wherever an occluder pushed it.
+    The mean over each band describes the clothes by height (Sun et al., "Beyond part models", ECCV 2018). The maximum
+    over the whole crop describes features at any position, also when an occluder shifts them.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Network(nn.Module):
         )
 
     def forward(self, crops: Tensor) -> Tensor:
-        """See the class."""
+        """Map normalised crops (n, 3, 128, 64) to unit descriptors (n, 192)."""
         features = self.trunk(crops)
         bands = [band.mean(dim=(2, 3)) for band in features.chunk(BANDS, dim=2)]
         pooled = torch.cat([*bands, features.amax(dim=(2, 3))], dim=1)
@@ -62,10 +62,10 @@ class Network(nn.Module):
 
 
 class Mirrored(nn.Module):
-    """What a network says of a crop and of its mirror image, the mean of both: people look much alike mirrored.
+    """Network averaged over a crop and its mirror image, because people look similar when mirrored.
 
-    Twice the work, for better descriptors: of the clearest crops of people never seen a quarter fewer are taken for
-    somebody else.
+    It takes twice the time and gives better descriptors: for the clearest crops of held-out people the rate of wrong
+    first matches is lower by a quarter.
     """
 
     def __init__(self, network: Network) -> None:
@@ -73,14 +73,15 @@ class Mirrored(nn.Module):
         self.network = network
 
     def forward(self, crops: Tensor) -> Tensor:
-        """Crops as the network takes them, (n, 3, 128, 64), to unit descriptors (n, 192)."""
+        """Map normalised crops (n, 3, 128, 64) to unit descriptors (n, 192)."""
         return functional.normalize(self.network(crops) + self.network(crops.flip(3)), dim=1)
 
 
-def parameters(network: nn.Module) -> int:
-    """How many numbers it has learnt."""
+def count_parameters(network: nn.Module) -> int:
+    """Return the number of trained parameters."""
     return sum(parameter.numel() for parameter in network.parameters())
 
 
 def _convolution(before: int, channels: int, *, size: int = 3, stride: int = 1) -> nn.Sequential:
+    """Make a convolution with batch normalisation."""
     return nn.Sequential(nn.Conv2d(before, channels, size, stride, size // 2, bias=False), nn.BatchNorm2d(channels))

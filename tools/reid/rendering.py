@@ -1,4 +1,4 @@
-"""Rendering a split, part by part: parts that lie in the cache, made by this same code, are not rendered again."""
+"""Rendering of crops with a cache on disk: parts made by the same code are not rendered again."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from functools import cache
 from pathlib import Path
 
 from tools.reid import code_digest
-from tools.reid.crops import Crops, Recipe, picture_group
+from tools.reid.crops import Crops, Recipe, crops_of_group
 from tools.reid.identities import Group, split_of
 from tools.reid.poses import Poses, plan_poses
 
-_PART = 10  # groups
+_PART = 10  # groups in a file of the cache
 
 
 @dataclass(frozen=True)
-class Order:
-    """Crops to be rendered.
+class RenderJob:
+    """Specification of crops to render.
 
     Attributes:
-        groups: of whom.
-        recipe: how.
+        groups: groups of people.
+        recipe: parameters of the crops.
     """
 
     groups: tuple[Group, ...]
@@ -32,21 +32,21 @@ class Order:
 
     @property
     def name(self) -> str:
-        """Tells it from every other order, and from the same one rendered by other code."""
+        """Digest of the job and of the code that renders it."""
         text = repr((code_digest.digest(), self.recipe, [astuple(group) for group in self.groups]))
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-def rendered(order: Order, folder: Path, *, workers: int = 1) -> Crops:
-    """The crops of an order, from the cache as far as they are there.
+def render_crops(job: RenderJob, folder: Path, *, workers: int = 1) -> Crops:
+    """Return the crops of a job; render those that are not in the cache.
 
     Args:
-        order: what to render.
-        folder: the cache.
-        workers: processes.
+        job: crops to render.
+        folder: folder of the cache, made if missing.
+        workers: number of processes.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    parts = tuple(_parts(order))
+    parts = tuple(_parts(job))
     paths = [folder / f"{part.name}.npz" for part in parts]
     missing = [(part, path) for part, path in zip(parts, paths, strict=True) if not path.is_file()]
     if workers > 1 and len(missing) > 1:
@@ -60,24 +60,23 @@ def rendered(order: Order, folder: Path, *, workers: int = 1) -> Crops:
     return Crops.joined([Crops.load(path) for path in paths])
 
 
-def _parts(order: Order) -> Iterator[Order]:
-    for first in range(0, len(order.groups), _PART):
-        yield Order(order.groups[first : first + _PART], order.recipe)
+def _parts(job: RenderJob) -> Iterator[RenderJob]:
+    """Split a job into jobs of at most ``_PART`` groups."""
+    for first in range(0, len(job.groups), _PART):
+        yield RenderJob(job.groups[first : first + _PART], job.recipe)
 
 
-def _render(order: Order, path: Path) -> None:
-    crops = Crops.joined([pictured(group, order.recipe) for group in order.groups])
-    whole = path.with_suffix(".part.npz")
-    crops.save(whole)
-    whole.replace(path)  # a file that is there is whole
-
-
-def pictured(group: Group, recipe: Recipe) -> Crops:
-    """Crops of a group, in poses of its split's own."""
-    return picture_group(group, recipe, poses=_poses(split_of(group.seed) or "none"))
+def _render(job: RenderJob, path: Path) -> None:
+    """Render a job and write its crops."""
+    crops = Crops.joined(
+        [crops_of_group(group, job.recipe, poses=_poses(split_of(group.seed) or "none")) for group in job.groups]
+    )
+    temporary = path.with_suffix(".part.npz")
+    crops.save(temporary)
+    temporary.replace(path)  # so a file in the cache is always complete
 
 
 @cache
 def _poses(split: str) -> Poses:
-    """Poses of a split: none of them is another's."""
+    """Return the poses of a split; every split has different ones."""
     return plan_poses(int.from_bytes(hashlib.blake2b(split.encode(), digest_size=6).digest(), "little"))

@@ -1,4 +1,4 @@
-"""One training from nothing: crops, network, ONNX file, figures, card."""
+"""Complete training run: crops, network, ONNX file, evaluation and card."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 from mvpose.networks.session import Session
 from tools.reid import card, scores
-from tools.reid.evaluation import judged
-from tools.reid.network import DIMENSIONS, parameters
+from tools.reid.evaluation import evaluate
+from tools.reid.network import DIMENSIONS, count_parameters
 from tools.reid.plan import Plan
-from tools.reid.rendering import rendered
+from tools.reid.rendering import render_crops
 from tools.reid.training import Progress, export, train
 
 
@@ -23,47 +23,47 @@ def run(
     workers: int = 1,
     threads: int = 1,
     command: str = "",
-    say: Callable[[str], None] = print,
+    log: Callable[[str], None] = print,
 ) -> dict[str, object]:
-    """Train, write the ONNX file and its card, and return the card.
+    """Train a network, write the ONNX file and its card, and return the card.
 
     Args:
-        plan: how much of everything.
-        output: the ONNX file.
+        plan: size of the run.
+        output: path of the ONNX file.
         cache: folder of the rendered crops.
-        workers: processes that render.
-        threads: of PyTorch on a CPU.
-        command: that made it, for the card.
-        say: called with a line of progress now and then.
+        workers: number of rendering processes.
+        threads: number of threads of PyTorch on a CPU.
+        command: command line of the run, for the card.
+        log: called with lines of progress.
     """
-    output.parent.mkdir(parents=True, exist_ok=True)  # now, not after an hour
+    output.parent.mkdir(parents=True, exist_ok=True)  # before the training, so that an error comes early
     clock = time.perf_counter()
-    crops = rendered(plan.training_order, cache, workers=workers)
+    crops = render_crops(plan.training_job, cache, workers=workers)
     rendering = time.perf_counter() - clock
-    say(f"{len(crops)} crops of {plan.training} groups to learn from")
+    log(f"{len(crops)} training crops of {plan.training} groups")
 
     def report(at: Progress) -> None:
-        say(f"epoch {at.epoch} of {at.epochs}: identities {at.identities:.3f}, triplets {at.triplets:.3f}")
+        log(f"epoch {at.epoch} of {at.epochs}: identity loss {at.identities:.3f}, triplet loss {at.triplets:.3f}")
 
     clock = time.perf_counter()
     network = train(crops, seed=plan.seed, epochs=plan.epochs, threads=threads, report=report)
     training = time.perf_counter() - clock
-    card.card_path(output).unlink(missing_ok=True)  # that of a former training is not this file's
+    card.card_path(output).unlink(missing_ok=True)  # the card of a former training does not belong to this file
     export(network, output)
 
     session = Session(output)
-    validation = rendered(plan.validation_order, cache, workers=workers)
-    midpoint, slope = scores.scale(session, validation)
-    card.stamp(output, midpoint=midpoint, slope=slope, plan=plan, command=command)
-    say(f"a distance of {midpoint:.3f} is as likely of one person as of two; slope {slope:.3f}")
+    validation = render_crops(plan.validation_job, cache, workers=workers)
+    midpoint, slope = scores.fit_affinity(session, validation)
+    card.write_metadata(output, midpoint=midpoint, slope=slope, plan=plan, command=command)
+    log(f"affinity: midpoint at distance {midpoint:.3f}, slope {slope:.3f}")
 
-    judgement = judged(Session(output), plan, cache=cache, workers=workers, say=say)  # as anyone will read it
+    evaluation = evaluate(Session(output), plan, cache=cache, workers=workers, log=log)  # with the final metadata
     content: dict[str, object] = {
         "name": card.NAME,
         "command": command,
         "sha256": card.digest(output),
         "network": {
-            "parameters": parameters(network),
+            "parameters": count_parameters(network),
             "bytes": output.stat().st_size,
             "input_width_height": session.size,
             "dimensions": DIMENSIONS,
@@ -72,7 +72,7 @@ def run(
             "plan": card.of_plan(plan),
             "training": card.of_crops(crops),
             "validation": card.of_crops(validation),
-            **judgement.data,
+            **evaluation.data,
         },
         "training": {
             "rendering_seconds": round(rendering),
@@ -82,11 +82,11 @@ def run(
         },
         "affinity": {"midpoint": round(midpoint, 4), "slope": round(slope, 4), "from": "validation people"},
         "results": {
-            **judgement.results,
+            **evaluation.results,
             "milliseconds_a_crop_in_batches_of_20_on_one_thread": round(scores.milliseconds(session), 2),
         },
-        "distances": judgement.distances,
+        "distances": evaluation.distances,
     }
     card.write(output, content)
-    say(f"{output} and {card.card_path(output)} are written")
+    log(f"wrote {output} and {card.card_path(output)}")
     return content

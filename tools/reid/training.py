@@ -1,4 +1,4 @@
-"""Learning to tell people apart: margins between identities, hard pairs, crops changed in colour and covered."""
+"""Training of the re-ID network: margin softmax and triplet loss, with augmented crops."""
 
 from __future__ import annotations
 
@@ -18,19 +18,26 @@ from simharness.types.random_streams import stream
 from tools.reid.crops import FILL, Crops
 from tools.reid.network import DIMENSIONS, Mirrored, Network
 
-Thing = TypeVar("Thing")
+Item = TypeVar("Item")
 
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 
-_SCALE, _MARGIN, _SMOOTHING = 24.0, 0.2, 0.05  # of the softmax over identities
+_SCALE, _MARGIN, _SMOOTHING = 24.0, 0.2, 0.05  # scale, margin and label smoothing of the softmax over identities
 _TRIPLET_MARGIN = 0.3
-_BATCH = (4, 3, 2, 4)  # sites, groups of each, people of each, crops of each
-_RATE, _DECAY = 2.5e-3, 0.02
+_BATCH = (4, 3, 2, 4)  # sites, groups per site, people per group, crops per person
+_RATE, _DECAY = 2.5e-3, 0.02  # learning rate and weight decay
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where training is: epochs done of all, the epoch's mean losses, seconds since it began."""
+    """Progress of a training.
+
+    Attributes:
+        epoch: number of completed epochs.
+        epochs: total number of epochs.
+        identities, triplets: mean losses of the last epoch.
+        seconds: time since the start.
+    """
 
     epoch: int
     epochs: int
@@ -42,17 +49,18 @@ class Progress:
 def train(
     crops: Crops, *, seed: int, epochs: int, threads: int = 1, report: Callable[[Progress], None] = lambda _: None
 ) -> Network:
-    """Train a network; on CUDA where PyTorch finds it.
+    """Train a network, on CUDA if it is available.
 
-    Two losses: a softmax over the training identities with an additive margin (Wang et al., "CosFace", CVPR 2018), and
-    the hardest positive and negative of each crop in its batch (Hermans et al., "In defense of the triplet loss",
-    2017). Batches take several people of one group, so those dressed alike meet.
+    The loss is the sum of a softmax over the training identities with an additive margin (Wang et al., "CosFace", CVPR
+    2018) and the triplet loss with the hardest positive and negative of each crop in its batch (Hermans et al., "In
+    defense of the triplet loss", 2017). A batch has several people of the same group, so that it contains people
+    dressed alike.
 
     Args:
-        crops: to learn from.
-        seed: of the first weights, the batches and the changes.
-        epochs: times over all crops.
-        threads: of PyTorch on a CPU. Another number may change the last digits.
+        crops: training crops.
+        seed: seed of the initial weights, the batches and the augmentation.
+        epochs: number of passes over all crops.
+        threads: number of threads of PyTorch on a CPU. It may change the last digits.
         report: called after every epoch.
     """
     torch.manual_seed(seed)
@@ -61,7 +69,7 @@ def train(
     identity = torch.from_numpy(crops.identity)
     network = Network().to(device)
     for weights in network.parameters():
-        if weights.ndim == 4:  # convolutions run faster so
+        if weights.ndim == 4:  # convolutions run faster in this layout
             weights.data = weights.data.contiguous(memory_format=torch.channels_last)
     centers = nn.Parameter(functional.normalize(torch.randn(int(identity.max()) + 1, DIMENSIONS), dim=1).to(device))
     batches = Batches(crops, seed)
@@ -71,17 +79,17 @@ def train(
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimizer, _RATE, total_steps=epochs * len(batches), pct_start=0.15, div_factor=10, final_div_factor=100
     )
-    changes = torch.Generator().manual_seed(seed)
+    augmentation = torch.Generator().manual_seed(seed)
     images = torch.from_numpy(crops.images)
     start = time.perf_counter()
     for epoch in range(epochs):
         network.train()
         sums = np.zeros(2)
         for rows in batches.epoch(epoch):
-            batch = changed(images[rows], changes).to(device, memory_format=torch.channels_last)
-            who = identity[rows].to(device)
+            batch = augment(images[rows], augmentation).to(device, memory_format=torch.channels_last)
+            labels = identity[rows].to(device)
             descriptors = network(batch)
-            losses = margin_loss(descriptors, centers, who), triplet_loss(descriptors, who)
+            losses = margin_loss(descriptors, centers, labels), triplet_loss(descriptors, labels)
             optimizer.zero_grad(set_to_none=True)
             torch.stack(losses).sum().backward()
             optimizer.step()
@@ -93,9 +101,9 @@ def train(
 
 
 class Batches:
-    """Which crops learn together: from some sites several groups, some people of each, some crops of each person.
+    """Sampler of batches: several sites, groups per site, people per group and crops per person.
 
-    So everyone meets people in the same light, and people dressed alike.
+    So every batch compares people in the same light and people dressed alike.
     """
 
     def __init__(self, crops: Crops, seed: int) -> None:
@@ -113,50 +121,50 @@ class Batches:
         return self._length
 
     def epoch(self, number: int) -> Iterator[Tensor]:
-        """Rows of every batch of an epoch."""
+        """Draw the rows of every batch of an epoch."""
         rng = stream(self._seed, "train", "batches", number)
         for _ in range(self._length):
-            groups = [group for site in some(rng, self._sites, _BATCH[0]) for group in some(rng, site, _BATCH[1])]
-            people = [rows for group in groups for rows in some(rng, group, _BATCH[2])]
+            groups = [group for site in choose(rng, self._sites, _BATCH[0]) for group in choose(rng, site, _BATCH[1])]
+            people = [rows for group in groups for rows in choose(rng, group, _BATCH[2])]
             chosen = [rng.choice(rows, _BATCH[3], replace=len(rows) < _BATCH[3]) for rows in people]
             yield torch.from_numpy(np.concatenate(chosen))
 
 
-def some(rng: np.random.Generator, things: Sequence[Thing], count: int) -> list[Thing]:
-    """As many different ones as asked for, or all of them where there are not so many."""
-    return [things[int(k)] for k in rng.choice(len(things), min(count, len(things)), replace=False)]
+def choose(rng: np.random.Generator, items: Sequence[Item], count: int) -> list[Item]:
+    """Draw ``count`` different items, or all of them in random order if there are fewer."""
+    return [items[int(k)] for k in rng.choice(len(items), min(count, len(items)), replace=False)]
 
 
-def margin_loss(descriptors: Tensor, centers: Tensor, who: Tensor) -> Tensor:
-    """Softmax over identities of scaled cosines, the right one lowered by a margin."""
+def margin_loss(descriptors: Tensor, centers: Tensor, labels: Tensor) -> Tensor:
+    """Return the cross-entropy of a softmax over scaled cosines, that of the correct identity lowered by a margin.
+
+    Args:
+        descriptors: unit descriptors, (n, D).
+        centers: centres of the identities, (I, D).
+        labels: identities of the crops, (n,).
+    """
     cosine = descriptors @ functional.normalize(centers, dim=1).T
-    lowered = cosine - _MARGIN * functional.one_hot(who, len(centers))
-    return functional.cross_entropy(_SCALE * lowered, who, label_smoothing=_SMOOTHING)
+    lowered = cosine - _MARGIN * functional.one_hot(labels, len(centers))
+    return functional.cross_entropy(_SCALE * lowered, labels, label_smoothing=_SMOOTHING)
 
 
-def triplet_loss(descriptors: Tensor, who: Tensor) -> Tensor:
-    """By how much the farthest crop of one's own is not nearer, by a margin, than the nearest of others."""
+def triplet_loss(descriptors: Tensor, labels: Tensor) -> Tensor:
+    """Return the batch-hard triplet loss of unit descriptors (n, D) with identities (n,)."""
     distance = (2 - 2 * descriptors @ descriptors.T).clamp(min=1e-6).sqrt()
-    same = who[:, None] == who
+    same = labels[:, None] == labels
     farthest = torch.where(same, distance, -torch.inf).amax(dim=1)
     nearest = torch.where(same, torch.inf, distance).amin(dim=1)
     return functional.relu(farthest - nearest + _TRIPLET_MARGIN).mean()
 
 
-def normalised(images: Tensor) -> Tensor:
-    """Crops (n, 128, 64, 3) uint8 as the network wants them, (n, 3, 128, 64)."""
-    mean, std = (torch.tensor(values).view(3, 1, 1) for values in (MEAN, STD))
-    return (images.permute(0, 3, 1, 2).float() / 255 - mean) / std
-
-
-def changed(images: Tensor, generator: torch.Generator) -> Tensor:
-    """Normalised crops (n, 3, 128, 64), mirrored, moved, tinted and covered by chance."""
+def augment(images: Tensor, generator: torch.Generator) -> Tensor:
+    """Convert crops (n, 128, 64, 3) uint8 to the input of the network, randomly mirrored, moved, tinted and covered."""
     n, height, width = images.shape[:3]
     drawn = torch.rand((16, n), generator=generator)
     normal = torch.randn((7, n), generator=generator)
     light = images.permute(0, 3, 1, 2).float() / 255
 
-    # Mirrored, and cut a little beside the box. Beyond it is the colour that normalisation makes 0.
+    # Mirror, shift and scale. Pixels outside the crop get the colour that normalisation maps to 0.
     turn = torch.where(drawn[0] < 0.5, -1.0, 1.0)
     zeros = torch.zeros(n)
     theta = torch.stack(
@@ -170,7 +178,7 @@ def changed(images: Tensor, generator: torch.Generator) -> Tensor:
     grid = functional.affine_grid(theta, [n, 3, height, width], align_corners=False)
     light = functional.grid_sample(light - fill, grid, align_corners=False) + fill
 
-    # Tinted, brighter or darker, more or less contrast.
+    # Change tint, brightness and contrast.
     gain = torch.exp(0.10 * normal[4])[:, None] * torch.exp(
         torch.stack([0.06 * normal[5], torch.zeros(n), 0.06 * normal[6]], 1)
     )
@@ -178,7 +186,7 @@ def changed(images: Tensor, generator: torch.Generator) -> Tensor:
     middle = light.mean(dim=(1, 2, 3), keepdim=True)
     light = middle + (light - middle) * (0.8 + 0.4 * drawn[1])[:, None, None, None]
 
-    # Covered: by a patch of another crop, or by a flat colour.
+    # Cover a rectangle by a patch of another crop or by a uniform colour.
     y, x = torch.arange(height)[None, :, None], torch.arange(width)[None, None, :]
     tall, wide = (0.15 + 0.35 * drawn[2]) * height, (0.25 + 0.5 * drawn[3]) * width
     top, left = drawn[4] * (height - tall), drawn[5] * (width - wide)
@@ -193,7 +201,7 @@ def changed(images: Tensor, generator: torch.Generator) -> Tensor:
 
 
 def export(network: Network, path: Path) -> None:
-    """Write the network, :class:`Mirrored`, as ONNX: ``crops`` (n, 3, 128, 64) to ``descriptors`` (n, 192)."""
+    """Write :class:`Mirrored` of the network as ONNX, from ``crops`` (n, 3, 128, 64) to ``descriptors`` (n, 192)."""
     crop = torch.zeros(2, 3, 128, 64)
     torch.onnx.export(
         Mirrored(network).eval(),
