@@ -242,6 +242,6 @@ def obstructs(prop: Prop, motion: Motion) -> bool:
     """Return whether a pelvis comes too near to the footprint of a prop."""
     pose = prop.trajectory.at(motion.time)
     turn = Rotation.from_quat(pose[:, 3:], scalar_first=True).inv()
-    way = turn.apply(np.column_stack([motion.root[:, :2] - pose[:, :2], np.zeros(len(pose))]))[:, :2]
-    outside = np.maximum(np.abs(way) - np.array(prop.size[:2]) / 2, 0.0)
+    offset = turn.apply(np.column_stack([motion.root[:, :2] - pose[:, :2], np.zeros(len(pose))]))[:, :2]
+    outside = np.maximum(np.abs(offset) - np.array(prop.size[:2]) / 2, 0.0)
     return bool(np.hypot(*outside.T).min() < _BESIDE)

@@ -99,8 +99,8 @@ class RecordedPath:
     def position(self, time: ArrayLike) -> Floats:
         """Return the position of the pelvis at times (...) in seconds, (..., 2) metres."""
         time = np.asarray(time, float)
-        way = np.stack([np.interp(time, self.time, self.offset[:, k]) for k in range(2)], axis=-1)
-        return self.spot.place + way @ rotation_2d(self.spot.bearing).T
+        path = np.stack([np.interp(time, self.time, self.offset[:, k]) for k in range(2)], axis=-1)
+        return self.spot.place + path @ rotation_2d(self.spot.bearing).T
 
 
 Track = Spot | Loop | RecordedPath
@@ -173,8 +173,8 @@ def draw_recorded(rng: np.random.Generator, *, half: float, time: Floats, offset
     """Draw rotation and shift of a recorded path; None if the rotated path does not fit into the square."""
     bearing = float(rng.uniform(-np.pi, np.pi))
     share = rng.uniform(size=2)
-    way = offset @ rotation_2d(bearing).T
-    low, high = -half - way.min(axis=0), half - way.max(axis=0)
+    path = offset @ rotation_2d(bearing).T
+    low, high = -half - path.min(axis=0), half - path.max(axis=0)
     if (low > high).any():
         return None
     return RecordedPath(Spot(low + share * (high - low), bearing), time, offset)

@@ -157,11 +157,11 @@ def _place(
         _draw(rng, request, board, half=half, wide=wide, following=_FOLLOWING if attempt >= alone else 0.0)
         for attempt in range(_TRIES)
     )
-    found: Iterable[Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
+    candidates: Iterable[Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
     if plan and isinstance(request, SpotRequest):
-        found = sorted(found, key=lambda track: board.elbow_room(track, request, half))
+        candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
     refusals = 0
-    for track in found:
+    for track in candidates:
         if admit(index, track, list(board.tracks)):
             board.add(index, track, request)
             break
@@ -175,7 +175,7 @@ class _Board:
     """Tracks found so far, with their positions at the coarse checks."""
 
     def __init__(self, span: tuple[float, float], spacing: float, around: float) -> None:
-        self.tracks: dict[int, Track] = {}  # by the index of the request, in the order in which they were found
+        self.tracks: dict[int, Track] = {}  # by the index of the request, in the order in which they were added
         self._needs: list[float] = []
         self._spacing, self._around = spacing, around
         self._time = np.linspace(*span, max(2, int(np.ceil((span[1] - span[0]) / _COARSE)) + 1))

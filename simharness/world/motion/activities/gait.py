@@ -40,7 +40,7 @@ _FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at hee
 _STIFF_TOES = np.radians(
     250.0
 )  # toes do not bend in this model: a heel that rose fully over their tips would lift the leg
-_EARLY = 0.03  # fraction of the stride by which feet land nearer: the leg would be too short at heel strike
+_EARLY = 0.03  # fraction of the stride by which feet land nearer; otherwise the leg would be too short at heel strike
 _HASTE = 1.02  # the foot is above its next footprint a little before it lands
 _CLEARANCE = 0.02  # metres between the swinging foot and the floor
 _SAMPLES = 240

@@ -37,10 +37,10 @@ def shake_hands(
     place = meeting.point + np.column_stack([np.zeros((len(time), 2)), shaken])
     motions = []
     for person, mover in enumerate(performers):
-        own = meeting.spots[person]
-        motion = look_ahead(gesture("stand", mover, own, time, rng=rng))
+        home = meeting.spots[person]
+        motion = look_ahead(gesture("stand", mover, home, time, rng=rng))
         motion = lean_forward(motion, on * (3.0 + meeting.lean[person]))
-        turn = handshake_orientation(own.bearing + _INWARD)
+        turn = handshake_orientation(home.bearing + _INWARD)
         motions.append(
             reach_with(mover, motion, "right", place, turn=np.tile(turn, (len(time), 1, 1)), weight=on, guess=_HELD_OUT)
         )

@@ -233,8 +233,10 @@ def _steps(mover: Kinematics, home: Spot, course: _Course, u: Floats) -> tuple[P
         times["left"].append((start + 0.5 * (end - start), start + 0.96 * (end - start)))
     feet, aside = {}, np.zeros(len(u))
     for side, (forth, back) in times.items():
-        start = stance(mover, side)
-        feet[side] = foot_path(mover, home, u, start, [(*forth, start.moved(step)), (*back, start)], lift=_LIFT)
+        footprint = stance(mover, side)
+        feet[side] = foot_path(
+            mover, home, u, footprint, [(*forth, footprint.moved(step)), (*back, footprint)], lift=_LIFT
+        )
         over = _SHIFT if side == "right" else -_SHIFT
         aside += over * (bump(u, *forth) + bump(u, *back))
     pelvis = Pelvis(

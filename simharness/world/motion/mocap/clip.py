@@ -47,8 +47,8 @@ class Clip:
         file, duration = self.recording.file, self.recording.duration
         if duration < TURN:
             raise ValueError(
-                f"people.motion.file: {file} lasts {duration:.3g} s ({len(self.recording)} frames), expected {TURN:g} s "
-                "or more: choose a longer recording"
+                f"people.motion.file: {file} lasts {duration:.3g} s ({len(self.recording)} frames), expected "
+                f"{TURN:g} s or more: choose a longer recording"
             )
         if not 0 <= self.start <= duration:
             raise ValueError(
@@ -72,9 +72,9 @@ class Clip:
     def path(self, kinematics: Kinematics) -> Floats:
         """Return the path of the pelvis over ``time``, (N, 2) metres; at ``start`` it is at the origin, facing +x."""
         turns = Rotation.from_matrix(self._source.turns["pelvis"]).as_quat(scalar_first=True)
-        way = pelvis_path(self._source, kinematics)
-        place, bearing = self._start_pose(np.concatenate([way, turns], axis=1))
-        return Rotation.from_euler("Z", -bearing).apply(way - place)[:, :2]
+        pelvis = pelvis_path(self._source, kinematics)
+        place, bearing = self._start_pose(np.concatenate([pelvis, turns], axis=1))
+        return Rotation.from_euler("Z", -bearing).apply(pelvis - place)[:, :2]
 
     def perform(
         self,

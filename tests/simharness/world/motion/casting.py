@@ -1,4 +1,4 @@
-"""Bodies for tests of what several people do; fitting one takes a while, so each is made once."""
+"""Bodies for tests with several people; each is made once, because fitting a body is slow."""
 
 from functools import cache
 
@@ -12,12 +12,12 @@ from simharness.world.motion.poses.kinematics import Kinematics
 
 @cache
 def performer(k: int, *, child: bool = False) -> Kinematics:
-    """A person, always the same for the same number."""
+    """Return the body of a person, always the same for the same number."""
     return Kinematics(make_body(draw_shape(stream(k, "casting"), child=child)))
 
 
 def foot_vertices(mover: Kinematics) -> dict[str, np.ndarray]:
-    """By side, which vertices of the skin are of the foot."""
+    """Return the mask of the skin vertices of the foot, by side."""
     body = mover.body
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     return {

@@ -1,4 +1,4 @@
-"""What every activity of one person must be, told from the skin and the joints, on several bodies."""
+"""Properties of every activity of one person, measured on skin and joints of several bodies."""
 
 from dataclasses import dataclass
 from typing import get_args
@@ -22,7 +22,7 @@ TIME = motion_clock(8.0, margin=1.0)
 RATE = 60.0
 FASTEST = {"walk": 6.0, "run": 10.0}  # m/s, of any joint; of others 6
 HARDEST = {"run": 160.0}  # m/s², of any joint; of others 60
-TOUCHING = 0.0015  # metres over the floor, or over the block of "step"
+TOUCHING = 0.0015  # metres above the floor, or over the block of "step"
 
 
 @dataclass
@@ -54,7 +54,7 @@ def perform(name: str, kinematics: Kinematics, time: np.ndarray, *, seed: int) -
 
 @pytest.fixture(scope="module")
 def bodies() -> list[Kinematics]:
-    """A woman, a man, and someone small."""
+    """Return a woman, a man, and a small woman."""
     drawn = [make_body(draw_shape(stream(seed, "singles"))) for seed in range(12)]
     women = [body for body in drawn if body.shape.gender > 0.5]
     men = [body for body in drawn if body.shape.gender < 0.5]
@@ -91,7 +91,7 @@ def test_nothing_sinks_into_the_floor(done):
     lowest = done.skins[..., 2].min(axis=1)
     assert lowest.min() > -0.01
     if done.name not in ("run", "step"):
-        assert lowest.max() < 0.005  # and somebody who does not run is always on it
+        assert lowest.max() < 0.005  # without running, some skin always touches the floor
 
 
 def test_stance_feet_do_not_slide(done):
@@ -99,8 +99,8 @@ def test_stance_feet_do_not_slide(done):
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     blocks = [prop.size[2] for prop in done.performance.props if prop.kind == "step"]
     for side in ("Left", "Right"):
-        own = np.isin(most, [body.index(f"{side}Foot"), body.index(f"{side}ToeBase")])
-        foot = done.skins[:, own].astype(float)
+        on_foot = np.isin(most, [body.index(f"{side}Foot"), body.index(f"{side}ToeBase")])
+        foot = done.skins[:, on_foot].astype(float)
         touching = np.any([np.abs(foot[..., 2] - level) < TOUCHING for level in (0.0, *blocks)], axis=0)
         if done.name == "lie":
             touching &= foot[..., 2].min(axis=1, keepdims=True) + 0.1 > foot[..., 2].max(axis=1, keepdims=True)
@@ -118,7 +118,7 @@ def test_speeds_are_human_and_do_not_jump(done):
     assert np.linalg.norm(acceleration, axis=-1).max() < HARDEST.get(done.name, 60.0)
 
 
-def test_something_happens(done):
+def test_joints_move(done):
     moved = np.linalg.norm(done.joints - done.joints[0], axis=-1).max()
     assert moved > {"stand": 0.03, "crouch": 0.1}.get(done.name, 0.2)
 
@@ -130,7 +130,7 @@ def test_pelvis_stays_within_the_clearance(done):
     assert reach < SOLO[done.name].clearance + 0.5 * done.kinematics.body.stature  # an arm and a shoulder
 
 
-def test_an_instant_does_not_depend_on_how_long_it_goes_on(done):
+def test_a_frame_does_not_depend_on_the_duration(done):
     short = perform(done.name, done.kinematics, TIME[:150], seed=done_seed(done))
     np.testing.assert_allclose(short.motions[0].root, done.motion.root[:150], atol=1e-9)
     np.testing.assert_allclose(short.motions[0].angles, done.motion.angles[:150], atol=1e-7)
@@ -140,7 +140,7 @@ def test_an_instant_does_not_depend_on_how_long_it_goes_on(done):
 
 
 def done_seed(done: Done) -> int:
-    """The seed that gives the very same performance."""
+    """Return the seed that gives the same performance."""
     for seed in range(3):
         again = perform(done.name, done.kinematics, TIME[:3], seed=seed)
         if np.allclose(again.motions[0].angles, done.motion.angles[:3], atol=1e-6):

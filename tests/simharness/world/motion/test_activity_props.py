@@ -1,4 +1,4 @@
-"""What people do with things: the seat carries them, the box is in their hands, the block is under their feet."""
+"""Activities with props: the seat supports the sitter, the box is in both hands, the block is under both feet."""
 
 import numpy as np
 import pytest
@@ -34,13 +34,13 @@ def perform(name, kinematics, seed):
 
 
 def of_bones(body, *bones):
-    """Which of the skin belongs to bones, (n,)."""
+    """Return the mask of the skin vertices of some bones, (n,)."""
     most = body.weight_bones[np.arange(len(body.vertices)), body.weights.argmax(axis=1)]
     return np.isin(most, [body.index(name) for name in bones])
 
 
 def in_prop(prop, points, time):
-    """World points (T, ..., 3) in the frame of the prop at each time."""
+    """Transform world points (T, ..., 3) to the frame of the prop at each time."""
     pose = prop.trajectory.at(time)
     yaw = 2 * np.arctan2(pose[:, 6], pose[:, 3])
     offset = points - pose[:, :3].reshape(len(time), *[1] * (points.ndim - 2), 3)
@@ -50,7 +50,7 @@ def in_prop(prop, points, time):
     )
 
 
-def test_the_seat_is_touched_and_not_sunk_into(kinematics, seed):
+def test_the_skin_touches_the_seat_without_penetration(kinematics, seed):
     motion, chair = perform("sit", kinematics, seed)
     assert chair.kind == "chair"
     assert 0.3 < chair.size[2] < 0.55
@@ -69,7 +69,7 @@ def test_the_seat_is_touched_and_not_sunk_into(kinematics, seed):
     seated = pelvis < pelvis.min() + 0.03
     assert 0.2 < seated.mean() < 0.85
     assert np.abs(gap[seated]).max() < 0.02
-    # Nobody leans through the backrest, whose front is 4 cm ahead of the back edge.
+    # The trunk does not penetrate the backrest, whose front is 4 cm ahead of the back edge.
     trunk = (local[..., 2] > height + 0.1) & (local[..., 2] < height + 0.45) & (np.abs(local[..., 1]) < 0.15)
     assert local[trunk][:, 0].min() > -depth / 2 + 0.02
 
@@ -111,15 +111,15 @@ def test_the_box_does_not_go_through_the_body(kinematics, seed):
     assert depth.max() < 0.04
 
 
-def test_both_feet_come_to_stand_on_the_block(kinematics, seed):
+def test_both_feet_stand_on_the_block(kinematics, seed):
     motion, block = perform("step", kinematics, seed)
     height = block.size[2]
     assert 0.08 < height < 0.25
     body = kinematics.body
     lowest = {}
     for side in ("Left", "Right"):
-        own = of_bones(body, f"{side}Foot", f"{side}ToeBase")
-        feet = np.array([body.skin(pose)[own] for pose in kinematics.transforms(motion)[::6]], float)
+        on_foot = of_bones(body, f"{side}Foot", f"{side}ToeBase")
+        feet = np.array([body.skin(pose)[on_foot] for pose in kinematics.transforms(motion)[::6]], float)
         local = in_prop(block, feet, TIME[::6])
         inside = (np.abs(local[..., 0]) < block.size[0] / 2) & (np.abs(local[..., 1]) < block.size[1] / 2)
         assert (local[..., 2][inside] > height - 0.01).all()  # never inside the block
@@ -130,6 +130,6 @@ def test_both_feet_come_to_stand_on_the_block(kinematics, seed):
 
 
 @pytest.mark.parametrize("name", ["sit", "carry", "step"])
-def test_other_bodies_find_other_props(name):
+def test_props_fit_the_body(name):
     sizes = {perform(name, Kinematics(make_body(draw_shape(stream(seed, "props")))), seed)[1].size for seed in range(3)}
     assert len(sizes) == 3

@@ -23,7 +23,7 @@ def cast(count):
     return [performer(k % 4, child=k % 4 == 3) for k in range(count)]
 
 
-def test_activities_are_handed_out_in_turn_and_pairs_take_two():
+def test_activities_are_assigned_in_turn_and_pairs_take_two():
     one, two = (Activity(name, n, Spot, 0.0, solo(lambda: None)) for name, n in (("one", 1), ("two", 2)))
     spare = Activity("stand", 1, Spot, 0.0, solo(lambda: None))
     groups = assign_activities([one, two], 7, fallback=spare)
@@ -34,12 +34,12 @@ def test_activities_are_handed_out_in_turn_and_pairs_take_two():
         ((4, 5), "two"),
         ((6,), "one"),
     ]
-    assert assign_activities([two], 3, fallback=spare)[-1].activity.name == "stand"  # nobody is left to greet
+    assert assign_activities([two], 3, fallback=spare)[-1].activity.name == "stand"  # no partner is left
     assert assign_activities([one], 0, fallback=spare) == ()
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_people_who_do_nothing_together_keep_out_of_each_other(seed):
+def test_people_of_different_groups_do_not_touch(seed):
     people = cast(6)
     made = choreograph(
         scenario(seed, count=6, activities=("walk", "point", "walk", "wave"), area=2.0, spacing=0.6), people, CLOCK
@@ -83,45 +83,44 @@ def test_one_more_person_changes_none_of_the_others():
         np.testing.assert_array_equal(before.angles, after.angles)
 
 
-def test_too_close_is_told_with_its_keys():
+def test_an_area_too_small_names_its_keys():
     with pytest.raises(ValueError, match=r"people.count = 4 .*people.area = 0.3 m .*people.spacing = 0.15 m"):
         choreograph(scenario(count=4, activities=("point",), area=0.3, spacing=0.15), cast(4), CLOCK[:60])
 
 
-def test_nobody():
+def test_no_people():
     assert choreograph(scenario(count=0), [], CLOCK).motions == ()
 
 
 @pytest.mark.parametrize("name", ["wave", "table", "hand_over"])
-def test_what_is_done_on_a_spot_is_carried_there(name):
-    """Done at the origin and carried to a spot it is what is done on that spot."""
+def test_a_performance_moved_to_a_spot_equals_one_made_there(name):
     activity = activities()[name]
     people = [performer(0), performer(1)][: activity.performers]
     spot = Spot(np.array([0.7, -1.1]), 2.2)
     clock = CLOCK[:90]
-    there, carried = (
+    expected, result = (
         activity.perform(people, where, clock, rng=stream(1, name), pace=1.1)
         for where in (spot, Spot(np.zeros(2), 0.0))
     )
-    carried = move_to(carried, spot)
-    for one, other in zip(there.motions, carried.motions, strict=True):
+    result = move_to(result, spot)
+    for one, other in zip(expected.motions, result.motions, strict=True):
         np.testing.assert_allclose(one.root[:, :3], other.root[:, :3], atol=1e-6)
         np.testing.assert_allclose(one.angles, other.angles, atol=2e-4)
-    for one, other in zip(there.props, carried.props, strict=True):
+    for one, other in zip(expected.props, result.props, strict=True):
         np.testing.assert_allclose(one.trajectory.at(clock)[:, :3], other.trajectory.at(clock)[:, :3], atol=1e-6)
 
 
-def test_carried_poses_turn_about_the_vertical():
+def test_moved_poses_rotate_about_the_vertical():
     pose = np.array([[1.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]])
     prop = Prop("box", (0.2, 0.3, 0.2), Trajectory(np.zeros(1), pose))
-    (carried,) = move_to(Performance((), (prop,)), Spot(np.array([2.0, 3.0]), np.pi / 2)).props
-    np.testing.assert_allclose(carried.trajectory.pose[0, :3], [2.0, 4.0, 0.5], atol=1e-12)
-    turn = Rotation.from_quat(carried.trajectory.pose[0, 3:], scalar_first=True)
+    (result,) = move_to(Performance((), (prop,)), Spot(np.array([2.0, 3.0]), np.pi / 2)).props
+    np.testing.assert_allclose(result.trajectory.pose[0, :3], [2.0, 4.0, 0.5], atol=1e-12)
+    turn = Rotation.from_quat(result.trajectory.pose[0, 3:], scalar_first=True)
     np.testing.assert_allclose(turn.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize(("ahead", "blocked"), [(0.2, True), (0.45, True), (0.55, False), (2.0, False)])
-def test_a_thing_is_in_the_way_of_whoever_comes_near_its_ground_plan(ahead, blocked):
+def test_a_prop_obstructs_pelvises_near_its_footprint(ahead, blocked):
     made = choreograph(scenario(count=1, activities=("stand",)), cast(1), CLOCK)
     (motion,) = made.motions
     place = [*(motion.root[0, :2] + [0.0, ahead]), 0.0, np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]

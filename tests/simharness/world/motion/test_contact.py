@@ -16,7 +16,7 @@ TIME = np.arange(0.0, 3.0, 0.1)
 
 
 def gliding(start, end, *, yaw=0.0, pose=None):
-    """Someone in one pose who glides from one place to the other."""
+    """Return the motion of a person in a fixed pose that moves from one position to another."""
     share = np.linspace(0, 1, len(TIME))[:, None]
     root = np.zeros((len(TIME), 7))
     root[:, :2] = np.array(start) + share * (np.array(end) - np.array(start))
@@ -29,7 +29,7 @@ def gliding(start, end, *, yaw=0.0, pose=None):
 
 
 def nearest_by_brute_force(one, other, first, second, rows):
-    """The least signed distances of all pairs of shapes, by MuJoCo's distance rather than by its contacts."""
+    """Return the least signed distance of all pairs of geometries, from MuJoCo's distances instead of its contacts."""
     spec = mujoco.MjSpec()
     for prefix, mover in (("a/", one), ("b/", other)):
         spec.attach(person_spec(mover.body, prefix[:-1]), prefix=prefix, frame=spec.worldbody.add_frame())
@@ -57,8 +57,8 @@ def test_depth_is_the_distance_of_the_nearest_shapes():
         assert between[row] == pytest.approx(max(0.0, -nearest), abs=2e-4)
 
 
-def test_an_arm_stretched_out_far_is_noticed():
-    """The pelvises are over a metre apart, and only a hand is in the other."""
+def test_contact_of_a_stretched_arm_is_detected():
+    """The pelvises are more than a metre apart, and only a hand penetrates the other body."""
     one, other = performer(0), performer(1)
     pose = {"right_shoulder_flexion": 90.0}
     side = float(one.arms["right"].end[1])
@@ -68,8 +68,8 @@ def test_an_arm_stretched_out_far_is_noticed():
     assert 1.4 - TIME[first] / TIME[-1] > 0.75 * reach  # long before the trunks meet
 
 
-def test_nobody_is_overlooked_by_looking_near_only():
-    """Whether all instants are asked or only those at which boxes meet, the depths are the same."""
+def test_bounding_rectangles_miss_no_contact():
+    """Depths are the same for all frames and for those in which the bounding rectangles overlap."""
     cast = [performer(0), performer(1)]
     motions = [
         gesture(name, mover, Spot(np.array(place), bearing), TIME, rng=stream(k, "contact"))

@@ -73,6 +73,6 @@ def test_stride_and_speed_are_human(kinematics):
     assert stroll.vigour < gait.vigour
 
 
-def test_nobody_runs(kinematics):
+def test_running_speed_is_refused(kinematics):
     with pytest.raises(ValueError, match=r"tall walks at 0\.\d+ to \d\.\d+ m/s, not at 4 m/s"):
         make_gait(kinematics, speed=4.0)

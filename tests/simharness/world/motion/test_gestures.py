@@ -50,7 +50,7 @@ def test_limits_and_smoothness(done):
     assert np.degrees(np.abs(np.diff(velocity, axis=0)).max()) < 90
 
 
-def test_pelvis_stays_on_the_spot_and_faces_its_way(done):
+def test_pelvis_stays_on_the_spot_and_keeps_its_bearing(done):
     name, kinematics, motion = done
     assert np.linalg.norm(motion.root[:, :2] - SPOT.place, axis=1).max() < SWAY
     joints = kinematics.joints(motion)
@@ -59,7 +59,7 @@ def test_pelvis_stays_on_the_spot_and_faces_its_way(done):
     assert np.abs(np.angle(np.exp(1j * (facing - SPOT.bearing)))).max() < np.radians(30), name
 
 
-def test_hands_do_what_the_name_says(kinematics):
+def test_hands_perform_the_named_gesture(kinematics):
     joints = {}
     for name in GESTURES:
         joints[name] = kinematics.joints(gesture(name, kinematics, SPOT, TIME, rng=stream(6, name)))

@@ -1,4 +1,4 @@
-"""What every pair activity must be, on two adults, and on an adult and a child."""
+"""Properties of every activity of two people, with two adults, and with an adult and a child."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from simharness.world.motion.trajectory import RATE
 PAIRED = {name: each for name, each in activities().items() if each.performers == 2}
 TIME = np.arange(-1.0, 7.0, 1 / RATE)
 SPOT = Spot(np.array([0.4, -0.3]), 0.8)
-TOUCHING = 0.002  # metres over the floor
+TOUCHING = 0.002  # metres above the floor
 
 
 @dataclass
@@ -48,8 +48,8 @@ def test_feet_do_not_skate_or_sink(played):
         feet = foot_vertices(mover)
         skins = np.array([mover.body.skin(pose) for pose in mover.transforms(motion)[::3]])
         assert skins[..., 2].min() > -0.01
-        for own in feet.values():
-            foot = skins[:, own].astype(float)
+        for on_foot in feet.values():
+            foot = skins[:, on_foot].astype(float)
             touching = foot[..., 2] < TOUCHING
             both = touching[1:] & touching[:-1]
             moved = np.linalg.norm(np.diff(foot[..., :2], axis=0), axis=-1)
@@ -70,7 +70,7 @@ def test_joints_keep_their_limits_and_do_not_jump(played):
         assert np.linalg.norm(np.diff(velocity, axis=0), axis=-1).max() * RATE < 60.0
 
 
-def test_people_in_one_another(played):
+def test_penetration_is_small(played):
     depth = penetration(played.cast, played.performance.motions, TIME[::4])
     assert depth.max() < 0.05
 
@@ -90,7 +90,7 @@ def test_first_and_second_face_each_other_along_the_bearing(played):
     assert np.degrees(np.arctan2(np.abs(across), along)).max() < 25
 
 
-def test_an_instant_does_not_depend_on_how_long_it_goes_on(played):
+def test_a_frame_does_not_depend_on_the_duration(played):
     short = play(played.name, played.cast, seed=len(played.name), time=TIME[:120])
     for one, other in zip(short.motions, played.performance.motions, strict=True):
         np.testing.assert_allclose(one.angles, other.angles[:120], atol=1e-9)
@@ -99,7 +99,7 @@ def test_an_instant_does_not_depend_on_how_long_it_goes_on(played):
         np.testing.assert_allclose(one.trajectory.at(TIME[:120]), other.trajectory.at(TIME[:120]), atol=1e-9)
 
 
-def test_things_do_not_jump(played):
+def test_props_do_not_jump(played):
     for prop in played.performance.props:
         pose = prop.trajectory.at(TIME)
         velocity = np.diff(pose[:, :3], axis=0) * RATE
@@ -112,7 +112,7 @@ def palms(mover, motion, side):
 
 
 def runs(on):
-    """The lengths of the runs of true values."""
+    """Return the lengths of the runs of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
     return edges[1::2] - edges[::2]
 
@@ -146,15 +146,15 @@ def test_hug_closes_both_pairs_of_arms(cast, seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_thing_is_always_in_somebodys_hand(cast, seed):
+def test_the_object_is_always_in_a_hand(cast, seed):
     made = play("hand_over", cast, seed=seed)
     (prop,) = made.props
     middle = prop.trajectory.at(TIME)[:, :3]
     near = []
     for mover, motion in zip(cast, made.motions, strict=True):
         hand = palms(mover, motion, "right") - middle
-        own = np.linalg.norm(hand, axis=1)
-        near.append(own < np.linalg.norm(prop.size))
+        distance = np.linalg.norm(hand, axis=1)
+        near.append(distance < np.linalg.norm(prop.size))
         steady = np.linalg.norm(hand - np.median(hand[near[-1]], axis=0), axis=1) < 0.012
         near[-1] &= steady
     assert (near[0] | near[1]).mean() > 0.97  # each hand stays where it grips while it holds
@@ -164,7 +164,7 @@ def test_the_thing_is_always_in_somebodys_hand(cast, seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_at_the_table_hands_are_on_it_and_not_in_it(cast, seed):
+def test_hands_are_on_the_table_and_not_in_it(cast, seed):
     made = play("table", cast, seed=seed)
     (top,) = (prop for prop in made.props if prop.kind == "table")
     for mover, motion in zip(cast, made.motions, strict=True):
@@ -182,7 +182,7 @@ def test_at_the_table_hands_are_on_it_and_not_in_it(cast, seed):
         assert (np.abs(over) < 0.03).all()  # sits on it
 
 
-def test_they_are_not_all_alike(cast):
+def test_motions_differ_between_seeds(cast):
     for name in PAIRED:
         one, again, other = (play(name, cast, seed=seed, time=TIME[:60]).motions[0].angles for seed in (1, 1, 2))
         np.testing.assert_array_equal(one, again)

@@ -49,7 +49,7 @@ def test_the_palm_lies_on_the_skin_in_any_pose(kinematics, standing):
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_a_hand_goes_where_it_is_sent(kinematics, standing, side):
+def test_a_hand_reaches_its_target_position(kinematics, standing, side):
     sign = 1.0 if side == "left" else -1.0
     chest = kinematics.standing_height + kinematics.arms[side].anchors[0, 2]
     length = np.linalg.norm(kinematics.arms[side].end - kinematics.arms[side].anchors[0])
@@ -66,7 +66,7 @@ def test_a_hand_goes_where_it_is_sent(kinematics, standing, side):
     assert np.abs(np.diff(moved.angles, axis=0)).max() < 0.2
 
 
-def test_a_hand_turns_as_it_is_told(kinematics, standing):
+def test_a_hand_reaches_its_target_orientation(kinematics, standing):
     guess = arm_angles(kinematics, shoulder_flexion=30.0, elbow_flexion=80.0)
     angles = standing.angles.copy()
     angles[:, arm_columns(kinematics, "right")] = guess + np.radians([5.0, 3, -4, 6, 10, 8])
@@ -78,7 +78,7 @@ def test_a_hand_turns_as_it_is_told(kinematics, standing):
     assert Rotation.from_matrix(got_turn.swapaxes(1, 2) @ turn).magnitude().max() < np.radians(6)
 
 
-def test_what_is_out_of_reach_is_pointed_at_smoothly(kinematics, standing):
+def test_a_target_out_of_reach_is_approached_smoothly(kinematics, standing):
     shoulder = kinematics.standing_height + kinematics.arms["left"].anchors[0, 2]
     ahead = 0.2 + 2.0 * ease(TIME / 2.0)  # metres: from well within reach to far out of it
     far = np.stack([ahead, 0.2 + 0 * TIME, shoulder + 0 * TIME], axis=-1)
@@ -93,28 +93,28 @@ def test_what_is_out_of_reach_is_pointed_at_smoothly(kinematics, standing):
     assert (elbow > 0).all()
 
 
-def test_arm_angles_refuse_what_an_arm_has_not(kinematics):
+def test_arm_angles_refuse_unknown_hinges(kinematics):
     with pytest.raises(ValueError, match=r"an arm has no hinge knee_flexion; its hinges are shoulder_flexion"):
         arm_angles(kinematics, knee_flexion=3.0)
 
 
-def test_a_bent_leg_carries_the_hip_where_kinematics_says(kinematics):
-    """``hip_position`` in closed form against the whole body, solved and posed."""
+def test_hip_position_agrees_with_the_kinematics(kinematics):
+    """Compare the closed form with the solved and posed body."""
     shank, thigh = np.radians([3.0, 12.0, 20.0]), np.radians([5.0, 40.0, 75.0])
-    own = {side: Footprint((0.0, float(kinematics.legs[side].anchors[0, 1]))) for side in ("left", "right")}
+    prints = {side: Footprint((0.0, float(kinematics.legs[side].anchors[0, 1]))) for side in ("left", "right")}
     hip = hip_position(kinematics, shank=shank, thigh=thigh)
     lean = np.radians([2.0, 20.0, 30.0])
     pelvis, height = pelvis_from_hips(kinematics, SPOT, hip, lean=lean)
-    feet = {side: foot_path(kinematics, SPOT, np.zeros(3), own[side]) for side in own}
+    feet = {side: foot_path(kinematics, SPOT, np.zeros(3), prints[side]) for side in prints}
     motion = solve_legs(kinematics, np.arange(3.0), pelvis, height, feet, pose_angles(3))
-    for side in own:
+    for side in prints:
         column = {name: np.degrees(motion.angles[:, DOFS.index(f"{side}_{name}")]) for name in kinematics.leg_order}
         np.testing.assert_allclose(column["knee_flexion"], np.degrees(shank + thigh), atol=0.5)
         np.testing.assert_allclose(column["hip_flexion"], np.degrees(thigh + lean), atol=0.5)
         np.testing.assert_allclose(column["ankle_dorsiflexion"], np.degrees(shank), atol=0.5)
 
 
-def test_a_foot_treads_from_print_to_print(kinematics):
+def test_a_foot_steps_from_footprint_to_footprint(kinematics):
     first = stance(kinematics, "left")
     up = first.moved(0.3, 0.1, floor=0.2)
     time = np.linspace(0.0, 3.0, 301)

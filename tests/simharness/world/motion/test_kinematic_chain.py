@@ -19,7 +19,7 @@ def kinematics():
 
 
 def posed(kinematics, **angles):
-    """MuJoCo's data of the person with the pelvis at the origin and hinges at angles."""
+    """Return MuJoCo data of the person with the pelvis at the origin and hinges at angles."""
     model = person_spec(kinematics.body, "someone").compile()
     data = mujoco.MjData(model)
     data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
@@ -30,7 +30,7 @@ def posed(kinematics, **angles):
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_trunk_and_arm_carry_the_hand_as_mujoco_says(kinematics, side):
+def test_trunk_and_arm_agree_with_mujoco(kinematics, side):
     trunk, arm = kinematics.trunks[side], kinematics.arms[side]
     rng = stream(0, "arms", side)
     hand = f"{side.capitalize()}Hand"
@@ -48,7 +48,7 @@ def test_trunk_and_arm_carry_the_hand_as_mujoco_says(kinematics, side):
         np.testing.assert_allclose(base @ turn @ turn_at_rest, data.body(hand).xmat.reshape(3, 3), atol=1e-9)
 
 
-def test_palms_are_where_palms_are(kinematics):
+def test_palms_are_on_the_skin_and_face_the_thighs(kinematics):
     left, right = (kinematics.arms[side].end for side in ("left", "right"))
     np.testing.assert_allclose(left, right * [1, -1, 1], atol=1e-3)
     skin = kinematics.neutral_skin
@@ -59,7 +59,7 @@ def test_palms_are_where_palms_are(kinematics):
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_forward_is_what_mujoco_says(kinematics, side):
+def test_forward_kinematics_agrees_with_mujoco(kinematics, side):
     chain = kinematics.legs[side]
     angles = stream(0, "angles", side).uniform(*chain.ranges.T, (20, 6))
     turns, places = chain.forward(angles)
@@ -142,7 +142,7 @@ def test_hinges_at_their_limit_leave_the_rest_to_the_others():
     assert np.abs(np.degrees(found[0, 0])) <= 10 + 1e-9
 
 
-def test_following_does_not_leap(kinematics):
+def test_follow_does_not_jump_between_solutions(kinematics):
     arm = kinematics.arms["right"]
     t = np.linspace(0, 2 * np.pi, 120)
     # The forearm turned well away from 0, where a hinge of the wrist and one of the shoulder come into line.
@@ -157,8 +157,8 @@ def test_following_does_not_leap(kinematics):
     angle=st.floats(0.0, np.pi),
 )
 @settings(max_examples=60, deadline=None)
-def test_a_ball_joint_turns_the_whole_way(axis, angle):
-    """Three hinges through one point reach any orientation, half a turn included."""
+def test_a_ball_joint_reaches_every_orientation(axis, angle):
+    """Three hinges through one point reach any orientation, including half a turn."""
     chain = Chain(axes=np.eye(3), anchors=np.zeros((3, 3)), end=np.zeros(3), ranges=np.tile([-7.0, 7.0], (3, 1)))
     turn = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()[None]
     start = Rotation.from_matrix(turn).as_euler("XYZ") + 0.05

@@ -1,4 +1,4 @@
-"""ASF and AMC files: what they mean, worked out by hand on small ones, and what is wrong with broken ones."""
+"""ASF and AMC files: poses of small files computed by hand, and messages about malformed ones."""
 
 from pathlib import Path
 
@@ -90,7 +90,7 @@ def places(files, asf=ASF, amc=AMC) -> dict[str, np.ndarray]:
 
 
 def test_zero_pose(files):
-    """Bones begin where their parents end; the root's position is added to its translation."""
+    """Bones start at the ends of their parents; the position of the root is added to its translation."""
     found = places(files)
     np.testing.assert_allclose(found["root"][0], [11, 22, 33])
     np.testing.assert_allclose(found["thigh"][0], [11, 22, 33])
@@ -100,11 +100,11 @@ def test_zero_pose(files):
 
 
 def test_turned_pose(files):
-    """The thigh's own x axis is y, for its axes are turned by 90 degrees about z: its direction -y stays."""
+    """The local x axis of the thigh is y, because its axes are rotated by 90 degrees about z; -y stays."""
     found = places(files)
     np.testing.assert_allclose(found["root"][1], [1, 2, 3])
     np.testing.assert_allclose(found["shin"][1], [1, 2 - 3, 3], atol=1e-12)
-    # The shin's own turn takes -y to -z; the thigh's, 90 about y, -z to -x; the root's, 90 about y, -x to +z.
+    # The rotation of the shin takes -y to -z; the thigh's, 90 about y, -z to -x; the root's, 90 about y, -x to +z.
     np.testing.assert_allclose(found["shin end"][1], [1, -1, 3 + 2], atol=1e-12)
     np.testing.assert_allclose(found["spine end"][1], [1, 2 + 4, 3], atol=1e-12)
 
@@ -133,7 +133,7 @@ def test_an_excerpt_may_begin_anywhere_and_lines_may_end_in_any_way(files):
         np.testing.assert_array_equal(where, whole[name])
 
 
-def test_what_cmu_publishes(shared_data):
+def test_a_recording_of_cmu(shared_data):
     """Subject 02 walks: 343 frames at 120 Hz, at 1 to 1.6 m/s with a leg of 84 cm (a unit is an inch over 0.45)."""
     folder = shared_data / "motion" / "cmu" / "02"
     recording = read_amc(folder / "02_01.amc", read_asf(folder / "02.asf"))
@@ -221,9 +221,9 @@ def test_a_malformed_skeleton_names_the_line(files, old, new, message):
         read_asf(skeleton)
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(ValueError, match=r"nobody.asf: cannot be read"):
-        read_asf(tmp_path / "nobody.asf")
+def test_a_missing_file(tmp_path):
+    with pytest.raises(ValueError, match=r"none.asf: cannot be read"):
+        read_asf(tmp_path / "none.asf")
 
 
 @pytest.fixture(scope="module")
@@ -237,8 +237,8 @@ _NOISE = st.sampled_from(
 
 
 @given(data=st.data())
-def test_no_damage_does_worse_than_a_clear_error(folder, data):
-    """Cut, doubled, or written over anywhere: it is read, or a ValueError names the file."""
+def test_a_damaged_file_raises_at_most_a_clear_error(folder, data):
+    """A file that is cut, doubled or overwritten anywhere is read, or a ValueError names it."""
     texts = {"walk.asf": ASF, "walk.amc": AMC}
     for name, text in texts.items():
         start = data.draw(st.integers(0, len(text)), label=f"{name} from")

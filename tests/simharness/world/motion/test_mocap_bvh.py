@@ -1,4 +1,4 @@
-"""BVH files: what they mean, worked out by hand on a small one, and what is wrong with broken ones."""
+"""BVH files: poses of a small file computed by hand, and messages about malformed ones."""
 
 import numpy as np
 import pytest
@@ -48,16 +48,16 @@ def test_places_by_hand(tmp_path):
     assert recording.duration == pytest.approx(0.02)
     assert recording.skeleton.names == ("Hips", "Leg", "Leg end", "Arm")
     where, _ = recording.pose()
-    # The root's position stands in place of its offset.
+    # The position of the root replaces its offset.
     np.testing.assert_allclose(where[0], [[10, 20, 30], [11, 20, 30], [11, 18, 30], [10, 23, 30]])
     # The root's 90 degrees about z take x to y and y to -x; before that the leg's 90 about x take -y to -z.
     np.testing.assert_allclose(where[1], [[0, 0, 0], [0, 1, 0], [0, 1, -2], [-3, 0, 0]], atol=1e-12)
 
 
-def test_channels_turn_about_the_joint_s_own_axes_in_their_order(tmp_path):
+def test_channels_rotate_about_local_axes_in_their_order(tmp_path):
     text = BVH.replace("0 0 0 90 0 0 0 90 0 45", "0 0 0 90 90 0 0 0 0 0")
     where, _ = read(tmp_path, text).pose()
-    # Z then X, each about own axes, is Rz Rx: Rx takes +y to +z, which Rz leaves.
+    # Z then X, each about local axes, is Rz Rx: Rx takes +y to +z, which Rz leaves.
     np.testing.assert_allclose(where[1][3], [0, 0, 3], atol=1e-12)
 
 
@@ -68,7 +68,7 @@ def test_a_root_without_position_stays_at_its_offset(tmp_path):
     np.testing.assert_allclose(where[:, 0], [[5, 6, 7], [5, 6, 7]])
 
 
-def test_positions_of_other_joints_are_passed_over(tmp_path):
+def test_positions_of_other_joints_are_ignored(tmp_path):
     text = BVH.replace("CHANNELS 1 Xrotation", "CHANNELS 4 Xposition Yposition Zposition Xrotation")
     text = text.replace("0 0 0 0\n", "0 0 0 8 8 8 0\n").replace("90 0 45\n", "90 0 8 8 8 45\n")
     np.testing.assert_allclose(read(tmp_path, text).pose()[0], read(tmp_path).pose()[0])
@@ -88,7 +88,7 @@ def test_braces_and_line_ends_of_other_writers(tmp_path):
     ],
 )
 def test_real_files(shared_data, name, frames, rate, height):
-    """Legs are as long as the offsets of knee and ankle say, whatever the frame."""
+    """Leg lengths equal the offsets of knee and ankle in every frame."""
     recording = read_bvh(shared_data / "motion" / "bvh" / name)
     assert len(recording) == frames
     assert recording.rate == pytest.approx(rate, rel=1e-3)
@@ -161,8 +161,8 @@ _NOISE = st.sampled_from(["", "{", "}", "\n}\n", "End Site", "JOINT a\n{\n", "MO
     noise=st.one_of(_NOISE, st.text(max_size=8)),
     twice=st.booleans(),
 )
-def test_no_damage_does_worse_than_a_clear_error(folder, start, length, noise, twice):
-    """Cut, doubled, or written over anywhere: it is read, or a ValueError names the file."""
+def test_a_damaged_file_raises_at_most_a_clear_error(folder, start, length, noise, twice):
+    """A file that is cut, doubled or overwritten anywhere is read, or a ValueError names it."""
     text = BVH[:start] + (2 * BVH[start : start + length] if twice else noise) + BVH[start + length :]
     try:
         recording = read(folder, text)

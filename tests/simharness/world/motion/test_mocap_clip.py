@@ -1,4 +1,4 @@
-"""Recorded clips on our bodies: feet on the floor, joints in their ranges, where and when they are asked for."""
+"""Recorded clips on bodies: feet on the floor, joints within their ranges, at the requested positions and times."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from simharness.world.motion.mocap.joint_mapping import map_joints
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 
-TOUCHING = 0.0015  # metres over the floor
+TOUCHING = 0.0015  # metres above the floor
 CLIPS = [
     "cmu/02/02_01.amc",
     "cmu/02/02_03.amc",
@@ -80,7 +80,7 @@ def test_feet_stand_and_do_not_slide(played):
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_uneven_ground_is_made_flat(bodies, shared_data, which):
-    """Subject 03 walks over ground that rises and falls by 25 cm: here the pelvis rides as on a level floor."""
+    """Subject 03 walks over ground that rises and falls by 25 cm; the pelvis moves as on a level floor."""
     kinematics = bodies[which]
     clip = load_clip(Mocap(file=str(shared_data / "motion/cmu/03/03_01.amc")))
     motion = clip.perform(kinematics, clip.time[:-1], place=(0.0, 0.0), bearing=0.0)
@@ -91,7 +91,7 @@ def test_uneven_ground_is_made_flat(bodies, shared_data, which):
 
 
 def test_knees_bend_like_the_recorded_ones(played):
-    """By the angle between the recorded thigh and shank; not where the ground under them was made flat."""
+    """Compare the angle between recorded thigh and shank; not for uneven ground, which is made flat."""
     recording = played.clip.recording
     if recording.file.startswith("03"):
         pytest.skip("uneven ground")
@@ -116,7 +116,7 @@ def test_joints_keep_their_limits(played):
 
 
 def test_velocities_do_not_jump(played):
-    """A runner's knee swings at 15 rad/s and turns round within 0.05 s; a jump of its velocity would show as more."""
+    """A runner's knee swings at 15 rad/s and reverses within 0.05 s; a jump of its velocity would exceed this."""
     speed = np.abs(np.diff(played.motion.angles, axis=0)) * 60
     assert speed.max() < 30.0
     acceleration = np.abs(np.diff(played.motion.angles, 2, axis=0)) * 60**2
@@ -124,13 +124,13 @@ def test_velocities_do_not_jump(played):
     assert np.quantile(acceleration.max(axis=1), 0.9) < 400.0
 
 
-def test_it_begins_where_and_facing_where_it_is_asked_to(played):
+def test_a_clip_starts_at_the_given_position_and_bearing(played):
     np.testing.assert_allclose(played.motion.root[0, :2], [1.0, -2.0], atol=1e-9)
     w, x, y, z = played.motion.root[0, 3:]
     assert np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(0.7, abs=1e-6)
 
 
-def test_the_path_is_the_pelvis_s(played):
+def test_path_agrees_with_the_pelvis(played):
     clip = played.clip
     path = clip.path(played.kinematics)
     assert path.shape == (len(clip.time), 2)
@@ -148,7 +148,7 @@ def test_a_small_body_takes_small_steps(bodies, shared_data):
     assert 1.0 < ways[0] / clip.time[-1] < 1.7  # m/s, a walk
 
 
-def test_it_begins_at_the_start_and_goes_back_and_forth(bodies, shared_data):
+def test_a_clip_starts_at_its_start_and_plays_back_and_forth(bodies, shared_data):
     file = str(shared_data / "motion/cmu/02/02_01.amc")
     whole, later = load_clip(Mocap(file=file)), load_clip(Mocap(file=file, start=1.0))
     (kinematics, _) = bodies
@@ -170,7 +170,7 @@ def test_it_begins_at_the_start_and_goes_back_and_forth(bodies, shared_data):
     assert acceleration.max() < 25.0  # from walking one way to the other in 0.3 s is 9 m/s2
 
 
-def test_how_long_it_is_asked_for_changes_nothing(bodies, shared_data):
+def test_motion_does_not_depend_on_the_duration(bodies, shared_data):
     clip = load_clip(Mocap(file=str(shared_data / "motion/cmu/02/02_03.amc"), start=0.4))
     long = clip.perform(bodies[0], np.arange(-60, 300) / 60, place=(0.0, 0.0), bearing=0.0)
     short = clip.perform(bodies[0], np.arange(0, 90) / 60, place=(0.0, 0.0), bearing=0.0)
@@ -185,7 +185,7 @@ def test_how_long_it_is_asked_for_changes_nothing(bodies, shared_data):
         ({"file": "walk.bvh"}, r"people.motion.file = 'walk.bvh': no such file"),
     ],
 )
-def test_files_that_cannot_be(mocap, message):
+def test_missing_and_unknown_files_are_refused(mocap, message):
     with pytest.raises(ValueError, match=message):
         load_clip(Mocap(**mocap))
 

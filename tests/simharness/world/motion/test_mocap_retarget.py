@@ -1,4 +1,4 @@
-"""What a recorded skeleton does, our bodies do: told on small skeletons whose angles are known."""
+"""Retargeting of small skeletons with known angles."""
 
 from dataclasses import dataclass
 
@@ -68,7 +68,7 @@ _OFFSETS = {
 
 
 def bvh(style: str = "motionbuilder", **turns: np.ndarray) -> str:
-    """A T-posed person; ``turns`` are degrees (FRAMES, 3) about z, x, y by role: "pelvis", "left_arm"."""
+    """Return a BVH file of a person in T pose; ``turns`` are degrees (FRAMES, 3) about z, x, y by role: "left_arm"."""
     middle, limbs, sides = STYLES[style]
     pelvis, chest, head = middle.split()
     names = {f"{side}_{role}": limb for side, word in zip(("left", "right"), sides, strict=True)
@@ -112,7 +112,7 @@ def bvh(style: str = "motionbuilder", **turns: np.ndarray) -> str:
 
 
 def slowly(z: float = 0.0, x: float = 0.0, y: float = 0.0) -> np.ndarray:
-    """From nothing to turns about z, x and y, degrees, held over the last third."""
+    """Return rotations about z, x and y in degrees that grow from 0 and are constant in the last third."""
     share = np.clip(np.linspace(0, 1.5, FRAMES), 0, 1)
     return (share * share * (3 - 2 * share))[:, None] * np.array([z, x, y])
 
@@ -143,7 +143,7 @@ def perform(kinematics, tmp_path_factory):
 
 
 def last(motion: Motion) -> dict[str, float]:
-    """The angles at the end, degrees."""
+    """Return the angles of the last frame, degrees."""
     return dict(zip(DOFS, np.degrees(motion.angles[-5]), strict=True))
 
 
@@ -174,7 +174,7 @@ def test_a_zero_pose_stands_with_the_arms_out(perform, kinematics):
         (HANG, "right_shoulder_abduction", 10),
     ],
 )
-def test_a_known_turn_arrives(perform, turns, dof, degrees):
+def test_a_known_rotation_is_retargeted(perform, turns, dof, degrees):
     angles = last(perform(bvh(**(HANG | turns))))
     assert sum(angles[name] for name in dof.split("+")) == pytest.approx(degrees, abs=8)
 
@@ -213,7 +213,7 @@ def test_the_unit_of_length_does_not_matter(perform):
 
 
 @pytest.mark.parametrize("height", [-60.0, 40.0])
-def test_where_the_recording_has_its_floor_does_not_matter(perform, height):
+def test_the_floor_height_of_the_recording_does_not_matter(perform, height):
     bent = {"left_thigh": slowly(x=-20), "left_shank": slowly(x=40), "left_foot": slowly(x=-20)}
     bent |= {name.replace("left", "right"): turn for name, turn in bent.items()}
     sinking = np.tile([0.0, 94.0, 0.0], (FRAMES, 1)) - slowly(x=82 * (1 - np.cos(np.radians(20))))
@@ -240,7 +240,7 @@ def test_missing_joints_are_named_with_the_existing_ones(perform):
 
 @given(seed=st.integers(0, 10_000))
 def test_arms_meet_their_directions_smoothly(kinematics, seed):
-    """From angles to directions and back: the directions agree, whatever angles were found."""
+    """Directions made from angles agree with those of the solved angles."""
     rng = stream(seed, "arms")
     time = np.arange(50) / 60
     low, high = np.array([kinematics.ranges[DOFS.index(f"left_{name}")] for name in ARM]).T
@@ -259,14 +259,14 @@ def test_arms_meet_their_directions_smoothly(kinematics, seed):
 
 
 def directions(kinematics, angles):
-    """Upper arm, forearm, hand and thumb in the clavicle's frame, by the body's own chain."""
+    """Return directions of upper arm, forearm, hand and thumb in the clavicle frame, from the chain of the body."""
     chain = kinematics.arms["left"]
     full = [chain.forward(np.where(np.arange(len(ARM)) < count, angles, 0.0))[0] for count in (3, 4, 6)]
     return (-full[0][:, :, 2], -full[1][:, :, 2], -full[2][:, :, 2], full[2][:, :, 0])
 
 
 @given(start=st.floats(0, 1), end=st.floats(0.31, 20), time=st.floats(-30, 60), step=st.floats(1e-4, 0.05))
-def test_back_and_forth_keeps_within_and_never_jumps(start, end, time, step):
+def test_back_and_forth_stays_in_range_without_jumps(start, end, time, step):
     moments = back_and_forth(time + step * np.arange(-1, 2), start=start * end, end=end)
     assert (moments >= 0).all()
     assert (moments <= end).all()
@@ -276,7 +276,7 @@ def test_back_and_forth_keeps_within_and_never_jumps(start, end, time, step):
     assert back_and_forth(np.zeros(1), start=start * end, end=end)[0] == pytest.approx(start * end, abs=1e-9)
 
 
-def test_back_and_forth_plays_at_the_speed_of_time_and_turns_at_the_ends():
+def test_back_and_forth_has_speed_one_and_reverses_at_the_ends():
     moments = back_and_forth(np.linspace(0, 20, 20001), start=2.0, end=5.0)
     np.testing.assert_allclose(moments[:2800], 2.0 + np.linspace(0, 20, 20001)[:2800], atol=1e-9)
     assert moments.max() == pytest.approx(5.0, abs=1e-6)

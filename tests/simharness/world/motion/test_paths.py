@@ -41,7 +41,7 @@ def draw_some_loop(seed: int, *, half: float = 2.0) -> Loop:
     return next(loop for loop in loops if loop is not None)
 
 
-def test_heading_is_the_way_it_goes():
+def test_heading_is_the_direction_of_travel():
     loop = draw_some_loop(0, half=3.0)
     step = loop.position(TIME + 1e-4) - loop.position(TIME - 1e-4)
     heading = loop.heading(TIME)
@@ -55,13 +55,13 @@ def test_loops_stay_in_turn_gently_and_close(seed, half):
     loop = draw_some_loop(seed, half=half)
     once = np.linspace(0.0, loop.length / loop.speed, 400)
     assert np.abs(loop.position(once)).max() <= half + 0.01
-    assert np.abs(loop.curvature(once)).max() * loop.speed < 1.45  # radians a second
+    assert np.abs(loop.curvature(once)).max() * loop.speed < 1.45  # radians per second
     closed = np.linalg.norm(loop.position(0.0) - loop.position(loop.length / loop.speed))
     assert closed < 1e-9
 
 
 @given(half=st.floats(0.5, 6.0), speed=st.floats(0.5, 4.0), running=st.booleans())
-def test_nobody_is_thrown_off_a_bend(half, speed, running):
+def test_runners_slow_down_for_tight_bends(half, speed, running):
     limits = loop_limits(speed, slowest=0.5, fastest=5.0, half=half, running=running)
     assert limits.tightest < half  # a circle of that radius fits
     assert limits.speed <= min(speed, limits.fastest) + 1e-9
@@ -74,12 +74,12 @@ def test_spots_are_inside_and_face_the_middle():
     inward = [-spot.place @ [np.cos(spot.bearing), np.sin(spot.bearing)] for spot in spots]
     assert np.mean(np.array(inward) > 0) > 0.9
     pairs = [draw_spot(stream(0, k), half=1.5, apart=True).bearing for k in range(300)]
-    assert abs(np.mean(np.exp(1j * np.array(pairs)))) < 0.15  # those of two face anywhere
+    assert abs(np.mean(np.exp(1j * np.array(pairs)))) < 0.15  # bearings of pairs are uniform
     np.testing.assert_array_equal(spots[0].position(TIME), np.tile(spots[0].place, (len(TIME), 1)))
 
 
 @given(seed=st.integers(0, 10**6))
-def test_recorded_way_is_turned_shifted_and_kept_inside(seed):
+def test_recorded_path_is_rotated_shifted_and_kept_inside(seed):
     offset = np.column_stack([TIME * 0.5, np.sin(TIME)])
     for k in range(50):
         way = draw_recorded(stream(seed, k), half=2.0, time=TIME, offset=offset)
@@ -92,7 +92,7 @@ def test_recorded_way_is_turned_shifted_and_kept_inside(seed):
     assert way.fastest == pytest.approx(steps.max())
 
 
-def test_recorded_way_that_fits_at_no_bearing_is_not_drawn():
+def test_recorded_path_that_does_not_fit_is_not_drawn():
     long = np.column_stack([TIME, 0 * TIME])
     assert all(draw_recorded(stream(0, k), half=1.0, time=TIME, offset=long) is None for k in range(50))
 

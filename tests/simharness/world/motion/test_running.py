@@ -47,7 +47,7 @@ def test_there_is_a_flight_in_every_step(kinematics, running):
     assert 0.08 < aloft.mean() < 0.3
     steps = np.count_nonzero(aloft[1:] & ~aloft[:-1])
     cadence = steps / TIME[-1] * 60
-    assert 140 < cadence < 200  # steps a minute: joggers take 150 to 180
+    assert 140 < cadence < 200  # steps per minute: joggers take 150 to 180
     assert lowest.min() > -0.01
 
 
@@ -61,7 +61,7 @@ def test_knees_and_arms_are_those_of_a_runner(running):
         assert np.corrcoef(angles[f"{side}_shoulder_flexion"], angles[f"{side}_hip_flexion"])[0, 1] < -0.5
 
 
-def test_the_pelvis_goes_up_and_down_twice_a_stride(kinematics, running):
+def test_the_pelvis_bobs_twice_per_stride(kinematics, running):
     loop, motion, _ = running
     stride = make_stride(kinematics, speed=loop.speed, pace=1.1)
     height = motion.root[:, 2]

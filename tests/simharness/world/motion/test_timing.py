@@ -26,7 +26,7 @@ def test_ease_is_the_quintic_of_least_jerk():
     values=st.lists(st.floats(-5, 5), min_size=6, max_size=6),
 )
 @settings(max_examples=50, deadline=None)
-def test_glide_passes_its_keys_and_stays_between_them(times, values):
+def test_minimum_jerk_passes_its_keys_and_stays_between_them(times, values):
     keys = list(zip(sorted(times), values, strict=False))
     t = np.linspace(-1.0, 11.0, 500)
     curve = minimum_jerk(t, *keys)
@@ -46,7 +46,7 @@ def test_bump_goes_up_once_and_comes_down():
     assert not b[(TIME <= 2.0) | (TIME >= 3.0)].any()
 
 
-def test_rounds_repeat():
+def test_cycles_repeat():
     u, marks = cycle_time(TIME, (1.0, 0.5, 2.0), rng=stream(0, "r"), pace=1.2)
     assert len(marks) == 4
     assert marks[0] == 0.0
@@ -58,7 +58,7 @@ def test_rounds_repeat():
     np.testing.assert_allclose(np.exp(2j * np.pi * later / marks[-1]), np.exp(2j * np.pi * u / marks[-1]), atol=1e-9)
 
 
-def test_strokes_and_wander_keep_their_bounds():
+def test_gesture_envelope_and_smooth_noise_keep_their_bounds():
     for k in range(50):
         on = gesture_envelope(TIME, stream(k, "on"), hold=2.0, rest=0.8)
         assert on.min() >= 0
@@ -68,6 +68,6 @@ def test_strokes_and_wander_keep_their_bounds():
         assert np.abs(smooth_noise(TIME, stream(k, "w"), 0.3)).max() <= 1.0
 
 
-def test_in_four_seconds_everyone_makes_the_gesture():
+def test_every_gesture_is_made_within_four_seconds():
     early = TIME[TIME < 4]
     assert all(gesture_envelope(early, stream(k, "on"), hold=2.4, rest=0.8).max() > 0.9 for k in range(200))

@@ -1,4 +1,4 @@
-"""Plans are checked by brute force: everybody's place at many instants, finer than the planner's own."""
+"""Track plans, checked by brute force at a finer time step than the planner uses."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ SPAN = (-1.0, 7.0)
 
 
 def apart(tracks, wishes, *, span, step=1 / 50):
-    """Least distance of any two tracks beyond their clearances, metres."""
+    """Return the least distance of two tracks beyond their clearances, and the largest coordinate, metres."""
     times = np.arange(*span, step)
     ways = np.stack([track.position(times) for track in tracks])
     clear = np.array([getattr(wish, "clearance", 0.0) for wish in wishes])
@@ -56,8 +56,8 @@ def test_ten_minutes_of_twenty_people_are_planned():
     assert len({track.length for track in tracks if isinstance(track, Loop)}) >= 3  # not all in one file
 
 
-def test_ways_that_cross_are_gone_round_in_time():
-    """Two loops that meet can only be kept for long if they repeat together."""
+def test_crossing_loops_have_commensurable_round_times():
+    """Two crossing loops can be walked for long only if they repeat together."""
     crossing = 0
     for seed in range(6):
         one, other = plan_tracks(seed, [WALK, WALK], area=2.0, spacing=0.8, span=(-1.0, 601.0))
@@ -70,7 +70,7 @@ def test_ways_that_cross_are_gone_round_in_time():
     assert crossing >= 3
 
 
-def test_one_more_wish_moves_nobody():
+def test_one_more_request_changes_no_other_track():
     four = plan_tracks(5, [WALK, STAND] * 2, area=2.0, spacing=0.8, span=SPAN)
     five = plan_tracks(5, [WALK, STAND] * 2 + [WALK], area=2.0, spacing=0.8, span=SPAN)
     times = np.linspace(*SPAN, 50)
@@ -87,7 +87,7 @@ def test_plans_differ_by_seed_and_repeat():
     assert np.abs(one - other).max() > 0.1
 
 
-def test_recorded_ways_keep_apart_too():
+def test_recorded_paths_keep_apart():
     times = np.linspace(*SPAN, 481)
     way = np.column_stack([0.3 * times, 0.1 * np.sin(times)])
     wishes = [RecordedRequest("mocap", times, way)] * 3 + [WALK]
@@ -97,7 +97,7 @@ def test_recorded_ways_keep_apart_too():
     assert furthest <= 2.46
 
 
-def test_who_is_not_admitted_is_sent_elsewhere():
+def test_rejected_tracks_are_replaced():
     tried = []
 
     def admit(index, track, before):
@@ -111,11 +111,11 @@ def test_who_is_not_admitted_is_sent_elsewhere():
     assert [index for index, _ in tried] == sorted(index for index, _ in tried)
 
 
-def test_nobody_needs_no_room():
+def test_no_requests_need_no_room():
     assert plan_tracks(0, [], area=0.01, spacing=9.0, span=SPAN) == ()
 
 
-def test_a_crowd_that_does_not_fit_is_told_what_to_change():
+def test_a_crowd_that_does_not_fit_names_the_keys_to_change():
     with pytest.raises(ValueError, match=r"people.count = 9 .*people.area = 1 m.*people.spacing = 1.5 m") as error:
         plan_tracks(0, [STAND] * 9, area=1.0, spacing=1.5, span=SPAN)
     assert "lower people.count" in str(error.value)
@@ -133,7 +133,7 @@ def test_an_area_too_small_for_one_alone(wish, area, least):
     named = float(str(error.value).split("it takes ")[1].split(" m")[0])
     if least is not None:
         assert named == pytest.approx(least)
-    plan_tracks(0, [wish], area=named + 0.05, spacing=0.5, span=SPAN)  # what the message asks for suffices
+    plan_tracks(0, [wish], area=named + 0.05, spacing=0.5, span=SPAN)  # the value in the message suffices
 
 
 STRAIGHT = RecordedRequest(
@@ -161,7 +161,7 @@ def test_a_recorded_path_too_long_for_the_area_names_its_keys():
     with pytest.raises(ValueError, match=r"people.motion.*people.area = 1 m.*people.motion.start") as error:
         plan_tracks(0, [STRAIGHT], area=1.0, spacing=0.5, span=SPAN)
     needed = float(str(error.value).split("set people.area to ")[1].split(" m")[0])
-    plan_tracks(0, [STRAIGHT], area=needed, spacing=0.5, span=SPAN)  # what the message asks for suffices
+    plan_tracks(0, [STRAIGHT], area=needed, spacing=0.5, span=SPAN)  # the value in the message suffices
 
 
 def test_a_recorded_path_too_long_for_the_room_names_its_keys():
@@ -171,7 +171,7 @@ def test_a_recorded_path_too_long_for_the_room_names_its_keys():
     plan_tracks(0, [STRAIGHT], area=1.0, spacing=0.5, span=SPAN, widest=1.5 + grown / 2)
 
 
-def test_people_keep_the_middle_free():
+def test_people_keep_the_centre_free():
     tracks = plan_tracks(3, [STAND, WALK, STAND], area=2.2, spacing=0.6, span=SPAN, around=0.9)
     times = np.arange(*SPAN, 0.01)
     for track in tracks:

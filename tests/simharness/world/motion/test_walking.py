@@ -1,4 +1,4 @@
-"""What a walk must be, told from the skin and the joints, on several bodies and ways."""
+"""Properties of walking, measured on skin and joints of several bodies on several loops."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from simharness.world.motion.track_planning import LoopRequest, plan_tracks
 
 RATE = 80.0  # Hz
 TIME = np.arange(0.0, 3.2, 1 / RATE)
-TOUCHING = 0.0015  # metres over the floor
+TOUCHING = 0.0015  # metres above the floor
 
 
 @dataclass
@@ -89,7 +89,7 @@ def test_velocities_are_human_and_do_not_jump(walked):
     assert np.abs(np.diff(root, axis=0)).max() < 0.02  # m/s
 
 
-def test_pelvis_follows_the_way(walked):
+def test_pelvis_follows_the_loop(walked):
     off = walked.motion.root[:, :2] - walked.loop.position(TIME)
     assert np.linalg.norm(off, axis=1).max() < SWAY
     assert 0.01 < np.ptp(walked.motion.root[:, 2]) < 0.06  # 2 to 5 cm, Winter 1991
@@ -113,7 +113,7 @@ def test_arms_swing_against_the_legs(walked):
         assert np.corrcoef(arm, leg)[0, 1] < -0.5
 
 
-def test_straight_walk_comes_near_the_curves():
+def test_a_straight_walk_is_close_to_the_curves():
     kinematics = Kinematics(make_body(draw_shape(stream(9, "walk"))))
     gait = make_gait(kinematics, speed=1.2)
     around = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
