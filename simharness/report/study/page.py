@@ -117,7 +117,7 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         failures=_failures(results, variants),
         shown=shown,
         times=_times(results, variants),
-        folder=results.folder,
+        study_folder=results.folder,
         machine=_machine(info["machine"]),
         study_file=_study_file(results.folder),
     )
