@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.trial.stages import build as trial
+from simharness.trial import run_trial as trial
 
 QUICKSTART = Path(__file__).parents[1] / "scenarios" / "quickstart.toml"
 

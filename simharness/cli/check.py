@@ -1,4 +1,4 @@
-"""``simharness check``: is the method worse than it was?"""
+"""``simharness check``: the regression gate."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simharness.gate.gate_result import Check, Failed
     from simharness.scenario.study_definition import Study
 
-_LISTED = 8  # of each kind: a bug that breaks everything breaks a hundred scores
+_LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
 _VERDICTS = {"worse": "[red]worse[/]", "better": "[green]better[/]", "same": ""}
 
 
@@ -27,25 +27,31 @@ def add_to(app: typer.Typer) -> None:
 
 
 def check(
-    suite: Annotated[Path, typer.Argument(help="The suite: a scenario file.", metavar="FILE")],
+    suite: Annotated[
+        Path,
+        typer.Argument(help="The suite: a scenario file, or the name of a shipped one: [cyan]ci[/].", metavar="SUITE"),
+    ],
     baseline: Annotated[
-        Path, typer.Option(metavar="FILE", help="What the suite scored when it was last found good.", dir_okay=False)
+        Path,
+        typer.Option(metavar="FILE", help="Scores of the accepted version of the method.", dir_okay=False),
     ],
     junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report there, XML.", dir_okay=False)
+        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report (XML) to this file.", dir_okay=False)
     ] = None,
     summary: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a summary there, Markdown.", dir_okay=False)
+        Path | None, typer.Option(metavar="FILE", help="Write a summary (Markdown) to this file.", dir_okay=False)
     ] = None,
     update: Annotated[
-        bool, typer.Option("--update-baseline", help="Write the baseline anew instead of comparing with it.")
+        bool, typer.Option("--update-baseline", help="Write a new baseline instead of comparing with it.")
     ] = False,
     workers: Annotated[int, typer.Option(metavar="N", min=1, help="Processes that share the trials.")] = 1,
 ) -> None:
-    r"""Run a suite and fail, exit code 1, where the method got worse than the baseline.
+    r"""Run a suite and exit with code 1 where the method is worse than the baseline.
 
-    Worse is a change of a headline score that is significant and larger than its tolerance, section \[gate] of the
-    suite, or a method that takes longer beside a reference kernel. Trials that cannot be run fail the check, too.
+    A regression is a loss in a headline score that is significant and larger
+    than its tolerance, section \[gate] of the suite, or a growth of the time
+    per frame, relative to a reference kernel. Trials that fail to run fail the
+    check as well.
     """
     with border():
         from simharness.gate.baseline import check_place
@@ -54,7 +60,8 @@ def check(
         reports = {option: path for option, path in (("--junit", junit), ("--summary", summary)) if path is not None}
         if update and reports:
             raise ValueError(
-                f"{next(iter(reports))}: with --update-baseline nothing is compared: leave one of them out"
+                f"{next(iter(reports))}: cannot be combined with --update-baseline, which compares nothing; "
+                "remove one of them"
             )
         for option, path in ({"--baseline": baseline} if update else reports).items():
             check_place(path, option=option)
@@ -78,7 +85,7 @@ def check(
 
 
 def _write(result: Check, reports: Mapping[str, Path]) -> bool:
-    """Write the reports, each whatever becomes of the other; whether one could not be written, which is said."""
+    """Write the reports independently of each other; return whether one could not be written, after a message."""
     from simharness.gate.baseline import write_text
     from simharness.gate.junit import junit
     from simharness.gate.markdown import markdown
@@ -94,7 +101,7 @@ def _write(result: Check, reports: Mapping[str, Path]) -> bool:
 
 
 def _update(study: Study, path: Path, workers: int) -> None:
-    """Measure a suite and write what it scored."""
+    """Measure a suite and write its scores as the baseline."""
     from simharness.gate.baseline import write_baseline
     from simharness.gate.required_seeds import require_seeds
     from simharness.gate.suite import run_suite
@@ -104,8 +111,8 @@ def _update(study: Study, path: Path, workers: int) -> None:
     with after_reading(), reporter() as bars:
         done = run_suite(study, workers=workers, reporter=bars)
     if done.failed:
-        said = f"{_list_failed(done.failed)}\n{path} was not written, for it would lack these trials"
-        Console(stderr=True).print(said, soft_wrap=True, highlight=False, markup=False)
+        message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
+        Console(stderr=True).print(message, soft_wrap=True, highlight=False, markup=False)
         raise typer.Exit(REGRESSION)
     measured = done.measurement(study)
     write_baseline(measured, path)
@@ -118,32 +125,32 @@ def _update(study: Study, path: Path, workers: int) -> None:
 
 
 def _print(check: Check, console: Console) -> None:
-    """What the check came to."""
+    """Print the result of a check."""
     from rich.text import Text
 
     from simharness.gate.change_text import sentence
 
-    def say(text: str | Text) -> None:
+    def write(text: str | Text) -> None:
         console.print(text, soft_wrap=True, highlight=False, markup=False)
 
     verdict = Text(check.verdict, "bold green" if check.passed else "bold red")
-    say(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
+    write(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
     if check.failed:
-        say(_list_failed(check.failed))
+        write(_list_failed(check.failed))
     for kind, style in (("worse", "red"), ("better", "green")):
         changes = check.comparison.that_are(kind)  # type: ignore[arg-type]
         for change in changes[:_LISTED]:
-            say(Text.assemble((f"{kind:<6}", style), " ", sentence(change, check.gate)))
+            write(Text.assemble((f"{kind:<6}", style), " ", sentence(change, check.gate)))
         if len(changes) > _LISTED:
-            say(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
+            write(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
     for variant in check.variants:
         console.print()
         console.print(_table(check, variant))
-    say(f"\n{check.pointer}\n  {check.command}")
+    write(f"\n{check.pointer}\n  {check.command}")
 
 
 def _table(check: Check, variant: str) -> Table:
-    """Headline scores of a variant over the whole suite."""
+    """Return the headline scores of a variant over the whole suite."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""``simharness evaluate``: the method on real data, and on what stands for it."""
+"""``simharness evaluate``: scores of the method on real data and on its simulated twins."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class HeadMapping(enum.StrEnum):
-    """The published rules of :func:`mvpose.skeleton.coco17_to_shelf14`."""
+    """Published rules of :func:`mvpose.skeleton.coco17_to_shelf14`."""
 
     VOXELPOSE = "voxelpose"
     Y2019 = "2019"
@@ -30,25 +30,25 @@ app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
 
 @app.command()
 def shelf(
-    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
     json_file: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the summary there too.", dir_okay=False),
+        typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False),
     ] = None,
     head: Annotated[
         HeadMapping,
-        typer.Option(help="How the head of the 14 joints is made from COCO's: moves PCP by a point."),
+        typer.Option(help="Rule that converts the head from COCO-17 to the 14 joints; it changes PCP by one point."),
     ] = HeadMapping.VOXELPOSE,
     method: Annotated[
         list[str] | None,
         typer.Option(
             metavar="VARIANT",
-            help="A preset of mvpose.Pipeline, or a method of one's own, FILE.py:NAME. Repeatable. "
+            help="A preset of mvpose.Pipeline, or a user-defined estimator, FILE.py:NAME. Repeatable. "
             "[dim]\\[default: full][/]",
         ),
     ] = None,
 ) -> None:
-    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and what PCP does not see.
+    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and errors that PCP ignores.
 
     FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
     """
@@ -79,17 +79,15 @@ def shelf(
 
 @app.command()
 def twin(
-    folder: Annotated[Path, typer.Argument(help="The published files of Shelf.", metavar="FOLDER")],
+    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
     scenario: Annotated[
         Path | None,
-        typer.Option(
-            metavar="SCENARIO", help="The simulated twin. [dim]\\[default: scenarios/shelf.toml][/]", dir_okay=False
-        ),
+        typer.Option(metavar="SCENARIO", help="The simulated twin. [dim]\\[default: shelf][/]", dir_okay=False),
     ] = None,
-    twins: Annotated[int, typer.Option(metavar="N", min=2, help="How many twins, of different seeds.")] = 10,
+    twins: Annotated[int, typer.Option(metavar="N", min=2, help="Number of twins, of different seeds.")] = 10,
     json_file: JsonFile = None,
 ) -> None:
-    """Shelf beside its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
+    """Shelf and its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
     with border():
         start = perf_counter()
         from simharness.reality.shelf import read_shelf
@@ -109,10 +107,10 @@ def twin(
 def evaluate_seeds(
     scenario: ScenarioFile,
     overrides: Overrides = None,
-    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="How many seeds.")] = 10,
+    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="Number of seeds.")] = 10,
     json_file: JsonFile = None,
 ) -> None:
-    """A scenario at many seeds: PCP of its variants, everybody's and each person's, with intervals."""
+    """A scenario at many seeds: PCP of its variants, of all people and of each person, with intervals."""
     with border():
         start = perf_counter()
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at
@@ -129,7 +127,7 @@ def evaluate_seeds(
 
 
 def _estimator(name: str) -> Estimator:
-    """A preset, or a method of one's own by its place."""
+    """Return a preset, or a user-defined estimator by its place."""
     from mvpose import Pipeline
     from simharness.trial.stages.estimators import OwnEstimator, load_estimator
 
@@ -140,7 +138,7 @@ def _estimator(name: str) -> Estimator:
 
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:
-    """Write a summary with where it comes from; what it says of seeds and variants itself is more, and stands."""
+    """Write a summary with its provenance; keys of the summary itself take precedence."""
     from simharness.trial.provenance import provenance
 
     seconds = perf_counter() - start

@@ -1,4 +1,4 @@
-"""``simharness export``: a synthetic benchmark that other programs read."""
+"""``simharness export``: a scenario as a benchmark sequence for other programs."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ def add_to(app: typer.Typer) -> None:
 
 def export(
     scenario: ScenarioFile,
-    folder: Annotated[Path, typer.Argument(help="Where the folder NAME of the sequence goes.", metavar="FOLDER")],
+    folder: Annotated[
+        Path, typer.Argument(help="Parent folder of the folder NAME of the sequence.", metavar="FOLDER")
+    ] = Path("results/exports"),
     overrides: Overrides = None,
     seed: Seed = None,
     every: Annotated[int, typer.Option(metavar="N", help="Write one frame of N.")] = 1,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write what the cameras record.")] = True,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Write the pictures.")] = True,
 ) -> None:
-    """Write a scenario as a sequence of CMU Panoptic: pictures, true poses, calibration; and OpenPose detections.
+    """Write a scenario as a CMU Panoptic sequence: pictures, true poses, calibration; and OpenPose detections.
 
-    It appears, when whole, in FOLDER/NAME, and replaces an earlier export there. manifest.json says what is in it.
+    It appears, when it is complete, in FOLDER/NAME and replaces an earlier
+    export there; manifest.json describes it.
     """
     with border():
         from simharness.runtime.progress import reporter

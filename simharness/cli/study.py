@@ -1,4 +1,4 @@
-"""``simharness study`` and ``merge``: many trials, kept as they finish."""
+"""``simharness study`` and ``merge``: many trials, stored as they finish."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from simharness.study.result_folder import Results
 
 INTERRUPTED = 130
-_LISTED = 10  # failed trials that are told one by one
+_LISTED = 10  # failed trials that are listed
 
 
 def add_to(app: typer.Typer) -> None:
@@ -34,38 +34,40 @@ def study(
     file: ScenarioFile,
     overrides: Overrides = None,
     seeds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="How many seeds, instead of the file's.")
+        int | None, typer.Option(metavar="N", min=1, help="Number of seeds, instead of the file's.")
     ] = None,
     variant: Annotated[
         list[str] | None,
         typer.Option(metavar="VARIANT", help="A preset of mvpose.Pipeline, instead of the file's. Repeatable."),
     ] = None,
     workers: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Processes that share the trials. The results are the same.")
+        int,
+        typer.Option(metavar="N", min=1, help="Processes that share the trials; the results stay the same."),
     ] = 1,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster does it: [cyan]tcp://host:8786[/].")
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="Run the I-th of N parts into the store; see [cyan]merge[/].")
+        str | None, typer.Option(metavar="I/N", help="Run only the I-th of N parts into the store; see [cyan]merge[/].")
     ] = None,
     store: Annotated[
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Where finished trials are kept. [dim]\\[default: store, in --out][/]",
+            help="Folder of finished trials. [dim]\\[default: store, in --out][/]",
             file_okay=False,
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)] = Path(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
         "results/studies"
     ),
-    yes: Annotated[bool, typer.Option("--yes", help="Run it though it has more than 10,000 trials.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Run a study of more than 10,000 trials.")] = False,
 ) -> None:
     """Run a study: every setting of a scenario file's sweep at every seed.
 
-    Finished trials are kept and never run again, so a study that was interrupted goes on where it was. The results
-    appear, when all is run, in a folder NAME: report.html for people, Parquet tables for programs.
+    Finished trials are stored and not run again, so that an interrupted study
+    resumes where it stopped. The results appear, when all trials are finished,
+    in a folder NAME: report.html for people, Parquet tables for programs.
     """
     with border(), _stopping():
         from simharness.scenario.study_definition import LIMIT, load_study
@@ -81,9 +83,9 @@ def study(
             with reporter() as bars:
                 tally = run_shard(loaded, part, store=kept_in, workers=workers, scheduler=scheduler, reporter=bars)
             info: dict[str, Any] = {**vars(tally), "failed": [vars(each) for each in tally.failed]}
-            _say(_counts(info, f"part {shard}"))
-            _say(f"store: {kept_in}")
-            _say("when all parts are run: simharness merge STORE... --into STORE, then the same study without --shard")
+            _write(_counts(info, f"part {shard}"))
+            _write(f"store: {kept_in}")
+            _write("after all parts: simharness merge STORE... --into STORE, then the same study without --shard")
         else:
             command = command_line()
             with reporter() as bars:
@@ -93,7 +95,7 @@ def study(
             info = dict(results.info)
             if len(results.trials):
                 Console().print(_headline(results))
-            _say(_counts(info, loaded.name))
+            _write(_counts(info, loaded.name))
             _report(results)
     if info["failed"]:
         raise typer.Exit(FAILED)
@@ -101,29 +103,29 @@ def study(
 
 def merge(
     stores: Annotated[list[Path], typer.Argument(help="Stores of finished trials.", metavar="STORE...")],
-    into: Annotated[Path, typer.Option(metavar="STORE", help="The store that gets all of them.", file_okay=False)],
+    into: Annotated[Path, typer.Option(metavar="STORE", help="The store to which they are copied.", file_okay=False)],
 ) -> None:
-    """Copy the finished trials of stores into one: what the parts of a study left, by --shard, on several machines."""
+    """Copy the finished trials of several stores into one: of the parts of a study (--shard) on several machines."""
     with border(), _stopping():
         from simharness.study.merge import merge as merge_stores
 
         merged = merge_stores(stores, into)
-        _say(f"{merged.copied} entries copied into {into}, {merged.there} were there")
+        _write(f"{merged.copied} entries copied into {into}, {merged.there} were already there")
         if merged.damaged:
-            _say(f"{len(merged.damaged)} are damaged and were left out:", err=True)
+            _write(f"{len(merged.damaged)} are damaged and were skipped:", err=True)
             for damaged in merged.damaged[:_LISTED]:
-                _say(f"  {damaged}", err=True)
+                _write(f"  {damaged}", err=True)
 
 
 @contextlib.contextmanager
 def _stopping() -> Iterator[None]:
-    """Say in one message why a study stopped before its end."""
+    """Report in one message why a study stopped early."""
     from simharness.runtime.errors import RunError
 
     try:
         yield
     except KeyboardInterrupt as interruption:
-        _say(str(interruption) or "interrupted", err=True)
+        _write(str(interruption) or "interrupted", err=True)
         raise typer.Exit(INTERRUPTED) from None
     except RunError as error:
         Console(stderr=True).print(Text.assemble(("the study stopped: ", "bold red"), str(error)), soft_wrap=True)
@@ -133,13 +135,13 @@ def _stopping() -> Iterator[None]:
 def _part(shard: str | None) -> tuple[int, int] | None:
     if shard is None:
         return None
-    if not (found := re.fullmatch(r"(\d+)/(\d+)", shard)):
+    if not (match := re.fullmatch(r"(\d+)/(\d+)", shard)):
         raise ValueError(f"--shard {shard}: expected I/N, for example --shard 1/8")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def _headline(results: Results) -> Table:
-    """Mean scores and their intervals over seeds, a row for each variant; of a study of one factor, of each setting."""
+    """Return mean scores with intervals over seeds, a row for each variant; with one factor, for each setting."""
     import polars as pl
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -159,8 +161,8 @@ def _headline(results: Results) -> Table:
         info = SCORES[score]
         table.add_column(f"{info.title}\n{info.unit}", justify="right", no_wrap=True)
     for group in results.trials.select(keys).unique(maintain_order=True).iter_rows():
-        mine = results.trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
-        cells = [_cell(mean_interval(list(by_seed(mine, score).values())), SCORES[score].digits) for score in HEADLINE]
+        rows = results.trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
+        cells = [_cell(mean_interval(list(by_seed(rows, score).values())), SCORES[score].digits) for score in HEADLINE]
         table.add_row(*(Text("–" if value is None else str(value)) for value in group), *cells)
     return table
 
@@ -173,7 +175,7 @@ def _cell(interval: Any, digits: int) -> str:
 
 
 def _counts(info: dict[str, Any], what: str) -> str:
-    """What became of the trials, the failed ones one by one."""
+    """Return the numbers of kept, run and failed trials as text, and the failed trials."""
     trials = "1 trial" if info["trials"] == 1 else f"{info['trials']} trials"
     lines = [
         f"{what}: {trials}: {info['kept']} kept from before, {info['run']} run, "
@@ -199,8 +201,8 @@ def _report(results: Results) -> None:
 
     with after_reading(), reporter() as bars, bars.stage("report", SHOWN) as advance:
         page = write_report(results, progress=advance)
-    _say(f"report: {page}")
+    _write(f"report: {page}")
 
 
-def _say(text: str, *, err: bool = False) -> None:
+def _write(text: str, *, err: bool = False) -> None:
     Console(stderr=err).print(text, soft_wrap=True, highlight=False, markup=False)

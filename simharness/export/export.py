@@ -24,7 +24,7 @@ from simharness.runtime.atomic_files import appearing
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
-from simharness.scenario.toml_writer import dumps
+from simharness.scenario.toml_files import dumps
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback

@@ -1,4 +1,4 @@
-"""The whole detector: its parts together, frame by frame."""
+"""Whole detector: all steps together, frame by frame."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from mvpose import Pipeline
 from simharness.detector.conditions import Conditions
 from simharness.detector.detect import detect
 from simharness.scenario.load import load
-from simharness.scenario.profiles import SHIPPED, read_profile
+from simharness.scenario.presets import PROFILES, read_profile
 from simharness.scenario.sections.detector import Detector
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
@@ -24,7 +24,7 @@ def run(where, *, seed=3, **sections):
 
 
 def by_person(frames, views, people):
-    """Keypoints of the first detection of everyone as (T, V, P, 17, 2), NaN where absent."""
+    """Return the keypoints of everyone's first detection, (T, V, P, 17, 2); NaN where absent."""
     result = np.full((len(frames), views, people, 17, 2), np.nan)
     for t, frame in enumerate(frames):
         for view, person, keypoints in zip(
@@ -48,7 +48,7 @@ def test_a_perfect_detector_sees_the_exact_projections():
         np.testing.assert_allclose(frame.detections.boxes, boxes)
 
 
-def test_what_a_perfect_detector_sees_is_reconstructed_to_under_a_millimetre():
+def test_perfect_detections_are_reconstructed_to_under_a_millimetre():
     scenario = load(
         "scenarios/quickstart.toml",
         overrides=["detector.profile=perfect", "duration=1.0", "rendering.renderer=rays"],
@@ -57,7 +57,7 @@ def test_what_a_perfect_detector_sees_is_reconstructed_to_under_a_millimetre():
     sequence = simulate(trial.scene)
     views = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset())(range(scenario.frames))
     frames = detect(sequence, views, trial.exposures.believed_rig, scenario.detector, seed=scenario.seed)
-    # The prior of 3DPS has opinions on bone lengths, whatever the detections say.
+    # The prior of 3DPS on bone lengths moves joints even with perfect detections.
     for variant, worst, usual in (("fast", 1e-3, 1e-3), ("no-3dps", 1e-3, 1e-3), ("full", 3e-3, 1e-3)):
         errors = []
         for t, frame in enumerate(frames):
@@ -73,8 +73,8 @@ def test_what_a_perfect_detector_sees_is_reconstructed_to_under_a_millimetre():
         assert np.nanmean(errors) < usual
 
 
-@pytest.mark.parametrize("name", sorted(file.stem for file in SHIPPED.glob("*.toml")))
-def test_every_profile_gives_detections_that_can_be_used(name):
+@pytest.mark.parametrize("name", sorted(file.stem for file in PROFILES.shipped.glob("*.toml")))
+def test_every_profile_gives_valid_detections(name):
     profile = read_profile(name)
     assert profile.name == name
     seen = np.random.default_rng(1).choice([0, 0, 0, 0, 1, 2, 3, 4], size=(40, 3, 4, 17))
@@ -102,7 +102,7 @@ def test_better_profiles_err_less():
     assert list(share) == sorted(share, key=share.__getitem__)
 
 
-PUBLISHED = {  # shares of all joints that PoseFix's authors print, for people with more than 10 joints
+PUBLISHED = {  # shares of all joints published by the authors of PoseFix, for people with more than 10 joints
     KeypointError.JITTER: {"nose": 0.10, "elbow": 0.15, "hip": 0.20, "ankle": 0.10},
     KeypointError.MISS: {"nose": 0.02, "elbow": 0.10, "hip": 0.10, "ankle": 0.05},
     KeypointError.INVERSION: {"elbow": 0.03, "hip": 0.06, "ankle": 0.06},
@@ -124,10 +124,10 @@ def test_the_posefix_profile_has_the_published_rates():
         apart &= (conditions.neighbour >= 0)[..., None]
         if name != "nose":
             apart &= np.linalg.norm(true - true[..., mirror, :], axis=-1) >= reach
-        mine = error[..., joints][apart[..., joints]]
-        assert len(mine) > 5000
+        errors = error[..., joints][apart[..., joints]]
+        assert len(errors) > 5000
         for kind, rates in PUBLISHED.items():
-            assert within((mine == kind).sum(), len(mine), rates.get(name, 0.0))
+            assert within((errors == kind).sum(), len(errors), rates.get(name, 0.0))
 
 
 SECTIONS = {
@@ -138,7 +138,7 @@ SECTIONS = {
 
 
 @pytest.mark.parametrize(
-    ("section", "dial", "value"),
+    ("section", "parameter", "value"),
     [
         ("phantoms", "rate", 1.0),
         ("phantoms", "life", 1.0),
@@ -150,17 +150,17 @@ SECTIONS = {
         ("heatmaps", "size", "64x48"),
     ],
 )
-def test_one_dial_leaves_every_other_draw_alone(section, dial, value):
+def test_a_parameter_changes_no_other_draw(section, parameter, value):
     where = world(frames=30)
     before = by_person(run(where, **SECTIONS), 3, 2)
-    after = run(where, **{**SECTIONS, section: {**SECTIONS.get(section, {}), dial: value}})
+    after = run(where, **{**SECTIONS, section: {**SECTIONS.get(section, {}), parameter: value}})
     after = by_person(after, 3, 2)
     both = np.isfinite(after) & np.isfinite(before)
     assert both.mean() > 0.4
     np.testing.assert_array_equal(after[both], before[both])
 
 
-def test_one_seed_is_one_result_and_another_is_another():
+def test_equal_seeds_give_equal_results():
     where = world(frames=5)
     first, again, other = (run(where, seed=seed, **SECTIONS) for seed in (0, 0, 1))
     for a, b in zip(first, again, strict=True):
@@ -171,7 +171,7 @@ def test_one_seed_is_one_result_and_another_is_another():
     )
 
 
-def test_the_order_of_detections_does_not_give_the_people_away():
+def test_the_order_of_detections_does_not_reveal_the_people():
     orders = {
         tuple(frame.truth.person[frame.detections.view == 0].tolist())
         for frame in run(world(), boxes={"deviation": 0.5, "score": 0.9})
@@ -179,8 +179,8 @@ def test_the_order_of_detections_does_not_give_the_people_away():
     assert orders == {(0, 1), (1, 0)}
 
 
-def test_heat_maps_come_with_detections_that_read_the_same():
-    # Misses far outside the crop are seen by no head.
+def test_heat_maps_give_the_keypoints_of_the_detections():
+    # A head does not see misses far outside its crop.
     far = {"scatter": 0.4, "miss": 0.3, "reach": 20.0}
     frames = run(world(frames=3), **{**SECTIONS, "keypoints": far}, heatmaps={"size": "64x48"})
     for frame in frames:
@@ -191,11 +191,11 @@ def test_heat_maps_come_with_detections_that_read_the_same():
         assert found.any()
         np.testing.assert_array_equal(np.isfinite(pixels[:, :, 0, 0]), found)
         away = (np.abs(pixels[:, :, 0] - frame.detections.keypoints) / maps.stride[:, None])[found]
-        assert away.max() < 0.51  # at the border of a map there is no reading between its cells
+        assert away.max() < 0.51  # at the border of a map there is no interpolation between cells
         assert np.median(away) < 1e-3
 
 
-def test_nobody_and_phantoms_only():
+def test_phantoms_without_people():
     frames = run(world(people=0), phantoms={"rate": 2.0})
     assert all((frame.truth.person == -1).all() and frame.truth.joints.shape == (0, 17, 3) for frame in frames)
     assert sum(len(frame.detections) for frame in frames) > 100
@@ -209,7 +209,7 @@ LOSSY = {
 
 
 class TestDelivery:
-    """A detector works on the pictures that arrive."""
+    """Detections by the pictures that arrive."""
 
     @staticmethod
     def late(source):
@@ -222,14 +222,14 @@ class TestDelivery:
         for t, row in enumerate(source):
             for v, frame in enumerate(row):
                 got, expected = frozen[t], live[frame]
-                mine, theirs = got.detections.view == v, expected.detections.view == v
-                np.testing.assert_array_equal(got.detections.keypoints[mine], expected.detections.keypoints[theirs])
-                np.testing.assert_array_equal(got.detections.boxes[mine], expected.detections.boxes[theirs])
-                np.testing.assert_array_equal(got.truth.person[mine], expected.truth.person[theirs])
-                np.testing.assert_array_equal(got.truth.error[mine], expected.truth.error[theirs])
+                rows, old = got.detections.view == v, expected.detections.view == v
+                np.testing.assert_array_equal(got.detections.keypoints[rows], expected.detections.keypoints[old])
+                np.testing.assert_array_equal(got.detections.boxes[rows], expected.detections.boxes[old])
+                np.testing.assert_array_equal(got.truth.person[rows], expected.truth.person[old])
+                np.testing.assert_array_equal(got.truth.error[rows], expected.truth.error[old])
         assert any((got.detections.view == 0).any() for got in frozen)
 
-    def test_nothing_is_found_in_a_picture_that_never_arrives(self):
+    def test_a_picture_that_never_arrives_gives_no_detections(self):
         source = [[0, -1], [-1, 1], [-1, -1], [3, 3], [4, -1], [5, -1]]
         found = run(self.late(source), phantoms={"rate": 3.0})
         for frame, row in zip(found, source, strict=True):

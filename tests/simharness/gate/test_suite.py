@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from suites import SMALL, remember_scenes
+from trials import Recorder
 
 from simharness.gate import suite
 from simharness.gate.baseline import KEPT, TIME
@@ -72,13 +73,13 @@ class TestFingerprint:
 @pytest.mark.slow
 def test_every_trial_is_measured_once_beside_the_reference(study, monkeypatch):
     remember_scenes(monkeypatch)
-    told = []
-    done = run_suite(study, progress=told.append)
+    recorder = Recorder()
+    done = run_suite(study, reporter=recorder)
     assert done.failed == ()
     assert {(trial.case, trial.seed, trial.variant) for trial in done.scores} == {
         (case, seed, "fast") for case in ("phantoms", "crowd") for seed in (0, 1)
     }
-    assert sum(told) == 4
+    assert recorder.steps == [(1, 0)] * 4
     for scores in done.scores.values():
         assert set(scores) == {*SCORES, TIME}
         assert 0.005 < scores[TIME] < 50
@@ -90,12 +91,12 @@ def test_every_trial_is_measured_once_beside_the_reference(study, monkeypatch):
 
 
 def test_a_trial_that_cannot_be_run_is_said_and_the_others_go_on(study, monkeypatch):
-    def sometimes(scenario, variants, *, blame):
+    def sometimes(scenario, *, variants, until):
         if scenario.seed == 1:
             raise RunError("the ceiling came down")
         raise ValueError("nobody fits") if scenario.people.count == 5 else RunError("and again")
 
-    monkeypatch.setattr(suite, "measure", sometimes)
+    monkeypatch.setattr(suite, "run_trial", sometimes)
     done = run_suite(study)
     assert done.scores == {}
     assert {(each.case, each.seed, each.error) for each in done.failed} == {
@@ -107,12 +108,12 @@ def test_a_trial_that_cannot_be_run_is_said_and_the_others_go_on(study, monkeypa
 
 
 def test_two_settings_of_one_scenario_both_have_its_scores(study, monkeypatch):
-    def measure(scenario, variants, *, blame):
+    def measure(scenario, *, variants, until):
         measured.append(scenario.seed)
         raise RunError("enough")
 
     measured = []
-    monkeypatch.setattr(suite, "measure", measure)
+    monkeypatch.setattr(suite, "run_trial", measure)
     twice = replace(study, settings=(study.settings[0], replace(study.settings[0], case="again")))
     done = run_suite(twice)
     assert {(each.case, each.seed) for each in done.failed} == {

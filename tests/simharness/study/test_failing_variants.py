@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 from fakes import made_up, study_of
+from trials import Recorder
 
 from simharness.gate import suite
 from simharness.runtime.errors import RunError
+from simharness.study.measure import TrialOutput
 from simharness.study.plan import plan
 from simharness.study.runner import run_study
-from simharness.study.scheduler import ATTEMPTS, Failure, Success, Unit, work_off
+from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, work_off
 from simharness.study.trial_store import Store
 from simharness.trial.identity import entry_identity
 
@@ -34,7 +36,7 @@ class Broken:
     calls: Path = field(default=Path(os.devnull))
     least: int = 1
 
-    def __call__(self, scenario, variants):
+    def __call__(self, scenario, variants, stored=None):
         with self.calls.open("a") as file:
             file.write(f"{scenario.seed} {'+'.join(variants)}\n")
         for variant in variants:
@@ -42,7 +44,7 @@ class Broken:
                 if self.errors[variant] == "kill":
                     os.kill(os.getpid(), signal.SIGKILL)
                 raise self.errors[variant]
-        return {variant: made_up(scenario, variant) for variant in variants}
+        return TrialOutput({variant: made_up(scenario, variant) for variant in variants})
 
 
 def units_of(folder, seeds, variants=VARIANTS):
@@ -75,25 +77,25 @@ class TestOneByOne:
         results = list(results)
         assert sorted(result.unit.scenario.seed for result in results) == [0, 1]  # each once
         for result in results:
-            assert isinstance(result, Failure if result.unit.scenario.seed % 2 else Success)
+            assert isinstance(result, TrialFailure if result.unit.scenario.seed % 2 else TrialSuccess)
             assert result.unit.variants == VARIANTS
             measured = {}
             for part in result.parts:
-                if isinstance(part, Success):
-                    measured |= part.measured
+                if isinstance(part, TrialSuccess):
+                    measured |= part.output.results
                     assert part.seconds >= 0
                 else:
                     assert part.unit.variants == ("fast",)
                     assert result.error == f"fast: {part.error}"
-            there = {"full", "no-3dps"} if isinstance(result, Failure) else set(VARIANTS)
+            there = {"full", "no-3dps"} if isinstance(result, TrialFailure) else set(VARIANTS)
             assert set(measured) == there
             for variant in there:
                 assert measured[variant].scores == made_up(result.unit.scenario, variant).scores
 
     def test_what_fails_only_together_is_whole_in_the_end(self, tmp_path):
         (result,) = work_off(units_of(tmp_path, 2)[1:], Broken({"fast": MemoryError()}, least=2))
-        assert isinstance(result, Success)
-        assert tuple(result.measured) == VARIANTS
+        assert isinstance(result, TrialSuccess)
+        assert tuple(result.output.results) == VARIANTS
 
     def test_it_costs_one_attempt_more_for_each_variant(self, tmp_path):
         list(work_off(units_of(tmp_path, 2)[1:], Broken({"fast": RunError("boom")}, tmp_path / "calls")))
@@ -129,18 +131,11 @@ class TestOneByOne:
 
 class TestStudies:
     def test_the_others_are_kept_and_the_trial_counts_as_failed_once(self, tmp_path, run):
-        class Seen:
-            def begin(self, trials, kept):
-                seen.append((trials, kept))
-
-            def advance(self, failed):
-                seen.append(failed)
-
-        seen = []
-        results = run({"fast": RunError("boom")}, watch=Seen())
+        recorder = Recorder()
+        results = run({"fast": RunError("boom")}, reporter=recorder)
         assert [results.info[key] for key in ("trials", "kept", "run")] == [3, 0, 2]
-        assert seen[0] == (3, 0)
-        assert sorted(seen[1:]) == [False, False, True]
+        assert recorder.stages == [("trials", 3, 0)]
+        assert sorted(recorder.steps) == [(1, 0), (1, 0), (1, 1)]
         (failed,) = results.info["failed"]
         assert (failed["seed"], failed["variants"], failed["error"]) == (1, ["fast"], "fast: boom")
         there = {(seed, variant) for seed in range(3) for variant in VARIANTS} - {(1, "fast")}
@@ -170,9 +165,9 @@ class TestStudies:
 
 
 def test_a_suite_counts_such_a_trial_once(tmp_path, monkeypatch):
-    seen = []
+    recorder = Recorder()
     monkeypatch.setattr(suite, "measure_beside_reference", Broken({"fast": RunError("boom")}))
-    done = suite.run_suite(study_of(tmp_path, variants=VARIANTS, seeds=3), progress=seen.append)
+    done = suite.run_suite(study_of(tmp_path, variants=VARIANTS, seeds=3), reporter=recorder)
     assert [(each.seed, each.error) for each in done.failed] == [(1, "fast: boom")]
-    assert seen == [1, 1, 1]
+    assert sorted(recorder.steps) == [(1, 0), (1, 0), (1, 1)]
     assert {trial.seed for trial in done.scores} == {0, 2}

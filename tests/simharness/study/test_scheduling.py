@@ -7,7 +7,7 @@ from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
 from simharness.study import scheduler as scheduling
 from simharness.study.plan import plan
-from simharness.study.scheduler import Failure, Success, Unit, work_off
+from simharness.study.scheduler import TrialFailure, TrialSuccess, Unit, work_off
 
 
 def units_of(folder, seeds):
@@ -24,20 +24,20 @@ class TestHere:
         results = list(work_off(units, Fake(tmp_path / "calls")))
         assert [result.unit for result in results] == units
         for result in results:
-            assert isinstance(result, Success)
-            assert set(result.measured) == {"full", "fast"}
-            assert result.measured["fast"].scores == made_up(result.unit.scenario, "fast").scores
+            assert isinstance(result, TrialSuccess)
+            assert set(result.output.results) == {"full", "fast"}
+            assert result.output.results["fast"].scores == made_up(result.unit.scenario, "fast").scores
 
     @pytest.mark.parametrize(("times_raised", "calls"), [(1, 2), (2, 3)])
     def test_what_fails_now_and_then_is_done(self, tmp_path, times_raised, calls):
         fake = Fake(tmp_path / "calls", {1: ("raise", times_raised)})
-        assert all(isinstance(result, Success) for result in work_off(units_of(tmp_path, 3), fake))
+        assert all(isinstance(result, TrialSuccess) for result in work_off(units_of(tmp_path, 3), fake))
         assert times(fake.calls) == {0: 1, 1: calls, 2: 1}
 
     def test_what_always_fails_is_given_up(self, tmp_path):
         fake = Fake(tmp_path / "calls", {1: ("raise", ALWAYS), 2: ("refuse", ALWAYS)})
         results = by_seed(work_off(units_of(tmp_path, 4), fake))
-        assert {seed for seed, result in results.items() if isinstance(result, Failure)} == {1, 2}
+        assert {seed for seed, result in results.items() if isinstance(result, TrialFailure)} == {1, 2}
         assert results[1].error == "ZeroDivisionError: by zero"
         assert "ZeroDivisionError" in results[1].traceback
         assert results[2].error == "nobody fits"
@@ -62,7 +62,7 @@ def test_workers_that_die_cost_a_retry(tmp_path):
     fake = Fake(tmp_path / "calls", harm, seconds=0.05)
     results = by_seed(work_off(units_of(tmp_path, 10), fake, workers=2))
     assert set(results) == set(range(10))
-    failed = {seed: result for seed, result in results.items() if isinstance(result, Failure)}
+    failed = {seed: result for seed, result in results.items() if isinstance(result, TrialFailure)}
     assert set(failed) == {3, 5}
     assert failed[3].error == "ZeroDivisionError: by zero"
     assert "fakes.py" in failed[3].traceback
@@ -70,7 +70,7 @@ def test_workers_that_die_cost_a_retry(tmp_path):
     for seed, least in {0: 1, 1: 2, 3: 3, 4: 2, 5: 1}.items():
         assert least <= calls[seed] <= least + 3  # with a worker may die a result that is on its way
     for seed in set(results) - set(failed):
-        assert results[seed].measured["full"].scores == made_up(results[seed].unit.scenario, "full").scores
+        assert results[seed].output.results["full"].scores == made_up(results[seed].unit.scenario, "full").scores
 
 
 class TestClusters:
@@ -87,9 +87,9 @@ class TestClusters:
             LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster,
         ):
             results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
-        assert isinstance(results[0], Failure)
+        assert isinstance(results[0], TrialFailure)
         assert "worker process died" in results[0].error
-        assert isinstance(results[1], Success)
+        assert isinstance(results[1], TrialSuccess)
         calls = times(fake.calls)
         assert calls[0] == 3
         assert calls[1] == 2
@@ -101,7 +101,7 @@ class TestClusters:
         units, fake = units_of(tmp_path, 5), Fake(tmp_path / "calls", {1: ("raise", 1), 2: ("raise", ALWAYS)})
         with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster:
             results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
-            assert {seed for seed, result in results.items() if isinstance(result, Failure)} == {2}
+            assert {seed for seed, result in results.items() if isinstance(result, TrialFailure)} == {2}
             again = list(work_off(units[:1], fake, scheduler=cluster.scheduler_address))
         assert len(again) == 1
         assert times(fake.calls) == {0: 2, 1: 2, 2: 3 + 2, 3: 1, 4: 1}

@@ -24,7 +24,7 @@ def store_is_clean(folder):
     for each in plan(study_of(folder, cameras=(3, 4), seeds=3)):
         there = {variant: store.file_of(identity).exists() for variant, identity in each.entries.items()}
         for variant in (variant for variant, exists in there.items() if exists):
-            assert store.read(each.entries[variant]).measured.scores == made_up(each.scenario, variant).scores
+            assert store.read(each.entries[variant]).result.scores == made_up(each.scenario, variant).scores
         finished += all(there.values())
     assert not store.damaged
     return finished

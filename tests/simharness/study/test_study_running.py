@@ -6,6 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 from fakes import ALWAYS, Fake, called, made_up, study_of, times
+from trials import Recorder
 
 from simharness.scenario.study_definition import load_study
 from simharness.scoring.catalogue import SCORES
@@ -301,18 +302,9 @@ class TestShards:
             run_shard(study_of(tmp_path), shard, store=run.store, measure=Fake(run.calls))
 
 
-def test_whoever_watches_is_told_of_every_trial(tmp_path, run):
-    class Seen:
-        def __init__(self):
-            self.said = []
-
-        def begin(self, trials, kept):
-            self.said.append((trials, kept))
-
-        def advance(self, failed):
-            self.said.append(failed)
-
+def test_the_reporter_receives_every_trial(tmp_path, run):
     run(study_of(tmp_path, seeds=1))
-    seen = Seen()
-    run(study_of(tmp_path, seeds=3), harm={2: ("refuse", ALWAYS)}, watch=seen)
-    assert seen.said == [(3, 1), False, True]
+    recorder = Recorder()
+    run(study_of(tmp_path, seeds=3), harm={2: ("refuse", ALWAYS)}, reporter=recorder)
+    assert recorder.stages == [("trials", 3, 1)]
+    assert recorder.steps == [(1, 0), (1, 1)]

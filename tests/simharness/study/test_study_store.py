@@ -25,9 +25,9 @@ def entry(tmp_path_factory):
 
 def same(one, other):
     assert (one.trial, one.variant, one.seconds) == (other.trial, other.variant, other.seconds)
-    assert one.measured.scores == other.measured.scores
+    assert one.result.scores == other.result.scores
     for table in ("frames", "people", "failures"):
-        assert getattr(one.measured, table).equals(getattr(other.measured, table))
+        assert getattr(one.result, table).equals(getattr(other.result, table))
 
 
 def files(folder):
@@ -46,10 +46,10 @@ def test_what_is_written_is_read(tmp_path, entry):
 
 
 def test_a_score_that_does_not_apply_stays_none(tmp_path, entry):
-    scores = {**entry.measured.scores, "pcp": None}
+    scores = {**entry.result.scores, "pcp": None}
     store = Store(tmp_path)
-    store.write(ID, dataclasses.replace(entry, measured=dataclasses.replace(entry.measured, scores=scores)))
-    assert store.read(ID).measured.scores == scores
+    store.write(ID, dataclasses.replace(entry, result=dataclasses.replace(entry.result, scores=scores)))
+    assert store.read(ID).result.scores == scores
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +174,7 @@ def hammer(folder, entry, start, results):
         store, identity = Store(folder), f"{turn % 4:02x}" * 16
         store.write(identity, entry)
         found = store.read(identity)
-        seen.add(found is not None and found.measured.scores == entry.measured.scores)
+        seen.add(found is not None and found.result.scores == entry.result.scores)
         seen.add(not store.damaged)
     results.put(seen)
 

@@ -13,7 +13,7 @@ from simharness.report.run.pictures import frame_costs
 from simharness.report.run.result_folder import run
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import fingerprint
-from simharness.scenario.profiles import read_profile
+from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
 from simharness.scoring.summary import VariantScores
 from simharness.trial.run_folder import read_run
