@@ -1,7 +1,7 @@
-"""The command line: a module for each group of commands.
+"""Command line: one module for each group of commands.
 
-Exit codes: 0 fine, 1 regression found, 2 bad input (one message on stderr), 3 the run itself failed (with its
-traceback), 130 interrupted. Nothing heavy is imported before a command needs it.
+Exit codes: 0 success, 1 regression found, 2 bad input (one message on stderr), 3 the run itself failed (with its
+traceback), 130 interrupted. Commands import heavy modules only when they run.
 """
 
 from __future__ import annotations
@@ -22,5 +22,5 @@ app.add_typer(fit_detector.app, name="fit-detector")
 
 
 def main() -> None:
-    """Entry point of the console script."""
+    """Run the command line; entry point of the console script."""
     app()

@@ -1,4 +1,4 @@
-"""``python -m simharness.cli``."""
+"""Command line as a module: ``python -m simharness.cli``."""
 
 from simharness.cli import main
 

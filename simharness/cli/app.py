@@ -1,4 +1,4 @@
-"""The program itself: its name, its help, its version."""
+"""The program: its name, help and version."""
 
 from __future__ import annotations
 

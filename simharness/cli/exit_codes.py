@@ -1,4 +1,4 @@
-"""Where errors become exit codes, and files are written that a command was asked for."""
+"""Exit codes of errors, and JSON output of commands."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ FAILED = 3
 
 @contextlib.contextmanager
 def border() -> Iterator[None]:
-    """Where errors become exit codes.
+    """Turn errors into messages and exit codes.
 
-    A ValueError that gets here is the input's fault, for whatever works on checked input raises a RunError
-    instead: :func:`simharness.report.run.result_folder.run` and :func:`after_reading` see to that.
+    A ValueError means bad input, because code that works on validated input raises a RunError instead:
+    :func:`simharness.report.run.result_folder.run` and :func:`after_reading` ensure it.
     """
     console = Console(stderr=True)
     try:
@@ -41,8 +41,8 @@ def border() -> Iterator[None]:
 
 @contextlib.contextmanager
 def after_reading() -> Iterator[None]:
-    """From here on, an error is not the input's fault."""
-    from simharness.runtime.frame_pool import RunError
+    """Turn every error into a RunError: the input has been validated."""
+    from simharness.runtime.errors import RunError
 
     try:
         yield
@@ -51,7 +51,11 @@ def after_reading() -> Iterator[None]:
 
 
 def write_json(summary: dict[str, Any], path: Path) -> None:
-    """A file that is there is whole."""
+    """Write a summary as JSON; the file appears only when it is complete.
+
+    Raises:
+        ValueError: the file cannot be written.
+    """
     from simharness.runtime.atomic_files import write_whole
 
     try:

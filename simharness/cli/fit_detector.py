@@ -1,4 +1,4 @@
-"""``simharness fit-detector``: profiles of real detectors."""
+"""``simharness fit-detector``: profiles fitted to real detectors."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from rich.console import Console
 
 from simharness.cli.exit_codes import after_reading, border, write_json
 
-app = typer.Typer(no_args_is_help=True, help="Measure a real detector and write the profile that errs as it does.")
+app = typer.Typer(no_args_is_help=True, help="Measure a real detector and write a profile with its errors.")
 
 
 @app.command("shelf")
 def fit_shelf(
-    folder: Annotated[Path, typer.Argument(help="The published files.", metavar="FOLDER")],
+    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the profile there, a TOML file.", dir_okay=False)
+        Path | None, typer.Option(metavar="FILE", help="Write the profile (TOML) to this file.", dir_okay=False)
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write a PNG there: measured beside its simulated twin.", dir_okay=False),
+        typer.Option(metavar="FILE", help="Plot the measurement and its simulated twin (PNG).", dir_okay=False),
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures there.", dir_okay=False)
+        Path | None,
+        typer.Option("--json", metavar="FILE", help="Write all numbers to this file.", dir_okay=False),
     ] = None,
 ) -> None:
     """Shelf: OpenPose on frames 300 to 599 against the published truth.

@@ -1,4 +1,4 @@
-"""``simharness report``: the page of a study."""
+"""``simharness report``: the report of a study."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ def add_to(app: typer.Typer) -> None:
 
 
 def report(
-    study: Annotated[Path, typer.Argument(help="The folder of a study.", metavar="STUDY")],
+    study: Annotated[Path, typer.Argument(help="The result folder of a study.", metavar="STUDY")],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The page. [dim]\\[default: STUDY/report.html][/]", dir_okay=False),
+        typer.Option(metavar="FILE", help="File of the report. [dim]\\[default: STUDY/report.html][/]", dir_okay=False),
     ] = None,
     threshold: Annotated[
         list[str] | None,
         typer.Option(
             metavar="SCORE=VALUE",
-            help="Tell where a score passes a value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
+            help="Report where a score passes a value. Repeatable. [dim]\\[default: pcp=90, precision=90][/]",
         ),
     ] = None,
     rerun: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Instead of the page, write the worst trial for the viewer of rerun: an .rrd file.",
+            help="Instead of the report, write the worst trial for the viewer rerun: an .rrd file.",
             dir_okay=False,
         ),
     ] = None,
@@ -45,23 +45,24 @@ def report(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Instead of the page, write what is kept beside the code: numbers, a table, the curves.",
+            help="Instead of the report, write a digest to keep with the code: numbers, a table, the curves.",
             file_okay=False,
         ),
     ] = None,
     trial: Annotated[
-        str | None, typer.Option(metavar="ID", help="With --rerun: this trial, not the worst; its first digits do.")
+        str | None,
+        typer.Option(metavar="ID", help="With --rerun: this trial, by its first digits, instead of the worst."),
     ] = None,
 ) -> None:
-    """Write the page of a study: scores, curves, failures, the worst frames in pictures and in 3D.
+    """Write the report of a study: scores, curves, failures, the worst frames in pictures and in 3D.
 
-    The trials of the worst frames are run again for their pictures.
+    The trials of the worst frames are run again to make their pictures.
     """
     with border():
         if trial is not None and rerun is None:
-            raise ValueError("--trial: says which trial --rerun writes; without --rerun it has no meaning")
+            raise ValueError("--trial: chooses the trial that --rerun writes; add --rerun FILE, or remove --trial")
         if rerun is not None and digest is not None:
-            raise ValueError("--rerun and --digest: each is written instead of the page; give one of them")
+            raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
         thresholds = _thresholds(threshold or [])
         from simharness.study.result_folder import read_study
 
@@ -87,13 +88,13 @@ def report(
 
 
 def _thresholds(given: list[str]) -> dict[str, float]:
-    """The values of ``--threshold`` by score."""
+    """Return the values of ``--threshold`` by score."""
     thresholds = {}
     for each in given:
         score, sign, value = each.partition("=")
         try:
             number = float(value)
-            if not sign or not math.isfinite(number):  # nothing passes infinity, or what is no number
+            if not sign or not math.isfinite(number):  # no score passes infinity or NaN
                 raise ValueError
         except ValueError:
             raise ValueError(f"--threshold {each}: expected SCORE=NUMBER, for example --threshold pcp=90") from None
@@ -114,13 +115,13 @@ def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
 
 
 def _chosen(results: Results, trial: str | None) -> Frame:
-    """The worst frame of a trial, or of all."""
+    """Return the worst frame of a trial, or of all trials."""
     from simharness.report.study.worst_frames import worst_frames
 
     frames = worst_frames(results, count=results.trials["trial"].n_unique())
     chosen = [frame for frame in frames if frame.trial.startswith(trial or "")]
     if len({frame.trial for frame in chosen}) > 1 and trial is not None:
-        raise ValueError(f"--trial {trial}: {len(chosen)} trials begin so; give more digits")
+        raise ValueError(f"--trial {trial}: {len(chosen)} trials begin with it; give more digits")
     if not chosen:
         what = "the study has no trial that finished" if trial is None else f"--trial {trial}: no such trial"
         raise ValueError(f"{what}; the column trial of {results.folder / 'trials.parquet'} lists them")

@@ -1,4 +1,4 @@
-"""``simharness run`` and ``render``: one scenario."""
+"""``simharness run`` and ``render``: a single scenario."""
 
 from __future__ import annotations
 
@@ -28,21 +28,24 @@ def run(
     seed: Seed = None,
     workers: Annotated[
         int,
-        typer.Option(metavar="N", min=1, help="Processes that share the frames. The results are the same."),
+        typer.Option(metavar="N", min=1, help="Processes that share the frames; the results stay the same."),
     ] = 1,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the result folder goes.", file_okay=False)] = Path(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
         "results/runs"
     ),
 ) -> None:
     """Run a scenario: simulate, film, detect, estimate, score, report.
 
-    The results appear, when whole, in a folder NAME-HASH: report.html for people, the rest for programs.
+    The results appear, when they are complete, in a folder NAME-HASH:
+    report.html for people, other files for programs.
     """
     with border():
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 
-        loaded = load(scenario, overrides=overrides or (), seed=seed)  # before the slow imports, to answer at once
+        loaded = load(
+            scenario, overrides=overrides or (), seed=seed
+        )  # before slow imports: mistakes are reported at once
         from simharness.report.run.result_folder import run as run_scenario
 
         command = command_line()
@@ -58,23 +61,27 @@ def render(
     scenario: ScenarioFile,
     overrides: Overrides = None,
     seed: Seed = None,
-    video: Annotated[bool, typer.Option("--video", help="MP4 films instead of PNG pictures.")] = False,
+    video: Annotated[bool, typer.Option("--video", help="Write MP4 films instead of PNG pictures.")] = False,
     overlay: Annotated[
         str,
-        typer.Option(metavar="LAYERS", help="Draw in [cyan]truth[/], [cyan]detections[/], [cyan]estimates[/]: a list."),
+        typer.Option(
+            metavar="LAYERS",
+            help="Draw [cyan]truth,detections,estimates[/], or some of them.",
+        ),
     ] = "",
     also: Annotated[
         str,
-        typer.Option(metavar="CHANNELS", help="Write [cyan]depth[/], [cyan]ids[/], [cyan]parts[/] too: a list."),
+        typer.Option(metavar="CHANNELS", help="Also write [cyan]depth,ids,parts[/], or some of them."),
     ] = "",
     every: Annotated[int, typer.Option(metavar="N", help="Render one frame of N.")] = 1,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the folder NAME goes.", file_okay=False)] = Path(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the folder NAME.", file_okay=False)] = Path(
         "results/renders"
     ),
 ) -> None:
-    """Render what the cameras of a scenario record, and a mosaic of them all.
+    """Render the pictures of all cameras of a scenario, and a mosaic of them.
 
-    The pictures appear, when whole, in FOLDER/NAME: CAMERA/0000.png, ... or CAMERA.mp4, and mosaic.
+    They appear, when they are complete, in FOLDER/NAME: CAMERA/0000.png, ...
+    or CAMERA.mp4, and mosaic.
     """
     with border():
         from simharness.runtime.progress import reporter
@@ -92,7 +99,7 @@ def render(
 
 
 def _headline(summary: dict[str, Any]) -> Table:
-    """The headline numbers of a run, a row for each variant."""
+    """Return the headline scores of a run, a row for each variant."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 

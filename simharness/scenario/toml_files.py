@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
+import textwrap
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,6 +17,8 @@ from simharness.scenario.layers import is_range
 from simharness.scenario.sections.scenario import Scenario
 
 _LISTED = 10  # files that a message lists where one is missing
+_WIDTH = 80  # columns of a line
+_COMMENT = 32  # column where comments begin
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -83,18 +86,28 @@ def toml(value: Any) -> str:
 
 
 def _model_lines(section: BaseModel, name: str = "", description: str | None = None) -> list[str]:
-    head = f"[{name}]"
-    lines = [f"{head:<31} # {description}" if description else head] if name else []
+    lines = _commented(f"[{name}]", description) if name else []
     nested: list[str] = []
     for key, field in type(section).model_fields.items():
         value = getattr(section, key)
         if isinstance(value, BaseModel):
             nested += ["", *_model_lines(value, f"{name}.{key}" if name else key, field.description)]
         elif value is not None:
-            assignment = f"{key} = {toml(value)}"
-            lines.append(f"{assignment:<31} # {field.description}" if field.description else assignment)
+            lines += _commented(f"{key} = {toml(value)}", field.description)
     lines += [f"{key} = {toml(value)}" for key, value in (section.model_extra or {}).items()]
     return lines + nested
+
+
+def _commented(line: str, comment: str | None) -> list[str]:
+    """Return a line with a comment beside it, in as many lines as fit a terminal of 80 columns."""
+    first, *others = textwrap.wrap(comment or "", _WIDTH - _COMMENT - 2) or [""]
+    if not first:
+        return [line]
+    if len(line) < _COMMENT:
+        line = f"{line:<{_COMMENT}}# {first}"
+    else:
+        others = [first, *others]
+    return [line, *(f"{'':<{_COMMENT}}# {other}" for other in others)]
 
 
 def _key_lines(table: Mapping[str, Any], name: str = "") -> Iterator[str]:

@@ -18,7 +18,7 @@ from mvpose.affinity import GeometricAffinity
 from mvpose.reconstruction.likelihood import Noise
 from simharness.cli import app
 from simharness.gate import suite
-from simharness.runtime.frame_pool import RunError
+from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 
 
@@ -212,13 +212,13 @@ class TestBadInput:
         """A baseline as a file, of a suite that need not be run for it."""
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
-        from simharness.gate.trial_command import Trial, name_of, scenes_of
+        from simharness.gate.trial_command import TrialKey, name_of, scenes_of
         from simharness.scenario.study_definition import load_study
 
         (tmp_path / "small.toml").write_text(SMALL)
         study = load_study(tmp_path / "small.toml")
         scores = {
-            Trial(name_of(setting, study), seed, "fast"): dict.fromkeys(KEPT, 1.0) for setting, seed in scenes_of(study)
+            TrialKey(name_of(setting, study), seed, "fast"): dict.fromkeys(KEPT, 1.0) for setting, seed in scenes_of(study)
         }
         write_baseline(Measurement("small", fingerprint(study), "1", scores), tmp_path / "small.json")
         return tmp_path / "small.json"
@@ -260,7 +260,7 @@ class TestBadInput:
 
     @pytest.mark.parametrize("option", ["--junit", "--summary"])
     def test_a_report_of_a_comparison_that_is_not_made(self, check, there, option):
-        refused(check("--update-baseline", option, "out"), f"{option}: with --update-baseline nothing is compared")
+        refused(check("--update-baseline", option, "out"), f"{option}: cannot be combined with --update-baseline")
 
     def test_no_suite(self, check):
         refused(check(file="none.toml"), "none.toml: no such file")

@@ -78,7 +78,7 @@ def test_a_study_in_parts_and_then_whole(simharness, reports):
 
     merged = simharness("merge", "one", "--into", "all")
     assert merged.exit_code == 0, merged.stderr
-    assert "2 entries copied into all, 0 were there" in merged.stdout
+    assert "2 entries copied into all, 0 were already there" in merged.stdout
 
     whole = simharness("study", QUICKSTART, *TINY, *SWEEP, "--seeds", "2", "--store", "all", "--out", "out")
     assert whole.exit_code == 0, whole.stderr
@@ -155,7 +155,7 @@ def test_damaged_entries_are_told_of(simharness):
     left_out = simharness("merge", "out/store", "--into", "all")
     assert left_out.exit_code == 0
     assert "0 entries copied into all" in left_out.stdout
-    assert "1 are damaged and were left out" in left_out.stderr
+    assert "1 are damaged and were skipped" in left_out.stderr
     assert str(entry) in left_out.stderr
     again = simharness(*arguments)
     assert again.exit_code == 0

@@ -62,7 +62,7 @@ class Scenario(Section):
     """A scenario: one simulated scene, the cameras and the detector, and the variants under test."""
 
     name: str = Field(pattern=NAME, description="lowercase letters, digits, - and _; result folders are named after it")
-    description: str = Field("", description="one line about the scenario")
+    description: str = ""
     seed: int = Field(0, ge=0, description="seed of every random draw; 0 is a seed like any other")
     duration: Positive = Field(4.0, description="seconds")
     rate: Positive = Field(10.0, description="frames per second")
