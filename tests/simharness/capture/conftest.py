@@ -25,7 +25,7 @@ def _made(name):
 def _renderer_or_skip(name):
     made = _made(name)
     if isinstance(made, Unavailable):
-        # CI installs the GL libraries and says so: there, a test that cannot run has failed.
+        # CI installs the GL libraries and declares it: there, a test that cannot run counts as failed.
         (pytest.fail if os.environ.get("SIMHARNESS_REQUIRE_GL") else pytest.skip)(str(made))
     return made
 

@@ -29,7 +29,7 @@ def box(center, size, color=(0.7, 0.6, 0.5)):
 
 
 def room(size=(8, 8, 3), color=(0.85, 0.83, 0.8)):
-    """Floor, walls and ceiling, seen from within."""
+    """Floor, walls and ceiling, seen from inside."""
     outside = box((0, 0, size[2] / 2), size, color)
     return _mesh(outside.vertices, outside.faces[:, ::-1], color)
 
@@ -63,7 +63,7 @@ def ball(center, radius, color=(0.8, 0.5, 0.4), *, rings=24, stretch=1.0):
 
 
 def figure(x, y, color=(0.3, 0.5, 0.8), *, rings=24, turn=0.0):
-    """A stand-in person of balls: legs, torso, arms, head; about 1.75 m tall, on the floor."""
+    """A simplified person of balls: legs, torso, arms, head; about 1.75 m tall, on the floor."""
     across = np.array([-np.sin(turn), np.cos(turn), 0.0])
     base = np.array([x, y, 0.0])
     parts = [
@@ -85,7 +85,7 @@ def figure(x, y, color=(0.3, 0.5, 0.8), *, rings=24, turn=0.0):
 
 
 def crowd(rings=24):
-    """Four people, boxes, a thin board and a room: 0..3 people, 4.. things, last the room."""
+    """Four people, boxes, a thin board and a room: meshes 0..3 are people, 4.. objects, the last is the room."""
     people = [
         figure(0.4, 0.3, (0.2, 0.45, 0.7), rings=rings, turn=0.4),
         figure(-0.9, 0.6, (0.75, 0.3, 0.25), rings=rings, turn=1.9),

@@ -22,7 +22,7 @@ PLACES = ((0.0, 0.0), (1.0, 0.4))
 
 
 class Stage:
-    """Two people at ``PLACES`` in a pose of their own, a box that stands and a ball that moves."""
+    """Two people at ``PLACES`` in different poses, a box at rest and a moving ball."""
 
     def __init__(self):
         spec = mujoco.MjSpec()
@@ -43,7 +43,7 @@ class Stage:
         self.state = self.posed(stream(1, "test", "pose"))
 
     def posed(self, rng, ball=(0.5, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)):
-        """Joints bent at random within a third of their ranges; MuJoCo's data is left in that configuration."""
+        """Bend joints at random within a third of their ranges; the MuJoCo data keeps that configuration."""
         model, data = self.model, self.data
         hinge = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
         low, high = model.jnt_range[hinge].T / 3
@@ -60,7 +60,7 @@ class Stage:
         return SimpleNamespace(bones=np.stack(bones), placements=np.array([ball]))
 
     def first_met(self, start, way):
-        """By MuJoCo, one ray: whose surface it is (2 of a thing, -1 of nothing) and how far off."""
+        """Cast one ray by MuJoCo: owner of the surface (2 an object, -1 none) and its distance."""
         geom = np.empty(1, np.int32)
         distance = mujoco.mj_ray(self.model, self.data, start, way, None, 1, -1, geom, None)
         if geom[0] < 0:
@@ -76,8 +76,8 @@ def stage():
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 10_000))
-def test_everything_is_met_where_mujoco_meets_it(stage, seed):
-    """From anywhere, also from within a body, towards the people and past them."""
+def test_hits_agree_with_mujoco(stage, seed):
+    """From any position, also inside a body, towards the people and past them."""
     rng = stream(seed, "test", "rays")
     state = stage.posed(rng, ball=(*rng.uniform([-1, -1, 0.5], [1, 1, 1.5]), 1.0, 0.0, 0.0, 0.0))
     caster = RayCaster(stage)
@@ -88,7 +88,7 @@ def test_everything_is_met_where_mujoco_meets_it(stage, seed):
     for target, who, metres in zip(targets, owner, in_front, strict=True):
         length = np.linalg.norm(target - camera.center)
         way = (target - camera.center) / length
-        begin = 0.05 / (way @ camera.R[2])  # nothing nearer than the near plane is seen
+        begin = 0.05 / (way @ camera.R[2])  # the near plane
         expected, distance = stage.first_met(camera.center + begin * way, way)
         if begin + distance >= length:
             assert (who, metres) == (-1, -np.inf)
@@ -97,7 +97,7 @@ def test_everything_is_met_where_mujoco_meets_it(stage, seed):
             assert metres == pytest.approx(length - begin - distance, abs=1e-8)
 
 
-def test_a_box_hides_what_is_behind_it_and_nothing_in_front(stage):
+def test_a_box_occludes_only_targets_behind_it(stage):
     caster = RayCaster(stage)
     caster.place(stage.state)
     camera = camera_at((-1.0, 4.0, 0.5), (-1.0, 1.0, 0.5))
@@ -109,7 +109,7 @@ def test_a_box_hides_what_is_behind_it_and_nothing_in_front(stage):
     assert in_front[0] == pytest.approx(1.0 + half, abs=1e-6)
 
 
-def test_what_moves_is_met_where_it_is(stage):
+def test_moving_solids_are_hit_at_their_positions(stage):
     caster = RayCaster(stage)
     camera = camera_at((3.0, -1.0, 1.2), (0.0, -1.0, 1.2))
     target = np.array([[0.0, -1.0, 1.2]])
@@ -117,24 +117,24 @@ def test_what_moves_is_met_where_it_is(stage):
         caster.place(stage.posed(stream(1, "test"), ball=(x, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
         owner, in_front = caster.cast(camera, target)
         assert owner.tolist() == [2]
-        assert in_front[0] == pytest.approx(x + 0.1)  # the ball's near side, from the target
+        assert in_front[0] == pytest.approx(x + 0.1)  # the near side of the ball, from the target
     caster.place(stage.posed(stream(1, "test"), ball=(0.5, -3.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     assert caster.cast(camera, target)[0].tolist() == [-1]
 
 
-def test_nothing_nearer_than_the_near_plane_is_met(stage):
-    """A lens 3 cm from a ball's surface, inside of it: only what comes after the ball's far side counts."""
+def test_nothing_before_the_near_plane_is_hit(stage):
+    """A camera inside a ball, 3 cm from its surface: only hits behind the far side count."""
     caster = RayCaster(stage)
     ball = (0.5, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # its centre is 20 cm above
     caster.place(stage.posed(stream(1, "test"), ball=ball))
-    for behind, met in ((0.02, -1), (0.08, 2)):  # the far side is that far from the lens
+    for behind, met in ((0.02, -1), (0.08, 2)):  # distance of the far side from the camera
         camera = camera_at((0.5 - 0.1 + behind, -1.0, 1.2), (-2.0, -1.0, 1.2))
         owner, _ = caster.cast(camera, np.array([[-1.0, -1.0, 1.2]]))
         assert owner.tolist() == [met]
 
 
-def test_capsules_are_passed_by_only_if_they_are_out_of_the_way(stage):
-    """Rays at the very edge of each capsule: just inside is met, just outside is not. No short cut may miss one."""
+def test_capsules_are_skipped_only_if_the_ray_misses_them(stage):
+    """Rays at the edge of each capsule: just inside is a hit, just outside is not; skipping must not lose one."""
     state = stage.posed(stream(3, "test"))
     caster = RayCaster(stage)
     caster.place(state)

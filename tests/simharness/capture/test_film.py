@@ -26,11 +26,11 @@ RIG = Rig([camera_at(c, (0, 0, 1), size=(200, 150)) for c in ((3.5, 0, 1.8), (0,
 FRAMES, PEOPLE, JOINTS = 4, 2, 17
 TIME = np.arange(FRAMES) / 10
 ARRAYS = ("pixels", "visibility", "boxes", "area_visible", "source")
-SPEED = np.array([4.0, 0.0, 0.0])  # metres a second
+SPEED = np.array([4.0, 0.0, 0.0])  # m/s
 
 
 class BallBody:
-    """A body of one bone: skinning moves a ball about."""
+    """A body of one bone: skinning moves a ball."""
 
     def __init__(self, radius, rings=40):
         self.mesh = ball((0, 0, 0), radius, rings=rings)
@@ -42,7 +42,7 @@ class BallBody:
 
 
 class BallPlayback:
-    """Balls that roll along x; their joints lie in and beside their middle."""
+    """Balls that move along x; their joints lie in and beside their middle."""
 
     def __init__(self, people=PEOPLE):
         bodies = tuple(BallBody(0.25 + 0.05 * p) for p in range(people))
@@ -114,7 +114,7 @@ def test_people_come_first_among_the_meshes():
         np.testing.assert_allclose(meshes[p].vertices.mean(axis=0), state.joints[p, 0], atol=1e-3)
 
 
-def test_boxes_frame_the_silhouette_of_the_person_alone(views, raster):
+def test_boxes_frame_the_silhouette_without_occlusion(views, raster):
     playback = BallPlayback()
     for t, v, p in np.ndindex(FRAMES, len(RIG), PEOPLE):
         alone = meshes_at(playback.scene, playback.at(TIME[t]))[p]
@@ -125,7 +125,7 @@ def test_boxes_frame_the_silhouette_of_the_person_alone(views, raster):
         np.testing.assert_allclose([x + w, y + h], [columns.max(), rows.max()], atol=1.5)
 
 
-def test_a_person_behind_the_box_is_labelled_so(views):
+def test_a_person_behind_the_box_is_occluded_by_clutter(views):
     assert Visibility.OCCLUDED_BY_CLUTTER in views.visibility
     assert Visibility.VISIBLE in views.visibility
     assert (views.visibility == Visibility.VISIBLE)[views.area_visible == 0].sum() == 0
@@ -144,7 +144,7 @@ def test_a_scene_without_people():
 
 
 class TestClocks:
-    """Every camera sees the scene at its own time."""
+    """Every camera observes the scene at the times of its pictures."""
 
     def test_a_late_camera_sees_what_is_then(self):
         exposures = schedule_exposures(RIG, Faults(clock_offset=0.05), TIME, seed=1)
@@ -241,7 +241,7 @@ class TestStudio:
 
 
 @pytest.mark.parametrize("finer", [1, 2, 3])
-def test_an_antialiased_dot_stays_where_it_projects(renderer, finer):
+def test_an_antialiased_dot_is_at_its_projection(renderer, finer):
     place = np.array([0.2, 0.3, 0.9])
     rgb = antialiased(renderer, RIG[0], [disc(place, -RIG[0].R[2], 0.3, (0, 0, 0))], finer=finer).astype(float)
     weight = rgb[0, 0, 0] - rgb[..., 0]
@@ -274,7 +274,7 @@ def test_lookalikes_are_none_by_default_and_checked(views):
         Views.concatenate([views, replace(views, lookalikes=poster)])
 
 
-def test_previews_are_the_pictures_reduced_and_only_those_asked_for():
+def test_previews_are_reduced_pictures_of_the_requested_frames():
     exposures, picture_source = ExposureSchedule.ideal(RIG, TIME), TestStudio.picture_source()
     views = Views.concatenate(
         [filmed(frames=[t], picture_source=picture_source, previews={1, 3}) for t in range(FRAMES)]
@@ -286,7 +286,7 @@ def test_previews_are_the_pictures_reduced_and_only_those_asked_for():
     assert filmed().previews == {}
 
 
-def test_a_smaller_picture_shows_the_same():
+def test_a_reduced_picture_shows_the_same():
     exposures, picture_source = ExposureSchedule.ideal(RIG, TIME), TestStudio.picture_source()
     small, full = (
         picture_source.picture(exposures, 3, 0, finer=2, width=100),

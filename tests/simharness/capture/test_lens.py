@@ -26,7 +26,7 @@ def bent_camera(distortion, *, size=(320, 240), fov=75.0, center=(3.0, -1.0, 2.0
 
 
 @pytest.mark.parametrize("distortion", LENSES)
-def test_a_dot_is_drawn_where_it_projects(renderer, distortion):
+def test_a_dot_is_drawn_at_its_projection(renderer, distortion):
     camera = bent_camera(distortion, size=(640, 480), shift=(4.3, -2.6))
     columns, rows = np.meshgrid(np.linspace(16, 623, 14), np.linspace(16, 463, 11))
     targets = np.stack([columns, rows], axis=-1).reshape(-1, 2) + np.random.default_rng(3).uniform(-3, 3, (154, 2))
@@ -37,20 +37,20 @@ def test_a_dot_is_drawn_where_it_projects(renderer, distortion):
     centroids = np.array([np.argwhere(image.ids == k)[:, ::-1].mean(axis=0) for k in range(len(places))])
     error = centroids - targets
     assert np.abs(error.mean(axis=0)).max() < 0.05
-    assert np.linalg.norm(error, axis=1).max() < 0.75  # a disc of few pixels has a centroid of its own
+    assert np.linalg.norm(error, axis=1).max() < 0.75  # the centroid of a disc of few pixels is inexact
     column, row = np.floor(targets + 0.5).astype(int).T
     np.testing.assert_array_equal(image.ids[row, column], np.arange(len(places)))
 
 
 @pytest.mark.parametrize("distortion", LENSES)
 def test_edges_lie_within_a_pixel(renderer, distortion):
-    """Whatever a pixel shows, the sphere's outline passes within one pixel of where ids change."""
+    """The outline of a sphere passes within one pixel of every change of ids."""
     camera = bent_camera(distortion)
     center, radius = np.array([0.2, 0.3, 1.0]), 0.7
     image = renderer.render(camera, [ball(center, radius, rings=120)])
     rays, offset = camera.rays(pixel_grid(camera)), camera.center - center
     inside = (rays @ offset) ** 2 - (offset @ offset - radius**2) > 0
-    near = np.zeros_like(inside)  # pixels with one of the other kind within a pixel
+    near = np.zeros_like(inside)  # pixels next to one of the other kind
     padded = np.pad(inside, 1, mode="edge")
     for y in range(3):
         for x in range(3):
@@ -61,7 +61,7 @@ def test_edges_lie_within_a_pixel(renderer, distortion):
 
 @pytest.mark.parametrize("distortion", LENSES)
 def test_depth_is_that_of_the_nearest_ray_of_the_pinhole(renderer, distortion):
-    """The depth of a plane, whose change over one pixel bounds the error; it is depth along the axis, not the ray."""
+    """Depth of a plane along the axis; its change over one pixel bounds the error."""
     camera = bent_camera(distortion)
     floor = box((0, 0, -0.05), (30, 30, 0.1))
     image = renderer.render(camera, [floor])
@@ -76,8 +76,8 @@ def test_depth_is_that_of_the_nearest_ray_of_the_pinhole(renderer, distortion):
 
 
 @pytest.mark.parametrize("distortion", LENSES)
-def test_colours_are_those_of_the_place(renderer, distortion):
-    """A pattern on a board, whose bent picture is worked out pixel by pixel."""
+def test_colours_match_the_position_on_the_board(renderer, distortion):
+    """A pattern on a board; its distorted picture is computed pixel by pixel."""
     camera = replace(camera_at((-1.6, 0.0, 0.5), (0, 0, 0.5), size=(320, 240)), distortion=np.array(distortion))
     board = chequered((3.0, 2.0), repeat=(2, 2))
     image = renderer.render(camera, [board], lighting=Lighting(key=0, sky=1 / 0.65, fill=0))
@@ -100,7 +100,7 @@ def test_colours_are_those_of_the_place(renderer, distortion):
     fov=st.floats(30, 85),
     shift=st.tuples(st.floats(-20, 20), st.floats(-20, 20)),
 )
-def test_the_pinhole_sees_all_and_is_nowhere_coarser(k1, k2, p1, p2, fov, shift):
+def test_the_pinhole_picture_covers_the_view_at_full_resolution(k1, k2, p1, p2, fov, shift):
     camera = bent_camera((k1, k2, p1, p2, 0.0), size=(96, 72), fov=fov, shift=shift)
     lens = lens_of(camera)
     pixels = pixel_grid(camera)
@@ -117,7 +117,7 @@ def test_the_pinhole_sees_all_and_is_nowhere_coarser(k1, k2, p1, p2, fov, shift)
     assert (lens.dark is None) == imaged.all()
 
 
-def test_beyond_the_edge_of_the_lens_it_is_dark(renderer):
+def test_pixels_beyond_the_fold_are_dark(renderer):
     """A polynomial that folds over: nothing is imaged in the corners."""
     camera = bent_camera((-0.5, 0.0, 0.0, 0.0, 0.0), fov=60.0)
     dark = np.isnan(camera.rays(pixel_grid(camera))).any(axis=-1)
@@ -130,13 +130,13 @@ def test_beyond_the_edge_of_the_lens_it_is_dark(renderer):
     assert (image.ids[~dark] >= 0).all()
 
 
-def test_without_distortion_the_picture_is_the_pinhole_s():
+def test_without_distortion_the_picture_is_that_of_the_pinhole():
     seen = []
     through_lens(VIEWS[0], lambda camera: seen.append(camera) or RasterRenderer().render(camera, []))
     assert seen[0] is VIEWS[0]
 
 
-def test_a_weak_lens_is_nearly_none(renderer):
+def test_a_weak_lens_changes_little(renderer):
     straight = VIEWS[0]
     one = renderer.render(straight, crowd(12))
     other = renderer.render(replace(straight, distortion=np.array([1e-7, 0, 0, 0, 0])), crowd(12))
@@ -144,13 +144,13 @@ def test_a_weak_lens_is_nearly_none(renderer):
     assert np.abs(one.rgb.astype(int) - other.rgb)[one.ids == other.ids].mean() < 0.5
 
 
-def test_one_lens_serves_wherever_the_camera_stands():
+def test_a_lens_is_shared_by_cameras_in_any_pose():
     one = bent_camera(BARREL)
     assert lens_of(one) is lens_of(replace(bent_camera(BARREL, center=(-1.0, 2.0, 1.0)), name="other"))
     assert lens_of(one) is not lens_of(bent_camera(WEBCAM))
 
 
-def test_an_absurd_lens_is_refused_by_name(renderer):
+def test_too_much_distortion_is_refused(renderer):
     camera = replace(bent_camera((-0.5, 0.115, 0.0, 0.0, 0.0), fov=100.0), name="fisheye")
     with pytest.raises(ValueError, match=r"'fisheye'.*distorts so much.*cameras\.distortion"):
         renderer.render(camera, [])

@@ -48,8 +48,8 @@ def test_reflection_keeps_distances_and_undoes_itself(yaw, seed):
 
 
 @given(yaw=angles, seed=st.integers(0, 99))
-def test_light_takes_the_shortest_way_over_the_glass(yaw, seed):
-    """Fermat: where the mirror shows a point, the way over the glass is as long as the straight way to its image."""
+def test_light_takes_the_shortest_path_by_the_glass(yaw, seed):
+    """Fermat: if the mirror shows a point, the path by the glass is as long as the line to its image."""
     mirror = GLASS.moved((0.5, -1.0), yaw)
     rng = np.random.default_rng(seed)
     eye, points = rng.uniform(-3, 3, 3), rng.uniform(-3, 3, (30, 3))
@@ -68,14 +68,14 @@ def test_light_takes_the_shortest_way_over_the_glass(yaw, seed):
     assert not mirror.shows(mirror.reflect(eye), points)[mirror.in_front(points) * mirror.in_front(eye) > 0].any()
 
 
-def test_a_mirror_on_the_wall_shows_what_a_camera_behind_it_would_see():
-    """The picture in the glass is that of the reflected camera, turned left to right."""
+def test_a_mirror_shows_the_picture_of_the_reflected_camera():
+    """The picture in the glass is that of the reflected camera, flipped horizontally."""
     ground, thing = room(), ball((1.5, 0.4, 1.1), 0.35, (0.9, 0.1, 0.1))
     eye = camera((2.5, -0.8, 1.3), (0, 0, 1.0))
     meshes, renderer = [thing, pane(GLASS), ground], RasterRenderer()
-    how = {"lighting": Lighting(key=0.0, sky=0.9, fill=0.0)}  # light without shadows, the same from all sides
-    image = renderer.render(eye, meshes, **how)
-    got = with_mirrors(renderer, eye, meshes, {1: GLASS}, image, **how)
+    options = {"lighting": Lighting(key=0.0, sky=0.9, fill=0.0)}  # light without shadows, the same from all sides
+    image = renderer.render(eye, meshes, **options)
+    got = with_mirrors(renderer, eye, meshes, {1: GLASS}, image, **options)
     glass = image.ids == 1
     assert 500 < glass.sum() < 0.7 * glass.size
     np.testing.assert_array_equal(got[~glass], image.rgb[~glass])
@@ -98,8 +98,8 @@ def area(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def test_nothing_behind_the_glass_is_seen_in_it():
-    """A wall close behind, a box that straddles the plane beside the glass: cut off where they would come through."""
+def test_the_glass_shows_nothing_behind_it():
+    """A wall close behind, and a box across the plane beside the glass: both are clipped at the plane."""
     wall = box((-0.4, 0.0, 1.0), (0.2, 6.0, 3.0), color=(0.1, 0.9, 0.1))
     across = box((0.0, 1.5, 1.0), (1.0, 0.5, 1.0), color=(0.1, 0.1, 0.9))
     eye = camera((2.0, 0.0, 1.2), (0, 0, 1.0))
@@ -114,8 +114,8 @@ def test_nothing_behind_the_glass_is_seen_in_it():
     assert len(reflected(wall, GLASS).faces) == 0
 
 
-def test_what_is_reflected_keeps_its_looks():
-    """Faces turn over with the mesh, so that outsides stay outsides; textures and labels go with their faces."""
+def test_reflected_meshes_keep_colours_textures_and_labels():
+    """The orientation of faces is kept, and textures and labels stay with their faces."""
     thing = ball((0.1, 0.0, 1.0), 0.5, (0.5, 0.5, 0.5))
     k = len(thing.faces)
     uv = np.random.default_rng(0).uniform(size=(k, 3, 2)).astype(np.float32)
@@ -127,7 +127,7 @@ def test_what_is_reflected_keeps_its_looks():
     solid = np.linalg.norm(normal, axis=1) > 1e-9
     assert ((normal * outward).sum(axis=1)[solid] > 0).all()
     assert cut.uv.shape == (len(cut.faces), 3, 2)
-    back = GLASS.reflect(corners)  # a corner that was there before has the place in the texture that it had
+    back = GLASS.reflect(corners)  # a corner that existed before keeps its texture coordinates
     for n in range(0, len(cut.faces), 7):
         for corner, place in zip(back[n], cut.uv[n], strict=True):
             same = (np.abs(thing.vertices[thing.faces] - corner).max(axis=2) < 1e-6).nonzero()
@@ -145,7 +145,7 @@ def test_from_behind_a_mirror_is_a_board():
     assert with_mirrors(renderer, eye, meshes, {0: GLASS}, image) is image.rgb
 
 
-def test_a_frame_before_the_glass_does_not_reflect():
+def test_a_frame_in_front_of_the_glass_does_not_reflect():
     frame = box((0.02, 0.0, 1.0), (0.04, 0.2, 2.0), color=(0.9, 0.2, 0.2))
     glass = pane(GLASS)
     both = Mesh(

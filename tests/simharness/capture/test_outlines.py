@@ -30,7 +30,7 @@ def somebody(seed):
 
 
 def poses(body, count, seed):
-    """Bone transforms (count, B, 3, 4) with joints bent at random within half their ranges."""
+    """Return bone transforms (count, B, 3, 4) with joints bent at random within half their ranges."""
     mover, rng = Kinematics(body), stream(seed, "test", "poses")
     root = np.tile([0.0, 0.0, mover.standing_height, 1.0, 0.0, 0.0, 0.0], (count, 1))
     low, high = mover.ranges.T / 2
@@ -38,14 +38,14 @@ def poses(body, count, seed):
 
 
 def framed_by_outline(body, transforms, camera, rows=(0.0, 1.0)):
-    """Left, top, right, bottom, (4,)."""
+    """Return left, top, right, bottom, (4,)."""
     outline, out = Outline.of(body), np.empty((1, 4))
     bounding_box(outline.at(transforms), outline.edges, packed(camera)[None], *rows, out)
     return out[0]
 
 
 def framed_by_skin(skin, camera, rows=(0.0, 1.0)):
-    """The same from every vertex of the skin, of which those count that fall on the image."""
+    """Return the same from all vertices of the skin that fall on the image."""
     pixels = project_to_image(camera, skin, near=NEAR)
     share = (pixels[:, 1] + 0.5) / camera.size[1]
     pixels = pixels[camera.inside(pixels) & (share >= rows[0]) & (share < rows[1])]
@@ -53,14 +53,14 @@ def framed_by_skin(skin, camera, rows=(0.0, 1.0)):
 
 
 def assert_close(found, expected):
-    """Within 2 pixels, or 2 % of the box's larger side."""
+    """Compare within 2 pixels, or 2 % of the larger side of the box."""
     allowed = max(2.0, 0.02 * max(expected[2] - expected[0], expected[3] - expected[1]))
     np.testing.assert_allclose(found, expected, atol=allowed)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("distortion", [np.zeros(5), BARREL], ids=["pinhole", "barrel"])
-def test_an_outline_frames_what_the_whole_skin_frames(seed, distortion):
+def test_the_box_of_an_outline_is_that_of_the_skin(seed, distortion):
     body = somebody(seed)
     rng = stream(seed, "test", "cameras")
     for transforms in poses(body, 6, seed):
@@ -70,7 +70,7 @@ def test_an_outline_frames_what_the_whole_skin_frames(seed, distortion):
         assert_close(framed_by_outline(body, transforms, camera), framed_by_skin(body.skin(transforms), camera))
 
 
-def test_whom_the_border_cuts_is_framed_to_the_border():
+def test_boxes_end_at_the_image_border():
     """Close up and off centre: the box is that of the part on the image, and ends where the image does.
 
     Where an outline meets the border at a flat angle, little beside the skin is far along the border: hence shares.
@@ -98,7 +98,7 @@ def between(corners):
     return np.einsum("bk,fkc->bfc", steps, corners).reshape(-1, 3)
 
 
-def test_a_lens_among_the_limbs_sees_up_to_its_near_plane():
+def test_outlines_are_clipped_at_the_near_plane():
     body = make_body(Shape())
     transforms = neutral_transforms(body)
     camera = camera_at((0.1, 0.45, 1.0), (0.0, 0.0, 1.2), size=(800, 600), fov=90.0)
@@ -107,7 +107,7 @@ def test_a_lens_among_the_limbs_sees_up_to_its_near_plane():
     assert_close(framed_by_outline(body, transforms, camera), framed_by_skin(skin, camera))
 
 
-def test_nobody_on_the_image_has_no_box():
+def test_a_person_outside_the_image_has_no_box():
     body = make_body(Shape())
     transforms = neutral_transforms(body)
     for aim in ((9, 0, 1), (4, 5, 1)):  # behind the camera; beside the image
@@ -115,7 +115,7 @@ def test_nobody_on_the_image_has_no_box():
         assert left > right
 
 
-def test_bands_of_rows_together_frame_the_whole():
+def test_boxes_of_bands_join_to_the_whole():
     body = make_body(Shape())
     transforms = neutral_transforms(body)
     camera = camera_at((3, 1, 1.5), (0, 0, 1), size=(800, 600))

@@ -13,7 +13,7 @@ from simharness.capture.rendering.renderer import NEAR
 
 
 def brute_force(camera, corners):
-    """Depth of the nearest triangle (k, 3, 3) along every pixel's ray, by Moeller and Trumbore; and its index."""
+    """Return depth and index of the nearest triangle (k, 3, 3) along the ray of every pixel, by Möller and Trumbore."""
     rays = axis_rays(camera)[..., None, :]
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     h = np.cross(rays, v)
@@ -44,7 +44,7 @@ def test_random_triangles_match_brute_force(seed, size):
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_no_pixel_falls_between_triangles(seed):
-    """A crumpled sheet of many triangles that fills the image leaves no hole, wherever its vertices fall."""
+    """A crumpled sheet of many triangles that fills the image leaves no hole, for random vertices."""
     rng = np.random.default_rng(seed)
     camera = camera_at((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), size=(64, 48), fov=60.0)
     n = 24
@@ -79,7 +79,7 @@ def test_degenerate_triangles_draw_nothing():
     assert (image.ids == -1).all()
 
 
-def test_things_throw_shadows_on_the_floor():
+def test_objects_cast_shadows_on_the_floor():
     floor = sheet([(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], (0.8, 0.8, 0.8))
     camera = camera_at((0.1, 0.0, 9.0), (0.0, 0.0, 0.0), size=(200, 200), fov=40.0)
     empty = RasterRenderer().render(camera, [floor]).rgb.astype(int)

@@ -30,7 +30,7 @@ SCENES = {
 
 @cache
 def played(name):
-    """A scene and its rig."""
+    """Return a scene and its rig."""
     seed, activities, clutter = SCENES[name]
     scenario = Scenario(
         name="rays",
@@ -46,7 +46,7 @@ def played(name):
 
 @cache
 def compared(name):
-    """What rays and pictures show, side by side: every camera at four times."""
+    """Pairs of observations by rays and pictures: every camera at four times."""
     playback, rig = played(name)
     rays, pictures = RayObserver(playback), PictureObserver(playback, make_renderer("raster"))
     pairs = []
@@ -57,7 +57,7 @@ def compared(name):
 
 
 def confusion(names):
-    """Labels of pictures (rows) by those of rays (columns), (5, 5)."""
+    """Return counts of labels by pictures (rows) and by rays (columns), (5, 5)."""
     table = np.zeros((5, 5), int)
     for name in names:
         for by_rays, by_picture in compared(name):
@@ -68,14 +68,14 @@ def confusion(names):
 def test_rays_and_pictures_agree_on_97_of_100_labels():
     table = confusion(SCENES)
     assert np.trace(table) / table.sum() >= 0.97, f"\n{table}"
-    assert (table.sum(axis=1) > 50).all()  # there is something of everything
+    assert (table.sum(axis=1) > 50).all()  # every label occurs
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_rays_and_pictures_agree_in_every_scene(name):
     table = confusion([name])
     assert np.trace(table) / table.sum() >= 0.95, f"\n{table}"
-    assert table[4, :4].sum() == table[:4, 4].sum() == 0  # what is outside is no matter of seeing
+    assert table[4, :4].sum() == table[:4, 4].sum() == 0  # OUTSIDE does not depend on the observer
     hidden = table[2:4].sum()
     assert np.trace(table[2:4, 2:4]) / hidden > 0.85
 
@@ -88,10 +88,10 @@ def test_pixels_are_the_same_and_boxes_nearly(name):
         low, high = (by_rays.boxes[:, :2] - by_picture.boxes[:, :2]), by_rays.boxes - by_picture.boxes
         wrong = np.abs(np.concatenate([low, high[:, :2] + high[:, 2:]], axis=1)).max(axis=1)
         off += (wrong > np.maximum(2.0, 0.02 * by_picture.boxes[:, 2:].max(axis=1))).tolist()
-    assert np.mean(off) < 0.06  # those whom the border cuts at a flat angle
+    assert np.mean(off) < 0.06  # people cut by the border at a small angle
 
 
-def test_the_estimate_of_the_area_that_is_seen_is_right_on_average():
+def test_the_estimated_visible_area_is_right_on_average():
     pairs = [pair for name in SCENES for pair in compared(name)]
     estimate, area = (np.concatenate([pair[k].area_visible for pair in pairs]) for k in (0, 1))
     seen = area > 500
@@ -99,8 +99,8 @@ def test_the_estimate_of_the_area_that_is_seen_is_right_on_average():
     assert np.corrcoef(estimate, area)[0, 1] > 0.8
 
 
-def test_a_lens_that_bends_shifts_pixels_and_hides_nothing_else():
-    """Rays are straight in the world: of joints that both lenses image, the labels are the same."""
+def test_distortion_shifts_pixels_but_changes_no_visibility():
+    """Rays are straight in the world: joints that both lenses image have the same labels."""
     playback, rig = played("walking about")
     bent = [replace(camera, distortion=np.array([-0.3, 0.1, 0.0, 0.0, 0.0])) for camera in rig]
     observer, state = RayObserver(playback), playback.at(1.0)
@@ -116,7 +116,7 @@ def test_a_lens_that_bends_shifts_pixels_and_hides_nothing_else():
         assert (np.abs(curved.pixels[on] - boxes[:, :2] - boxes[:, 2:] / 2) <= boxes[:, 2:] / 2 + 2).all()
 
 
-def test_a_rolling_shutter_of_a_still_scene_shows_what_any_shutter_shows():
+def test_a_rolling_shutter_changes_nothing_in_a_static_scene():
     playback, rig = played("low")
     observer, state = RayObserver(playback), playback.at(0.8)
     for at_once, rolled in zip(
@@ -127,8 +127,8 @@ def test_a_rolling_shutter_of_a_still_scene_shows_what_any_shutter_shows():
         np.testing.assert_allclose(rolled.boxes, at_once.boxes, atol=1e-6)
 
 
-def test_a_rolling_shutter_sees_every_joint_in_its_own_rows_moment():
-    """The upper half of the rows is taken in one moment, the lower half in another."""
+def test_a_rolling_shutter_observes_each_joint_at_the_time_of_its_row():
+    """The upper half of the rows is exposed at one time, the lower half at another."""
     playback, rig = played("walking about")
     observer = RayObserver(playback)
     early, late = playback.at(0.1), playback.at(1.4)
@@ -143,7 +143,7 @@ def test_a_rolling_shutter_sees_every_joint_in_its_own_rows_moment():
     assert differ > 10
 
 
-def test_cameras_and_moments_do_not_depend_on_what_was_seen_before():
+def test_observations_do_not_depend_on_earlier_ones():
     playback, rig = played("busy hands")
     observer = RayObserver(playback)
     states = [playback.at(time) for time in (0.5, 1.2)]

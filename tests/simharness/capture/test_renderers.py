@@ -30,13 +30,13 @@ def pixel_grid(camera):
 
 
 def axis_rays(camera):
-    """Through every pixel's centre, scaled so that their length along the optical axis is 1."""
+    """Rays through all pixel centres, with a length of 1 along the optical axis."""
     rays = camera.rays(pixel_grid(camera))
     return rays / (rays @ camera.R[2])[..., None]
 
 
 def plane_depth(camera, point, normal):
-    """Depth of a plane along every pixel's ray, inf where it is not ahead."""
+    """Depth of a plane along the ray of every pixel, inf if it is not ahead."""
     along = axis_rays(camera) @ normal
     with np.errstate(divide="ignore"):
         depth = np.dot(np.subtract(point, camera.center), normal) / along
@@ -98,7 +98,7 @@ def test_depth_of_a_sphere(renderer):
     assert (error < 1.5 * sagitta * obliquity[well_inside] + MILLIMETRE / 2).all()
 
 
-def test_a_dot_is_drawn_where_it_projects(renderer):
+def test_a_dot_is_drawn_at_its_projection(renderer):
     camera = camera_at((2.0, -3.0, 1.9), (0.1, 0.0, 1.0), size=(640, 480), shift=(3.7, -2.2))
     rng = np.random.default_rng(5)
     columns, rows = np.meshgrid(np.linspace(20, 619, 16), np.linspace(20, 459, 12))
@@ -111,10 +111,10 @@ def test_a_dot_is_drawn_where_it_projects(renderer):
     centroids = np.array([np.argwhere(image.ids == k)[:, ::-1].mean(axis=0) for k in range(len(places))])
     error = centroids - camera.project(places)
     assert np.abs(error.mean(axis=0)).max() < 0.02  # no shift, which half a pixel would be
-    assert np.linalg.norm(error, axis=1).max() < 0.25  # a disc of whole pixels has a centroid of its own
+    assert np.linalg.norm(error, axis=1).max() < 0.25  # the centroid of a disc of whole pixels is inexact
 
 
-def test_the_nearer_surface_is_seen_whatever_the_order(renderer):
+def test_the_nearer_surface_is_visible_in_any_order(renderer):
     camera = camera_at((4.0, 0.0, 1.0), (0.0, 0.0, 1.0))
     far = sheet([(-1, -2, -1), (-1, 2, -1), (-1, 2, 3), (-1, -2, 3)])
     near = box((1.0, 0.0, 1.0), (0.2, 0.8, 0.8))
@@ -139,7 +139,7 @@ def test_crossing_planes_swap_where_they_meet(renderer):
     assert set(right) == {0}
 
 
-def test_winding_does_not_matter_for_what_is_seen(renderer):
+def test_winding_does_not_change_visibility(renderer):
     camera = VIEWS[0]
     meshes = [ball((0.2, 0.1, 1.0), 0.5), box((-0.8, 0.5, 0.4), (0.4, 0.3, 0.8))]
     turned = [_mesh(m.vertices, m.faces[:, ::-1], (0.5, 0.5, 0.5)) for m in meshes]
@@ -169,7 +169,7 @@ def test_a_scene_without_meshes_is_empty(renderer):
     assert (image.rgb == image.rgb[0, 0]).all()
 
 
-def test_without_colour_the_rest_is_the_same(renderer):
+def test_depth_and_ids_are_the_same_without_colour(renderer):
     scene = crowd(12)
     full, plain = renderer.render(VIEWS[0], scene), renderer.render(VIEWS[0], scene, color=False)
     assert full.rgb.std() > 10
@@ -202,12 +202,12 @@ def test_colours_are_those_of_the_faces(renderer):
         assert (seen.argmax(axis=1) == k).all()
 
 
-def test_gl_refuses_more_meshes_than_it_can_tell_apart(gl):
+def test_gl_refuses_more_meshes_than_ids(gl):
     with pytest.raises(ValueError, match="distinguishes at most 254 meshes, got 255"):
         gl.render(VIEWS[0], [ball((0, 0, 1), 0.1, rings=3)] * 255)
 
 
-def test_gl_tells_254_meshes_apart(gl):
+def test_gl_distinguishes_254_meshes(gl):
     camera = camera_at((8.0, 0.0, 0.0), (0.0, 0.0, 0.0), size=(320, 320), fov=60.0)
     grid = [(0.0, 0.5 * (k % 16 - 7.5), 0.5 * (k // 16 - 7.5)) for k in range(254)]
     image = gl.render(camera, [disc(place, (1, 0, 0), 0.2) for place in grid])
@@ -222,7 +222,7 @@ def test_unknown_renderer_is_named():
 
 
 def assert_agree(one, other, *, share=1e-4):
-    """Ids equal and depth within 1 mm on all but ``share`` of the pixels."""
+    """Compare ids for equality and depth within 1 mm, on all except ``share`` of the pixels."""
     assert (one.ids != other.ids).mean() <= share
     with np.errstate(invalid="ignore"):
         apart = np.abs(one.depth - other.depth)
@@ -304,8 +304,8 @@ def test_parts_are_the_labels_of_the_faces(renderer):
     assert renderer.render(camera, [board]).parts is None
 
 
-def test_a_texture_shows_what_it_says_where_it_says(renderer):
-    """Colour at every pixel of a board against the texel that its place on the board names, v down, repeating."""
+def test_a_texture_is_drawn_at_its_coordinates(renderer):
+    """Colour at every pixel of a board compared with the texel at its coordinates, v down, repeating."""
     board = chequered((1.5, 1.0), repeat=(3, 2))
     camera = camera_at((-1.7, 0.4, 0.8), (0.0, 0.0, 0.4), size=(320, 240))
     flat = Lighting(key=0.0, sky=0.0, fill=0.0, background=(0, 0, 0))
@@ -325,7 +325,7 @@ def test_a_texture_shows_what_it_says_where_it_says(renderer):
 
 
 def test_a_texture_far_away_is_its_mean(renderer):
-    """Where a whole texture falls into a pixel there is no pattern left, and no shimmer."""
+    """If a whole texture falls into one pixel, no pattern and no aliasing is left."""
     board = chequered((4.0, 4.0), repeat=(64, 64))
     camera = camera_at((-9.0, 0.0, 2.0), (0.0, 0.0, 2.0), size=(160, 120))
     image = renderer.render(camera, [board], lighting=Lighting(key=0, sky=1 / 0.65, fill=0))
@@ -343,8 +343,8 @@ def test_texture_multiplies_the_colour_of_the_face(renderer):
     np.testing.assert_allclose(other[seen], one[seen] * [1.0, 0.5, 0.25], atol=1.1)
 
 
-def test_light_is_what_its_rule_says(renderer):
-    """A board, a light of each kind alone: closed forms."""
+def test_light_follows_the_shading_rule(renderer):
+    """A board under each kind of light alone, compared with closed forms."""
     board = sheet([(0, -1, 0), (0, 1, 0), (0, 1, 2), (0, -1, 2)], (1.0, 0.8, 0.6))
     camera = camera_at((3.0, 0.0, 1.0), (0.0, 0.0, 1.0))
     middle = np.s_[60, 80]
@@ -360,7 +360,7 @@ def test_light_is_what_its_rule_says(renderer):
         np.testing.assert_allclose(renderer.render(camera, [board], lighting=lighting).rgb[middle], wanted, atol=1.01)
 
 
-def test_light_changes_no_more_than_colours(renderer):
+def test_lighting_changes_only_colours(renderer):
     scene = crowd(12)
     one, other = renderer.render(VIEWS[0], scene), renderer.render(VIEWS[0], scene, lighting=SLANTING)
     np.testing.assert_array_equal(one.ids, other.ids)
@@ -370,7 +370,7 @@ def test_light_changes_no_more_than_colours(renderer):
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 2.0, 4.5])
-def test_a_shadow_lies_where_the_light_throws_it(renderer, azimuth):
+def test_a_shadow_lies_where_the_light_casts_it(renderer, azimuth):
     lighting = Lighting(direction=(np.cos(azimuth), np.sin(azimuth), 1.2))
     floor = sheet([(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], (0.8, 0.8, 0.8))
     bird = box((0.2, -0.1, 1.0), (0.5, 0.5, 0.02))
@@ -380,14 +380,14 @@ def test_a_shadow_lies_where_the_light_throws_it(renderer, azimuth):
     place = camera.center + image.depth[..., None] * axis_rays(camera)
     to_light = np.array(lighting.direction)
     above = (place + (1.0 / to_light[2]) * to_light)[..., :2] - [0.2, -0.1]
-    off = 0.25 - np.abs(above).max(axis=-1)  # metres inside the shadow's edge
+    off = 0.25 - np.abs(above).max(axis=-1)  # metres inside the edge of the shadow
     on_floor = image.ids == 0
     assert darker[on_floor & (off > 0.06)].all()
     assert not darker[on_floor & (off < -0.06)].any()
     assert (on_floor & (off > 0.06)).sum() > 50
 
 
-def test_moved_meshes_are_drawn_where_they_are(renderer):
+def test_moved_meshes_are_drawn_at_their_positions(renderer):
     scene = crowd(8)
     renderer.render(VIEWS[0], scene)
     shift = np.float32([0.1, -0.2, 0.05])
@@ -400,8 +400,8 @@ def test_moved_meshes_are_drawn_where_they_are(renderer):
 
 
 @pytest.mark.parametrize("field", ["colors", "smooth", "parts", "texture", "uv"])
-def test_what_is_kept_of_a_scene_is_what_did_not_change(renderer, field):
-    """One thing of a mesh changes and all else is the same object."""
+def test_changed_arrays_of_a_mesh_are_not_reused(renderer, field):
+    """One array of a mesh changes and all others are the same objects."""
     mesh = with_parts(chequered((2.0, 1.6)), [1, 2])
     camera = camera_at((-2.0, 0.3, 0.9), (0.0, 0.0, 0.8))
     changed = {

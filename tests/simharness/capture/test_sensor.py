@@ -20,13 +20,13 @@ def picture():
     return RasterRenderer().render(VIEWS[0], crowd(12)).rgb
 
 
-def test_with_all_dials_at_zero_the_picture_is_untouched(picture):
+def test_with_all_parameters_at_zero_the_picture_is_unchanged(picture):
     for view in range(3):
         assert develop(picture, Sensor(), seed=1, view=view, frame=2) is picture
 
 
 @pytest.mark.parametrize("amount", [1.0, 4.0, 12.0])
-def test_noise_has_the_deviation_asked_for(amount):
+def test_noise_has_the_given_standard_deviation(amount):
     noisy = develop(GRAY, Sensor(noise=amount), seed=3, view=0, frame=0).astype(float)
     apart = noisy - GRAY
     n = apart.size
@@ -72,7 +72,7 @@ def test_white_balance_leaves_green_and_scales_light_of_red_and_blue():
         assert np.abs(out[0, :, channel] - wanted).max() <= 0.51
 
 
-def test_contrast_turns_about_middle_gray():
+def test_contrast_leaves_middle_gray():
     sensor = Sensor(gain=0.2)
     response = draw_response(sensor, seed=2, view=0)
     out = develop(RAMP, sensor, seed=2, view=0, frame=0)[0, :, 0].astype(float)
@@ -97,7 +97,7 @@ def test_spreads_are_over_cameras():
     assert abs(np.corrcoef(wanted[1][0], wanted[2][0])[0, 1]) < 0.15
 
 
-def test_dials_do_not_shift_each_other_s_draws():
+def test_parameters_do_not_shift_draws_of_others():
     alone, all_of_them = Sensor(exposure=0.4), Sensor(exposure=0.4, gain=0.1, white_balance=0.2, noise=3)
     for view in range(4):
         one, other = (draw_response(sensor, seed=9, view=view) for sensor in (alone, all_of_them))
@@ -137,7 +137,7 @@ def test_a_blur_of_nothing_is_refused():
         blur([])
 
 
-def test_srgb_is_that_of_the_standard():
+def test_srgb_follows_the_standard():
     """IEC 61966-2-1: 50 % gray is 21.4 % of the light; both branches meet; the curves are inverse."""
     assert to_linear(np.array(127.5)) == pytest.approx(0.21404, abs=1e-4)
     assert to_linear(np.array(10.0)) == pytest.approx(10 / 255 / 12.92)

@@ -25,7 +25,7 @@ def test_bands_are_spread_evenly_over_the_readout():
 
 
 @pytest.mark.parametrize("speed", [(0.0, 1.5, 0.0), (0.0, 0.0, -2.0), (0.5, -1.0, 1.0)])
-def test_a_joint_is_where_it_was_when_its_row_was_read(camera, speed):
+def test_a_joint_is_observed_at_the_time_of_its_row(camera, speed):
     readout, start = 0.04, np.array([[[0.0, 0.2, 1.4], [0.3, -0.4, 0.5], [0.1, 0.0, 1.0]]])
     times = band_times(0.0, readout)
     joints = start + times[:, None, None, None] * np.array(speed)
@@ -46,7 +46,7 @@ def test_a_joint_behind_the_camera_stays_in_the_middle(camera):
 
 
 @pytest.mark.parametrize(("height", "count"), [(240, 8), (241, 8), (100, 7), (16, 8), (240, 1)])
-def test_strips_see_what_the_camera_sees_row_by_row(camera, height, count):
+def test_band_cameras_cover_the_rows_of_the_camera(camera, height, count):
     whole = replace(camera, size=(320, height))
     cut = band_cameras(whole, count)
     assert [strip.size[0] for strip in cut] == [320] * count

@@ -15,7 +15,7 @@ CAMERA = camera_at((3.5, 0.0, 1.0), (0.0, 0.0, 1.0), size=(320, 240), fov=60.0)
 
 
 def labels(raster, meshes, joints, radii, camera=CAMERA):
-    """``joints`` and ``radii`` of each person; the first meshes are the people."""
+    """Label ``joints`` with ``radii`` of each person; the first meshes are the people."""
     joints = np.array(joints, float)
     return label_joints(
         raster.render(camera, meshes), camera, joints=joints, radii=np.broadcast_to(radii, joints.shape[:2])
@@ -28,9 +28,9 @@ def test_a_joint_inside_its_own_limb_is_visible(raster):
 
 
 @pytest.mark.parametrize(("depth", "expected"), [(0.05, VISIBLE), (0.14, VISIBLE), (0.20, SELF), (0.5, SELF)])
-def test_a_joint_deep_in_its_own_body_is_hidden_by_it(raster, depth, expected):
+def test_a_joint_deep_in_its_body_is_self_occluded(raster, depth, expected):
     trunk = ball((0, 0, 1), 0.4)
-    joint = (0.4 - depth, 0, 1)  # so far under the skin that faces the camera
+    joint = (0.4 - depth, 0, 1)  # at this depth under the skin that faces the camera
     assert labels(raster, [trunk], [[joint]], 0.15).tolist() == [[expected]]
 
 
@@ -50,28 +50,28 @@ def test_a_person_behind_a_wall_is_hidden_by_clutter(raster):
     assert labels(raster, [person, wall], [[(0, 0, 1)]], 0.3).tolist() == [[CLUTTER]]
 
 
-def test_a_thin_board_hides_what_is_behind_it_only(raster):
+def test_a_thin_board_occludes_only_what_is_behind_it(raster):
     person = ball((0, 0, 1), 0.3, stretch=2.0)
     board = box((1, 0, 1.4), (0.01, 1, 0.3))
     low, high = (0.0, 0, 0.8), (0.0, 0, 1.49)
     assert labels(raster, [person, board], [[low, high]], 0.35).tolist() == [[VISIBLE, CLUTTER]]
 
 
-def test_of_two_people_the_nearer_hides_the_farther(raster):
+def test_the_nearer_of_two_people_occludes_the_other(raster):
     near, far = ball((1, 0, 1), 0.2), ball((-1, 0, 1), 0.2)
     joints = [[(1, 0, 1)], [(-1, 0, 1)]]
     assert labels(raster, [near, far], joints, 0.3).tolist() == [[VISIBLE], [PERSON]]
     assert labels(raster, [far, near], joints[::-1], 0.3).tolist() == [[PERSON], [VISIBLE]]
 
 
-def test_people_that_touch_hide_each_other_without_any_allowance(raster):
-    """Another's arm 11 cm in front hides a joint, though the joint's own skin might be as far in front."""
+def test_touching_people_occlude_each_other_without_margin(raster):
+    """The arm of another person 11 cm in front occludes a joint; skin of the same body would not."""
     arm, chest = ball((0.26, 0, 1), 0.05), ball((0, 0, 1), 0.25)
     joint = (0.2, 0, 1)
     assert labels(raster, [chest, arm], [[joint], [(0.26, 0, 1)]], 0.15).tolist() == [[PERSON], [VISIBLE]]
 
 
-def test_a_joint_just_off_the_outline_is_visible_before_whatever_is_behind(raster):
+def test_a_joint_just_outside_the_outline_is_visible(raster):
     limb, other, walls = ball((0, 0, 1), 0.03), ball((-1, 0, 1), 0.5), room()
     off = (0, 0.034, 1)  # beside its own ball, which the camera sees edge on
     assert labels(raster, [limb, other, walls], [[off], [(-1, 0, 1)]], 0.05).tolist()[0] == [VISIBLE]
@@ -79,12 +79,12 @@ def test_a_joint_just_off_the_outline_is_visible_before_whatever_is_behind(raste
     assert labels(raster, [limb], [[off]], 0.05).tolist() == [[VISIBLE]]  # nothing at all behind it
 
 
-def test_walls_hide_who_is_behind_them(raster):
+def test_walls_occlude_people_behind_them(raster):
     assert labels(raster, [ball((0, 9, 1), 0.3), room()], [[(-8, 0, 1)]], 0.3).tolist() == [[CLUTTER]]
 
 
 def test_the_border_of_the_image(raster):
-    """A pixel's area belongs to the image to its edge, half a pixel past its centre, and no further."""
+    """The image ends half a pixel beyond the centres of its outermost pixels."""
     width, height = CAMERA.size
     pixels = np.array(
         [(-0.49, 50), (-0.51, 50), (width - 0.51, 50), (width - 0.49, 50), (50, -0.51), (50, height - 0.51)]
@@ -109,8 +109,8 @@ def test_behind_the_camera_is_outside(raster):
     ],
     ids=["from the front", "from behind", "from the left", "from the right"],
 )
-def test_a_body_seen_from_around_it(raster, bearing, seen, hidden):
-    """Who stands with the arms a little off the body shows its near side, and the limbs front and back."""
+def test_a_body_seen_from_all_sides(raster, bearing, seen, hidden):
+    """With the arms slightly off the body, joints of the near side are visible, and limbs from front and back."""
     from mvpose.skeleton import COCO17
     from simharness.types.random_streams import stream
     from simharness.world.humans.body import make_body
@@ -122,7 +122,7 @@ def test_a_body_seen_from_around_it(raster, bearing, seen, hidden):
     turn = np.radians(bearing)
     camera = camera_at((4 * np.cos(turn), 4 * np.sin(turn), 1.5), (0, 0, 0.9), size=(800, 600))
     found = labels(raster, [skin], body.joints(rest)[None], body.joint_radii, camera)[0]
-    # At rest the forearms point a little forwards: from behind the wrists lie beyond their length.
+    # In the rest pose the forearms point slightly forwards: from behind, they occlude the wrists.
     limbs = [name for name in COCO17.joints[5:] if bearing == 0 or (bearing == 180 and "wrist" not in name)]
     assert {
         name: found[COCO17.index(name)] for name in seen.split() + limbs if found[COCO17.index(name)] != VISIBLE
@@ -148,7 +148,7 @@ def test_classification_of_surfaces():
         assert classify(*views, radii=radii)[1, :, 0].tolist() == expected
 
 
-def test_nobody(raster):
+def test_without_people(raster):
     assert labels(raster, [room()], np.zeros((0, 17, 3)), 0.1).shape == (0, 17)
 
 

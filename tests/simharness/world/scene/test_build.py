@@ -23,7 +23,7 @@ QUICKSTART = {
 
 
 def scenario(**sections) -> Scenario:
-    """The quickstart with some values of some sections replaced."""
+    """Return the quickstart scenario with some values replaced."""
     values = {k: dict(v) if isinstance(v, dict) else v for k, v in QUICKSTART.items()}
     for key, value in sections.items():
         values[key] = values.get(key, {}) | value if isinstance(value, dict) else value
@@ -62,14 +62,14 @@ def test_sequence_agrees_with_the_kinematics_of_each_body_alone(scene, sequence)
         np.testing.assert_allclose(sequence.joints[:, i], alone.joints(sampled), atol=1e-9)
 
 
-def test_a_moment_does_not_depend_on_what_was_looked_at_before(scene):
+def test_a_state_does_not_depend_on_earlier_states(scene):
     playback = Playback(scene)
     forwards = [state.joints for state in playback.over([0.1, 0.25, 2.0])]
     backwards = [playback.at(time).joints for time in (2.0, 0.25, 0.1)]
     np.testing.assert_array_equal(forwards, backwards[::-1])
 
 
-def test_everyone_moves_like_a_person(sequence):
+def test_speeds_and_heights_are_those_of_people(sequence):
     speed = np.linalg.norm(np.diff(sequence.joints, axis=0), axis=-1) * 10
     assert speed.max() < 6.0  # m/s: a swinging foot or a waving hand
     assert (np.ptp(sequence.joints, axis=0).max(axis=(1, 2)) > 0.2).all()
@@ -78,7 +78,7 @@ def test_everyone_moves_like_a_person(sequence):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_people_keep_apart_and_out_of_the_clutter(seed):
+def test_people_keep_clear_of_each_other_and_of_clutter(seed):
     chosen = scenario(seed=seed, people={"count": 6, "spacing": 0.9}, clutter={"boxes": 6, "shelves": 2})
     crowd = build(chosen)
     pelvises = np.stack([motion.root[:, :3] for motion in crowd.motions], axis=1)
@@ -98,8 +98,8 @@ def test_people_keep_apart_and_out_of_the_clutter(seed):
     assert min(box.distance(skin).min() for solid in clutter for box in solid.geoms for skin in skins) > 0.0
 
 
-def test_clutter_gets_between_cameras_and_people(scene, sequence):
-    """It is there to occlude: some line of sight from a lens to a joint meets a thing."""
+def test_clutter_occludes_people(scene, sequence):
+    """Some line of sight from a camera to a joint meets an object."""
     rig = build_rig(scenario().cameras)
     share = np.linspace(0.02, 0.98, 200)[:, None]
     clutter = [solid for solid in scene.solids if solid.kind == "clutter"]
@@ -124,7 +124,7 @@ def test_another_seed_another_scene(sequence):
     assert np.abs(other.joints - sequence.joints).max() > 0.1
 
 
-def test_one_more_person_changes_nobody(scene):
+def test_one_more_person_changes_no_other_person(scene):
     more = build(scenario(people={"count": 5}))
     assert len(more.bodies) == 5
     for i in range(4):
@@ -134,7 +134,7 @@ def test_one_more_person_changes_nobody(scene):
         np.testing.assert_array_equal(more.motions[i].angles, scene.motions[i].angles)
 
 
-def test_more_clutter_changes_no_person_and_no_other_thing(scene):
+def test_more_clutter_changes_no_person_and_no_other_object(scene):
     more = build(scenario(clutter={"boxes": 6}))
     for one, two in zip(scene.motions, more.motions, strict=True):
         np.testing.assert_array_equal(one.angles, two.angles)
@@ -149,7 +149,7 @@ def test_bodies_differ(scene):
     assert all(1.4 < stature < 2.0 for stature in statures)
 
 
-def test_the_model_holds_everyone_and_everything(scene):
+def test_the_model_contains_all_people_and_solids(scene):
     model = scene.model
     names = {model.body(i).name for i in range(model.nbody)}
     for i, body in enumerate(scene.bodies):
@@ -158,7 +158,7 @@ def test_the_model_holds_everyone_and_everything(scene):
     assert {"floor", "wall +x", "wall -y", "box0 0", "shelf0 0"} <= geoms
     assert model.nq == 4 * (7 + 35)
     np.testing.assert_allclose(model.joint("person3/left_knee_flexion").range, RANGES["left_knee_flexion"])
-    # A box in the model stands where its mesh does.
+    # A box in the model stands at the position of its mesh.
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     first = next(solid for solid in scene.solids if solid.name == "box0")
@@ -168,7 +168,7 @@ def test_the_model_holds_everyone_and_everything(scene):
 
 
 @pytest.mark.parametrize("clutter", [{"boxes": 0, "shelves": 0}, {"boxes": 3, "shelves": 1}])
-def test_nobody_is_a_valid_answer(clutter):
+def test_a_scene_without_people(clutter):
     empty = build(scenario(people={"count": 0}, clutter=clutter))
     sequence = simulate(empty)
     assert sequence.joints.shape == (40, 0, 17, 3)
@@ -176,7 +176,7 @@ def test_nobody_is_a_valid_answer(clutter):
     assert empty.bodies == empty.motions == empty.figures == ()
 
 
-def test_what_does_not_fit_is_told():
+def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match=r"people.count = 20 people do not fit.*people.area.*people.spacing"):
         build(scenario(people={"count": 20, "area": 1.2}))
     with pytest.raises(ValueError, match=r"people.area = 5 m does not fit between the walls.*at most 3.58"):
@@ -196,19 +196,19 @@ def test_a_good_rig_passes(scene):
             {"radius": 4.5},
             r"camera 'cam0' at \(4.50, 0.00, 2.30\) m is 0.50 m beyond wall \+x .*cameras.radius at most 3.90",
         ),
-        ({"radius": 3.95}, r"is 0.05 m from wall \+x .*must stay 0.1 m inside.*cameras.radius at most 3.90"),
+        ({"radius": 3.95}, r"is 0.05 m from wall \+x .*expected at least 0.1 m inside.*cameras.radius at most 3.90"),
         ({"radius": 4.2, "start": 90.0}, r"0.20 m beyond wall \+y"),
         ({"height": 3.5}, r"camera 'cam0' .* is above the walls, which are 3 m high.*cameras.height"),
         ({"height": -0.2}, r"is not above the floor"),
     ],
 )
-def test_a_camera_out_of_the_room(scene, cameras, message):
+def test_a_camera_outside_the_room_is_refused(scene, cameras, message):
     bad = scenario(cameras=cameras)
     with pytest.raises(ValueError, match=message):
         check_rig(bad, scene.solids, build_rig(bad.cameras))
 
 
-def test_the_radius_that_the_message_names_is_right(scene):
+def test_the_radius_in_the_message_is_accepted(scene):
     mended = scenario(cameras={"radius": 3.90, "start": 0.0})
     check_rig(mended, scene.solids[:5], build_rig(mended.cameras))
 
@@ -223,7 +223,7 @@ def test_a_camera_at_the_limit_is_accepted_however_the_processor_rounds(scene, e
         check_rig(nominal, scene.solids[:5], build_rig(scenario(cameras={"radius": 3.901, "start": 0.0}).cameras))
 
 
-def test_a_camera_inside_of_a_thing(scene):
+def test_a_camera_inside_an_object_is_refused(scene):
     rig = build_rig(scenario().cameras)
     shelf = next(solid for solid in scene.solids if solid.name == "shelf0")
     stuck = look_at(shelf.hull.center, (0.0, 0.0, 1.0), K=rig[0].K, size=rig[0].size, name="hidden")

@@ -11,7 +11,7 @@ from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LIMB
 
 @pytest.fixture(scope="module", params=[(seed, reach) for seed in range(4) for reach in (0.1, 3.0)])
 def rolling(request):
-    """One cart among eight people, some with their arms close to them and some with them stretched far out."""
+    """One cart among eight people, some with arms close to the body and some with arms stretched out."""
     seed, reach = request.param
     free = space(8, duration=12.0, seed=seed, area=3.2)
     pelvises = free.pelvises[:, :, None]
@@ -20,7 +20,7 @@ def rolling(request):
     return free, cart
 
 
-def test_it_moves_smoothly_on_the_floor_as_a_cart_does(rolling):
+def test_a_cart_moves_smoothly_on_the_floor(rolling):
     free, cart = rolling
     pose = cart.trajectory.at(free.time)
     velocity = np.gradient(pose[:, :2], free.time, axis=0)
@@ -36,16 +36,16 @@ def test_it_moves_smoothly_on_the_floor_as_a_cart_does(rolling):
     assert aslant.max() < 0.02  # wheels roll, they do not slide
 
 
-def test_it_is_never_near_anyone(rolling):
+def test_a_cart_keeps_its_distance_from_people(rolling):
     free, cart = rolling
     for frame, moment in enumerate(free.time):
         hull = cart.hull_at(moment)
         assert hull.distance_on_floor(free.pelvises[frame]).min() >= BODY_HALF_WIDTH - 1e-9
         assert hull.distance_on_floor(free.joints[frame]).min() >= LIMB - 1e-9
-        assert cart.hull.distance(hull.corners).max() < 1e-5  # the hull is of all the way
+        assert cart.hull.distance(hull.corners).max() < 1e-5  # the hull covers the whole trajectory
 
 
-def test_its_way_does_not_depend_on_how_long_it_goes_on():
+def test_the_path_does_not_depend_on_the_duration():
     short, long = space(1, duration=4.0, area=0.7), space(1, duration=9.0, area=0.7)
     one, two = (place_clutter(2, Clutter(carts=1), free)[0] for free in (short, long))
     moments = np.linspace(0, 4, 33)

@@ -14,7 +14,7 @@ from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, LENS, L
 from simharness.world.scene.placement.sight_lines import PictureFill, cuts
 
 ROOM = Room()
-DRAW = {species.name: lambda rng, draw=species.draw: draw(rng, ROOM) for species in CLUTTER_KINDS} | {"cart": draw_cart}
+DRAW = {kind.name: lambda rng, draw=kind.draw: draw(rng, ROOM) for kind in CLUTTER_KINDS} | {"cart": draw_cart}
 EVERYTHING = Clutter(boxes=2, shelves=1, racks=1, tables=1, chairs=2, pillars=1, partitions=1, plants=2, carts=1)
 
 
@@ -24,7 +24,7 @@ def extent(thing):
 
 @pytest.mark.parametrize("name", DRAW)
 @pytest.mark.parametrize("seed", range(4))
-def test_things_stand_on_the_floor_around_the_origin(name, seed):
+def test_models_stand_on_the_floor_around_the_origin(name, seed):
     thing = DRAW[name](stream(seed, name))
     low, high = extent(thing)
     assert low[2] == pytest.approx(0.0, abs=1e-6)
@@ -38,8 +38,8 @@ def test_things_stand_on_the_floor_around_the_origin(name, seed):
 
 
 @pytest.mark.parametrize("name", DRAW)
-def test_rays_meet_what_is_seen(name):
-    """The geoms are the mesh: lines through the thing are cut by both or by neither."""
+def test_geoms_match_the_mesh(name):
+    """Lines through the object are cut by geoms and mesh, or by neither."""
     rng = np.random.default_rng(5)
     for seed in range(3):
         solid = DRAW[name](stream(seed, name)).at((0.4, -0.3), 0.8, kind="clutter", name=name)
@@ -54,7 +54,7 @@ def test_rays_meet_what_is_seen(name):
 
 
 @pytest.mark.parametrize("name", DRAW)
-def test_no_two_are_alike(name):
+def test_objects_differ(name):
     one, two = (DRAW[name](stream(seed, name)) for seed in (0, 1))
     assert not np.array_equal(one.mesh.vertices, two.mesh.vertices)
     again = DRAW[name](stream(0, name))
@@ -63,7 +63,7 @@ def test_no_two_are_alike(name):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_box_on_a_box_lies_on_it(seed):
+def test_a_stacked_box_lies_on_the_lower_one(seed):
     boxes = draw_box(stream(seed, "box")).geoms
     for box in boxes:
         assert box.center[2] - box.half[2] in (pytest.approx(0.0), pytest.approx(2 * boxes[0].half[2]))
@@ -75,7 +75,7 @@ def test_some_boxes_are_stacked_and_most_are_not():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_shelf_is_an_open_bookshelf_with_things_on_its_boards(seed):
+def test_a_shelf_is_open_with_objects_on_its_boards(seed):
     thing = draw_shelf(stream(seed, "shelf"))
     low, high = extent(thing)
     boxes = thing.geoms
@@ -91,7 +91,7 @@ def test_shelf_is_an_open_bookshelf_with_things_on_its_boards(seed):
     lows, highs = (np.array([edge(box.corners, axis=0) for box in boxes]) for edge in (np.min, np.max))
     overlap = np.minimum(highs[:, None], highs) - np.maximum(lows[:, None], lows)
     through = (overlap > 1e-9).all(axis=2) & ~np.eye(len(boxes), dtype=bool)
-    assert not through.any()  # nothing goes through anything else
+    assert not through.any()  # no part intersects another
 
 
 @pytest.fixture(scope="module", params=range(3))
@@ -100,7 +100,7 @@ def furnished(request):
     return free, place_clutter(request.param, EVERYTHING, free)
 
 
-def test_everything_asked_for_is_there(furnished):
+def test_all_requested_objects_are_placed(furnished):
     _, placed = furnished
     assert [solid.name for solid in placed] == [
         *("pillar0", "shelf0", "rack0", "partition0", "table0", "box0", "box1"),
@@ -109,7 +109,7 @@ def test_everything_asked_for_is_there(furnished):
     assert all(solid.kind == "clutter" for solid in placed)
 
 
-def test_nothing_is_in_anyones_way(furnished):
+def test_objects_do_not_obstruct_people(furnished):
     free, placed = furnished
     for solid in placed:
         for frame in range(0, len(free.time), 5):
@@ -120,7 +120,7 @@ def test_nothing_is_in_anyones_way(furnished):
                 break
 
 
-def test_nothing_stands_in_anything_else_or_in_a_wall(furnished):
+def test_objects_do_not_overlap_each_other_or_walls(furnished):
     free, placed = furnished
     for moment in free.time[::40]:
         hulls = [solid.hull_at(moment) for solid in placed]
@@ -129,7 +129,7 @@ def test_nothing_stands_in_anything_else_or_in_a_wall(furnished):
             assert all(hull.gap_on_floor(other) > 0.05 for other in hulls[:k])
 
 
-def test_lenses_and_pictures_stay_clear(furnished):
+def test_cameras_and_pictures_stay_clear(furnished):
     free, placed = furnished
     pictures = PictureFill(free.rig)
     for solid in placed:
@@ -140,8 +140,8 @@ def test_lenses_and_pictures_stay_clear(furnished):
     assert pictures.filled.mean(axis=1).max() <= 0.6
 
 
-def test_a_picture_is_never_filled():
-    """Twelve partitions around people whom one low camera sees from close by: its picture stays open."""
+def test_a_picture_is_never_filled_completely():
+    """Twelve partitions around people seen by a low camera at close range: its picture stays open."""
     low = ring(3, radius=2.6, height=1.2)
     placed = place_clutter(0, Clutter(partitions=9), space(1, area=0.8, rig=low))
     pictures = PictureFill(low)
@@ -150,7 +150,7 @@ def test_a_picture_is_never_filled():
     assert 0.2 < pictures.filled.mean(axis=1).max() <= 0.6
 
 
-def test_one_more_changes_nothing_that_stood_before():
+def test_one_more_object_moves_no_earlier_one():
     free = space()
     before = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=2, shelves=1, carts=1), free)}
     after = {solid.name: solid for solid in place_clutter(4, Clutter(boxes=3, shelves=1, carts=2), free)}
@@ -159,14 +159,14 @@ def test_one_more_changes_nothing_that_stood_before():
         np.testing.assert_array_equal(after[name].mesh.vertices, before[name].mesh.vertices)
 
 
-def test_what_finds_no_place_is_told():
+def test_an_object_without_a_place_is_refused():
     with pytest.raises(ValueError, match=r"clutter.tables: found no place for table \d+.*lower clutter.tables"):
         place_clutter(0, Clutter(tables=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
     with pytest.raises(ValueError, match=r"clutter.carts: found no free path for cart \d+.*lower clutter.carts"):
         place_clutter(0, Clutter(carts=20), space(room=Room(size=(5.5, 5.5, 3.0)), area=2.0, rig=ring(radius=2.4)))
 
 
-def test_where_people_keep_the_middle_free_the_first_thing_stands_there():
+def test_the_first_object_stands_in_the_middle_that_people_keep_free():
     scenario = Scenario.model_validate(
         {
             "name": "about",

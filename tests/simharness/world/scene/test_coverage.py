@@ -8,7 +8,7 @@ from simharness.world.scene.placement.coverage import share_hidden
 
 
 def measured(free, solids) -> float:
-    """Share of the joints in the pictures that MuJoCo's rays do not reach, at other moments than the placer's."""
+    """Share of joints in the pictures that MuJoCo rays do not reach, at other times than used for placement."""
     rays = Rays(solids)
     hidden, count = 0, 0
     for moment in np.linspace(0.13, free.time[-1] - 1.2, 9):
@@ -21,25 +21,25 @@ def measured(free, solids) -> float:
     return hidden / count
 
 
-@pytest.mark.parametrize("asked", [0.1, 0.25, 0.4])
+@pytest.mark.parametrize("requested", [0.1, 0.25, 0.4])
 @pytest.mark.parametrize("seed", range(2))
-def test_the_share_asked_for_is_hidden(asked, seed):
+def test_the_requested_share_is_occluded(requested, seed):
     free = space(seed=seed)
-    solids = place_clutter(seed, Clutter(coverage=asked), free)
-    assert measured(free, solids) == pytest.approx(asked, abs=0.05)
+    solids = place_clutter(seed, Clutter(coverage=requested), free)
+    assert measured(free, solids) == pytest.approx(requested, abs=0.05)
 
 
-def test_what_was_asked_for_counts_and_carts_where_they_are():
+def test_requested_objects_and_moving_carts_count():
     free = space(seed=3, duration=10.0)
-    asked = Clutter(boxes=3, shelves=1, carts=1, coverage=0.3)
-    solids = place_clutter(3, asked, free)
+    requested = Clutter(boxes=3, shelves=1, carts=1, coverage=0.3)
+    solids = place_clutter(3, requested, free)
     assert [solid.name for solid in solids][:5] == ["shelf0", "box0", "box1", "box2", "cart0"]
     assert len(solids) > 5
     assert measured(free, solids) == pytest.approx(0.3, abs=0.05)
     assert share_hidden(free, solids) == pytest.approx(measured(free, solids), abs=0.03)
 
 
-def test_asking_for_more_adds_to_the_same_things():
+def test_a_larger_share_adds_to_the_same_objects():
     free = space(seed=1)
     less, more = (place_clutter(1, Clutter(coverage=share), free) for share in (0.2, 0.35))
     assert len(more) > len(less)

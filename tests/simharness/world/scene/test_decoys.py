@@ -26,7 +26,7 @@ def placed():
     return free, {solid.name: solid for solid in place_decoys(1, ALL, free)}
 
 
-def test_all_that_are_asked_for_find_a_place(placed):
+def test_all_requested_decoys_are_placed(placed):
     free, decoys = placed
     assert set(decoys) == {"poster0", "poster1", "mannequin0", "coat stand0", "mirror0", "mirror1"}
     hulls = [solid.hull for solid in decoys.values()]
@@ -37,7 +37,7 @@ def test_all_that_are_asked_for_find_a_place(placed):
         assert all(solid.hull.gap_on_floor(other) > 0 for other in hulls[:k])
 
 
-def test_figures_are_upright_people_who_face_forward(placed):
+def test_figures_are_upright_and_face_forward(placed):
     _, decoys = placed
     for name, solid in decoys.items():
         if name.startswith("mirror"):
@@ -58,14 +58,14 @@ def test_figures_are_upright_people_who_face_forward(placed):
 @pytest.mark.parametrize("on_wall", [True, False])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_joints_of_a_poster_lie_on_its_picture(on_wall, seed):
-    """What is printed there is skin, shirt or trousers as it should be: read back through the texture's uv."""
-    thing = draw_poster(stream(seed, "poster"), on_wall)
-    mesh = thing.mesh
+    """The colours at the joints, read through the uv of the texture, are those of skin, shirt and trousers."""
+    model = draw_poster(stream(seed, "poster"), on_wall)
+    mesh = model.mesh
     printed = np.ptp(mesh.uv[..., 0], axis=1) > 0.3
     assert printed.sum() == 2
     corners, uv = mesh.vertices[mesh.faces[printed]].reshape(-1, 3), mesh.uv[printed].reshape(-1, 2)
     to_uv = np.linalg.lstsq(np.column_stack([corners[:, 1:], np.ones(6)]), uv, rcond=None)[0]
-    where = np.column_stack([thing.figure[:, 1:], np.ones(17)]) @ to_uv
+    where = np.column_stack([model.figure[:, 1:], np.ones(17)]) @ to_uv
     assert (where > 0).all()
     assert (where < 1).all()
     column, row = (where * mesh.texture.shape[1::-1]).astype(int).T
@@ -73,22 +73,22 @@ def test_the_joints_of_a_poster_lie_on_its_picture(on_wall, seed):
     np.testing.assert_allclose(colors[9], colors[10], atol=3)  # both wrists are skin
     np.testing.assert_allclose(colors[13:15], colors[15:17], atol=3)  # knees and ankles are trousers
     assert np.abs(colors[9] - colors[5]).max() > 20  # skin is not shirt
-    np.testing.assert_allclose(corners[:, 0], thing.figure[0, 0], atol=1e-3)  # and they are on its front
+    np.testing.assert_allclose(corners[:, 0], model.figure[0, 0], atol=1e-3)  # and they are on its front
     plain = ~printed
-    np.testing.assert_array_equal(mesh.texture[:, -3:], 255)  # what is not printed keeps its own colours
+    np.testing.assert_array_equal(mesh.texture[:, -3:], 255)  # faces without picture keep their colours
     assert (mesh.uv[plain][..., 0] * mesh.texture.shape[1] > mesh.texture.shape[1] - 3).all()
 
 
 def test_a_mannequin_is_a_body_of_one_colour():
-    thing = draw_mannequin(stream(2, "mannequin"))
-    skin = thing.mesh.colors[: -28 * 4]
+    model = draw_mannequin(stream(2, "mannequin"))
+    skin = model.mesh.colors[: -28 * 4]
     np.testing.assert_array_equal(skin, np.tile(skin[0], (len(skin), 1)))
-    nearest = np.sqrt(((thing.mesh.vertices[None] - thing.figure[:, None]) ** 2).sum(axis=2).min(axis=1))
-    assert nearest.max() < 0.13  # its joints are in it
-    assert thing.mesh.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    nearest = np.sqrt(((model.mesh.vertices[None] - model.figure[:, None]) ** 2).sum(axis=2).min(axis=1))
+    assert nearest.max() < 0.13  # joints are inside the body
+    assert model.mesh.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_coat_hides_what_is_behind_it():
+def test_a_coat_occludes_what_is_behind_it():
     solid = draw_coat_stand(stream(0, "coat")).at((0, 0), 0.0, kind="decoy", name="coat")
     chest = solid.figure[[5, 6, 11, 12]].mean(axis=0)
     assert np.isfinite(Rays([solid]).distance(chest + [2, 0, 0], np.array([chest - [2, 0, 0]]))).all()
@@ -96,17 +96,17 @@ def test_a_coat_hides_what_is_behind_it():
 
 @pytest.mark.parametrize("on_wall", [True, False])
 def test_the_glass_of_a_mirror_lies_on_its_front(on_wall):
-    thing = draw_mirror(stream(3, "mirror"), on_wall)
-    solid = thing.at((0.7, -0.2), 0.9, kind="decoy", name="mirror")
+    model = draw_mirror(stream(3, "mirror"), on_wall)
+    solid = model.at((0.7, -0.2), 0.9, kind="decoy", name="mirror")
     glass = solid.mirror
     center, normal = np.array(glass.center), np.array(glass.normal)
     rays = Rays([solid])
     reach = rays.distance(center + normal, np.array([center - normal]))[0] * 2
-    assert reach == pytest.approx(1.0, abs=1e-5)  # nothing before it, and it is where the geom is
+    assert reach == pytest.approx(1.0, abs=1e-5)  # nothing in front of it, and at the position of the geom
     assert 0.3 < glass.half[0] < 0.55 < glass.half[1]
 
 
-def test_with_walls_some_hang_on_them_and_without_none_does():
+def test_some_decoys_hang_on_walls_if_there_are_walls():
     for walls in (True, False):
         free = space(1, area=1.0, room=Room(walls=walls))
         decoys = place_decoys(5, Decoys(posters=4, mirrors=4), free)
@@ -124,14 +124,14 @@ def test_clutter_stands_clear_of_decoys(placed):
             assert min(solid.hull_at(moment).gap_on_floor(decoy.hull) for decoy in decoys.values()) > 0.05
 
 
-def test_one_more_changes_none_that_stood_before(placed):
+def test_one_more_decoy_moves_no_earlier_one(placed):
     free, decoys = placed
     fewer = {solid.name: solid for solid in place_decoys(1, Decoys(posters=1, mirrors=1), free)}
     np.testing.assert_array_equal(fewer["poster0"].mesh.vertices, decoys["poster0"].mesh.vertices)
     np.testing.assert_array_equal(fewer["poster0"].mesh.texture, decoys["poster0"].mesh.texture)
 
 
-def test_what_finds_no_place_is_told():
+def test_a_decoy_without_a_place_is_refused():
     tight = space(2, room=Room(size=(4.0, 4.0, 3.0)), area=1.5, rig=ring(radius=1.8))
     with pytest.raises(ValueError, match=r"decoys.coat_stands: found no place for coat stand \d+.*lower decoys.coat"):
         place_decoys(0, Decoys(coat_stands=30), tight)

@@ -1,4 +1,4 @@
-"""People with weight: what holds them up, what brings them down, and what happens when they meet."""
+"""Dynamic playback: gravity, joint servos, assistance, pushes and collisions."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ CHILD = Kinematics(make_body(Shape(gender=0.4, age=0.35, height=0.5)))
 
 
 def room(cast, *solids):
-    """A floor, people, and things."""
+    """Model of a floor, people and solids."""
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, -0.05], size=[60, 60, 0.05])
     for solid in solids:
@@ -39,7 +39,7 @@ def room(cast, *solids):
 
 
 def standing(kinematics, *, duration=1.0, height=0.0, place=(0.0, 0.0), **degrees) -> Motion:
-    """Somebody who stands still in the neutral pose but for some angles, ``height`` metres over the floor."""
+    """Plan of a person at rest in the neutral pose except for some angles, ``height`` metres over the floor."""
     time = motion_clock(duration)
     root = np.tile([*place, kinematics.standing_height + height, 1.0, 0, 0, 0], (len(time), 1))
     angles = np.zeros((len(time), len(DOFS)))
@@ -49,7 +49,7 @@ def standing(kinematics, *, duration=1.0, height=0.0, place=(0.0, 0.0), **degree
 
 
 def walking(kinematics, *, start=(0.0, 0.0), ahead=1.0, duration=2.0, seed=1) -> Motion:
-    """Somebody who walks along y, up (``ahead`` 1) or down (-1), all but straight."""
+    """Plan of a person who walks almost straight along y, up (``ahead`` 1) or down (-1)."""
     around = np.linspace(0, 2 * np.pi, 800, endpoint=False)
     circle = 20 * ahead * np.stack([np.cos(around) - 1, np.sin(around)], axis=-1)
     loop = make_loop(np.asarray(start) + circle, speed=1.0, start=0.0)
@@ -57,12 +57,12 @@ def walking(kinematics, *, start=(0.0, 0.0), ahead=1.0, duration=2.0, seed=1) ->
 
 
 def misplaced(planned: Motion, happened: Motion) -> np.ndarray:
-    """How far the pelvis is from its plan, (T,) metres."""
+    """Distance of the pelvis from its plan, (T,), metres."""
     return np.linalg.norm(happened.root[:, :3] - planned.root[:, :3], axis=1)
 
 
-def test_nothing_but_gravity_moves_the_centre_of_mass_of_one_who_floats():
-    """However the muscles pull, it falls by g t^2 / 2."""
+def test_only_gravity_moves_the_centre_of_mass_in_the_air():
+    """Independent of joint torques, it falls by g t^2 / 2."""
     plan = standing(MAN, height=3.0, duration=0.5, left_elbow_flexion=40.0)
     waving = replace(plan, angles=plan.angles + 0.8 * np.sin(9 * plan.time[:, None]) * (plan.angles > 0))
     tracker = Tracker(room([MAN]), [MAN.body], [waving], assist=1e-9)
@@ -82,7 +82,7 @@ def test_nothing_but_gravity_moves_the_centre_of_mass_of_one_who_floats():
     assert np.ptp(elbow) > 0.5
 
 
-def test_an_assist_of_more_than_the_weight_carries():
+def test_assistance_above_the_weight_carries_a_person():
     plan = standing(CHILD, height=1.0, duration=1.5)
     (held,) = track(room([CHILD]), [CHILD.body], [plan], assist=2 * GRAVITY * CHILD.body.mass)
     (let_go,) = track(room([CHILD]), [CHILD.body], [plan], assist=0.5 * GRAVITY * CHILD.body.mass)
@@ -101,13 +101,13 @@ def test_free_walking_follows_the_plan(kinematics):
     assert misplaced(plan, happened).max() > 1e-3  # it is not the plan itself
 
 
-def test_without_help_a_walk_falls():
+def test_a_walk_without_assistance_falls():
     plan = walking(MAN, duration=3.0)
     (happened,) = track(room([MAN]), [MAN.body], [plan], assist=1e-6)
     assert misplaced(plan, happened)[-1] > 0.4
 
 
-def test_the_help_keeps_within_its_bound():
+def test_assistance_stays_within_its_bound():
     push = Push(person=0, start=0.3, duration=0.2, force=(1200.0, 0.0, 0.0))
     tracker = Tracker(room([MAN]), [MAN.body], [standing(MAN)], assist=150.0, pushes=[push])
     pelvis = tracker.people[0].pelvis
@@ -118,7 +118,7 @@ def test_the_help_keeps_within_its_bound():
             torques.append(np.linalg.norm(tracker.data.xfrc_applied[pelvis, 3:]))
     assert max(forces) <= 150.0 + 1e-9
     assert max(torques) <= 150.0 * LEVER + 1e-9
-    assert max(forces) == pytest.approx(150.0)  # it was needed
+    assert max(forces) == pytest.approx(150.0)  # the bound is reached
 
 
 def test_a_push_displaces_and_a_small_one_is_recovered_from():
@@ -138,7 +138,7 @@ def test_a_push_displaces_and_a_small_one_is_recovered_from():
     assert great[-1] > 0.5
 
 
-def test_walkers_who_would_walk_through_each_other_collide():
+def test_people_whose_plans_intersect_collide():
     cast = [MAN, WOMAN]
     plans = [walking(MAN, start=(0.0, -1.2)), walking(WOMAN, start=(0.1, 1.2), ahead=-1.0, seed=2)]
     apart = np.linalg.norm(plans[0].root[:, :2] - plans[1].root[:, :2], axis=1)
@@ -160,7 +160,7 @@ def test_walkers_who_would_walk_through_each_other_collide():
 
 
 def block(kind, *, moving=True):
-    """A box of 0.4 m at the height of the hips that comes along x at 1 m/s, through the origin at 0.8 s."""
+    """A box of 0.4 m at the height of the hips that moves along x at 1 m/s, through the origin at 0.8 s."""
     time = np.arange(-0.1, 2.0, 1 / RATE) if moving else np.zeros(1)
     pose = np.zeros((len(time), 7))
     pose[:, 3] = 1.0
@@ -170,14 +170,14 @@ def block(kind, *, moving=True):
 
 
 @pytest.mark.parametrize(("kind", "moved"), [("clutter", True), ("prop", False)])
-def test_a_cart_pushes_people_and_what_is_carried_does_not(kind, moved):
+def test_a_cart_pushes_people_and_a_carried_prop_does_not(kind, moved):
     solid = block(kind)
     plan = standing(MAN, duration=1.4)
     (happened,) = track(room([MAN], solid), [MAN.body], [plan], assist=300.0, solids=[solid])
     assert (misplaced(plan, happened).max() > 0.2) == moved
 
 
-def test_the_model_and_the_plan_stay_as_they_are_and_it_happens_the_same_again():
+def test_model_and_plan_are_unchanged_and_results_repeat():
     scene = room([MAN])
     before = (scene.opt.timestep, scene.dof_damping.copy(), scene.geom_size.copy())
     plan = walking(MAN, duration=0.5)
@@ -190,19 +190,19 @@ def test_the_model_and_the_plan_stay_as_they_are_and_it_happens_the_same_again()
     np.testing.assert_array_equal(scene.geom_size, before[2])
 
 
-def test_how_long_it_goes_on_changes_nothing_of_what_was_before():
+def test_the_duration_does_not_change_earlier_frames():
     long, scene = walking(MAN, duration=3.0), room([MAN])
     short = Motion(long.time[:150], long.root[:150], long.angles[:150])
     (whole,), (part,) = (track(scene, [MAN.body], [plan], assist=300.0) for plan in (long, short))
     np.testing.assert_allclose(part.root[:140], whole.root[:140], atol=2e-3)
 
 
-def test_nobody_is_a_valid_answer():
+def test_without_people():
     assert track(room([]), [], [], assist=300.0) == ()
 
 
 class Planned:
-    """One person's plan at rest, and the torques that it asks for."""
+    """Plan of one person at rest, and the torques that it needs."""
 
     def __init__(self, height: float = 0.0, **degrees: float) -> None:
         plan = standing(MAN, height=height, **degrees)
@@ -221,7 +221,7 @@ class Planned:
         return dict(zip(DOFS, torques, strict=True))
 
     def moment(self, hinge: str, bone: str) -> float:
-        """Of the weight of a bone and all that hangs on it, about a hinge across the person, N m, forward positive."""
+        """Moment of the weight of a bone and its descendants about a transverse hinge, N m, forward positive."""
         anchor = self.data.joint(f"person0/{hinge}").xanchor[0]
         below = [i for i in range(self.model.nbody) if self._hangs(i, self.model.body(f"person0/{bone}").id)]
         return GRAVITY * sum(self.model.body_mass[i] * (self.data.xipos[i, 0] - anchor) for i in below)
@@ -241,7 +241,7 @@ def test_an_arm_held_out_needs_the_torque_of_its_weight():
     assert abs(torques["right_elbow_flexion"]) < 0.3
 
 
-def test_in_a_crouch_the_knees_carry_the_weight_and_in_the_air_they_do_not():
+def test_knees_carry_the_weight_in_a_crouch_but_not_in_the_air():
     """Statics: half the weight, under the centre of mass, at its lever about the knee, less that of the shank."""
     bent = {f"{side}_{name}": angle for side in ("left", "right")
             for name, angle in (("hip_flexion", 40), ("knee_flexion", 80), ("ankle_dorsiflexion", 40))}  # fmt: skip

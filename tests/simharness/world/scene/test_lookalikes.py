@@ -1,4 +1,4 @@
-"""What looks like a person: in space, in pictures, and by rays."""
+"""Lookalikes: positions, visibility by pictures and by rays."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def played(seed=1, decoys=True):
 
 @cache
 def compared(seed):
-    """What rays and pictures show of lookalikes, side by side."""
+    """Pairs of observations of lookalikes by rays and by pictures."""
     playback, rig = played(seed)
     observers = RayObserver(playback), PictureObserver(playback, make_renderer("raster"))
     pairs = []
@@ -162,7 +162,7 @@ class TestInPictures:
                 image = renderer.render(camera, meshes_at(playback.scene, state), color=False)
                 column, row = np.floor(seen.lookalike_pixels[inside] + 0.5).astype(int).T
                 person = (image.ids[row, column] >= 0) & (image.ids[row, column] < PEOPLE)
-                # A reflection lies behind the glass, so whoever stands before the glass is before it too.
+                # A reflection lies behind the glass, so a person in front of the glass is also in front of it.
                 nearer = person & (image.depth[row, column] < camera.depth(joints[inside]) - 1.0)
                 assert not seen.lookalike_visible[inside][nearer].any()
                 hidden += nearer.sum()
@@ -180,7 +180,7 @@ class TestInPictures:
 
     def test_through_a_wall_nothing_is_seen(self):
         playback, _ = played()
-        figures = Lookalikes.of(playback.scene).figures[1:]  # in the round, so all that hides them is the wall
+        figures = Lookalikes.of(playback.scene).figures[1:]  # solid figures, so only the wall occludes them
         for figure in figures:
             aim = figure.mean(axis=0)
             camera = looking(np.array([0.0, 1.4 * 4.0 * np.sign(aim[1]), 1.2]), aim)
@@ -220,7 +220,7 @@ class TestFilms:
         assert whole.lookalikes.names == names
         assert whole.lookalikes.pixels.shape == (3, 4, len(names), 17, 2)
         assert whole.lookalikes.visible[:, [0, 2, 3]].any()
-        assert not whole.lookalikes.visible[:, 1].any()  # a dead camera sees nothing
+        assert not whole.lookalikes.visible[:, 1].any()  # a dead camera delivers nothing
         assert np.isnan(whole.lookalikes.pixels[:, 1]).all()
         parts = Views.concatenate([film(playback, exposures, observer, frames=[f]) for f in range(3)])
         assert parts.lookalikes.pixels.tobytes() == whole.lookalikes.pixels.tobytes()

@@ -21,7 +21,7 @@ def standing(place=(0.0, 0.0), yaw=0.0):
 
 @pytest.mark.parametrize("kind", SIZES)
 def test_props_have_their_size(kind):
-    """Depth along x, width along y; a table, a box, a step and a bottle as high as asked, a chair's seat."""
+    """Depth along x, width along y, height of a table, box, step, bottle, or of the seat of a chair."""
     solid = make_prop(Prop(kind, SIZES[kind], standing()), f"{kind} 0")
     assert solid.kind == "prop"
     assert solid.trajectory is None
@@ -35,12 +35,12 @@ def test_props_have_their_size(kind):
         assert high[0] == pytest.approx(depth / 2, abs=0.01)
         assert high[2] > height + 0.3
         back = solid.mesh.vertices[solid.mesh.vertices[:, 2] > height + 0.05]
-        assert back[:, 0].max() < -depth / 2 + 0.03  # nobody who sits on it sits in its back
+        assert back[:, 0].max() < -depth / 2 + 0.03  # a person who sits on it does not touch its back
     else:
         assert high[0] - low[0] == pytest.approx(depth, rel=0.03)
 
 
-def test_a_prop_that_stands_still_is_put_there():
+def test_a_prop_at_rest_is_placed():
     still = Trajectory(np.array([0.0, 1.0]), np.tile(standing((1.0, 2.0), 0.8).pose, (2, 1)))
     one = make_prop(Prop("box", SIZES["box"], still), "prop 1")
     two = make_prop(Prop("box", SIZES["box"], standing((1.0, 2.0), 0.8)), "prop 1")
@@ -50,7 +50,7 @@ def test_a_prop_that_stands_still_is_put_there():
     assert one.hull.yaw == pytest.approx(0.8)
 
 
-def test_a_prop_that_is_carried_moves():
+def test_a_carried_prop_moves():
     pose = np.tile(standing((1.0, 0.0)).pose, (2, 1))
     pose[1, 2] = 0.9
     carried = Trajectory(np.array([0.0, 1.0]), pose)

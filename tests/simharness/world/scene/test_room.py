@@ -52,7 +52,7 @@ def test_the_room_has_its_size_and_its_solids_lie_outside(room):
     assert sum(len(solid.mesh.faces) for solid in room.values()) < 3000
 
 
-def test_rays_from_within_meet_the_room_where_it_is_seen(room):
+def test_rays_from_inside_hit_the_visible_surfaces(room):
     rays = Rays(list(room.values()))
     start, ways = np.array([0.5, -0.4, 1.2]), np.random.default_rng(0).normal(size=(300, 3))
     ways[:, 2] = -np.abs(ways[:, 2]) * 0.3
@@ -62,8 +62,8 @@ def test_rays_from_within_meet_the_room_where_it_is_seen(room):
     np.testing.assert_allclose(np.abs(edge).min(axis=0), 0, atol=1e-6)
 
 
-def test_textures_are_as_large_as_they_say(room):
-    """A metre of floor or wall is the same share of the texture everywhere, and walls stand on the floor."""
+def test_textures_have_their_given_size(room):
+    """A metre of floor or wall is the same share of the texture everywhere; textures of walls start at the floor."""
     for name, solid in room.items():
         mesh = solid.mesh
         a, b = mesh.vertices[mesh.faces][:, 0], mesh.vertices[mesh.faces][:, 2]
@@ -80,7 +80,7 @@ def test_textures_are_as_large_as_they_say(room):
 
 @pytest.mark.parametrize("look", [*FLOORS, *WALLS])
 def test_textures_repeat_without_a_seam(look):
-    """Across the seam neighbouring pixels differ no more than elsewhere."""
+    """Across the seam, neighbouring pixels differ no more than elsewhere."""
     rng = np.random.default_rng(3)
     texture = (FLOORS[look](rng) if look in FLOORS else WALLS[look](rng, 3.0)).texture.astype(float)
     for axis in (0, 1) if look in FLOORS else (1,):
@@ -90,7 +90,7 @@ def test_textures_repeat_without_a_seam(look):
     assert texture.std() > 0.5
 
 
-def test_a_look_changes_only_what_it_names():
+def test_a_finish_changes_only_its_surface():
     one = {solid.name: solid for solid in make_room(ROOM, 4)}
     two = {solid.name: solid for solid in make_room(ROOM.model_copy(update={"wall": "brick"}), 4)}
     np.testing.assert_array_equal(one["floor"].mesh.texture, two["floor"].mesh.texture)
@@ -99,13 +99,13 @@ def test_a_look_changes_only_what_it_names():
     np.testing.assert_array_equal(one["wall +x"].mesh.texture, three["wall +x"].mesh.texture)
 
 
-def test_any_is_each_of_them_in_turn():
+def test_any_draws_each_finish():
     floors, walls = set(), set()
     for seed in range(5):
         floor, wall = (solid.mesh.texture for solid in make_room(Room(floor="any", wall="any"), seed)[:2])
         for kinds, looks, key, texture, place in ((floors, FLOORS, "floor", floor, 0), (walls, WALLS, "wall", wall, 1)):
             same = {n for n in looks if np.array_equal(make_room(Room(**{key: n}), seed)[place].mesh.texture, texture)}
-            assert len(same) == 1  # drawn, it looks as it does when it is named
+            assert len(same) == 1  # a drawn finish equals the named one
             kinds.update(same)
     lights = {room_lighting(Room(light="any"), seed).key for seed in range(24)}
     assert len(floors) >= 3
@@ -113,7 +113,7 @@ def test_any_is_each_of_them_in_turn():
     assert lights == {light.key for light in LIGHTS.values()}
 
 
-def test_light_is_as_named():
+def test_lighting_by_name():
     assert room_lighting(ROOM, 0) == Lighting()
     seen = {name: (light.key + light.sky) for name, light in LIGHTS.items()}
     assert seen["dim"] < 0.5 * seen["day"]
@@ -121,7 +121,7 @@ def test_light_is_as_named():
     assert LIGHTS["side"].direction[2] < 0.6 < LIGHTS["day"].direction[2]
 
 
-def test_without_walls_the_ground_goes_on_and_pales():
+def test_without_walls_the_ground_fades_outwards():
     floor, ground = make_room(ROOM.model_copy(update={"walls": False}), 0)
     assert (floor.name, ground.name) == ("floor", "ground")
     low, high = ground.mesh.vertices.min(axis=0), ground.mesh.vertices.max(axis=0)

@@ -14,7 +14,7 @@ numbers = st.floats(-2, 2)
 
 
 @given(x=numbers, y=numbers, yaw=st.floats(-3, 3), seed=st.integers(0, 99))
-def test_lines_are_cut_by_boxes_as_the_slabs_say(x, y, yaw, seed):
+def test_boxes_cut_lines_as_the_slab_test(x, y, yaw, seed):
     box = Box((x, y, 0.5), (0.4, 0.2, 0.5), yaw)
     ends = np.random.default_rng(seed).uniform(-2, 2, (2, 200, 3))
     starts, ends = ends[0] + [0, 0, 0.5], ends[1] + [0, 0, 0.5]
@@ -22,7 +22,7 @@ def test_lines_are_cut_by_boxes_as_the_slabs_say(x, y, yaw, seed):
     one, two = (-np.array(box.half) - a) / (b - a), (np.array(box.half) - a) / (b - a)
     into, out = np.minimum(one, two).max(axis=1), np.maximum(one, two).min(axis=1)
     crosses = (into <= out) & (((into >= 0) & (into <= 1)) | ((out >= 0) & (out <= 1)))
-    assert (cuts(box_mesh([box], np.full((1, 3), 0.5)), starts, ends) == crosses).mean() > 0.995  # but at the edges
+    assert (cuts(box_mesh([box], np.full((1, 3), 0.5)), starts, ends) == crosses).mean() > 0.995  # except at the edges
 
 
 def test_no_lines_and_no_faces():
@@ -30,17 +30,17 @@ def test_no_lines_and_no_faces():
     assert cuts(mesh, np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
 
 
-def test_a_moving_thing_cuts_where_it_is_at_the_time():
-    thing = Assembly().box((0, 0, 0.5), (0.4, 0.2, 1.0), (0.5, 0.5, 0.5)).model()
+def test_a_moving_solid_cuts_lines_at_its_position_in_time():
+    model = Assembly().box((0, 0, 0.5), (0.4, 0.2, 1.0), (0.5, 0.5, 0.5)).model()
     turned = np.sqrt(0.5)
     poses = np.array([[0.0, 0, 0, 1, 0, 0, 0], [2.0, 0, 0, turned, 0, 0, turned]])
-    solid = thing.along(Trajectory(np.array([0.0, 1.0]), poses), kind="clutter", name="it")
+    solid = model.along(Trajectory(np.array([0.0, 1.0]), poses), kind="clutter", name="it")
     starts = np.array([[0.15, -1, 0.5], [0.15, -1, 0.5], [2.15, -1, 0.5], [2.05, -1, 0.5], [2.0, -1, 1.2]])
     lines = SightLines(starts, starts + [0, 2, 0], np.array([0.0, 1.0, 1.0, 1.0, 1.0]))
     np.testing.assert_array_equal(lines.cut_by(solid), [True, False, False, True, False])
 
 
-def test_lines_lead_to_the_joints_that_are_in_the_pictures():
+def test_lines_of_sight_end_at_joints_in_the_pictures():
     rig = ring(3)
     joints = np.array([[[[0.0, 0, 1.0]]], [[[0.0, 0, 40.0]]]])
     lines = lines_of_sight(rig, np.array([2.0, 3.0]), joints)
@@ -49,7 +49,7 @@ def test_lines_lead_to_the_joints_that_are_in_the_pictures():
     np.testing.assert_array_equal(lines.time, 2.0)
 
 
-def test_a_wall_before_one_camera_fills_its_picture():
+def test_a_wall_in_front_of_a_camera_fills_its_picture():
     rig = ring(4)
     wall = (
         Assembly()
@@ -63,11 +63,11 @@ def test_a_wall_before_one_camera_fills_its_picture():
     filled = pictures.filled.mean(axis=1)
     assert filled[0] > 0.9
     assert filled[1:].max() < 0.4
-    assert pictures.allows(wall, 0.6)  # once more hides no more
+    assert pictures.allows(wall, 0.6)  # adding it again changes nothing
 
 
 def test_the_share_of_a_picture_is_that_of_its_area():
-    """A square board straight before a pinhole camera: its share follows from its side and distance."""
+    """A square board in front of a pinhole camera: its share follows from its side and distance."""
     rig = ring(2, height=0.9)
     board = (
         Assembly().box((2.5, 0, 0.9), (0.001, 0.8, 0.6), (0.5,) * 3).model().at((0, 0), 0.0, kind="clutter", name="b")

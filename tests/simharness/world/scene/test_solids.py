@@ -22,7 +22,7 @@ def signed_volume(mesh) -> float:
 
 
 @given(x=numbers, y=numbers, yaw=st.floats(-7, 7))
-def test_mesh_is_closed_and_looks_outwards(x, y, yaw):
+def test_a_box_mesh_is_closed_with_outward_faces(x, y, yaw):
     box = Box((x, y, 0.5), (0.3, 0.2, 0.5), yaw)
     mesh = box_mesh([box], np.full((1, 3), 0.5))
     assert signed_volume(mesh) == pytest.approx(8 * 0.3 * 0.2 * 0.5, rel=1e-3)
@@ -42,8 +42,8 @@ def test_sides_have_their_names():
 
 
 @given(sides=st.integers(3, 40), squash=st.floats(0.3, 2.0))
-def test_a_lathe_turns_prisms(sides, squash):
-    """The volume of a turned prism is that of its polygon times its height, whatever edges its profile has."""
+def test_a_lathe_gives_prisms(sides, squash):
+    """The volume of a prism is the area of its polygon times its height, for profiles with and without edges."""
     profile = [(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (0.25, 1.0), (0.25, 2.0), (0.0, 2.0)]
     mesh = lathe(profile, (0.5, 0.5, 0.5), sides=sides, squash=squash)
     polygon = sides / 2 * np.sin(2 * np.pi / sides) * squash
@@ -53,7 +53,7 @@ def test_a_lathe_turns_prisms(sides, squash):
     assert (count == 2).all()  # watertight
 
 
-def test_meshes_from_corners_and_together():
+def test_meshes_from_corners_and_joined_meshes():
     box = Box((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), 0.7)
     assert signed_volume(hexahedron(box.corners, (0.5, 0.5, 0.5))) == pytest.approx(0.96, rel=1e-5)
     both = joined(box_mesh([box], np.ones((1, 3))), shifted(hexahedron(box.corners, (0.2, 0.4, 0.6)), (5, 0, 0)))
@@ -62,7 +62,7 @@ def test_meshes_from_corners_and_together():
 
 
 @given(yaw=st.floats(-3, 3), tilt=st.floats(0.1, 3.0), way=st.floats(-3, 3))
-def test_a_bar_is_where_its_geom_is(yaw, tilt, way):
+def test_a_bar_mesh_matches_its_geom(yaw, tilt, way):
     axis = (np.sin(tilt) * np.cos(way), np.sin(tilt) * np.sin(way), np.cos(tilt))
     bar = Cylinder((0.3, -0.2, 1.0), 0.2, 0.6, tuple(float(v) for v in axis))
     mesh = bar_mesh(bar, (0.5, 0.5, 0.5), sides=48)
@@ -77,7 +77,7 @@ def test_a_bar_is_where_its_geom_is(yaw, tilt, way):
 
 
 @pytest.mark.parametrize("end", [(0.4, 0.0, 0.9), (0.5, 0.6, 0.3), (0.0, -0.7, 0.3), (0.1, 0.1, 1.2)])
-def test_rays_meet_a_leaning_bar_where_it_is_seen(end):
+def test_rays_hit_a_tilted_bar_at_its_mesh(end):
     solid = (
         Assembly().bar((0, 0, 0.3), end, 0.08, (0.5,) * 3, sides=48).model().at((1, 2), 0.7, kind="prop", name="bar")
     )
@@ -90,7 +90,7 @@ def test_rays_meet_a_leaning_bar_where_it_is_seen(end):
     assert (seen != met).sum() <= 5
 
 
-def test_distance_by_hand():
+def test_distances_computed_by_hand():
     box = Box((1.0, 0.0, 0.5), (0.5, 0.25, 0.5), np.pi / 2)  # turned: 0.25 along x, 0.5 along y
     points = [[1.0, 0.0, 0.5], [2.25, 0.0, 0.5], [1.0, 0.9, 0.2], [1.0, 0.0, 1.7], [1.25 + 0.3, 0.5 + 0.4, 0.5]]
     np.testing.assert_allclose(box.distance(points), [0, 1.0, 0.4, 0.7, 0.5], atol=1e-12)
@@ -113,7 +113,7 @@ def test_gap_never_exceeds_the_true_distance(x, y, first, second):
     assert gap == pytest.approx(max(0.0, *apart), abs=1e-9)  # the separating axes, corner by corner
 
 
-def test_moved_turns_about_the_vertical_and_carries():
+def test_moved_rotates_about_the_vertical_and_translates():
     box = Box((1.0, 0.0, 0.5), (0.5, 0.25, 0.5), 0.1).moved([2.0, 3.0], np.pi / 2)
     np.testing.assert_allclose(box.center, (2.0, 4.0, 0.5), atol=1e-12)
     assert box.yaw == pytest.approx(0.1 + np.pi / 2)
@@ -123,7 +123,7 @@ def test_moved_turns_about_the_vertical_and_carries():
     )
 
 
-def thing():
+def assembly():
     return (
         Assembly()
         .box((0, 0, 0.1), (0.6, 0.4, 0.2), (0.5, 0.5, 0.5))
@@ -133,9 +133,9 @@ def thing():
 
 
 @given(x=numbers, y=numbers, yaw=st.floats(-7, 7))
-def test_all_of_a_thing_goes_where_it_is_put(x, y, yaw):
+def test_all_parts_of_a_model_are_placed(x, y, yaw):
     figure, glass = np.full((17, 3), 0.7), Mirror((0.3, 0.1, 0.5), (1.0, 0.0, 0.0), (0.2, 0.4))
-    loose = thing().model(figure=figure, mirror=glass)
+    loose = assembly().model(figure=figure, mirror=glass)
     placed = loose.at((x, y), yaw, kind="decoy", name="it")
     expected = carried(loose.mesh.vertices, (x, y), yaw)
     np.testing.assert_allclose(placed.mesh.vertices, expected, atol=1e-5)
@@ -147,11 +147,11 @@ def test_all_of_a_thing_goes_where_it_is_put(x, y, yaw):
     assert placed.hull_at(3.0) == placed.hull
 
 
-def test_geoms_have_the_names_that_others_look_for():
+def test_names_of_geoms():
     spec = mujoco.MjSpec()
     single = Assembly().box((0, 0, 0.5), (1, 1, 1), (0.5, 0.5, 0.5)).model().at((3, 0), 0.0, kind="room", name="floor")
-    several = thing().model().at((0, 0), 0.0, kind="clutter", name="box0")
-    moving = thing().model().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
+    several = assembly().model().at((0, 0), 0.0, kind="clutter", name="box0")
+    moving = assembly().model().along(Trajectory(np.zeros(1), np.eye(7)[[3]]), kind="prop", name="cart0")
     for solid in (single, several, moving):
         solid.add_to(spec)
     model = spec.compile()
@@ -161,8 +161,8 @@ def test_geoms_have_the_names_that_others_look_for():
     assert model.geom("box0 1").bodyid[0] == 0
 
 
-def test_a_moving_thing_is_where_its_trajectory_says():
-    """Rays find it there, and its hulls hold it, turned, tilted and lifted."""
+def test_a_moving_solid_follows_its_trajectory():
+    """Rays hit it at its pose, and its hulls contain it, rotated, tilted and lifted."""
     time = np.linspace(0, 2, 21)
     turn, tilt = 2.0 * time, 0.4 * np.sin(3 * time)
     zero = np.zeros(21)
@@ -172,7 +172,7 @@ def test_a_moving_thing_is_where_its_trajectory_says():
     for k in range(21):
         mujoco.mju_mulQuat(quat[k], yawed[k], tilted[k])
     pose = np.column_stack([time, -0.5 * time, 0.3 * time, quat])
-    solid = thing().model().along(Trajectory(time, pose), kind="prop", name="it")
+    solid = assembly().model().along(Trajectory(time, pose), kind="prop", name="it")
     rays = Rays([solid])
     for moment in (0.0, 0.7, 1.9):
         rays.put(moment)
@@ -182,6 +182,6 @@ def test_a_moving_thing_is_where_its_trajectory_says():
             mujoco.mju_rotVecQuat(vertices[k], vertex, where[3:])
         vertices += where[:3]
         assert solid.hull_at(moment).distance(vertices).max() < 1e-5
-        assert solid.hull.distance(vertices).max() < 0.02  # of all the way, at its samples
+        assert solid.hull.distance(vertices).max() < 0.02  # over the whole trajectory, at its samples
         middle = vertices.mean(axis=0)
         assert np.isfinite(rays.distance(middle + [0, 0, 3], np.array([middle - [0, 0, 1]]))).all()

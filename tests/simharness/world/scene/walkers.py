@@ -1,4 +1,4 @@
-"""People who walk in circles, cameras around them, and MuJoCo's own rays: what tests of furnished rooms share."""
+"""Shared by tests of furnished rooms: people who walk in circles, cameras around them, and MuJoCo rays."""
 
 import mujoco
 import numpy as np
@@ -20,7 +20,7 @@ STANDING = np.array(
 
 
 def crowd(count: int, duration: float, area: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (N,), pelvises (N, P, 3) and joints (N, P, 17, 3)."""
+    """Return times (N,), pelvises (N, P, 3) and joints (N, P, 17, 3)."""
     rng, time = np.random.default_rng(seed), motion_clock(duration, margin=1.0)
     pelvises, joints = np.zeros((len(time), count, 3)), np.zeros((len(time), count, 17, 3))
     for k in range(count):
@@ -55,7 +55,7 @@ def space(
 
 
 class Rays:
-    """MuJoCo's rays against the geoms of solids."""
+    """Rays of MuJoCo against the geoms of solids."""
 
     def __init__(self, solids) -> None:
         spec = mujoco.MjSpec()
@@ -74,7 +74,7 @@ class Rays:
         mujoco.mj_kinematics(self.model, self.data)
 
     def distance(self, start, ends) -> np.ndarray:
-        """How far along the way to each end (n, 3) the first geom is, 0..1; inf where none is before it."""
+        """Return where the first geom is on the way to each end (n, 3), 0..1; inf without a hit."""
         ways = np.ascontiguousarray(ends - start, float)
         hits, geoms = np.zeros(len(ways)), np.zeros(len(ways), np.int32)
         for n, way in enumerate(ways):

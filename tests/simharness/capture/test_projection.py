@@ -19,28 +19,28 @@ def camera(distortion=(0.0, 0, 0, 0, 0)):
 
 
 @given(distortion=st.sampled_from([(0.0,) * 5, (-0.1, 0.01, 0.001, -0.002, 0.0), (-0.37, 0.15, 0.0, 0.0, 0.0)]))
-def test_it_is_opencvs_projection(distortion):
+def test_projection_agrees_with_opencv(distortion):
     eye = camera(distortion)
     points = stream(0, "points").uniform([-1, -1, 0], [1, 1, 2], (200, 3))
     expected, _ = cv2.projectPoints(points, cv2.Rodrigues(eye.R)[0], eye.t, eye.K, eye.distortion)
     np.testing.assert_allclose(project_to_image(eye, points), expected[:, 0], atol=1e-6)
 
 
-def test_what_is_behind_or_too_near_does_not_appear():
+def test_points_behind_or_too_near_are_not_imaged():
     eye = camera()
     forward = eye.R[2]
     points = eye.center + np.array([-1.0, 0.04, 0.06])[:, None] * forward
     assert np.isnan(project_to_image(eye, points, near=0.05)).any(axis=-1).tolist() == [True, True, False]
 
 
-def test_a_lens_that_folds_over_shows_nothing_twice():
-    """With k1 = -0.4 the radius r (1 - 0.4 r²) turns back at r = 0.91: what lies beyond is not imaged."""
+def test_points_beyond_the_fold_are_not_imaged():
+    """With k1 = -0.4 the radius r (1 - 0.4 r²) has its maximum at r = 0.91: points beyond are not imaged."""
     eye = camera((-0.4, 0.0, 0.0, 0.0, 0.0))
     right, _, forward = eye.R
     radius = np.array([0.3, 0.85, 0.97, 1.4])
     points = eye.center + 2 * (forward + radius[:, None] * right)
     folded = eye.project(points)
-    assert eye.inside(folded)[2:].any()  # or this test shows nothing
+    assert eye.inside(folded)[2:].any()  # otherwise the test is void
     assert np.isfinite(project_to_image(eye, points)).all(axis=-1).tolist() == [True, True, False, False]
 
 
@@ -50,5 +50,5 @@ def test_shapes_are_kept():
 
 
 @pytest.mark.parametrize("where", [(np.nan, 0, 0), (np.inf, 0, 0)])
-def test_what_is_nowhere_does_not_appear(where):
+def test_non_finite_points_are_not_imaged(where):
     assert np.isnan(project_to_image(camera(), where)).all()
