@@ -59,7 +59,7 @@ def test_the_card_belongs_to_the_model_and_its_splits_are_disjoint(content):
 
 def test_scores_among_held_out_people_of_a_scene(content):
     """Required: rank-1 of 95 % and mAP of 90 % with colour casts and partial occlusion."""
-    curve = [content["results"]["look_alike"][f"{dial:g}"] for dial in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    curve = [content["results"]["look_alike"][f"{value:g}"] for value in (0.0, 0.25, 0.5, 0.75, 1.0)]
     distinct = curve[0]
     assert distinct["identities"] >= 290
     assert distinct["people_in_a_scene"] == 12

@@ -30,7 +30,7 @@ _ARM_START = 0.1  # distance from the root of the neck to the start of a sleeve,
 
 def is_plain(look: Look) -> tuple[bool, bool]:
     """Return whether the top, and whether the trousers or skirt, have a single colour."""
-    return look.top_pattern == "plain" and look.below != "coat", look.bottom_pattern == "plain"
+    return look.top_pattern == "plain" and look.lower_garment != "coat", look.bottom_pattern == "plain"
 
 
 def texture_image(look: Look) -> NDArray[np.uint8] | None:
@@ -38,7 +38,7 @@ def texture_image(look: Look) -> NDArray[np.uint8] | None:
     if all(is_plain(look)):
         return None
     top = _cloth(look.top_pattern, look.top, look.accent, look.repeats)
-    if look.below == "coat":  # the line where it is buttoned
+    if look.lower_garment == "coat":  # the line where it is buttoned
         top[:, :_OPENING] *= _SHADE
         top[:, -_OPENING:] *= _SHADE
     bottom = _cloth(look.bottom_pattern, look.trousers, look.accent, look.repeats)

@@ -76,13 +76,13 @@ def garments(body: Body, look: Look) -> NDArray[np.int64]:
     part, level = body.part, body.level
     result = np.full(len(part), int(Garment.NONE))
     result[part == Part.SCALP] = Garment.HAIR
-    hem = -np.inf if look.below in ("dress", "coat") else HEMS[look.hem]
+    hem = -np.inf if look.lower_garment in ("dress", "coat") else HEMS[look.hem]
     trunk = part == Part.TORSO
     result[(trunk & (level >= hem)) | ((part == Part.ARM) & (level < SLEEVES[look.sleeves]))] = Garment.TOP
     result[trunk & (level < hem)] = Garment.TROUSERS
-    if look.below in ("trousers", "coat"):
+    if look.lower_garment in ("trousers", "coat"):
         result[(part == Part.LEG) & (level < LEGS[look.legs])] = Garment.TROUSERS
-    result[part == Part.SKIRT] = Garment.TROUSERS if look.below == "skirt" else Garment.TOP
+    result[part == Part.SKIRT] = Garment.TROUSERS if look.lower_garment == "skirt" else Garment.TOP
     result[part == Part.SHOE] = Garment.SHOE
     result[part == Part.SOLE] = Garment.SOLE
     return result
@@ -125,10 +125,10 @@ def dress(body: Body, look: Look) -> Body:
     )
     if look.hair_style != "short":
         dressed = _add(dressed, (long_hair if look.hair_style == "long" else bun)(dressed, volume=look.volume))
-    if look.below != "trousers":
+    if look.lower_garment != "trousers":
         hips, neck = (body.heads[body.index(bone), 2] for bone in ("LeftUpLeg", "Neck"))
         waist = hips + 0.75 * _WAIST * (neck - hips)
-        mesh, hang = skirt(dressed, top=waist, length=look.length, kind=look.below, ease=0.015 * look.fit)
+        mesh, hang = skirt(dressed, top=waist, length=look.length, kind=look.lower_garment, ease=0.015 * look.fit)
         dressed = replace(_add(dressed, mesh), skirt=replace(hang, first=len(dressed.vertices)))
     return dressed
 

@@ -101,6 +101,7 @@ def _hang(
     right: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
+    """Write the posed vertices ``out`` (s, 3) of a :class:`Skirt` from the transforms (3, 4) of its three bones."""
     for i in range(pelvis_share.shape[0]):
         lead = np.float32(0.0)  # distance by which the left thigh extends further in the vertex's direction
         for row in range(3):

@@ -18,8 +18,8 @@ SLEEVES = {"short": 0.55, "half": 0.9, "long": 1.95}
 LEGS = {"shorts": 0.7, "cropped": 1.55, "long": 1.93}
 HEMS = {"tucked": 0.32, "loose": 0.13}
 PATTERNS = ("plain", "stripes", "checks", "blocks")
-BELOW = ("trousers", "skirt", "dress", "coat")
-HAIR = ("short", "long", "bun")
+LOWER_GARMENTS = ("trousers", "skirt", "dress", "coat")
+HAIR_STYLES = ("short", "long", "bun")
 REPEATS = (6, 24)
 """Least and greatest number of repeats of a pattern around the body; a multiple of six closes around limbs too."""
 
@@ -29,8 +29,8 @@ _CHOICES = {
     "hem": tuple(HEMS),
     "top_pattern": PATTERNS,
     "bottom_pattern": PATTERNS,
-    "below": BELOW,
-    "hair_style": HAIR,
+    "lower_garment": LOWER_GARMENTS,
+    "hair_style": HAIR_STYLES,
 }
 _NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0)}
 
@@ -47,11 +47,11 @@ class Look:
         hem: hem of the shirt, one of ``HEMS``.
         top_pattern, bottom_pattern: one of ``PATTERNS``.
         repeats: number of repeats of the patterns around the body, a multiple of six in ``REPEATS``.
-        below: one of ``BELOW``: trousers only, a skirt, a dress (a skirt of the same cloth as the top) or a coat (a
-            dress over trousers).
+        lower_garment: one of ``LOWER_GARMENTS``: trousers only, a skirt, a dress (a skirt of the same cloth as the
+            top) or a coat (a dress over trousers).
         length: level of the hem of a skirt, dress or coat, 0.3 to 1, where 0 is the hip and 1 the knee.
         fit: width of the clothes, 0 close to 1 wide.
-        hair_style: one of ``HAIR``.
+        hair_style: one of ``HAIR_STYLES``.
         volume: volume of the hair, 0 cropped to 2 full.
 
     Raises:
@@ -72,7 +72,7 @@ class Look:
     top_pattern: str = "plain"
     bottom_pattern: str = "plain"
     repeats: int = 12
-    below: str = "trousers"
+    lower_garment: str = "trousers"
     length: float = 0.85
     fit: float = 0.3
     hair_style: str = "short"
@@ -95,7 +95,7 @@ class Look:
 
 UNIFORM_COLORS = ("top", "trousers", "shoes", "accent")
 UNIFORM_NUMBERS = ("fit", "length")
-UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "below")
+UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "lower_garment")
 
 # Albedos, chosen by eye. Hair and skins both run from fair to dark, so that one draw can correlate the two.
 _SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
@@ -119,7 +119,7 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | No
     drawn = rng.random(_DRAWS).tolist()
     hue = drawn[0] if hue is None else hue
     skin = _between(_SKINS, drawn[1])
-    below = _pick(
+    lower_garment = _pick(
         ("trousers", "trousers", "skirt", "dress", "coat") if female else (*("trousers",) * 7, "coat"), drawn[12]
     )
     top = colorsys.hsv_to_rgb(hue % 1, 0.5 + 0.35 * drawn[4], 0.5 + 0.4 * drawn[5])
@@ -132,13 +132,13 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | No
         trousers=_color(_pick(_TROUSERS, drawn[6])),
         shoes=_color(_pick(_SHOES, drawn[7])),
         accent=_contrasting(top, drawn[13]),
-        sleeves="long" if below == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
-        legs="long" if below == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
-        hem="tucked" if below != "trousers" else _pick(("tucked", "loose"), drawn[10]),
-        top_pattern="plain" if below == "coat" else _pick(("plain", "plain", *PATTERNS), drawn[14]),
-        bottom_pattern=_pick(("plain", "checks", "stripes"), drawn[15]) if below == "skirt" else "plain",
+        sleeves="long" if lower_garment == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
+        legs="long" if lower_garment == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
+        hem="tucked" if lower_garment != "trousers" else _pick(("tucked", "loose"), drawn[10]),
+        top_pattern="plain" if lower_garment == "coat" else _pick(("plain", "plain", *PATTERNS), drawn[14]),
+        bottom_pattern=_pick(("plain", "checks", "stripes"), drawn[15]) if lower_garment == "skirt" else "plain",
         repeats=6 * (2 + int(3 * drawn[16])),
-        below=below,
+        lower_garment=lower_garment,
         length=0.6 + 0.38 * drawn[17],
         fit=drawn[18] ** 1.5,
         hair_style=_pick(("short", "long", "long", "bun") if female else (*("short",) * 9, "long"), drawn[19]),

@@ -18,7 +18,7 @@ def body():
 
 def look_with(**changes):
     look = draw_look(stream(1, "test"))
-    plain = {"below": "trousers", "hair_style": "short", "top_pattern": "plain", "bottom_pattern": "plain"}
+    plain = {"lower_garment": "trousers", "hair_style": "short", "top_pattern": "plain", "bottom_pattern": "plain"}
     return replace(look, **(plain | {"top": (0.8, 0.2, 0.1), "accent": (0.1, 0.1, 0.4)} | changes))
 
 
@@ -61,9 +61,9 @@ def test_stripes_are_horizontal_and_have_the_width_of_their_repeats(body):
     assert abs(abs(np.angle(np.exp(1j * (phase - light)))) - np.pi) < 0.4
 
 
-@pytest.mark.parametrize("below", ["trousers", "dress", "coat"])
-def test_faces_stay_in_their_band_and_do_not_wrap_around_the_texture(body, below):
-    look = look_with(top_pattern="checks", bottom_pattern="stripes", below=below)
+@pytest.mark.parametrize("lower_garment", ["trousers", "dress", "coat"])
+def test_faces_stay_in_their_band_and_do_not_wrap_around_the_texture(body, lower_garment):
+    look = look_with(top_pattern="checks", bottom_pattern="stripes", lower_garment=lower_garment)
     dressed = dress(body, look)
     uv, worn = paint(dressed, look).uv, garments(dressed, look)
     assert np.isfinite(uv).all()
@@ -72,7 +72,7 @@ def test_faces_stay_in_their_band_and_do_not_wrap_around_the_texture(body, below
     rows = 2 * BAND + WHITE
     for garment, low, high in ((Garment.TOP, 0, BAND), (Garment.TROUSERS, BAND, 2 * BAND)):
         used = uv[worn == garment, :, 1] * rows
-        if below != "dress" or garment == Garment.TOP:  # there are no trousers under a dress
+        if lower_garment != "dress" or garment == Garment.TOP:  # there are no trousers under a dress
             assert low + 1 < used.min() < used.max() < high - 1
     assert (uv[(worn == Garment.NONE) | (worn == Garment.HAIR), :, 1] * rows > 2 * BAND + 2).all()
 
@@ -99,7 +99,7 @@ def test_the_vertical_axis_of_the_texture_is_in_metres(body):
 
 
 def test_a_coat_has_a_dark_line_in_front(body):
-    look = look_with(below="coat", sleeves="long")
+    look = look_with(lower_garment="coat", sleeves="long")
     dressed = dress(body, look)
     surface = paint(dressed, look)
     texture = surface.texture[:BAND].astype(float) / 255

@@ -17,7 +17,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def look():
-    return replace(draw_look(stream(0, "test")), below="trousers", hair_style="short", fit=0.3)
+    return replace(draw_look(stream(0, "test")), lower_garment="trousers", hair_style="short", fit=0.3)
 
 
 def test_colors_are_albedos_of_every_face(body, look):
@@ -113,23 +113,23 @@ def test_wide_trousers_lie_on_the_shoe(body, look):
         assert hem < shoe + 0.002
 
 
-@pytest.mark.parametrize("below", ["trousers", "skirt", "dress", "coat"])
+@pytest.mark.parametrize("lower_garment", ["trousers", "skirt", "dress", "coat"])
 @pytest.mark.parametrize("hair_style", ["short", "long", "bun"])
-def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, below, hair_style):
-    dressed = dress(body, replace(look, below=below, hair_style=hair_style))
+def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, lower_garment, hair_style):
+    dressed = dress(body, replace(look, lower_garment=lower_garment, hair_style=hair_style))
     pose = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
     np.testing.assert_array_equal(dressed.landmarks(pose), body.landmarks(pose))
     np.testing.assert_array_equal(dressed.part[: len(body.part)], body.part)
     added = dressed.part[len(body.part) :]
-    assert (Part.SKIRT in added) == (below != "trousers")
+    assert (Part.SKIRT in added) == (lower_garment != "trousers")
     assert (Part.SCALP in added) == (hair_style != "short")
     assert dressed.vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
     np.testing.assert_allclose(dressed.skin(pose), dressed.vertices, atol=1e-5)
 
 
 def test_dresses_and_coats_have_the_colour_of_the_top_and_skirts_that_of_trousers(body, look):
-    for below, color in (("skirt", "trousers"), ("dress", "top"), ("coat", "top")):
-        changed = replace(look, below=below)
+    for lower_garment, color in (("skirt", "trousers"), ("dress", "top"), ("coat", "top")):
+        changed = replace(look, lower_garment=lower_garment)
         dressed = dress(body, changed)
         shown = face_colors(dressed, changed)[dressed.part == Part.SKIRT]
         np.testing.assert_allclose(np.unique(shown, axis=0), [getattr(changed, color)], atol=1e-6)
@@ -143,7 +143,7 @@ def test_plain_clothes_have_no_texture(body, look):
 
 
 def test_patterned_faces_take_their_whole_colour_from_the_texture(body, look):
-    patterns = replace(look, top_pattern="checks", bottom_pattern="stripes", below="skirt")
+    patterns = replace(look, top_pattern="checks", bottom_pattern="stripes", lower_garment="skirt")
     dressed = dress(body, patterns)
     surface, worn = paint(dressed, patterns), garments(dressed, patterns)
     assert surface.uv.shape == (len(dressed.faces), 3, 2)

@@ -31,9 +31,11 @@ COLUMNS = 40
 class Walker:
     """Body in a skirt, with its MuJoCo model."""
 
-    def __init__(self, seed, *, below="skirt", length=0.9, fit=0.2, child=False):
+    def __init__(self, seed, *, lower_garment="skirt", length=0.9, fit=0.2, child=False):
         bare = make_body(draw_shape(stream(seed, "test"), child=child))
-        look = replace(draw_look(stream(seed, "look"), female=True), below=below, length=length, fit=fit)
+        look = replace(
+            draw_look(stream(seed, "look"), female=True), lower_garment=lower_garment, length=length, fit=fit
+        )
         self.body = dress(bare, replace(look, hair_style="long", legs="shorts", hem="tucked"))
         self.length = length
         self.model = person_spec(self.body, "walker").compile()
@@ -77,9 +79,9 @@ def slice_at(rings, height):
     ("seed", "wear"),
     [
         (0, {}),
-        (1, {"below": "dress", "length": 0.65}),
+        (1, {"lower_garment": "dress", "length": 0.65}),
         (2, {"fit": 0.0, "length": 0.98}),
-        (3, {"below": "coat", "fit": 1.0}),
+        (3, {"lower_garment": "coat", "fit": 1.0}),
         (4, {"child": True}),
     ],
 )

@@ -8,8 +8,8 @@ import pytest
 from simharness.types.random_streams import stream
 from simharness.world.humans.population import draw_sex, draw_shape
 from simharness.world.humans.wardrobe import (
-    BELOW,
-    HAIR,
+    HAIR_STYLES,
+    LOWER_GARMENTS,
     PATTERNS,
     UNIFORM_CHOICES,
     UNIFORM_COLORS,
@@ -75,8 +75,8 @@ def test_colours_change_linearly_to_those_of_the_uniform():
 
 def test_every_cut_and_pattern_is_drawn():
     looks = [look for seed in range(40) for look in draw_looks(seed, 5)]
-    assert {look.below for look in looks} == set(BELOW)
-    assert {look.hair_style for look in looks} == set(HAIR)
+    assert {look.lower_garment for look in looks} == set(LOWER_GARMENTS)
+    assert {look.hair_style for look in looks} == set(HAIR_STYLES)
     patterned = [look.top_pattern for look in looks]
     assert set(patterned) == set(PATTERNS)
     assert 0.2 < np.mean([pattern != "plain" for pattern in patterned]) < 0.7
@@ -94,7 +94,7 @@ def test_skirts_are_worn_by_women_only():
         for i, look in enumerate(draw_looks(seed, 4)):
             key = (seed, "people", i, "shape")
             sex = draw_sex(stream(*key))
-            if look.below in ("skirt", "dress"):
+            if look.lower_garment in ("skirt", "dress"):
                 assert sex == "female"
             if seed < 3:
                 assert (draw_shape(stream(*key)).gender > 0.5) == (sex == "female")
@@ -110,7 +110,7 @@ def test_skirts_are_worn_by_women_only():
         ("volume", -1.0),
         ("fit", 1.5),
         ("repeats", 7),
-        ("below", "kilt"),
+        ("lower_garment", "kilt"),
         ("top_pattern", "dots"),
     ],
 )
