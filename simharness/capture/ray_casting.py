@@ -74,41 +74,54 @@ class RayCaster:
         owner, distance = np.full(count, -1), np.full(count, np.inf)
         if not count:
             return owner, distance
-        way = targets - camera.center
-        length = np.sqrt((way * way).sum(axis=1))
-        way /= length[:, None]
-        near = NEAR / (way @ camera.R[2])
+        direction = targets - camera.center
+        length = np.sqrt((direction * direction).sum(axis=1))
+        direction /= length[:, None]
+        near = NEAR / (direction @ camera.R[2])
         _hit_people(
-            camera.center, way, near, length, self._placed, self._radii, self._first, self._around, owner, distance
+            camera.center,
+            direction,
+            near,
+            length,
+            self._placed,
+            self._radii,
+            self._first,
+            self._around,
+            owner,
+            distance,
         )
-        on_object, object_distance = self._hit_objects(camera.center, way, near, length)
+        on_object, object_distance = self._hit_objects(camera.center, direction, near, length)
         first = on_object & (object_distance < distance)
         return np.where(first, self._people, owner), length - np.where(first, object_distance, distance)
 
     def _hit_objects(
-        self, start: Floats, way: Floats, near: Floats, length: Floats
+        self, start: Floats, direction: Floats, near: Floats, length: Floats
     ) -> tuple[NDArray[np.bool_], Floats]:
         """Return which rays hit an object before their ends, and the distances of the hits."""
-        geom, distance = np.empty(len(way), np.int32), np.empty(len(way))
-        self._cast(start, way, geom, distance, float(length.max()))
+        geom, distance = np.empty(len(direction), np.int32), np.empty(len(direction))
+        self._cast(start, direction, geom, distance, float(length.max()))
         for i in np.flatnonzero((geom >= 0) & (distance < near)):
-            self._cast(start + near[i] * way[i], way[i : i + 1], geom[i : i + 1], distance[i : i + 1], length[i])
+            self._cast(
+                start + near[i] * direction[i], direction[i : i + 1], geom[i : i + 1], distance[i : i + 1], length[i]
+            )
             distance[i] += near[i]
         return (geom >= 0) & (distance < length), distance
 
-    def _cast(self, start: Floats, way: Floats, geom: NDArray[np.int32], distance: Floats, farthest: float) -> None:
+    def _cast(
+        self, start: Floats, direction: Floats, geom: NDArray[np.int32], distance: Floats, farthest: float
+    ) -> None:
         mujoco.mj_multiRay(
             self._model,
             self._data,
             pnt=start,
-            vec=way.ravel(),
+            vec=direction.ravel(),
             geomgroup=_OBJECT_GROUPS,
             flg_static=1,
             bodyexclude=-1,
             geomid=geom,
             dist=distance,
             normal=None,
-            nray=len(way),
+            nray=len(direction),
             cutoff=farthest,
         )
 
@@ -140,10 +153,10 @@ def _place(rest, bone, radii, first, bones, placed, around):
 
 
 @njit(cache=True)
-def _hit_people(start, way, near, length, placed, radii, first, around, owner, distance):
+def _hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
     """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
-    for i in range(len(way)):
-        dx, dy, dz = way[i, 0], way[i, 1], way[i, 2]
+    for i in range(len(direction)):
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
         x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz
         best = length[i] - near[i]
         for person in range(len(around)):

@@ -1,4 +1,4 @@
-"""Exposure schedule of a sequence: when each picture is taken, and by which camera as it truly stands."""
+"""Exposure schedule of a sequence: time and true camera of every picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class ExposureSchedule:
 
     Attributes:
         believed_rig: calibration that the method is given, V cameras.
-        true_cameras: the true cameras as they stand at time 0, V, in the order of their own names.
+        true_cameras: the true cameras as they stand at time 0, V, in the order of the scenario.
         time: time at which the picture delivered by a view in a frame was taken (middle of the exposure), (T, V),
             seconds; if nothing arrives, the time at which it would have been taken.
         source: frame in which that picture was taken, (T, V): the frame itself, an earlier one if the camera repeats
@@ -124,5 +124,7 @@ def moved(camera: Camera, rotation: ArrayLike, shift: ArrayLike) -> Camera:
     rotation, shift = np.asarray(rotation, float), np.asarray(shift, float)
     if not rotation.any() and not shift.any():
         return camera
-    R = Rotation.from_rotvec(rotation).as_matrix().T @ camera.R  # the axes turn one way, what they see the other
+    R = (
+        Rotation.from_rotvec(rotation).as_matrix().T @ camera.R
+    )  # axes and observed points rotate in opposite directions
     return replace(camera, R=R, t=-R @ (camera.center + shift))

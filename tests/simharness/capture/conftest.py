@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import os
-import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from simharness.capture.rendering.renderer import Unavailable, make_renderer
-
-sys.path.insert(0, str(Path(__file__).parent))  # shapes.py
 
 
 @cache

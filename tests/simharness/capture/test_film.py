@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shapes import ball, box, disc, room
+from mesh_shapes import ball, box, disc, room
 from test_renderers import camera_at
 
 from mvpose.camera import Rig

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapes import ball, box, chequered, crowd, disc
+from mesh_shapes import ball, box, chequered, crowd, disc
 from test_renderers import VIEWS, axis_rays, camera_at, pixel_grid, plane_depth
 
 from simharness.capture.rendering.lens import lens_of, through_lens

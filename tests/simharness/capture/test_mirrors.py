@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shapes import ball, box, room
+from mesh_shapes import ball, box, room
 
 from mvpose import Camera
 from simharness.capture.rendering.mirrors import reflected, with_mirrors

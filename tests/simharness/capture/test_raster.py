@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapes import _mesh, ball, box, crowd, sheet
+from mesh_shapes import _mesh, ball, box, crowd, sheet
 from test_renderers import VIEWS, axis_rays, camera_at
 
 from simharness.capture.rendering.raster import RasterRenderer

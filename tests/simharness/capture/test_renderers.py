@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
+from mesh_shapes import _mesh, ball, box, chequered, crowd, disc, room, sheet, with_parts
 
 from simharness.capture.rendering.renderer import NEAR, make_renderer
 from simharness.scenario.sections.scenario import Cameras

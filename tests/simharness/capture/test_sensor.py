@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shapes import crowd
+from mesh_shapes import crowd
 from test_renderers import VIEWS
 
 from simharness.capture.rendering.raster import RasterRenderer

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import _mesh, ball, box, room, sheet
+from mesh_shapes import _mesh, ball, box, room, sheet
 from test_renderers import camera_at
 
 from simharness.capture.joint_visibility import classify, label_joints

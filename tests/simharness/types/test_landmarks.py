@@ -28,9 +28,7 @@ def test_coco_joints_come_first_and_all_skeletons_are_covered():
 
 def test_a_skeleton_with_an_unknown_joint_is_refused():
     tail = Skeleton("cat", ("nose", "tail"), (-1, 0), (0, 1), (0.1, 0.1))
-    with pytest.raises(
-        ValueError, match=r"'cat' has joints .* no landmark: tail; expected joints among nose,"
-    ):
+    with pytest.raises(ValueError, match=r"'cat' has joints .* no landmark: tail; expected joints among nose,"):
         of_skeleton(tail)
 
 

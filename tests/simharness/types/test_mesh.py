@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from shapes import ball, box, chequered, room, with_parts
+from mesh_shapes import ball, box, chequered, room, with_parts
 
 from simharness.types.mesh import Mesh
 
