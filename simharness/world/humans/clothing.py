@@ -174,7 +174,7 @@ def _thickness(worn: NDArray[np.int64], level: Floats, along_arm: Floats, sleeve
 
 
 def _draped(vertices: Floats, faces: NDArray[np.int32], garment: NDArray[np.int64], fit: float) -> Floats:
-    """Smooth tops and trousers between their hems, because cloth bridges hollows of the body; the more, the wider."""
+    """Smooth tops and trousers between their hems, because cloth bridges hollows of the body; wide cloth more."""
     cloth = faces[(garment == Garment.TOP) | (garment == Garment.TROUSERS)]
     edges = np.sort(cloth[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
