@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from simharness.gate.baseline import TIME, Measurement
+from simharness.gate.change_text import difference
 from simharness.gate.compare import compare
 from simharness.gate.gate_result import Check, Failed
 from simharness.gate.junit import SPEED, WHOLE, junit
@@ -53,6 +54,15 @@ def cases_of(check):
     assert root.tag == "testsuites"
     (suite,) = root
     return suite, {case.get("name"): case for case in suite}
+
+
+def test_a_difference_that_rounds_to_zero_has_no_sign():
+    """MPJPE has differences of both signs below the last digit that is printed."""
+    jitter = {seed: 0.003 * (-1) ** seed - 0.001 for seed in range(12)}
+    check = made(lambda trial: {"mpjpe_mm": jitter[trial.seed]})
+    (change,) = (each for each in check.comparison.of("full") if each.score == "mpjpe_mm")
+    assert change.low < change.difference < 0 < change.high
+    assert difference(change) == "0.0 (0.0 to 0.0)"
 
 
 class TestJUnit:
