@@ -1,1 +1,1 @@
-"""What the method and the simulator cost; never imported by the packages."""
+"""Benchmarks of the running time of the method and the simulator; never imported by the packages."""

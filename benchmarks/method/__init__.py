@@ -1,14 +1,15 @@
-"""What the method costs, and how well its matching solves hard instances: ``python -m benchmarks.method``.
+"""Benchmark of the method: running time, memory, and quality of matching; ``python -m benchmarks.method``.
 
-Sections, each a module with ``measure(quick=...)``, whose result is plain data, and ``table(result)``, its text:
+Each section is a module with ``measure(quick=...)``, which returns plain data, and ``table_of(rows)``, which formats
+it as text:
 
-- ``stages``: milliseconds of every stage at three sizes, beside the targets and the released code;
-- ``published``: both presets at the sizes at which others were timed, beside those figures;
-- ``reid``: the re-identification network, a crop and a frame;
-- ``hard``: the three ways of matching on noisy scenes with misses and phantoms;
-- ``curve``: cost against views and people, with the exponent;
-- ``memory``: the most memory that a process holds;
-- ``start``: import and compilation.
+- ``stages``: time of every stage at three sizes, compared with the targets and the released code;
+- ``published``: time of both presets at the sizes for which times of other code are known, compared with those times;
+- ``reid``: time of the re-ID network, per crop and per frame;
+- ``hard``: the three matching methods on noisy scenes with missed people and phantoms;
+- ``curve``: time against the number of views and people, with the exponent;
+- ``memory``: peak memory of a process;
+- ``start``: time of import and compilation.
 
-The scenes are made here (:mod:`benchmarks.method.scenes`), so the benchmark needs no data and no simulator.
+The scenes are synthetic (:mod:`benchmarks.method.scenes`), so the benchmark needs no data and no simulator.
 """

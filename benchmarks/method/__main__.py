@@ -1,4 +1,4 @@
-"""The command line of the benchmark; ``--help`` says what there is."""
+"""Command line of the benchmark of the method; see ``--help``."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ SECTIONS: dict[str, Section] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the sections asked for: see :func:`benchmarks.method.command.run`."""
-    return run("benchmarks.method", "What mvpose costs on one core, on synthetic scenes.", SECTIONS, arguments)
+    """Run the requested sections; see :func:`benchmarks.method.command.run`."""
+    return run("benchmarks.method", "Running time of mvpose on one core, on synthetic scenes.", SECTIONS, arguments)
 
 
 if __name__ == "__main__":

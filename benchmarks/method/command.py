@@ -1,4 +1,4 @@
-"""The command line of a benchmark made of sections, each a module that measures and makes a table."""
+"""Command line of a benchmark with sections; each section is a module that measures and formats a table."""
 
 from __future__ import annotations
 
@@ -19,47 +19,47 @@ _TITLES = {"python": "Python", "numpy": "NumPy", "scipy": "SciPy"}
 
 
 class Section(Protocol):
-    """What a module of a benchmark offers."""
+    """Interface of a benchmark section, a module."""
 
     __doc__: str | None
 
     def measure(self, *, quick: bool = False) -> list[Any]:
-        """Rows of the result, dataclasses of plain numbers and text."""
+        """Measure and return the rows of the result, dataclasses of plain numbers and text."""
         ...
 
     def table_of(self, rows: list[Any], /) -> str:
-        """Their text."""
+        """Format the rows as text."""
         ...
 
 
 def run(package: str, about: str, sections: Mapping[str, Section], arguments: Sequence[str] | None = None) -> int:
-    """Run the sections asked for; 0 whatever the figures are: this measures and does not judge.
+    """Run the requested sections and return exit code 0, even if a target is missed.
 
     Args:
-        package: what is measured, "mvpose".
-        about: what the sections say, for ``--help``.
-        sections: by name, in their order.
-        arguments: of the command line; by default the process's.
+        package: name of the benchmark package, for example "benchmarks.method".
+        about: one-line description for ``--help``.
+        sections: sections by name, in order.
+        arguments: command line arguments; by default those of the process.
     """
     options = _parser(package, about, sections).parse_args(arguments)
-    here, software, begin = machine(), versions(), time.perf_counter()
-    title = f"{here.cpu}, {here.cores} cores\n" + ", ".join(
+    hardware, software, start = machine(), versions(), time.perf_counter()
+    title = f"{hardware.cpu}, {hardware.cores} cores\n" + ", ".join(
         f"{_TITLES.get(name, name)} {number}" for name, number in software.items()
     )
-    warning = " · quick: these figures are not to be quoted" if options.quick else ""
-    _say(f"{package} benchmark · ✓ target met, ✗ missed{warning}\n{title}")
+    warning = " · quick: do not quote these figures" if options.quick else ""
+    _print(f"{package} benchmark · ✓ target met, ✗ missed{warning}\n{title}")
     measured: dict[str, Any] = {}
     for name in options.only or sections:
         section = sections[name]
         rows = section.measure(quick=options.quick)
         measured[name] = [asdict(row) for row in rows]
-        _say(f"\n\n{name.upper()}: {(section.__doc__ or '').splitlines()[0].rstrip('.')}\n\n{section.table_of(rows)}")
+        _print(f"\n\n{name.upper()}: {(section.__doc__ or '').splitlines()[0].rstrip('.')}\n\n{section.table_of(rows)}")
     if options.json:
         results = {
             "command": _command(package, options),
-            "machine": asdict(here),
+            "machine": asdict(hardware),
             "versions": software,
-            "seconds": round(time.perf_counter() - begin, 1),
+            "seconds": round(time.perf_counter() - start, 1),
             "quick": options.quick,
             **measured,
         }
@@ -69,7 +69,7 @@ def run(package: str, about: str, sections: Mapping[str, Section], arguments: Se
 
 
 def _command(package: str, options: argparse.Namespace) -> str:
-    """What was asked for, on any machine: of the file only the name."""
+    """Return the command line without the folder of the file, so that it holds on any machine."""
     only = ["--only", *options.only] if options.only else []
     quick = ["--quick"] if options.quick else []
     return shlex.join(["python", "-m", package, *only, *quick, "--json", options.json.name])
@@ -82,11 +82,11 @@ def _parser(package: str, about: str, sections: Mapping[str, Section]) -> argpar
         description=f"{about} Sections:\n{listed}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--only", nargs="+", choices=sections, metavar="NAME", help="these sections")
-    parser.add_argument("--quick", action="store_true", help="few, small frames: to see that it runs, not to quote")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to a file as well")
+    parser.add_argument("--only", nargs="+", choices=sections, metavar="NAME", help="run these sections only")
+    parser.add_argument("--quick", action="store_true", help="time few, small frames, to check that the benchmark runs")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to a file")
     return parser
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     print(encodable(text, sys.stdout.encoding), flush=True)

@@ -1,4 +1,4 @@
-"""Cost against the number of views and of people, and its exponent."""
+"""Time against the number of views and people, and its exponent."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {
 
 @dataclass(frozen=True)
 class Point:
-    """One size: milliseconds by preset and stage; of a curve the first quartile of the calls."""
+    """Milliseconds by preset and stage at one size; in a curve the first quartile of the calls."""
 
     views: int
     people: int
@@ -31,7 +31,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What grows ("views", "people", or "detections" where both do), the points, and exponents by preset and stage."""
+    """Times along one sweep.
+
+    Attributes:
+        grows: swept quantity, "views", "people", or "detections" if both are swept.
+        points: times at each size.
+        exponents: exponents by preset and stage.
+    """
 
     grows: str
     points: list[Point]
@@ -57,10 +63,10 @@ def timed(views: int, people: int, *, share: float = 0.25, quick: bool = False) 
     """Time both presets at one size.
 
     Args:
-        views: cameras.
-        people: in the room.
-        share: of the calls, which take no longer than the milliseconds told.
-        quick: few calls on few frames.
+        views: number of cameras.
+        people: number of people.
+        share: quantile of the calls that is reported, 0 to 1.
+        quick: whether to make few calls on few frames.
     """
     cases = prepare(frames(views, people, 3 if quick else 10))
     samples = interleaved(
@@ -74,7 +80,7 @@ def timed(views: int, people: int, *, share: float = 0.25, quick: bool = False) 
 
 
 def table_of(sweeps: list[Sweep]) -> str:
-    """The text, one sweep below the other."""
+    """Format the sweeps as text, one below the other."""
     totals = [point.ms[preset]["total"] for sweep in sweeps for point in sweep.points for preset in PRESETS]
     scale = min(totals) / 1.5, max(totals)
     rows: list[list[str]] = []
@@ -95,8 +101,8 @@ def table_of(sweeps: list[Sweep]) -> str:
             rows[-1] += [*(f"{sweep.exponents[preset][cost]:.2f}" for cost in COSTS), ""]
         rows.append([""] * len(rows[-1]))
     return table(rows[:-1], "<>" + ">>>><" * len(PRESETS), rules=rules) + caption(
-        "ms of a frame and of its stages (affinity, matching, reconstruction): the first quartile of the calls, which "
-        "other work on the machine disturbs less than the median. views×people; m detections. Bars are logarithmic, "
-        "all on one scale. Exponents: least squares of log time over log size (views, people, or m) on the larger "
-        "half of the sizes."
+        "ms per frame and per stage (affinity, matching, reconstruction): first quartile of the calls, which depends "
+        "less on other load on the machine than the median. views×people; m detections. Bars are logarithmic, all on "
+        "one scale. Exponents: least squares of log time over log size (views, people, or m) on the larger half of "
+        "the sizes."
     )

@@ -1,4 +1,4 @@
-"""The three ways of matching on hard frames."""
+"""Time and quality of the three matching methods on hard frames."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ FRAMES = {(5, 4): 40, (10, 6): 20, (10, 10): 12, (15, 20): 6}  # by views and pe
 
 @dataclass(frozen=True)
 class Row:
-    """One way to match the frames of one size.
+    """Result of one matching method on the frames of one size.
 
     Attributes:
-        views: cameras.
-        people: in the room.
-        frames: how many.
-        method: of matching, or "truth".
-        objective: mean of :func:`mvpose.matching.objective`; less is better, 0 is nobody found.
-        share: the objective over the best that any method reached on the frame, at most 1; mean over frames.
-        worst_share: the least of them.
-        precision: of pairs of detections taken for one person, over all frames.
-        recall: likewise.
-        f1: their harmonic mean.
-        time_ms: median; None for the truth.
-        iterations: median; None where the method has none.
-        most_iterations: on any frame.
-        converged: share of the frames on which the residuals fell below the tolerance.
+        views: number of cameras.
+        people: number of people.
+        frames: number of frames.
+        method: matching method, or "truth".
+        objective: mean of :func:`mvpose.matching.objective`; less is better, 0 means that no person was found.
+        share: objective over the best that any method reached on the frame, at most 1; mean over frames.
+        worst_share: least value of that ratio over frames.
+        precision: precision of pairs of detections matched to one person, over all frames.
+        recall: recall of the same pairs.
+        f1: harmonic mean of precision and recall.
+        time_ms: median time; None for the truth.
+        iterations: median number of iterations; None for a method without iterations.
+        most_iterations: greatest number of iterations on a frame.
+        converged: fraction of the frames on which the residuals fell below the tolerance.
     """
 
     views: int
@@ -119,27 +119,27 @@ def _solver(note: Mapping[str, np.ndarray]) -> dict[str, float]:
 
 
 def pairs(labels: ArrayLike, person: ArrayLike) -> tuple[int, int, int]:
-    """Pairs of detections taken for one person: rightly taken, taken, and truly of one person.
+    """Count pairs of detections matched to one person: correct pairs, matched pairs, and true pairs.
 
     Args:
-        labels: person that each detection is taken for, -1 for nobody, (m,).
-        person: whom it truly shows, -1 for a phantom, (m,).
+        labels: estimated person of each detection, -1 for none, (m,).
+        person: true person of each detection, -1 for a phantom, (m,).
     """
-    claimed, true = (_together(np.asarray(who)) for who in (labels, person))
+    claimed, true = (_same_person(np.asarray(assigned)) for assigned in (labels, person))
     return int((claimed & true).sum()), int(claimed.sum()), int(true.sum())
 
 
-def _together(who: np.ndarray) -> np.ndarray:
-    return np.triu((who[:, None] == who) & (who >= 0), k=1)
+def _same_person(assigned: np.ndarray) -> np.ndarray:
+    return np.triu((assigned[:, None] == assigned) & (assigned >= 0), k=1)
 
 
 def ratio(part: float, whole: float) -> float:
-    """``part / whole``, and 1 where there was nothing to get right."""
+    """Return ``part / whole``, or 1 if ``whole`` is 0."""
     return float(part / whole) if whole else 1.0
 
 
 def table_of(rows: list[Row]) -> str:
-    """The text."""
+    """Format the rows as text."""
     head = ["frames", "matching", "objective", "of best", "worst", "prec.", "recall", "F1", "ms", "iterations"]
     text = [head]
     for row in rows:
@@ -161,8 +161,8 @@ def table_of(rows: list[Row]) -> str:
     solved = 100 * min(row.converged for row in rows if row.converged is not None)
     return table(text, "<<>>>>>>>>", rules=range(0, len(text) - 1, len(METHODS) + 1)) + caption(
         "12 px noise, 30 % of people and 10 % of joints missed, a phantom in every view. Objective: mean of "
-        "<alpha E - A, P> over pairs, less is better; of best: its share of the best of the three, mean and worst "
-        "frame. Precision, recall and F1 are over pairs of detections. Truth is what the affinity makes of the right "
-        "answer: where a method's objective is better, the affinity errs and not the method. Iterations: median and "
-        f"most; the ADMM converged on {solved:.0f} % of the frames of the worst size."
+        "<alpha E - A, P> over pairs, less is better; of best: ratio to the best of the three methods, mean and worst "
+        "frame. Precision, recall and F1 are over pairs of detections. Truth: objective of the true matching; where a "
+        "method has a better objective, the error is in the affinity and not in the method. Iterations: median and "
+        f"greatest number; ADMM converged on {solved:.0f} % of the frames of the worst size."
     )

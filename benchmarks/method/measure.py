@@ -1,4 +1,4 @@
-"""Wall times of tasks: interleaved, medians and tails, growth against size."""
+"""Measurement of wall times: interleaved calls, quantiles, and exponents of growth."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _LEAST_CALLS = 3
 
 @dataclass(frozen=True)
 class Machine:
-    """What the figures were measured on."""
+    """Machine on which the figures were measured."""
 
     cpu: str
     cores: int
 
 
 def machine() -> Machine:
-    """The machine of this process."""
+    """Return the machine of this process."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -42,7 +42,7 @@ def machine() -> Machine:
 
 
 def versions() -> dict[str, str]:
-    """Python's version and those of the packages that times depend on and that are installed, by name."""
+    """Return the versions of Python and of the installed packages on which times depend, by name."""
     found = {"python": platform.python_version()}
     for package in ("numpy", "scipy", "numba", "onnxruntime"):
         with suppress(PackageNotFoundError):
@@ -52,38 +52,38 @@ def versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Sample:
-    """The n timed calls of one task.
+    """Times of n calls of one task.
 
     Attributes:
-        wall: seconds by a clock outside the call, (n,).
-        notes: what each call said of itself, by name, each (n,).
+        wall: wall time of each call, seconds, (n,).
+        notes: figures that the task recorded for each call, by name, each (n,).
     """
 
     wall: Floats
     notes: dict[str, Floats]
 
     def quantile(self, share: float) -> float:
-        """Milliseconds that this share of the calls keeps."""
+        """Return a quantile of the wall time, milliseconds."""
         return 1e3 * float(np.quantile(self.wall, share))
 
     def noted(self, name: str, share: float = 0.5) -> float:
-        """The same of what the calls noted under a name, in its unit; the median unless told otherwise."""
+        """Return a quantile, by default the median, of a recorded figure, in its unit."""
         return float(np.quantile(self.notes[name], share))
 
 
 def interleaved(
     tasks: Mapping[str, Task], cases: Sequence[Case], *, calls: int, seconds: float = np.inf
 ) -> dict[str, Sample]:
-    """Time tasks on cases, after one untimed call of each on the first two.
+    """Time tasks on cases, after one untimed call of each task on the first two cases.
 
-    Each round takes every task through all cases in turn, so that a machine that slows down slows all alike. The
-    garbage collector is off meanwhile.
+    Each round runs every task on all cases in turn, so that a slowdown of the machine affects all tasks equally. The
+    garbage collector is off during the measurement.
 
     Args:
-        tasks: what to time, by name.
-        cases: the frames.
-        calls: a task stops after as many, rounded up to whole rounds;
-        seconds: or when its calls have taken this long, but not before the third.
+        tasks: tasks by name.
+        cases: frames on which each task is called.
+        calls: number of calls after which a task stops, rounded up to whole rounds.
+        seconds: total time of its calls after which a task stops, but not before the third call.
     """
     for task in tasks.values():
         for case in cases[:2]:
@@ -98,10 +98,10 @@ def interleaved(
                     result = task.call(case)
                     walls[name].append(time.perf_counter() - start)
                     notes[name].append(task.note(case, result))
-                    late = len(walls[name]) >= _LEAST_CALLS and sum(walls[name]) > seconds
-                    if late:
+                    out_of_time = len(walls[name]) >= _LEAST_CALLS and sum(walls[name]) > seconds
+                    if out_of_time:
                         break
-                if late or len(walls[name]) >= calls:
+                if out_of_time or len(walls[name]) >= calls:
                     del running[name]
     return {
         name: Sample(
@@ -113,7 +113,7 @@ def interleaved(
 
 @contextmanager
 def collector_off() -> Iterator[None]:
-    """Collect garbage now and not within the block."""
+    """Collect garbage now, and turn the garbage collector off within the block."""
     was_on = gc.isenabled()
     gc.collect()
     gc.disable()
@@ -125,16 +125,18 @@ def collector_off() -> Iterator[None]:
 
 
 def exponent(sizes: ArrayLike, costs: ArrayLike) -> float:
-    """Growth of cost with size: the slope of log cost over log size, by least squares.
+    """Return the exponent of the growth of cost with size: the least-squares slope of log cost over log size.
 
-    Only the larger half of the points counts (rounded up): small sizes measure the overhead of a call.
+    Only the larger half of the points (rounded up) is used, because small sizes measure the overhead of a call.
 
     Raises:
-        ValueError: fewer than two different sizes among those, or a value that is not positive.
+        ValueError: fewer than two different sizes in the larger half, or a value that is not positive.
     """
     sizes, costs = np.asarray(sizes, float), np.asarray(costs, float)
     if not ((sizes > 0).all() and (costs > 0).all()):
-        raise ValueError("sizes and costs must be positive to fit an exponent")
+        raise ValueError(
+            f"sizes and costs must be positive to fit an exponent, got {sizes.tolist()} and {costs.tolist()}"
+        )
     larger = np.argsort(sizes, kind="stable")[len(sizes) // 2 :]
     x, y = np.log(sizes[larger]), np.log(costs[larger])
     x = x - x.mean() if len(x) else x

@@ -1,4 +1,4 @@
-"""The most memory that a fresh process holds, at the largest of the sizes."""
+"""Peak memory of a fresh process at the largest of the sizes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,16 @@ TARGET = 300.0  # MB in all
 
 @dataclass(frozen=True)
 class Peak:
-    """One preset's process: resident memory in MB, at its peak and at the peak of the imports, and the target."""
+    """Peak memory of the process of one preset.
+
+    Attributes:
+        preset: name of the preset.
+        views: number of cameras.
+        people: number of people.
+        total: peak resident memory, MB.
+        imports: peak resident memory after the imports, MB.
+        target: limit of ``total``, MB.
+    """
 
     preset: str
     views: int
@@ -28,18 +37,18 @@ class Peak:
 
 
 def measure(*, quick: bool = False) -> list[Peak]:
-    """Run some frames in a process for each preset, its kernels compiled by one before it."""
+    """Run some frames in a process for each preset, with kernels that an earlier process compiled."""
     views, people = (5, 4) if quick else SIZE
     peaks = []
     for preset in PRESETS:
         code = f"from benchmarks.method.memory import in_process; in_process({preset!r}, {views}, {people})"
-        report(code)  # compiles, which takes memory of its own
+        report(code)  # compiles the kernels, which itself takes memory
         peaks.append(Peak(preset, views, people, **report(code)))
     return peaks
 
 
 def in_process(preset: str, views: int, people: int) -> None:
-    """Print what :func:`measure` wants of a process of its own."""
+    """Run some frames and print the peak memory as JSON, for a child process of :func:`measure`."""
     imports = peak_memory()
     pipeline = Pipeline.preset(preset)
     for scene in frames(views, people, 5):
@@ -48,8 +57,8 @@ def in_process(preset: str, views: int, people: int) -> None:
 
 
 def table_of(peaks: list[Peak]) -> str:
-    """The text."""
-    rows = [["peak resident memory, MB", "in all", "", "target", "imports", "above them"]]
+    """Format the peaks as text."""
+    rows = [["peak resident memory, MB", "total", "", "target", "imports", "difference"]]
     for peak in peaks:
         rows.append(
             [
@@ -60,4 +69,4 @@ def table_of(peaks: list[Peak]) -> str:
                 figure(peak.total - peak.imports),
             ]
         )
-    return table(rows, "<>^>>>") + caption("Of a fresh process whose kernels are cached, over five frames.")
+    return table(rows, "<>^>>>") + caption("A fresh process with cached kernels, over five frames.")

@@ -1,4 +1,4 @@
-"""Fresh Python processes: what they report of themselves."""
+"""Measurement in fresh Python processes."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any
 
 
 def report(code: str, *, environment: Mapping[str, str] | None = None) -> Any:
-    """Run code in a fresh Python; what it printed, read as JSON.
+    """Run code in a fresh Python process and return its output, parsed as JSON.
 
-    The process keeps byte code as any Python does, whatever this one was told, so that a second one starts as quickly
-    as it does for everybody.
+    The process writes byte code even if this one does not (``PYTHONDONTWRITEBYTECODE``), so that a second process
+    starts as quickly as it does for a user.
 
     Raises:
-        RuntimeError: the code failed; with its last words.
+        RuntimeError: the code failed; the message has the end of its error output.
     """
     inherited = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    root = str(Path(__file__).parents[2])  # where mvpose lies, installed or not
+    root = str(Path(__file__).parents[2])  # folder of mvpose, also if it is not installed
     inherited["PYTHONPATH"] = os.pathsep.join(filter(None, (root, inherited.get("PYTHONPATH"))))
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -36,9 +36,9 @@ def report(code: str, *, environment: Mapping[str, str] | None = None) -> Any:
 
 
 def peak_memory() -> float:
-    """The most resident memory that this process has held, MB (10^6 bytes).
+    """Return the peak resident memory of this process, MB (10^6 bytes).
 
-    On Linux from /proc: ``getrusage`` there also counts what the parent held when it started the process.
+    On Linux it is read from /proc, because ``getrusage`` there includes the memory of the parent at the start.
     """
     status = Path("/proc/self/status")
     if status.exists():

@@ -1,4 +1,4 @@
-"""Both presets at the sizes at which others were timed, beside their figures."""
+"""Time of both presets compared with published times and times of other code, at the same sizes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ SIZES = ((3, 3), (5, 4), (5, 10), (10, 10), (31, 10))  # views, people
 PAPER: Mapping[tuple[int, int], Mapping[str, float]] = {
     (5, 4): {"affinity": 25.0, "matching": 20.0, "reconstruction": 60.0}
 }
-"""Milliseconds a frame that Dong et al. (CVPR 2019, "Running time") report of Shelf, on an Intel i7 at 3.6 GHz with a
-GeForce 1080 Ti; their affinity holds the re-ID network on the GPU."""
+"""Milliseconds per frame that Dong et al. (CVPR 2019, "Running time") report for Shelf, on an Intel i7 at 3.6 GHz with
+a GeForce 1080 Ti; their affinity includes the re-ID network on the GPU."""
 
 RELEASED = "released, matching + 3DPS"
-"""The name, in :data:`OTHERS`, of what a whole frame is set beside."""
+"""Key of :data:`OTHERS` with which a whole frame is compared."""
 
 OTHERS: Mapping[str, tuple[float, ...]] = {
     RELEASED: (8.4, 28.0, 75.0, 328.0, 5555.0),
@@ -25,21 +25,21 @@ OTHERS: Mapping[str, tuple[float, ...]] = {
     "released, matching, constrained": (94.0, 526.0, 1133.0, 3785.0, 46000.0),
     "EasyMocap, matching, constrained": (0.35, 3.5, 21.0, 71.0, 1089.0),
 }
-"""Milliseconds a frame at :data:`SIZES` of code that others released, without networks, each measured once on one core
-of a 2-core machine: zju3dv/mvpose, the paper's own, and the matching of zju3dv/EasyMocap (C++).
+"""Milliseconds per frame at :data:`SIZES` of other released code, without networks, each measured once on one core of a
+2-core machine: zju3dv/mvpose, the code of the paper, and the matching of zju3dv/EasyMocap (C++).
 
-"Constrained" matching keeps rows and columns of P to sums of at most 1, as the paper asks and as ADMM here always does;
-the released code does not by default."""
+"Constrained" matching limits row and column sums of P to 1, as the paper requires and as ADMM here always does; the
+released code does not by default."""
 
 
 @dataclass(frozen=True)
-class Beside:
-    """One size; milliseconds a frame.
+class Comparison:
+    """Times at one size, milliseconds per frame.
 
     Attributes:
-        ours: the medians of both presets by stage.
-        others: figures of :data:`OTHERS`, by name.
-        paper: those of :data:`PAPER`, by stage; None at other sizes than its own.
+        ours: medians of both presets by stage.
+        others: times of :data:`OTHERS`, by name.
+        paper: times of :data:`PAPER`, by stage; None at other sizes.
     """
 
     ours: Point
@@ -47,22 +47,22 @@ class Beside:
     paper: dict[str, float] | None
 
 
-def measure(*, quick: bool = False) -> list[Beside]:
-    """Time both presets at the sizes."""
+def measure(*, quick: bool = False) -> list[Comparison]:
+    """Time both presets at :data:`SIZES`."""
     return [
-        Beside(timed(*size, share=0.5, quick=quick), others_at(size), dict(PAPER[size]) if size in PAPER else None)
+        Comparison(timed(*size, share=0.5, quick=quick), others_at(size), dict(PAPER[size]) if size in PAPER else None)
         for size in (SIZES[:2] if quick else SIZES)
     ]
 
 
 def others_at(size: tuple[int, int]) -> dict[str, float]:
-    """The figures of :data:`OTHERS` at one of :data:`SIZES`, by name."""
+    """Return the times of :data:`OTHERS` at one of :data:`SIZES`, by name."""
     return {name: figures[SIZES.index(size)] for name, figures in OTHERS.items()}
 
 
-def table_of(rows: list[Beside]) -> str:
-    """The text."""
-    text = [["ms a frame", *(f"{row.ours.views}×{row.ours.people}" for row in rows)]]
+def table_of(rows: list[Comparison]) -> str:
+    """Format the rows as text."""
+    text = [["ms per frame", *(f"{row.ours.views}×{row.ours.people}" for row in rows)]]
     for preset in PRESETS:
         for cost in COSTS:
             name = preset if cost == COSTS[0] else f"  {cost}"
@@ -73,6 +73,6 @@ def table_of(rows: list[Beside]) -> str:
         text.append([f"paper, {stage}", *(figure(row.paper[stage]) if row.paper else "" for row in rows)])
     return table(text, "<" + ">" * len(rows), rules=(0, ours, ours + len(OTHERS))) + caption(
         "views×people. Ours: medians on one core, without networks. Released code and EasyMocap: timed once, on one "
-        "core of a 2-core machine, without networks; constrained is what ADMM here always does. The paper's affinity "
-        "holds its re-ID network, on a GPU."
+        "core of a 2-core machine, without networks; constrained: row and column sums of at most 1, which ADMM here "
+        "always enforces. The affinity of the paper includes its re-ID network, on a GPU."
     )

@@ -1,4 +1,4 @@
-"""Milliseconds of the re-identification network, which looks take and geometry does without."""
+"""Time of the re-ID network, which only presets that match by appearance need."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from benchmarks.method.tasks import Task, prepare
 
 @dataclass(frozen=True)
 class Crops:
-    """One size.
+    """Times of the re-ID network at one size.
 
     Attributes:
-        views: cameras.
-        people: in the room.
-        crops: of a frame, median: a detection is one.
-        frame: milliseconds for those, median.
-        crop: milliseconds for one of them.
+        views: number of cameras.
+        people: number of people.
+        crops: median number of crops per frame, one per detection.
+        frame: median milliseconds per frame.
+        crop: median milliseconds per crop.
     """
 
     views: int
@@ -34,9 +34,9 @@ class Crops:
 
 
 def measure(*, quick: bool = False) -> list[Crops]:
-    """Time the network that comes with mvpose on one thread, on pictures of noise: what they show does not matter.
+    """Time the re-ID network of mvpose on one thread, on pictures of noise, because the content does not matter.
 
-    Nothing is measured where onnxruntime is not installed.
+    The result is empty if onnxruntime is not installed.
     """
     if find_spec("onnxruntime") is None:
         return []
@@ -59,13 +59,13 @@ def _crops(views: int, people: int, quick: bool) -> Crops:
 
 
 def table_of(rows: list[Crops]) -> str:
-    """The text."""
+    """Format the rows as text."""
     if not rows:
         return "not measured: onnxruntime is not installed"
-    text = [["ms, one core", "crops", "a frame", "a crop"]]
+    text = [["ms, one core", "crops", "per frame", "per crop"]]
     for row in rows:
         text.append([f"{row.views}×{row.people}", str(row.crops), figure(row.frame), figure(row.crop)])
     return table(text, "<>>>") + caption(
-        "views×people. Medians of ReId.descriptors: cutting the boxes out of the pictures and the network that comes "
-        "with mvpose, on one thread of the CPU. Only presets that match by appearance need it."
+        "views×people. Medians of ReId.descriptors: cutting crops out of the pictures and running the network of "
+        "mvpose, on one thread of the CPU. Only presets that match by appearance need it."
     )

@@ -1,4 +1,4 @@
-"""Plain aligned text: tables, figures, bars."""
+"""Formatting of results as aligned text: tables, figures, bars."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _PLAIN = str.maketrans(
 
 
 def table(rows: Sequence[Sequence[str]], align: str, *, gap: int = 2, rules: Sequence[int] = (0,)) -> str:
-    """Columns as wide as their widest cell.
+    """Format cells as a table with columns as wide as their widest cell.
 
     Args:
         rows: cells, the same number in every row.
-        align: one of ``<>^`` for each column.
-        gap: spaces between columns.
-        rules: a line is drawn under these rows.
+        align: alignment, one of ``<>^`` for each column.
+        gap: number of spaces between columns.
+        rules: indices of rows under which a line is drawn.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(align))]
     lines = []
@@ -35,12 +35,12 @@ def table(rows: Sequence[Sequence[str]], align: str, *, gap: int = 2, rules: Seq
 
 
 def caption(text: str) -> str:
-    """What is said under a table, filled to the width of a page."""
+    """Format the caption under a table, wrapped to the page width."""
     return "\n\n" + textwrap.fill(text, WIDTH)
 
 
 def figure(value: float) -> str:
-    """Three significant digits without an exponent, four decimals at most: 0.0521, 0.600, 70.2, 5555."""
+    """Format a number with three significant digits and at most four decimals: 0.0521, 0.600, 70.2, 5555."""
     if value == 0:
         return "0"
     places = min(max(0, 2 - math.floor(math.log10(abs(value)))), 4)
@@ -48,21 +48,21 @@ def figure(value: float) -> str:
 
 
 def against(value: float, target: float | None) -> tuple[str, str]:
-    """Two cells: whether a figure keeps what it should not exceed, and that; empty where nothing is asked."""
+    """Return two cells: whether a figure meets the target that it should not exceed, and the target; empty without."""
     if target is None:
         return "", ""
     return MET if value <= target else MISSED, f"{target:g}"
 
 
 def bar(value: float, low: float, high: float, *, width: int) -> str:
-    """A bar on a logarithmic scale, empty at ``low`` and full at ``high``."""
+    """Draw a bar on a logarithmic scale, empty at ``low`` and full at ``high``."""
     share = math.log(value / low) / math.log(high / low) if high > low else 1.0
     eighths = round(8 * width * min(max(share, 0.0), 1.0))
     return _EIGHTHS[8] * (eighths // 8) + (_EIGHTHS[eighths % 8] if eighths % 8 else "")
 
 
 def encodable(text: str, encoding: str | None) -> str:
-    """The text, with signs in place of symbols where the terminal cannot show them."""
+    """Return the text, with ASCII in place of symbols that the encoding of the terminal lacks."""
     try:
         text.encode(encoding or "utf-8")
     except (UnicodeEncodeError, LookupError):

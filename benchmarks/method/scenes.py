@@ -1,7 +1,7 @@
-"""Synthetic rigs and stick people, made without the simulator: what the benchmark runs on.
+"""Synthetic rigs and stick figures for the benchmark, made without the simulator.
 
-People stand on a jittered grid in a room, cameras on a ring around them that takes everybody in. What the cameras
-see is blurred, thinned and mixed with phantoms as :class:`Conditions` say. A seed gives the same scene everywhere.
+People stand on a jittered grid in a room, and cameras on a ring around them see all of them. Detections have noise,
+misses and phantoms according to :class:`Conditions`. A seed gives the same scene on every machine.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from mvpose.detections import Detections
 from mvpose.skeleton import COCO17
 
 SPACING = 1.0  # metres between neighbours on the grid
-JITTER = 0.1  # each is off its place by at most this, so neighbours are 0.8 to 1.2 m apart
-CLEARANCE = 0.4  # a phantom stands at least this far from everybody: it is nobody
+JITTER = 0.1  # metres; greatest distance from the grid point, so neighbours are 0.8 to 1.2 m apart
+CLEARANCE = 0.4  # metres; least distance of a phantom from every person
 FOCAL, SIZE = 800.0, (1280, 960)
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """How well the detector sees.
+    """Error rates of the detector.
 
     Attributes:
         noise: standard deviation of a keypoint in each axis, pixels.
-        joints_missing: share of the keypoints of a detected person that are not detected.
-        people_missed: share of the people that a view misses altogether.
-        phantoms: detections a view has of people who are not there.
+        joints_missing: probability that a keypoint of a detected person is not detected.
+        people_missed: probability that a view misses a person.
+        phantoms: number of false-positive detections per view.
     """
 
     noise: float = 4.0
@@ -46,14 +46,14 @@ HARD = Conditions(noise=12.0, people_missed=0.30, phantoms=1)
 
 @dataclass(frozen=True)
 class Scene:
-    """One frame and its truth.
+    """Detections of one frame and its truth.
 
     Attributes:
         rig: V cameras.
-        detections: m poses, by view; within a view in random order.
+        detections: m detections, sorted by view, in random order within a view.
         person: true person of each detection, -1 for a phantom, (m,).
-        joints: where the people are, metres, (P, 17, 3).
-        phantoms: who the phantoms of each view would be, metres, (V, F, 17, 3).
+        joints: true joints of the people, metres, (P, 17, 3).
+        phantoms: joints from which the phantoms of each view are projected, metres, (V, F, 17, 3).
     """
 
     rig: Rig
@@ -64,19 +64,19 @@ class Scene:
 
 
 def frames(views: int, people: int, count: int, *, conditions: Conditions = LIVE, seed: int = 0) -> list[Scene]:
-    """``count`` unrelated frames of as many people before one rig; ``seed`` is that of the first."""
+    """Return ``count`` independent frames with one rig; ``seed`` is the seed of the first frame."""
     rig = ring(views, people)
     return [film(rig, people, seed=seed + k, conditions=conditions) for k in range(count)]
 
 
 def ring(views: int, people: int) -> Rig:
-    """Cameras 2 to 2.5 m high around so many people, all of whom are in every image.
+    """Return cameras 2 to 2.5 m high on a ring, with a radius at which all people are in every image.
 
-    Bearings advance by the golden angle: few or many, they are spread evenly, no two cameras face each other (what
-    lies between those cannot be triangulated), and a larger rig contains the smaller.
+    Bearings advance by the golden angle. So they are spread evenly for any number, no two cameras face each other
+    (points between facing cameras cannot be triangulated), and a larger rig contains the smaller.
     """
-    crowd_radius = np.sqrt(people / np.pi) * SPACING + SPACING / np.sqrt(2) + 0.5  # of a grid, and reach of an arm
-    radius = max(crowd_radius + 2.3, crowd_radius * 2 * FOCAL / SIZE[0] * 1.3)  # feet in the near, arms in the far
+    crowd_radius = np.sqrt(people / np.pi) * SPACING + SPACING / np.sqrt(2) + 0.5  # radius of the grid plus an arm
+    radius = max(crowd_radius + 2.3, crowd_radius * 2 * FOCAL / SIZE[0] * 1.3)  # for near feet and for far arms
     return Rig([_camera(k, radius) for k in range(views)])
 
 
@@ -93,30 +93,30 @@ def _camera(k: int, radius: float) -> Camera:
 
 
 def film(rig: Rig, people: int, *, seed: int = 0, conditions: Conditions = LIVE) -> Scene:
-    """What the cameras of a rig make of so many people; the people depend on the seed alone."""
-    standing, figures, seen = (np.random.default_rng([seed, stream]) for stream in range(3))
-    places = _places(people, standing)
-    joints = stick_people(places, standing)
-    # Blocks are drawn whole and masked afterwards: a condition changes nothing but what it names.
-    views, all_there = len(rig), people + conditions.phantoms
-    phantoms = stick_people(_elsewhere(places, views * conditions.phantoms, figures), figures)
+    """Simulate the detections of one frame; the people depend on the seed and their number only."""
+    people_rng, phantom_rng, detector_rng = (np.random.default_rng([seed, stream]) for stream in range(3))
+    places = _places(people, people_rng)
+    joints = stick_people(places, people_rng)
+    # Blocks are drawn whole and masked afterwards, so that a condition changes no other draw.
+    views, bodies_per_view = len(rig), people + conditions.phantoms
+    phantoms = stick_people(_free_places(places, views * conditions.phantoms, phantom_rng), phantom_rng)
     phantoms = phantoms.reshape(views, conditions.phantoms, len(COCO17), 3)
     bodies = np.concatenate([np.broadcast_to(joints, (views, *joints.shape)), phantoms], axis=1)
     pixels = np.stack([camera.project(body) for camera, body in zip(rig, bodies, strict=True)])
-    pixels += conditions.noise * seen.standard_normal(pixels.shape)
-    scores = seen.uniform(0.5, 1.0, pixels.shape[:3])
-    scores[seen.random(scores.shape) < conditions.joints_missing] = 0.0
-    kept = seen.random((views, all_there)) >= conditions.people_missed
+    pixels += conditions.noise * detector_rng.standard_normal(pixels.shape)
+    scores = detector_rng.uniform(0.5, 1.0, pixels.shape[:3])
+    scores[detector_rng.random(scores.shape) < conditions.joints_missing] = 0.0
+    kept = detector_rng.random((views, bodies_per_view)) >= conditions.people_missed
     kept[:, people:] = True
     view, person = np.nonzero(kept)
-    order = np.lexsort([seen.random(len(view)), view])
+    order = np.lexsort([detector_rng.random(len(view)), view])
     view, person = view[order], person[order]
     detections = Detections.from_keypoints(view, pixels[view, person], scores[view, person])
     return Scene(rig, detections, np.where(person < people, person, -1), joints, phantoms)
 
 
 def _places(people: int, rng: np.random.Generator) -> Floats:
-    """The points of a grid that lie nearest the origin, each off by up to the jitter, (P, 2), metres."""
+    """Return the grid points nearest to the origin, each with jitter, (P, 2), metres."""
     reach = np.arange(-int(np.sqrt(people)) - 2, int(np.sqrt(people)) + 3) * SPACING
     grid = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2) + rng.uniform(-0.5, 0.5, 2) * SPACING
     grid = grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")[:people]]
@@ -125,8 +125,8 @@ def _places(people: int, rng: np.random.Generator) -> Floats:
     return grid @ np.array([[c, s], [-s, c]]) + off[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _elsewhere(places: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """Random places in the room of the people at which none of them stands, (count, 2), metres."""
+def _free_places(places: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Return random places in the room at a distance from all people, (count, 2), metres."""
     radius = np.linalg.norm(places, axis=1).max(initial=0.0) + SPACING / 2
     angle = rng.uniform(0, 2 * np.pi, (count, 64))
     tries = radius * np.sqrt(rng.random((count, 64)))[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -135,17 +135,17 @@ def _elsewhere(places: Floats, count: int, rng: np.random.Generator) -> Floats:
 
 
 def stick_people(places: Floats, rng: np.random.Generator) -> Floats:
-    """Standing and walking adults in COCO-17 who face anywhere, (n, 17, 3), metres.
+    """Draw standing and walking adults in COCO-17 with random headings, (n, 17, 3), metres.
 
     Segment lengths are fractions of stature after Drillis and Contini (1966, in Winter, "Biomechanics and motor
     control of human movement", figure 4.1); the spans of shoulders and hips are those of the joint centres.
 
     Args:
-        places: where they stand on the floor z = 0, (n, 2).
-        rng: draws their statures, poses and headings.
+        places: positions on the floor z = 0, metres, (n, 2).
+        rng: generator of statures, poses and headings.
     """
     count = len(places)
-    body = np.zeros((count, len(COCO17), 3))  # x ahead, y left, z up; statures, from the middle of the hips
+    body = np.zeros((count, len(COCO17), 3))  # x ahead, y left, z up, in statures, from the mid-hip
     neck = np.array([0.0, 0.0, 0.288])
     face = {"nose": (0.07, 0, 0.10), "left_eye": (0.055, 0.018, 0.12), "left_ear": (0, 0.043, 0.11)}
     for name, offset in face.items():
@@ -158,12 +158,12 @@ def stick_people(places: Floats, rng: np.random.Generator) -> Floats:
         arm, out, bend = rng.uniform(-0.4, 1.2, count), rng.uniform(0.05, 0.6, count), rng.uniform(0.0, 1.6, count)
         leg, apart, flex = rng.uniform(-0.4, 0.5, count), rng.uniform(0.0, 0.12, count), rng.uniform(0.0, 0.5, count)
         body[:, shoulder] = neck + [0, sign * 0.097, 0]
-        body[:, elbow] = body[:, shoulder] + 0.186 * _hanging(arm, sign * out)
-        body[:, wrist] = body[:, elbow] + 0.146 * _hanging(arm + bend, sign * out)
+        body[:, elbow] = body[:, shoulder] + 0.186 * _limb_directions(arm, sign * out)
+        body[:, wrist] = body[:, elbow] + 0.146 * _limb_directions(arm + bend, sign * out)
         body[:, hip] = [0, sign * 0.052, 0]
-        body[:, knee] = body[:, hip] + 0.245 * _hanging(leg, sign * apart)
-        body[:, ankle] = body[:, knee] + 0.246 * _hanging(leg - flex, sign * apart)
-    body[..., 2] += 0.039 - body[..., 2].min(axis=1, keepdims=True)  # the lower ankle at its height above the floor
+        body[:, knee] = body[:, hip] + 0.245 * _limb_directions(leg, sign * apart)
+        body[:, ankle] = body[:, knee] + 0.246 * _limb_directions(leg - flex, sign * apart)
+    body[..., 2] += 0.039 - body[..., 2].min(axis=1, keepdims=True)  # the lower ankle is 0.039 statures above the floor
     body *= rng.uniform(1.55, 1.90, count)[:, None, None]
     heading = rng.uniform(0, 2 * np.pi, count)
     c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
@@ -171,8 +171,8 @@ def stick_people(places: Floats, rng: np.random.Generator) -> Floats:
     return np.stack([x + places[:, :1], y + places[:, 1:], body[..., 2]], axis=-1)
 
 
-def _hanging(ahead: Floats, aside: Floats) -> Floats:
-    """Directions, (n, 3), of limbs that hang down, swung ahead and aside by these angles, radians."""
+def _limb_directions(ahead: Floats, aside: Floats) -> Floats:
+    """Return unit directions, (n, 3), of limbs rotated from straight down by angles ahead and aside, radians."""
     return np.stack(
         [np.sin(ahead) * np.cos(aside), np.sin(aside), -np.cos(ahead) * np.cos(aside)],
         axis=1,

@@ -1,4 +1,4 @@
-"""Milliseconds of every stage at three sizes, beside targets and the released code."""
+"""Time of every stage at three sizes, compared with the targets and the released code."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ TARGETS: dict[tuple[int, int], dict[str, float]] = {
 
 @dataclass(frozen=True)
 class Size:
-    """One size; times are milliseconds, medians unless they say otherwise.
+    """Times at one size in milliseconds, medians unless stated otherwise.
 
     Attributes:
-        views: cameras.
-        people: in the room.
-        detections: median over the frames.
-        calls: timed, by task.
-        cores: processor time over wall time while ``fast`` and ``full`` ran: above 1, threads were at work.
-        times: by name.
-        iterations: of the ADMM, median.
-        targets: by name.
-        released: matching and 3DPS of the released code.
+        views: number of cameras.
+        people: number of people.
+        detections: median number of detections per frame.
+        calls: number of timed calls by task.
+        cores: processor time over wall time of ``fast`` and ``full``; above 1 if threads were used.
+        times: times by name.
+        iterations: median number of iterations of ADMM.
+        targets: target times by name.
+        released: time of matching and 3DPS of the released code.
     """
 
     views: int
@@ -51,7 +51,7 @@ class Size:
 
 
 def measure(*, quick: bool = False) -> list[Size]:
-    """Time ``fast``, ``full`` and the matching by ADMM at the three sizes."""
+    """Time ``fast``, ``full`` and matching by ADMM at the three sizes."""
     return [_size(views, people, quick) for views, people in (SIZES[:1] if quick else SIZES)]
 
 
@@ -62,7 +62,7 @@ def _size(views: int, people: int, quick: bool) -> Size:
     whole = interleaved({name: estimating(name) for name in ("fast", "full")}, cases, calls=calls, seconds=seconds)
     cores = (time.process_time() - busy) / (time.perf_counter() - wall)
     admm = matching("admm", lambda case, result: {"iterations": result.iterations})
-    with threadpool_limits(1):  # as in the pipeline, and the same for both
+    with threadpool_limits(1):  # as in the pipeline, for both tasks
         alone = interleaved({"admm": admm, "eigh": decomposing()}, cases, calls=calls, seconds=seconds / 2)
     return Size(
         views=views,
@@ -107,8 +107,8 @@ _ROWS = (
 
 
 def table_of(sizes: list[Size]) -> str:
-    """The text."""
-    rows = [["ms a frame, one core"], [""]]
+    """Format the sizes as text."""
+    rows = [["ms per frame, one core"], [""]]
     for size in sizes:
         rows[0] += [f"{size.views}×{size.people}", "", "target"]
         rows[1] += [f"m = {size.detections}", "", ""]
@@ -131,9 +131,9 @@ def table_of(sizes: list[Size]) -> str:
     )
     cores = "/".join(f"{size.cores:.2f}" for size in sizes)
     return table(rows, "<" + ">^>" * len(sizes), rules=(1, 6, 11, 15)) + caption(
-        f"m detections; 4 px noise, 10 % of joints and 5 % of people missed. Calls timed: {calls}. Cores busy "
-        f"meanwhile: {cores}; below 1, the machine had other work; above, threads were at work. Stages are medians of "
-        "the pipeline's own clock; the whole is timed from outside. eigh is of the same size and on one thread, as is "
-        "the ADMM beside it. The released code was timed once, on one core of a similar machine, without its "
-        "networks; faster by: matching and 3DPS alone."
+        f"m detections; 4 px noise, 10 % of joints and 5 % of people missed. Calls timed: {calls}. Cores used: "
+        f"{cores}; below 1, the machine had other load; above 1, threads were used. Stages are medians of "
+        "Estimate.timings; whole frames are timed outside the call. eigh has the size of the frame and runs on one "
+        "thread, as does ADMM alone. The released code was timed once, on one core of a similar machine, without its "
+        "networks; faster by: matching and 3DPS only."
     )

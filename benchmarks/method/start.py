@@ -1,4 +1,4 @@
-"""How long Python takes to import mvpose, and the first call to compile."""
+"""Time of the import of mvpose, and of a first call that compiles the kernels."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ IMPORT_TARGET, COMPILE_TARGET = 0.5, 20.0  # seconds
 
 @dataclass(frozen=True)
 class Start:
-    """Seconds of one way to start, and what it should keep, or None."""
+    """Time of one kind of start.
+
+    Attributes:
+        what: description of the start.
+        seconds: time in seconds.
+        target: greatest time allowed, seconds, or None.
+    """
 
     what: str
     seconds: float
@@ -27,11 +33,11 @@ class Start:
 
 
 def measure(*, quick: bool = False) -> list[Start]:
-    """Time imports, and first calls without and with compiled kernels on the disk, each in a fresh process."""
+    """Time imports, and first calls without and with a cache of compiled kernels, each in a fresh process."""
     starts = []
     for statement in IMPORTS:
         code = f"import time; start = time.perf_counter(); {statement}; print(time.perf_counter() - start)"
-        report(code)  # brings files into memory
+        report(code)  # loads the files into the page cache
         seconds = statistics.median(report(code) for _ in range(1 if quick else 7))
         starts.append(Start(statement, seconds, IMPORT_TARGET if "mvpose" in statement else None))
     for preset in PRESETS:
@@ -44,9 +50,9 @@ def measure(*, quick: bool = False) -> list[Start]:
 
 
 def in_process(preset: str) -> None:
-    """Print the seconds of a preset's first frames, for a process of its own.
+    """Print the time of the first frames of a preset in seconds, for a child process of :func:`measure`.
 
-    The frames are hard ones, and several, so that no kernel is left to be compiled later.
+    Several hard frames are used, so that all kernels are compiled.
     """
     scenes = frames(5, 4, 5, conditions=HARD)
     begin = time.perf_counter()
@@ -57,10 +63,10 @@ def in_process(preset: str) -> None:
 
 
 def table_of(starts: list[Start]) -> str:
-    """The text."""
+    """Format the starts as text."""
     rows = [["seconds, in a fresh process", "", "", "target"]]
     for start in starts:
         rows.append([start.what, figure(start.seconds), *against(start.seconds, start.target)])
     return table(rows, "<>^>", rules=(0, len(IMPORTS))) + caption(
-        "First calls: five hard 5×4 frames, in a process of their own and with a cache of their own, empty or not."
+        "First calls: five hard 5×4 frames, in a fresh process with a separate cache, empty or filled."
     )

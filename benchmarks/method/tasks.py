@@ -1,4 +1,4 @@
-"""What is timed: the public faces of mvpose as calls on a frame."""
+"""Tasks to be timed: public functions of mvpose as calls on a frame."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ STAGES = ("affinity", "matching", "reconstruction")
 
 @dataclass(frozen=True)
 class Case:
-    """A scene, and the affinity (m, m) that ``full`` matches it by, made beforehand."""
+    """Scene with its precomputed affinity, (m, m), of the preset ``full``."""
 
     scene: Scene
     affinity: NDArray[np.float64]
 
 
 def prepare(scenes: Iterable[Scene]) -> list[Case]:
-    """Make the affinities."""
+    """Compute the affinities of scenes."""
     affinity = Pipeline().affinity
     return [
         Case(scene, affinity(scene.rig, scene.detections, viewing_rays(scene.rig, scene.detections)))
@@ -37,11 +37,11 @@ def prepare(scenes: Iterable[Scene]) -> list[Case]:
 
 @dataclass(frozen=True)
 class Task:
-    """Something to time.
+    """Function to time.
 
     Attributes:
-        call: it, on a case.
-        note: figures of its result to keep beside the time; not timed itself.
+        call: timed function of a case.
+        note: function that returns figures of the result to record with the time; not timed.
     """
 
     call: Callable[[Case], Any]
@@ -49,7 +49,7 @@ class Task:
 
 
 def estimating(preset: str) -> Task:
-    """The whole of a preset; notes the milliseconds of its stages."""
+    """Create the task of a whole preset; it records the milliseconds of its stages."""
     pipeline = Pipeline.preset(preset)
 
     def note(case: Case, estimate: Estimate) -> Mapping[str, float]:
@@ -59,10 +59,10 @@ def estimating(preset: str) -> Task:
 
 
 def matching(method: Method, note: Callable[[Case, Matching], Mapping[str, float]] = lambda case, result: {}) -> Task:
-    """Matching alone."""
+    """Create the task of matching only."""
     return Task(lambda case: match(case.affinity, case.scene.detections.view, method=method), note)
 
 
 def decomposing() -> Task:
-    """One eigen-decomposition of the size of the frame, which the matching by ADMM is measured by."""
+    """Create the task of one eigendecomposition of the size of the frame, the yardstick of matching by ADMM."""
     return Task(lambda case: np.linalg.eigh(case.affinity))

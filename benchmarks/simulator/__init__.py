@@ -1,11 +1,13 @@
-"""What the simulator costs: ``python -m benchmarks.simulator``.
+"""Benchmark of the running time of the simulator: ``python -m benchmarks.simulator``.
 
-Sections, each a module with ``measure(quick=...)``, whose result is plain data, and ``table_of(result)``, its text:
+Each section is a module with ``measure(quick=...)``, which returns plain data, and ``table_of(rows)``, which formats
+it as text:
 
-- ``rendering``: milliseconds a picture of the rasteriser, pictures a second on two processes, posing and skinning;
-- ``simulation``: scene frames a second without pictures, and cost against people and cameras.
+- ``rendering``: time per picture of the rasteriser, pictures per second on two processes, time of posing and skinning;
+- ``simulation``: scene frames per second without pictures, and time against the number of people and cameras.
 
-``python -m benchmarks.simulator.plot`` shows what ``python -m benchmarks.method`` measured of the method.
+``python -m benchmarks.simulator.plot`` plots the results of ``python -m benchmarks.method``; it is here because it uses
+the figures of simharness.
 
-The scenes come from :mod:`benchmarks.simulator.scenes`; how they are timed from :mod:`benchmarks.method`.
+The scenes are in :mod:`benchmarks.simulator.scenes`; the functions for timing are those of :mod:`benchmarks.method`.
 """

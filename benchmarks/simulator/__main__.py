@@ -1,4 +1,4 @@
-"""The command line of the benchmark; ``--help`` says what there is."""
+"""Command line of the benchmark of the simulator; see ``--help``."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ SECTIONS: dict[str, Section] = {"rendering": rendering, "simulation": simulation
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the sections asked for: see :func:`benchmarks.method.command.run`."""
-    return run("benchmarks.simulator", "What simulation and pictures cost.", SECTIONS, arguments)
+    """Run the requested sections; see :func:`benchmarks.method.command.run`."""
+    return run("benchmarks.simulator", "Running time of simulation and rendering.", SECTIONS, arguments)
 
 
 if __name__ == "__main__":

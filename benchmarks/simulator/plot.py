@@ -1,4 +1,4 @@
-"""The running time of the method as a table and curves: ``python -m benchmarks.simulator.plot bench.json FOLDER``."""
+"""Plot of the running time of the method, and a table: ``python -m benchmarks.simulator.plot bench.json FOLDER``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from benchmarks.method.curve import COSTS, PRESETS, Sweep
-from benchmarks.method.published import RELEASED, Beside
+from benchmarks.method.published import RELEASED, Comparison
 from benchmarks.simulator.result import SWEPT, Result, read
 from benchmarks.simulator.table import markdown
 from simharness.report.figures.svg_plots import INK, STAGE_COLORS, Color, legend_above, plot_sheet, svg_plot
@@ -23,12 +23,17 @@ _RELEASED_COLOR, _PAPER_COLOR = "#d9643a", "#8a63c9"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write ``table.md`` and ``curves.svg`` into a folder; 2 where the figures cannot be read."""
+    """Write ``table.md`` and ``curves.svg`` to a folder; return 2 if the result cannot be read."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.simulator.plot", description="What python -m benchmarks.method measured."
+        prog="python -m benchmarks.simulator.plot", description="Plot the results of python -m benchmarks.method."
     )
-    parser.add_argument("result", type=Path, metavar="RESULT.json", help="of --only published reid curve --json")
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where table.md and curves.svg go")
+    parser.add_argument(
+        "result",
+        type=Path,
+        metavar="RESULT.json",
+        help="result of python -m benchmarks.method --only published reid curve --json RESULT.json",
+    )
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="output folder of table.md and curves.svg")
     options = parser.parse_args(arguments)
     try:
         result = read(options.result)
@@ -42,22 +47,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def curves(result: Result) -> str:
-    """Milliseconds a frame of each stage against views and people, a row of plots a preset (SVG).
+    """Plot milliseconds per frame of each stage against views and people, one row of plots per preset (SVG).
 
-    Lines have ids ("views-full-matching"), and so have the figures of others: "views-full-released",
-    "views-full-paper" and, of its CPU stages alone, "views-full-paper-without".
+    Lines have ids such as "views-full-matching". The ids of other times are "views-full-released", "views-full-paper"
+    and, for the CPU stages of the paper only, "views-full-paper-without".
     """
     swept = [point for grows in SWEPT for point in result.sweep(grows).points]
     known = [point.ms[preset][cost] for point in swept for preset in PRESETS for cost in COSTS]
-    known += [beside.others[RELEASED] for beside in result.published]
+    known += [comparison.others[RELEASED] for comparison in result.published]
     span = 10 ** math.floor(math.log10(min(known))), 10 ** math.ceil(math.log10(max(known)))
     return plot_sheet(
         [[_plot(result.sweep(grows), result.published, preset, span) for grows in SWEPT] for preset in PRESETS[::-1]]
     )
 
 
-def _plot(sweep: Sweep, others: Sequence[Beside], preset: str, span: tuple[float, float]) -> str:
-    """One preset along one sweep."""
+def _plot(sweep: Sweep, others: Sequence[Comparison], preset: str, span: tuple[float, float]) -> str:
+    """Plot one preset along one sweep."""
     name = f"{sweep.grows}-{preset}"
     fixed = "people" if sweep.grows == "views" else "views"
     (rest,) = {getattr(point, fixed) for point in sweep.points}
@@ -73,7 +78,7 @@ def _plot(sweep: Sweep, others: Sequence[Beside], preset: str, span: tuple[float
         _released(axes, _nearest(others, sweep.grows, rest), sweep.grows, f"{name}-released")
         _paper(axes, others, sweep.grows, f"{name}-paper")
         axes.set(xscale="log", yscale="log", ylim=span, xlim=(min(sizes) / 1.15, max(sizes) * 1.15))
-        axes.set(xlabel=f"{sweep.grows}, with {rest} {fixed}", ylabel=f"{preset}: ms a frame")
+        axes.set(xlabel=f"{sweep.grows}, with {rest} {fixed}", ylabel=f"{preset}: ms per frame")
         axes.set_xticks(sizes, [f"{size}" for size in sizes])
         axes.yaxis.set_major_locator(LogLocator(numticks=12))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
@@ -83,35 +88,35 @@ def _plot(sweep: Sweep, others: Sequence[Beside], preset: str, span: tuple[float
     return written[0]
 
 
-def _nearest(others: Sequence[Beside], grows: str, rest: int) -> list[Beside]:
-    """Those that come nearest to a sweep: as many views; of as many views, the number of people nearest to its own."""
+def _nearest(others: Sequence[Comparison], grows: str, rest: int) -> list[Comparison]:
+    """Select the comparisons nearest to a sweep: equal views, and for each number of views the nearest people."""
     if grows == "people":
-        return [beside for beside in others if beside.ours.views == rest]
-    best: dict[int, Beside] = {}
-    for beside in sorted(others, key=lambda beside: abs(math.log(beside.ours.people / rest)), reverse=True):
-        best[beside.ours.views] = beside
+        return [comparison for comparison in others if comparison.ours.views == rest]
+    best: dict[int, Comparison] = {}
+    for comparison in sorted(others, key=lambda comparison: abs(math.log(comparison.ours.people / rest)), reverse=True):
+        best[comparison.ours.views] = comparison
     return list(best.values())
 
 
-def _released(axes: Axes, others: Sequence[Beside], grows: str, gid: str) -> None:
-    """The released code, each point with its size."""
-    places = [getattr(beside.ours, grows) for beside in others]
-    times = [beside.others[RELEASED] for beside in others]
+def _released(axes: Axes, others: Sequence[Comparison], grows: str, gid: str) -> None:
+    """Plot the times of the released code, each point labelled with its size."""
+    places = [getattr(comparison.ours, grows) for comparison in others]
+    times = [comparison.others[RELEASED] for comparison in others]
     axes.plot(places, times, "s", gid=gid, ms=4.6, color=_RELEASED_COLOR, label="released code")
-    for beside, place, ms in zip(others, places, times, strict=True):
-        _label(axes, f"{beside.ours.views} × {beside.ours.people}", (place, ms), _RELEASED_COLOR)
+    for comparison, place, ms in zip(others, places, times, strict=True):
+        _label(axes, f"{comparison.ours.views} × {comparison.ours.people}", (place, ms), _RELEASED_COLOR)
 
 
-def _paper(axes: Axes, others: Sequence[Beside], grows: str, gid: str) -> None:
-    """The paper's sum with its GPU stage, filled, and without, hollow."""
-    for beside in others:
-        if beside.paper:
-            place, whole = getattr(beside.ours, grows), sum(beside.paper.values())
-            without = whole - beside.paper["affinity"]
+def _paper(axes: Axes, others: Sequence[Comparison], grows: str, gid: str) -> None:
+    """Plot the total of the paper with its GPU stage (filled marker) and without (hollow marker)."""
+    for comparison in others:
+        if comparison.paper:
+            place, whole = getattr(comparison.ours, grows), sum(comparison.paper.values())
+            without = whole - comparison.paper["affinity"]
             axes.plot(place, whole, "D", gid=gid, ms=3.4, color=_PAPER_COLOR, label="paper")
             axes.plot(place, without, "D", gid=f"{gid}-without", ms=3.4, color=_PAPER_COLOR, mfc="none")
-            told = f"with re-ID {whole:g}\nwithout {without:g}"
-            _label(axes, told, (place, math.sqrt(whole * without)), _PAPER_COLOR)
+            text = f"with re-ID {whole:g}\nwithout {without:g}"
+            _label(axes, text, (place, math.sqrt(whole * without)), _PAPER_COLOR)
 
 
 def _label(axes: Axes, text: str, at: tuple[float, float], color: Color) -> None:

@@ -1,4 +1,4 @@
-"""Milliseconds a picture, pictures a second on two processes, posing and skinning."""
+"""Time per picture, pictures per second on two processes, and time of posing and skinning."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
 from simharness.world.scene.playback import Playback
 
-SIZES = {(640, 480): 9.0, (1032, 776): 20.0}  # pixels, and milliseconds that a picture may take
-TOGETHER = 180.0  # pictures a second on two processes, 640 x 480
-SKINNING = 0.3  # milliseconds a person, posing and skinning
+SIZES = {(640, 480): 9.0, (1032, 776): 20.0}  # pixels, and target milliseconds per picture
+PARALLEL_RATE = 180.0  # target pictures per second on two processes, 640 x 480
+SKINNING = 0.3  # target milliseconds per person for posing and skinning
 _PROCESSES = 2
 _BLOCK = 64  # frames
 
 
 @dataclass(frozen=True)
-class Figure:
-    """One figure.
+class Measurement:
+    """Measured quantity.
 
     Attributes:
-        name: of what.
-        value: the median.
-        best: the least of times, the greatest of rates: what the machine does where nobody disturbs it.
-        target: that the median should keep; None where nothing is asked.
+        name: name and unit of the quantity.
+        value: median.
+        best: least time or greatest rate, which is the value without other load on the machine.
+        target: target of the median, or None.
         more: whether more is better.
     """
 
@@ -48,22 +48,22 @@ class Figure:
     more: bool = False
 
 
-def measure(*, quick: bool = False) -> list[Figure]:
-    """Time the rasteriser and what it draws."""
+def measure(*, quick: bool = False) -> list[Measurement]:
+    """Time the rasteriser, posing and skinning."""
     frames, rounds = (3, 2) if quick else (12, 6)
     staged = scenario()
     scene = build(staged, build_rig(staged.cameras))
     playback = Playback(scene)
     states = [playback.at(moment) for moment in np.linspace(0.0, staged.duration, frames)]
     shown = [meshes_at(scene, state) for state in states]
-    figures = [Figure("triangles", *2 * (float(sum(len(mesh.faces) for mesh in shown[0])),))]
+    figures = [Measurement("triangles", *2 * (float(sum(len(mesh.faces) for mesh in shown[0])),))]
     for size, target in SIZES.items():
         rig = list(build_rig(scenario(size=size).cameras))
         for color in (True, False):
             times = _pictures(rig, shown, rounds, color)
-            name = f"{size[0]} x {size[1]}, {'RGB, depth, ids' if color else 'depth, ids'}: ms a picture"
+            name = f"{size[0]} x {size[1]}, {'RGB, depth, ids' if color else 'depth, ids'}: ms per picture"
             figures.append(_times(name, times, target if color else None))
-    figures.append(_together(list(build_rig(staged.cameras)), shown, rounds))
+    figures.append(_parallel_rate(list(build_rig(staged.cameras)), shown, rounds))
 
     people = len(scene.bodies)
     posing, skinning = [], []
@@ -71,21 +71,21 @@ def measure(*, quick: bool = False) -> list[Figure]:
     with collector_off():
         for _ in range(rounds):
             start = time.perf_counter()
-            posed = list(playback.over(moments))  # as films do: motions are read for a block of frames at a time
+            posed = list(playback.over(moments))  # as films do, which read motions in blocks of frames
             middle = time.perf_counter()
             for state in posed:
                 for body, bones in zip(scene.bodies, state.bones, strict=True):
                     body.skin(bones)
             posing.append((middle - start) / (people * _BLOCK))
             skinning.append((time.perf_counter() - middle) / (people * _BLOCK))
-    figures.append(_times("posing: ms a person", np.array(posing)))
-    figures.append(_times("skinning: ms a person", np.array(skinning)))
+    figures.append(_times("posing: ms per person", np.array(posing)))
+    figures.append(_times("skinning: ms per person", np.array(skinning)))
     figures.append(_times("both", np.add(posing, skinning), SKINNING))
     return figures
 
 
 def _pictures(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int, color: bool) -> NDArray[np.float64]:
-    """Seconds a picture of every frame, a frame's shadows and normals shared by its views; rounds x frames."""
+    """Return seconds per picture for rounds x frames; the views of a frame share its shadows and normals."""
     renderer, times = RasterRenderer(), []
     renderer.render(rig[0], shown[0], color=color)
     with collector_off():
@@ -98,26 +98,26 @@ def _pictures(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: in
     return np.array(times)
 
 
-def _together(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int) -> Figure:
-    """Pictures a second of processes that start together; each round ends with the slowest."""
+def _parallel_rate(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int) -> Measurement:
+    """Measure pictures per second of processes that start together; a round ends with the slowest process."""
     spawn = multiprocessing.get_context("spawn")
     barrier = spawn.Barrier(_PROCESSES)
-    with spawn.Pool(_PROCESSES, _begin, (barrier, rig, shown)) as pool:
+    with spawn.Pool(_PROCESSES, _initialise, (barrier, rig, shown)) as pool:
         rates = []
-        for k in range(rounds + 1):  # the first loads the kernels
-            spans = np.array(pool.map(_share, range(_PROCESSES), chunksize=1))
+        for k in range(rounds + 1):  # the first round loads the kernels
+            spans = np.array(pool.map(_render_all, range(_PROCESSES), chunksize=1))
             if k:
                 rates.append(_PROCESSES * len(rig) * len(shown) / (spans[:, 1].max() - spans[:, 0].min()))
     name = f"640 x 480, RGB, depth, ids: pictures/s on {_PROCESSES} processes"
-    return Figure(name, float(np.median(rates)), float(max(rates)), TOGETHER, more=True)
+    return Measurement(name, float(np.median(rates)), float(max(rates)), PARALLEL_RATE, more=True)
 
 
-def _begin(barrier: Barrier, rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]]) -> None:
+def _initialise(barrier: Barrier, rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]]) -> None:
     globals()["_work"] = barrier, rig, shown, RasterRenderer()
 
 
-def _share(_: int) -> tuple[float, float]:
-    """When this process began and ended, by the clock that all share."""
+def _render_all(_: int) -> tuple[float, float]:
+    """Render all pictures and return the start and end time of this process, by a clock shared by all processes."""
     barrier, rig, shown, renderer = globals()["_work"]
     barrier.wait()
     start = time.monotonic()
@@ -127,19 +127,19 @@ def _share(_: int) -> tuple[float, float]:
     return start, time.monotonic()
 
 
-def _times(name: str, seconds: NDArray[np.float64], target: float | None = None) -> Figure:
-    return Figure(name, 1e3 * float(np.median(seconds)), 1e3 * float(np.min(seconds)), target)
+def _times(name: str, seconds: NDArray[np.float64], target: float | None = None) -> Measurement:
+    return Measurement(name, 1e3 * float(np.median(seconds)), 1e3 * float(np.min(seconds)), target)
 
 
-def table_of(figures: list[Figure]) -> str:
-    """The text."""
+def table_of(figures: list[Measurement]) -> str:
+    """Format the figures as text."""
     rows = [["", "median", "best", "", "target"]]
     for row in figures:
         met = row.target is None or (row.value >= row.target if row.more else row.value <= row.target)
-        asked = ("", "") if row.target is None else (MET if met else MISSED, f"{row.target:g}")
-        rows.append([row.name, figure(row.value), figure(row.best), *asked])
+        target = ("", "") if row.target is None else (MET if met else MISSED, f"{row.target:g}")
+        rows.append([row.name, figure(row.value), figure(row.best), *target])
     return table(rows, "<>>^>") + caption(
-        "Four people and clutter, five views of every frame: a picture bears a fifth of what a frame's views share "
-        "(normals, the map of shadows). One process and one core but where it says two. The best is what the machine "
-        "does where nothing else runs on it."
+        "Four people and clutter, five views of every frame: a picture includes a fifth of the work that the views of "
+        "a frame share (normals, shadow map). One process on one core unless stated otherwise. Best: figure without "
+        "other load on the machine."
     )

@@ -1,4 +1,4 @@
-"""The scenes that are timed: people at everyday things among furniture, in a ring of cameras."""
+"""Scenario for the benchmark: people with everyday motions among furniture, in a ring of cameras."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from simharness.scenario.sections.scenario import Cameras, Clutter, People, Scen
 def scenario(
     *, people: int = 4, cameras: int = 5, size: tuple[int, int] = (640, 480), duration: float = 4.0
 ) -> Scenario:
-    """A room with ``people`` and some clutter, seen by ``cameras``; the same people and things whatever the size."""
+    """Return a scenario with people and clutter; the scene does not depend on the picture size."""
     return Scenario(
         name="bench",
         duration=duration,

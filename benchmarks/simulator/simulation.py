@@ -1,4 +1,4 @@
-"""Scene frames a second without pictures, and how the cost of a frame grows with people and cameras."""
+"""Scene frames per second without pictures, and growth of the time per frame with people and cameras."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import Scene, build
 from simharness.world.scene.playback import Playback, simulate
 
-TARGET = 250.0  # scene frames a second of 4 people before 5 cameras
+TARGET = 250.0  # scene frames per second with 4 people and 5 cameras
 RATE = 25.0  # frames per second
 STAGES = ("simulate", "film", "detect")
 SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {
@@ -30,15 +30,15 @@ SWEEPS: dict[str, tuple[tuple[int, int], ...]] = {
 
 @dataclass(frozen=True)
 class Size:
-    """One size.
+    """Times at one size.
 
     Attributes:
-        sweep: "target", or what grows: "people", "cameras" or "both".
-        people: in the room.
-        cameras: around it.
-        frames: of the sequence.
-        build: milliseconds a frame for what is done once (bodies, motions, things, the MuJoCo model), spread over them.
-        ms: milliseconds a frame of each stage, the least of the rounds.
+        sweep: "target", or the swept quantity: "people", "cameras" or "both".
+        people: number of people.
+        cameras: number of cameras.
+        frames: number of frames of the sequence.
+        build: time of the build (bodies, motions, objects, MuJoCo model), milliseconds divided by the frames.
+        ms: milliseconds per frame of each stage, least of the rounds.
     """
 
     sweep: str
@@ -53,13 +53,13 @@ class Size:
 class _Staged:
     scenario: Scenario
     scene: Scene
-    seconds: float  # that it took to build
+    seconds: float  # time of the build
 
 
 def measure(*, quick: bool = False) -> list[Size]:
-    """Time a long sequence of 4 people before 5 cameras, then shorter ones along the sweeps."""
+    """Time a long sequence with 4 people and 5 cameras, then shorter sequences along the sweeps."""
     rounds = 2 if quick else 4
-    _staged(4, 10)  # loads and compiles
+    _staged(4, 10)  # loads modules and compiles kernels
     sizes = [_size("target", _staged(4, 50 if quick else 2000), 5, rounds)]
     scenes = {}
     for sweep, points in SWEEPS.items():
@@ -71,7 +71,7 @@ def measure(*, quick: bool = False) -> list[Size]:
 
 
 def _staged(people: int, frames: int) -> _Staged:
-    """The bench's scene; a crowd gets a larger room."""
+    """Build the scene of the benchmark; a crowd gets a larger room."""
     plain = scenario(people=people, duration=frames / RATE)
     area = max(plain.people.area, people**0.5)
     staged = plain.model_copy(
@@ -91,7 +91,7 @@ def _staged(people: int, frames: int) -> _Staged:
 def _size(sweep: str, staged: _Staged, cameras: int, rounds: int) -> Size:
     rig = build_rig(staged.scenario.cameras.model_copy(update={"count": cameras}))
     with collector_off():
-        runs = [_run(staged, rig) for _ in range(rounds)]  # the first one compiles and loads, and is not the least
+        runs = [_run(staged, rig) for _ in range(rounds)]  # the first run compiles and loads, so it is not the least
     frames = len(staged.scene.time)
     return Size(
         sweep=sweep,
@@ -104,10 +104,10 @@ def _size(sweep: str, staged: _Staged, cameras: int, rounds: int) -> Size:
 
 
 def _run(staged: _Staged, rig: Rig) -> dict[str, float]:
-    """Milliseconds a frame of every stage."""
+    """Return milliseconds per frame of every stage."""
     scene, config = staged.scene, staged.scenario
     playback = Playback(scene)
-    observer = RayObserver(playback)  # laid out once for a whole sequence, too
+    observer = RayObserver(playback)  # built once for a whole sequence, as in a trial
     marks = [time.process_time()]
     sequence = simulate(scene)
     marks.append(time.process_time())
@@ -119,37 +119,37 @@ def _run(staged: _Staged, rig: Rig) -> dict[str, float]:
 
 
 def table_of(sizes: list[Size]) -> str:
-    """The text: frames a second and the shares of the stages, then the curves."""
+    """Format as text: frames per second with the fractions of the stages, then the curves."""
     target, curves = sizes[0], sizes[1:]
     whole = target.build + sum(target.ms.values())
     parts = {"build (once)": target.build, **target.ms}
-    first = [[f"{target.people} × {target.cameras}, {target.frames} frames", "ms a frame", "share", ""]]
+    first = [[f"{target.people} × {target.cameras}, {target.frames} frames", "ms per frame", "share", ""]]
     first += [[name, figure(ms), f"{100 * ms / whole:.0f} %", ""] for name, ms in parts.items()]
     rate = 1e3 / whole
-    first.append(["frames a second", figure(rate), MET if rate >= TARGET else MISSED, f"{TARGET:g}"])
+    first.append(["frames per second", figure(rate), MET if rate >= TARGET else MISSED, f"{TARGET:g}"])
 
     totals = [sum(size.ms.values()) for size in curves]
     scale = min(totals) / 1.5, max(totals)
     rows, rules = [], []
     for sweep in SWEEPS:
-        mine = [(size, total) for size, total in zip(curves, totals, strict=True) if size.sweep == sweep]
-        rows.append([f"by {sweep}", "ms a frame", *STAGES, "µs a person and view", ""])
+        points = [(size, total) for size, total in zip(curves, totals, strict=True) if size.sweep == sweep]
+        rows.append([f"by {sweep}", "ms per frame", *STAGES, "µs per person and view", ""])
         rules.append(len(rows) - 1)
-        for size, total in mine:
+        for size, total in points:
             pairs = size.people * size.cameras
             cells = [figure(total), *(figure(size.ms[stage]) for stage in STAGES), figure(1e3 * total / pairs)]
             rows.append([f"{size.people} × {size.cameras}", *cells, bar(total, *scale, width=16)])
-        grows = [size.people * size.cameras for size, _ in mine]  # one of the two stays the same, or both grow
-        rows.append(["exponent", f"{exponent(grows, [total for _, total in mine]):.2f}", "", "", "", "", ""])
+        grows = [size.people * size.cameras for size, _ in points]  # one of the two is constant, or both grow
+        rows.append(["exponent", f"{exponent(grows, [total for _, total in points]):.2f}", "", "", "", "", ""])
     return (
         table(first, "<>>>", rules=(0, len(parts)))
         + "\n\n"
         + table(rows, "<>>>>><", rules=rules)
         + caption(
-            "People × cameras, without pictures: visibility by rays. Building is done once and spread over the frames; "
-            "simulate is the truth at the frames' times, film is posing again, rays, pixels and boxes, detect is the "
-            "simulated detector. Processor time of one process, least of the rounds. Exponents: growth of a frame's "
-            "cost with people, cameras, or people × cameras, by least squares of logarithms on the larger half of the "
-            "sizes; 1 is linear. Bars are logarithmic."
+            "People × cameras, without pictures: visibility by rays. The build is done once and divided by the frames; "
+            "simulate computes the truth at the times of the frames; film is posing, rays, pixels and boxes; detect is "
+            "the simulated detector. Processor time of one process, least of the rounds. Exponents: growth of the time "
+            "per frame with people, cameras, or people × cameras, by least squares of logarithms on the larger half of "
+            "the sizes; 1 is linear. Bars are logarithmic."
         )
     )

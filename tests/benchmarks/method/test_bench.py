@@ -277,7 +277,7 @@ def test_tables_fit_a_page_however_fast_the_machine(factor):
     texts = [
         stages.table_of([likely_stages(*size, factor) for size in stages.SIZES]),
         published.table_of(
-            [published.Beside(likely(*size, factor), others_at(size), published.PAPER.get(size)) for size in SIZES]
+            [published.Comparison(likely(*size, factor), others_at(size), published.PAPER.get(size)) for size in SIZES]
         ),
         reid.table_of([reid.Crops(*size, math.prod(size), factor * math.prod(size), factor) for size in SIZES]),
         curve.table_of([likely_sweep(grows, sizes, factor) for grows, sizes in curve.SWEEPS.items()]),

@@ -26,6 +26,6 @@ def test_exponents_are_those_of_the_cost(power):
 @pytest.mark.parametrize(("build", "mark"), [(3.9, "✓"), (4.0, "✗")])
 def test_the_target_counts_what_is_done_once(build, mark):
     """60 microseconds of stages and the building: 253 frames a second, and 246."""
-    (line,) = [line for line in table_of(sizes(power=1.0, build=build)).splitlines() if "frames a second" in line]
+    (line,) = [line for line in table_of(sizes(power=1.0, build=build)).splitlines() if "frames per second" in line]
     assert line.split()[3] == f"{1e3 / (build + 0.06):.0f}"
     assert mark in line

@@ -8,18 +8,18 @@ import pytest
 
 from benchmarks.simulator import rendering
 from benchmarks.simulator.__main__ import main
-from benchmarks.simulator.rendering import Figure, table_of
+from benchmarks.simulator.rendering import Measurement, table_of
 from benchmarks.simulator.scenes import scenario
 
 
 def test_targets_are_judged_by_the_median_in_their_own_direction():
     lines = table_of(
         [
-            Figure("quick enough", 8.0, 7.0, 9.0),
-            Figure("too slow", 12.0, 8.0, 9.0),
-            Figure("many enough", 200.0, 210.0, 180.0, more=True),
-            Figure("too few", 150.0, 190.0, 180.0, more=True),
-            Figure("not asked", 3.0, 2.0),
+            Measurement("quick enough", 8.0, 7.0, 9.0),
+            Measurement("too slow", 12.0, 8.0, 9.0),
+            Measurement("many enough", 200.0, 210.0, 180.0, more=True),
+            Measurement("too few", 150.0, 190.0, 180.0, more=True),
+            Measurement("no target", 3.0, 2.0),
         ]
     ).splitlines()
     marks = {line.split("  ")[0]: ("✓" in line, "✗" in line) for line in lines[2:7]}
@@ -28,13 +28,13 @@ def test_targets_are_judged_by_the_median_in_their_own_direction():
         "too slow": (False, True),
         "many enough": (True, False),
         "too few": (False, True),
-        "not asked": (False, False),
+        "no target": (False, False),
     }
 
 
 def test_sizes_and_targets_are_those_of_the_task():
     assert rendering.SIZES == {(640, 480): 9.0, (1032, 776): 20.0}
-    assert rendering.TOGETHER == 180.0
+    assert rendering.PARALLEL_RATE == 180.0
     staged = scenario()
     assert (staged.people.count, staged.cameras.count, staged.cameras.size) == (4, 5, (640, 480))
     assert staged.clutter.boxes + staged.clutter.shelves > 0
