@@ -126,3 +126,15 @@ def test_a_prop_obstructs_pelvises_near_its_footprint(ahead, blocked):
     place = [*(motion.root[0, :2] + [0.0, ahead]), 0.0, np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
     prop = Prop("table", (0.4, 1.0, 0.7), Trajectory(np.zeros(1), np.array([place])))  # turned: 0.2 m towards it
     assert obstructs(prop, motion) == blocked
+
+
+def test_a_recorded_walk_longer_than_the_area_is_played_in_the_room(shared_data):
+    file = str(shared_data / "motion/bvh/AV_8Walk_Meredith_HVHA_Rep1.bvh")
+    crowd = scenario(count=4, area=2.0, motion={"file": file})
+    made = choreograph(crowd, cast(4), CLOCK, widest=3.58)
+    paths = np.stack([motion.root[:, :2] for motion in made.motions])
+    assert 2.0 < np.abs(paths).max() <= 3.58
+    apart = np.linalg.norm(paths[:, None] - paths[None], axis=-1)[~np.eye(4, dtype=bool)]
+    assert apart.min() >= crowd.people.spacing
+    with pytest.raises(ValueError, match=r"people.motion: the recorded path extends over 6.* set people.area to"):
+        choreograph(crowd, cast(4), CLOCK)
