@@ -25,7 +25,7 @@ class FusedAffinity:
     """Affinity from appearance and geometry where geometry allows a match, else 0.
 
     The rule ``"mean"`` is the geometric mean of the paper, sqrt(A_a A_g) if D_g <= th. It gives appearance half the
-    weight regardless of how informative it is: a person who looks different from two sides is lost whatever the
+    weight regardless of how informative it is: a person who looks different from two sides is lost at any
     distance between the rays, and where people wear one uniform all affinities rise towards 1, so geometry no longer
     separates them.
 

@@ -124,7 +124,7 @@ def add_ray(sums, weight, direction, origin):
 
 @njit(cache=True)
 def add_sums(sums, A, b):
-    """Add what :func:`add_ray` has gathered to A (3, 3) and b (3,)."""
+    """Add the sums of :func:`add_ray` to A (3, 3) and b (3,)."""
     k = 0
     for r in range(3):
         b[r] += sums[6 + r]
