@@ -71,11 +71,11 @@ class BirthDeathProcess:
         return (2.0**53 * self.uniform("name")).astype(np.int64)
 
     def normal(self, purpose: str, *shape: int) -> Floats:
-        """Draw standard normal numbers for each individual, (n, *shape)."""
+        """Draw standard normal numbers for each individual, ``(n, *shape)``."""
         return self._drawn(purpose, shape, np.random.Generator.standard_normal)
 
     def uniform(self, purpose: str, *shape: int) -> Floats:
-        """Draw uniform numbers for each individual, (n, *shape)."""
+        """Draw uniform numbers for each individual, ``(n, *shape)``."""
         return self._drawn(purpose, shape, np.random.Generator.random)
 
     @cached_property

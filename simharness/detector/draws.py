@@ -44,11 +44,11 @@ class KeyedDraws:
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1) if len(self.time) > 1 else np.inf
 
     def uniform(self, *key: Key, shape: tuple[int, ...] = ()) -> Floats:
-        """Draw independent uniform numbers for every frame, (T, *shape)."""
+        """Draw independent uniform numbers for every frame, ``(T, *shape)``."""
         return stream(self.seed, "detector", *key).random((len(self.time), *shape))
 
     def normal(self, *key: Key, shape: tuple[int, ...] = ()) -> Floats:
-        """Draw independent standard normal numbers for every frame, (T, *shape)."""
+        """Draw independent standard normal numbers for every frame, ``(T, *shape)``."""
         return self._normal(len(self.time), key, shape)
 
     def held_frames(self, *key: Key, life: float) -> NDArray[np.int64] | None:

@@ -35,7 +35,7 @@ class LabelledJoints:
         association: people shown by the detections.
         boxes: boxes of the people, (T, V, P, 4).
         unit: OKS sigma x sqrt(area), (T, V, P, 17) pixels.
-        target: true joints apply_bias by the detector's bias, (T, V, P, 17, 2) pixels; NaN where unknown.
+        target: true joints moved by the detector's bias, (T, V, P, 17, 2) pixels; NaN where unknown.
         occlusion: occlusion class estimated from skeletons, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED.
         expected: people who should be detected, (T, V, P): known people with half of the limb joints in the picture.
         error: :class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where the truth is unknown.

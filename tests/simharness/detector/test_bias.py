@@ -11,7 +11,7 @@ from simharness.world.humans.shape import Shape
 
 @pytest.fixture(scope="module")
 def standing():
-    """A person at rest, who looks along +x with the left side towards +y, (17, 3) metres."""
+    """Joints of a person at rest who faces +x, with the left side towards +y, (17, 3) metres."""
     body = make_body(Shape(gender=0.5, muscle=0.5, weight=0.5, height=0.4, proportions=0.0))
     return body.joints(np.broadcast_to(np.eye(3, 4), (len(body.bones), 3, 4)))
 
@@ -19,8 +19,8 @@ def standing():
 def test_axes_of_a_standing_person(standing):
     axes = body_axes(standing)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(axes, np.eye(3), atol=0.1)  # nobody stands quite straight
-    assert (standing[1] - standing[3]) @ axes[0] > 0.03  # eyes are before ears
+    np.testing.assert_allclose(axes, np.eye(3), atol=0.1)  # no body is exactly upright
+    assert (standing[1] - standing[3]) @ axes[0] > 0.03  # eyes are in front of ears
 
 
 def test_offsets_turn_with_the_body_and_are_mirrored(standing):
@@ -35,7 +35,7 @@ def test_offsets_turn_with_the_body_and_are_mirrored(standing):
     assert {COCO17.joints[joint] for joint in np.flatnonzero(moved)} == {"nose", "left_hip", "right_hip"}
 
 
-def test_shifts_are_those_of_the_moved_joints(standing):
+def test_pixel_offsets_are_those_of_the_moved_joints(standing):
     rig = Rig([
         Camera(np.diag([700.0, 700, 1]), Rotation.from_euler("x", angle, degrees=True).as_matrix(), [0.1, 0.2, 4.0],
                size=(800, 600))

@@ -1,4 +1,4 @@
-"""Drawn descriptors against the distances of the network that they stand for."""
+"""Drawn descriptors against the distances of the network that they simulate."""
 
 import json
 import shutil
@@ -29,8 +29,8 @@ def model():
     return DescriptorModel.of_network(DEFAULT)
 
 
-def groups(model, dial, hidden, *, seeds=60):
-    """Distances of pairs of crops of one moment: of one person, and of two; everybody is seen in all views."""
+def groups(model, level, hidden, *, seeds=60):
+    """Return distances of pairs of crops of one moment, of one person and of two; all views see all people."""
     rng = np.random.default_rng(0)
     identity = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
     same = np.arange(len(identity))[:, None] // VIEWS == np.arange(len(identity)) // VIEWS
@@ -43,7 +43,7 @@ def groups(model, dial, hidden, *, seeds=60):
             hidden=hidden(rng, len(identity)),
             noise=rng.standard_normal((len(identity), model.dimensions)),
             noise_level=rng.standard_normal(len(identity)),
-            look_alike=dial,
+            look_alike=level,
             seed=seed,
         )
         distance = np.linalg.norm(drawn[:, None] - drawn, axis=-1)
@@ -53,7 +53,7 @@ def groups(model, dial, hidden, *, seeds=60):
 
 
 def as_measured(card, kind):
-    """A draw of hidden shares such that the worse of two crops has the measured ones."""
+    """Return a draw of hidden shares for which the worse of two crops has the measured distribution."""
     edges = np.array(card["hidden_share_of_the_joints_of_the_worse_crop"])
     pairs = np.array([[bin_["pairs"] for bin_ in row] for row in card["look_alike"]["0"][kind]["bins"]]).sum(axis=0)
     worse = np.cumsum(pairs) / pairs.sum()
@@ -65,19 +65,21 @@ def as_measured(card, kind):
     return draw
 
 
-@pytest.mark.parametrize("dial", ["0", "0.25", "0.5", "0.75", "1"])
-def test_distances_are_distributed_as_the_networks(model, card, dial):
-    drawn = groups(model, float(dial), as_measured(card, "same"))
+@pytest.mark.parametrize("level", ["0", "0.25", "0.5", "0.75", "1"])
+def test_distances_have_the_distribution_of_the_network(model, card, level):
+    drawn = groups(model, float(level), as_measured(card, "same"))
     for kind in ("same", "other"):
-        measured = card["look_alike"][dial][kind]["all"]
+        measured = card["look_alike"][level][kind]["all"]
         assert drawn[kind].mean() == pytest.approx(measured["mean"], abs=0.03)
         assert drawn[kind].std() == pytest.approx(measured["deviation"], abs=0.025)
         ranks = [rank for rank in card["quantiles"] if 0.05 <= rank <= 0.95]
-        asked = [value for rank, value in zip(card["quantiles"], measured["quantiles"], strict=True) if rank in ranks]
-        np.testing.assert_allclose(np.quantile(drawn[kind], ranks), asked, atol=0.06)
+        expected = [
+            value for rank, value in zip(card["quantiles"], measured["quantiles"], strict=True) if rank in ranks
+        ]
+        np.testing.assert_allclose(np.quantile(drawn[kind], ranks), expected, atol=0.06)
 
 
-def test_what_is_hidden_moves_one_person_apart_as_in_the_network(model, card):
+def test_occlusion_raises_distances_of_one_person_as_in_the_network(model, card):
     edges = card["hidden_share_of_the_joints_of_the_worse_crop"]
     for h in (0, len(edges) - 2):
         bins = [row[h] for row in card["look_alike"]["0"]["same"]["bins"] if row[h]["pairs"]]
@@ -91,9 +93,9 @@ def test_what_is_hidden_moves_one_person_apart_as_in_the_network(model, card):
         assert drawn[:, : VIEWS - 1].mean() == pytest.approx(measured, abs=0.05)
 
 
-@pytest.mark.parametrize("dial", ["0", "0.25", "0.5", "0.75", "1"])
-def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, card, dial):
-    """In every bin that the network's pairs fill: within 0.05, and the standard error of what was measured."""
+@pytest.mark.parametrize("level", ["0", "0.25", "0.5", "0.75", "1"])
+def test_distances_by_view_and_occlusion_are_those_of_the_network(model, card, level):
+    """In every bin with enough measured pairs: within 0.05 and the standard error of the measurement."""
     turns, covers = card["view_difference_degrees"], card["hidden_share_of_the_joints_of_the_worse_crop"]
     hidden, rng = as_measured(card, "same"), np.random.default_rng(0)
     identity = [("person", person) for person in range(PEOPLE) for _ in range(VIEWS)]
@@ -109,7 +111,7 @@ def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, car
             hidden=cover,
             noise=noise,
             noise_level=noise_level,
-            look_alike=float(dial),
+            look_alike=float(level),
             seed=seed,
         )
         distance = np.linalg.norm(drawn[:, None] - drawn, axis=-1)
@@ -119,7 +121,7 @@ def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, car
             total[k] += np.histogram2d(turn[pair], worse[pair], [turns, covers], weights=distance[pair])[0]
             count[k] += np.histogram2d(turn[pair], worse[pair], [turns, covers])[0]
     for k, kind in enumerate(("same", "other")):
-        bins = card["look_alike"][dial][kind]["bins"]
+        bins = card["look_alike"][level][kind]["bins"]
         filled = [(v, h, bin_) for v, row in enumerate(bins) for h, bin_ in enumerate(row) if bin_["pairs"] >= 100]
         assert len(filled) > 15
         for v, h, bin_ in filled:
@@ -128,7 +130,7 @@ def test_distances_follow_the_view_and_what_is_hidden_as_the_networks(model, car
 
 
 def apart(model, turn, *, pairs):
-    """Distances of two clear crops of one person from bearings ``turn`` apart, (pairs,), the same draws at any turn."""
+    """Return distances of two clear crops of one person at bearings ``turn`` apart, (pairs,), with the same draws."""
     rng, count = np.random.default_rng(1), 2 * pairs
     drawn = model.draw(
         [("person", k // 2) for k in range(count)],
@@ -142,8 +144,8 @@ def apart(model, turn, *, pairs):
     return np.linalg.norm(drawn[::2] - drawn[1::2], axis=1)
 
 
-def test_front_and_back_are_nearer_than_either_and_the_side(model, card):
-    """Seen from behind an outline is the same: so it is in the network, too."""
+def test_front_and_back_are_nearer_than_front_and_side(model, card):
+    """The outline is the same from behind; the network behaves so, too."""
     clear = [row[0]["mean"] for row in card["look_alike"]["0"]["same"]["bins"]]
     assert clear[-1] < max(clear[2:4])
     side, back = apart(model, np.pi / 2, pairs=3000), apart(model, np.pi, pairs=3000)
@@ -154,7 +156,7 @@ def test_two_views_of_one_side_are_nearer_than_front_and_back(model):
     one_side, front_and_back = apart(model, 0.0, pairs=2000), apart(model, np.pi, pairs=2000)
     error = np.hypot(*(each.std() / np.sqrt(len(each)) for each in (one_side, front_and_back)))
     assert front_and_back.mean() - one_side.mean() > 5 * error
-    assert front_and_back.mean() < 1.2  # and still nearer than strangers
+    assert front_and_back.mean() < 1.2  # and still nearer than different people
 
 
 def test_bearings_turn_with_the_body_and_the_camera():
@@ -179,13 +181,13 @@ def with_decoys(where):
     return replace(where, views=replace(where.views, lookalikes=seen))
 
 
-def joined(base, dial):
-    """Sections with some dials turned."""
-    merged = {key: {**base.get(key, {}), **value} for key, value in dial.items() if isinstance(value, dict)}
-    return {**base, **dial, **merged}
+def joined(base, change):
+    """Return sections with some parameters changed."""
+    merged = {key: {**base.get(key, {}), **value} for key, value in change.items() if isinstance(value, dict)}
+    return {**base, **change, **merged}
 
 
-class TestInDetections:
+class TestDetections:
     """Descriptors of a whole sequence."""
 
     @staticmethod
@@ -195,7 +197,7 @@ class TestInDetections:
         settings = DescriptorSettings(model, look_alike, alike)
         return detect(where.sequence, where.views, where.rig, config, seed=3, descriptors=settings)
 
-    def test_people_are_like_themselves_and_phantoms_like_nobody(self, model):
+    def test_people_are_near_themselves_and_phantoms_far_from_all(self, model):
         frames = self.described(model, phantoms={"rate": 1.0, "life": 1.0})
         near = {"one": [], "two": [], "phantom": []}
         for frame in frames:
@@ -213,7 +215,7 @@ class TestInDetections:
         assert np.mean(near["phantom"]) > np.mean(near["one"]) + 0.25
 
     @pytest.mark.parametrize(
-        "dial",
+        "change",
         [
             {"boxes": {"duplicates": 0.3}},
             {"boxes": {"split": 0.3}},
@@ -224,12 +226,13 @@ class TestInDetections:
         ],
         ids=str,
     )
-    def test_one_dial_leaves_the_descriptors_of_all_others_alone(self, model, dial):
+    def test_a_parameter_changes_no_other_descriptor(self, model, change):
         base = {"phantoms": {"rate": 1.0, "life": 0.4, "views": 0.4}, "people": 4}
         before, after = (
-            self.by_detection(self.described(model, **sections)) for sections in (base, joined(base, dial))
+            self.by_detection(self.described(model, **sections)) for sections in (base, joined(base, change))
         )
-        for real in (False,) if "people" in dial else (False, True):  # the world's people turn where there are more
+        # In this world more people change the bearings of the others.
+        for real in (False,) if "people" in change else (False, True):
             both = [key for key in before[real] if key in after[real]]
             assert len(both) > 0.35 * len(before[real]) > 30
             for key in both:
@@ -237,7 +240,7 @@ class TestInDetections:
 
     @staticmethod
     def by_detection(frames):
-        """Descriptors of nobody (False) and of people (True) by frame, view, keypoints and their scores."""
+        """Return descriptors of false positives (False) and people (True) by frame, view, keypoints and scores."""
         result = {False: {}, True: {}}
         for t, frame in enumerate(frames):
             found = frame.detections
@@ -246,10 +249,10 @@ class TestInDetections:
                 result[bool(person >= 0)][key] = found.descriptors[d]
         return result
 
-    @pytest.mark.parametrize("dial", ["duplicates", "split"])
-    def test_who_is_found_twice_has_the_same_look_and_other_noise(self, model, dial):
+    @pytest.mark.parametrize("key", ["duplicates", "split"])
+    def test_duplicates_have_the_same_identity_and_other_noise(self, model, key):
         apart = []
-        for frame in self.described(model, boxes={dial: 0.3}):
+        for frame in self.described(model, boxes={key: 0.3}):
             drawn, found = frame.detections.descriptors, np.column_stack([frame.detections.view, frame.truth.person])
             same = (found[:, None] == found).all(axis=-1) & np.triu(np.ones((len(found),) * 2, bool), 1)
             apart += np.linalg.norm(drawn[:, None] - drawn, axis=-1)[same].tolist()
@@ -257,7 +260,7 @@ class TestInDetections:
         assert min(apart) > 0.2
         assert np.mean(apart) < 1.0
 
-    def test_a_figure_in_the_room_has_one_look_in_all_views(self, model):
+    def test_a_figure_in_the_room_has_one_identity_in_all_views(self, model):
         def apart(views):
             """Distances of phantoms in two views, in moments in which no view has more than one."""
             result = []
@@ -273,7 +276,7 @@ class TestInDetections:
         assert np.median(room) < 0.9  # as of one person seen from one side
         assert np.mean(alone) > 1.2
 
-    def test_two_figures_have_two_looks(self, model):
+    def test_two_figures_have_two_identities(self, model):
         drawn = []
         for frame in self.described(model, phantoms={"rate": 2.0, "life": 0.4, "views": 1.0}):
             last = (frame.truth.person < 0) & (frame.detections.view == 2)
@@ -282,23 +285,23 @@ class TestInDetections:
         assert len(apart) > 5
         assert np.mean(apart) > 1.2
 
-    def test_nobody_is_described_where_nobody_is(self, model):
+    def test_phantoms_have_descriptors_without_people(self, model):
         frames = self.described(model, people=0, phantoms={"rate": 1.0})
         assert sum(len(frame.detections.descriptors) for frame in frames) > 50
 
-    def test_some_may_look_alike(self, model):
+    def test_some_people_may_look_alike(self, model):
         frames = self.described(model, look_alike=1.0, alike=2)
 
         def apart(one, other):
             result = []
             for frame in frames:
-                mine, theirs = (frame.detections.descriptors[frame.truth.person == person] for person in (one, other))
-                result.append(np.linalg.norm(mine[:, None] - theirs, axis=-1).mean())
+                first, second = (frame.detections.descriptors[frame.truth.person == person] for person in (one, other))
+                result.append(np.linalg.norm(first[:, None] - second, axis=-1).mean())
             return np.mean(result)
 
         assert apart(0, 1) < apart(2, 3) - 0.1
 
-    def test_without_looks_there_are_none_and_nothing_else_changes(self, model):
+    def test_without_settings_there_are_no_descriptors_and_nothing_else_changes(self, model):
         where = with_decoys(world(frames=40, people=4))
         sections = {"keypoints": {"scatter": 0.3}, "phantoms": {"rate": 0.5}}
         plain = detect(where.sequence, where.views, where.rig, Detector.model_validate(sections), seed=3)
@@ -314,15 +317,15 @@ def test_a_network_without_measured_distances_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("content", ["[1]", "{}", '{"distances": 3}', "no JSON"])
-def test_a_card_that_states_no_distances_is_said(tmp_path, content):
+def test_a_card_without_distances_is_refused(tmp_path, content):
     (tmp_path / "other.json").write_text(content)
     with pytest.raises(ValueError, match=r"other\.json: expected a card with the distances of other\.onnx"):
         DescriptorModel.of_network(tmp_path / "other.onnx")
 
 
-def test_distances_of_another_networks_card_are_refused(tmp_path):
+def test_the_card_of_another_network_is_refused(tmp_path):
     shutil.copy(DEFAULT.with_suffix(".json"), tmp_path / "other.json")
-    DescriptorModel.of_network(tmp_path / "other.onnx")  # they can be drawn without the network
+    DescriptorModel.of_network(tmp_path / "other.onnx")  # the network file itself is not needed
     (tmp_path / "other.onnx").write_bytes(DEFAULT.read_bytes()[:-1])
     with pytest.raises(ValueError, match="is not the file of"):
         DescriptorModel.of_network(tmp_path / "other.onnx")

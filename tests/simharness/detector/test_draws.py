@@ -12,26 +12,26 @@ TIME = np.arange(4000) / 10.0
 
 @pytest.mark.parametrize("life", [0.0, 0.5, 3.0])
 @pytest.mark.parametrize("shared", [0.0, 0.4, 1.0])
-def test_whatever_is_shared_or_lasts_an_event_comes_as_often_as_asked(life, shared):
+def test_events_have_the_configured_rate_at_any_sharing_and_life(life, shared):
     states = np.concatenate(
         [KeyedDraws(seed, TIME[:400], 3).states("x", life=life, shared=shared)[::10] for seed in range(60)]
     )
-    for chance in (0.05, 0.3):
-        # Draws that last or are shared are fewer: the bound is for the independent ones among them.
+    for probability in (0.05, 0.3):
+        # Held or shared draws are fewer: the bound is for the number of independent draws.
         independent = len(states) * (3 if shared == 0 else 1) / max(1.0, 2 * life)
-        share = (states < ndtri(chance)).mean()
-        assert abs(share - chance) < 4.5 * np.sqrt(chance * (1 - chance) / independent)
+        share = (states < ndtri(probability)).mean()
+        assert abs(share - probability) < 4.5 * np.sqrt(probability * (1 - probability) / independent)
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.3, 0.7, 1.0])
-def test_views_share_what_is_asked(shared):
+def test_views_share_the_configured_variance(shared):
     states = KeyedDraws(1, TIME, 2).joint_states("x", 0, shared=shared)
     assert np.corrcoef(states[:, 0].ravel(), states[:, 1].ravel())[0, 1] == pytest.approx(shared, abs=0.015)
     assert states.std() == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("limb", [0.0, 0.5, 1.0])
-def test_joints_share_what_is_asked_with_their_limb_alone(limb):
+def test_joints_share_variance_with_their_limb_only(limb):
     states = KeyedDraws(2, TIME, 1).joint_states("x", 0, limb=limb)[:, 0]
     correlation = np.corrcoef(states.T)
     same = LIMB_OF_JOINT[:, None] == LIMB_OF_JOINT
@@ -41,10 +41,10 @@ def test_joints_share_what_is_asked_with_their_limb_alone(limb):
 
 
 @pytest.mark.parametrize("life", [0.3, 1.0, 4.0])
-def test_states_live_as_long_as_asked(life):
+def test_states_have_the_configured_life(life):
     states = np.stack([KeyedDraws(seed, TIME, 1).states("x", life=life)[:, 0] for seed in range(5)])
     changes = (np.diff(states, axis=1) != 0).mean()
-    # Observed ten times a second, a life of mean L is seen to end with chance 1 - exp(-0.1 / L).
+    # Observed at 10 Hz, a life of mean L ends between two frames with probability 1 - exp(-0.1 / L).
     assert changes == pytest.approx(-np.expm1(-0.1 / life), rel=0.1)
 
 
@@ -58,7 +58,7 @@ def test_states_with_the_same_lives_change_together_and_others_do_not():
     assert (changed != (np.diff(other, axis=0) != 0)).any()
 
 
-def test_what_wanders_forgets_in_its_life():
+def test_autoregressive_numbers_have_the_configured_correlation():
     values = KeyedDraws(4, TIME, 1).autoregressive("x", shape=(40,), life=0.8)
     assert values.std() == pytest.approx(1.0, abs=0.05)
     for lag in (1, 5, 10):
@@ -67,7 +67,7 @@ def test_what_wanders_forgets_in_its_life():
     assert kstest(values[::100].ravel(), "norm").pvalue > 1e-4
 
 
-def test_a_longer_sequence_begins_like_a_shorter_one_and_more_views_change_none():
+def test_more_frames_or_views_change_no_draw():
     short, long = (KeyedDraws(5, TIME[:n], views) for n, views in ((50, 2), (90, 4)))
     for draw in (
         lambda draws: draws.joint_states("x", 0, life=0.5, shared=0.3, limb=0.2)[:, :2],
@@ -77,7 +77,7 @@ def test_a_longer_sequence_begins_like_a_shorter_one_and_more_views_change_none(
         np.testing.assert_array_equal(draw(short), draw(long)[:50])
 
 
-def test_one_frame_is_enough():
+def test_a_single_frame():
     one = KeyedDraws(6, TIME[:1], 2)
     assert one.states("x", life=1.0).shape == (1, 2)
     assert one.autoregressive("x", life=1.0).shape == (1,)

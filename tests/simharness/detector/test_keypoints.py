@@ -1,4 +1,4 @@
-"""Keypoints and their errors: rates, places, independence of the dials."""
+"""Keypoints and their errors: rates, positions, independence of the parameters."""
 
 import numpy as np
 import pytest
@@ -16,15 +16,15 @@ from simharness.types.views import Visibility
 MIRROR = np.array(COCO17.mirror)
 
 
-def find(where, *, seed=3, correlation=None, **dials):
-    config = Keypoints.model_validate(dials)
+def find(where, *, seed=3, correlation=None, **parameters):
+    config = Keypoints.model_validate(parameters)
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     tie = Correlation.model_validate(correlation or {})
     return find_keypoints(where.views, Conditions.of(where.views), where.sequence, where.rig, config, tie, draws)
 
 
 def units(where, found):
-    """How far off keypoints are, in units of OKS sigma x sqrt(area)."""
+    """Return the distance of keypoints from the truth, in units of OKS sigma x sqrt(area)."""
     unit = Conditions.of(where.views).unit
     return np.linalg.norm(found.pixels - where.views.pixels, axis=-1) / unit
 
@@ -46,32 +46,32 @@ CLASSES = {
 
 
 @pytest.mark.parametrize("correlation", [{}, {"views": 0.5, "limb": 0.5}], ids=["independent", "tied"])
-@pytest.mark.parametrize("dial", CLASSES)
-def test_each_error_comes_at_the_asked_rate(dial, correlation):
-    where = world(frames=400, people=2, together=dial == "swap")
-    error = find(where, correlation=correlation, **{dial: 0.2}).error
+@pytest.mark.parametrize("parameter", CLASSES)
+def test_each_error_occurs_at_the_configured_rate(parameter, correlation):
+    where = world(frames=400, people=2, together=parameter == "swap")
+    error = find(where, correlation=correlation, **{parameter: 0.2}).error
     true = where.views.pixels
     conditions = Conditions.of(where.views)
     possible = np.ones(error.shape, bool)
-    if dial == "inversion":  # one that leads nowhere is none
+    if parameter == "inversion":  # an inversion to a near counterpart is none
         possible = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
-    if dial == "swap":
+    if parameter == "swap":
         far = np.linalg.norm(true - true[:, :, ::-1], axis=-1) >= MISS_FROM * conditions.unit
         possible = far & (conditions.neighbour >= 0)[..., None]
     assert possible.sum() > 5000
-    taken = error == CLASSES[dial]
+    taken = error == CLASSES[parameter]
     assert not taken[~possible].any()
-    # Joints of a limb and the views are tied: so many fewer draws are independent.
+    # Joints of a limb and views share draws, so fewer draws are independent.
     independent = 1 if not correlation else 18
     assert within(taken[possible].sum() // independent, possible.sum() // independent, 0.2)
 
 
-def test_shares_are_of_the_joints_that_the_classes_before_left():
+def test_shares_are_of_the_joints_left_by_earlier_classes():
     where = world(frames=1500, views=2, people=2, together=True)
-    asked = {"swap": 0.1, "inversion": 0.2, "miss": 0.15, "jitter": 0.3}
-    found = find(where, drop={"visible": 0.05}, **asked)
+    shares = {"swap": 0.1, "inversion": 0.2, "miss": 0.15, "jitter": 0.3}
+    found = find(where, drop={"visible": 0.05}, **shares)
     true, conditions = where.views.pixels, Conditions.of(where.views)
-    # Where all classes can be told apart.
+    # Where all classes are distinguishable.
     apart = np.linalg.norm(true - true[..., MIRROR, :], axis=-1) >= MISS_FROM * conditions.unit
     apart &= np.linalg.norm(true - true[:, :, ::-1], axis=-1) >= MISS_FROM * conditions.unit
     apart &= (conditions.neighbour >= 0)[..., None]
@@ -99,7 +99,7 @@ def test_shares_are_of_the_joints_that_the_classes_before_left():
         ("occluded", Visibility.OCCLUDED_BY_CLUTTER),
     ],
 )
-def test_joints_are_dropped_by_what_hides_them(key, visibility):
+def test_drops_depend_on_occlusion(key, visibility):
     seen = np.full((60, 3, 2, 17), visibility)
     seen[..., :4] = Visibility.VISIBLE if visibility != Visibility.VISIBLE else Visibility.SELF_OCCLUDED
     absent = find(world(visibility=seen), drop={key: 0.3}).error == KeypointError.ABSENT
@@ -107,7 +107,7 @@ def test_joints_are_dropped_by_what_hides_them(key, visibility):
     assert not absent[..., :4].any()
 
 
-def test_joints_outside_the_image_are_never_found_and_the_others_stay():
+def test_joints_outside_the_image_are_never_reported():
     seen = np.full((60, 3, 2, 17), Visibility.VISIBLE)
     seen[..., 15:] = Visibility.OUTSIDE
     found = find(world(visibility=seen), scatter=0.5, inversion=0.3, miss=0.2)
@@ -121,7 +121,7 @@ def test_scatter_grows_with_the_person_and_is_good(height):
     where = world(frames=300, height=height)
     found = find(where, scatter=0.35)
     offset = found.pixels - where.views.pixels
-    # Rayleigh with 0.35, cut at 1.14: 0.5 % of it are redistributed.
+    # Rayleigh with 0.35, truncated at 1.14: 0.5 % of it is redistributed.
     expected = 0.35 * np.array(COCO17.sigmas) * np.sqrt(BOX_SHARE * 0.4 * height * height)
     np.testing.assert_allclose(offset.std(axis=(0, 1, 2, 4)), expected, rtol=0.06)
     assert (found.error == KeypointError.GOOD).all()
@@ -130,7 +130,7 @@ def test_scatter_grows_with_the_person_and_is_good(height):
     assert within((distance < 0.35).sum(), distance.size, chi(2).cdf(1.0) / chi(2).cdf(GOOD_BELOW / 0.35))
 
 
-def test_places_of_errors():
+def test_distances_and_places_of_errors():
     where = world(frames=200)
     distance = units(where, find(where, jitter=1.0))
     assert distance.min() >= GOOD_BELOW - 1e-9
@@ -166,7 +166,7 @@ def test_hidden_joints_are_guessed_from_the_pose():
     found = find(where, hallucinate=0.4)
     assert not found.guessed[..., :5].any()
     assert within(found.guessed[..., 5:].sum(), found.guessed[..., 5:].size, 0.4)
-    # A guessed joint hangs on its parent: right bone, wrong way.
+    # A guessed joint keeps its parent; the bone gets a wrong direction and length.
     parent = np.array(COCO17.parents)
     for joint in (8, 10, 13, 16):
         here = found.guessed[..., joint]
@@ -176,7 +176,7 @@ def test_hidden_joints_are_guessed_from_the_pose():
     np.testing.assert_array_equal(found.pixels[~found.guessed], where.views.pixels[~found.guessed])
 
 
-def test_quality_multiplies_all_errors_and_adds_to_those_of_better_detectors():
+def test_quality_multiplies_all_rates_and_only_adds_errors():
     where = world(frames=300)
     rates = {"jitter": 0.1, "miss": 0.2}
     half, whole = (find(where, quality=quality, **rates).error for quality in (0.5, 1.0))
@@ -187,18 +187,18 @@ def test_quality_multiplies_all_errors_and_adds_to_those_of_better_detectors():
 
 
 @pytest.mark.parametrize(
-    ("dial", "make"),
+    ("parameter", "make"),
     [
         ("self_occluded", lambda: world(frames=200, visibility=Visibility.SELF_OCCLUDED)),
         ("occluded", lambda: world(frames=200, visibility=Visibility.OCCLUDED_BY_CLUTTER)),
     ],
 )
-def test_hidden_joints_err_more(dial, make):
-    error = find(make(), miss=0.1, **{dial: 3.0}).error
+def test_hidden_joints_have_more_errors(parameter, make):
+    error = find(make(), miss=0.1, **{parameter: 3.0}).error
     assert within((error == KeypointError.MISS).sum(), error.size, 0.3)
 
 
-def test_the_truncated_and_the_small_err_more():
+def test_truncated_and_small_people_have_more_errors():
     seen = np.full((200, 3, 2, 17), Visibility.VISIBLE)
     seen[:, :, 0, 16] = Visibility.OUTSIDE
     error = find(world(frames=200, visibility=seen), miss=0.1, truncated=2.0).error[..., :16]
@@ -212,7 +212,7 @@ def test_the_truncated_and_the_small_err_more():
     assert within((error == KeypointError.MISS).sum(), error.size, 0.1)
 
 
-def test_few_joints_and_crowds_have_rates_of_their_own():
+def test_people_with_few_joints_and_crowds_have_separate_rates():
     seen = np.full((200, 3, 3, 17), Visibility.OCCLUDED_BY_CLUTTER)
     for person, valid in enumerate((11, 10, 5)):
         seen[:, :, person, :valid] = Visibility.VISIBLE
@@ -222,7 +222,7 @@ def test_few_joints_and_crowds_have_rates_of_their_own():
         assert within((error[:, :, person] == KeypointError.MISS).sum(), error[:, :, person].size, share)
     alone = find(where, miss=0.1, miss_some=0.2).error[:, :, 2] == KeypointError.MISS
     assert within(alone.sum(), alone.size, 0.2)
-    # Two who overlap, of whom one shows 10 joints: a crowd for that one.
+    # Two overlapping people, one with 10 visible joints: that one counts as crowded.
     seen = np.full((200, 3, 2, 17), Visibility.VISIBLE)
     seen[:, :, 0, 10:] = Visibility.OCCLUDED_BY_PERSON
     where = world(frames=200, visibility=seen, together=True)
@@ -234,41 +234,41 @@ def test_few_joints_and_crowds_have_rates_of_their_own():
     assert not (error[:, :, 1] == KeypointError.SWAP).any()
 
 
-DIALS = {
+PARAMETERS = {
     "scatter": 0.4, "jitter": 0.2, "miss": 0.2, "inversion": 0.2, "swap": 0.2, "drop": {"visible": 0.2},
     "hallucinate": 0.3,
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("dial", ["jitter", "miss", "inversion", "swap", "drop", "hallucinate"])
-def test_a_dial_takes_joints_and_moves_no_other(dial):
+@pytest.mark.parametrize("parameter", ["jitter", "miss", "inversion", "swap", "drop", "hallucinate"])
+def test_a_parameter_takes_joints_and_changes_no_other(parameter):
     seen = np.full((80, 3, 2, 17), Visibility.VISIBLE)
     seen[..., 9:11] = Visibility.OCCLUDED_BY_PERSON
     where = world(frames=80, visibility=seen, together=True)
-    without = find(where, **{key: value for key, value in DIALS.items() if key != dial})
-    with_it = find(where, **DIALS)
+    without = find(where, **{key: value for key, value in PARAMETERS.items() if key != parameter})
+    with_it = find(where, **PARAMETERS)
     changed = ~((with_it.pixels == without.pixels).all(axis=-1) | (with_it.error == without.error))
     took = ~np.isclose(with_it.pixels, without.pixels, equal_nan=True).all(axis=-1)
     assert 0.01 < took.mean() < 0.35
-    # Whatever it did not take is as it was, to the bit.
+    # Joints that it did not take are unchanged to the bit.
     np.testing.assert_array_equal(with_it.pixels[~took], without.pixels[~took])
     assert not (changed & ~took).any()
-    more = DIALS[dial]
+    more = PARAMETERS[parameter]
     more = {key: 0.5 for key in more} if isinstance(more, dict) else 0.6
-    still = find(where, **{**DIALS, dial: more})
+    still = find(where, **{**PARAMETERS, parameter: more})
     takes = ~np.isclose(still.pixels, without.pixels, equal_nan=True).all(axis=-1)
-    assert (takes | ~took).all()  # more of it keeps what less of it took
+    assert (takes | ~took).all()  # a higher rate keeps the joints that a lower rate took
     np.testing.assert_array_equal(still.pixels[took], with_it.pixels[took])
 
 
-def test_scatter_that_views_share_is_a_displacement_in_space():
+def test_shared_scatter_is_a_displacement_in_space():
     where = world(frames=400, views=2)
     offsets = {}
     for shared in (0.0, 0.5, 1.0):
         found = find(where, scatter=0.3, correlation={"scatter_views": shared})
         offsets[shared] = (found.pixels - where.views.pixels) / Conditions.of(where.views).unit[..., None]
         assert offsets[shared].std() == pytest.approx(0.3, rel=0.03)
-    # The cameras stand side by side and look the same way: down is down in both, and right nearly right.
+    # The cameras stand side by side with the same orientation: down is equal in both, right nearly equal.
     down = {shared: np.corrcoef(each[:, 0, ..., 1].ravel(), each[:, 1, ..., 1].ravel())[0, 1]
             for shared, each in offsets.items()}  # fmt: skip
     assert abs(down[0.0]) < 0.03
@@ -276,7 +276,7 @@ def test_scatter_that_views_share_is_a_displacement_in_space():
     assert down[1.0] > 0.98
 
 
-def test_errors_last_and_views_err_together():
+def test_errors_last_and_are_shared_by_views():
     where = world(frames=2000, views=2, people=1)
     errors = {
         name: find(where, miss=0.2, correlation=tie).error[:, :, 0] == KeypointError.MISS
@@ -284,14 +284,14 @@ def test_errors_last_and_views_err_together():
     }
     stays = {name: (each[1:] & each[:-1]).sum() / each[:-1].sum() for name, each in errors.items()}
     assert stays["alone"] == pytest.approx(0.2, abs=0.02)
-    # It ends with chance 1 - exp(-0.1 s / 1 s), and is drawn again with 0.2.
+    # The state ends with probability 1 - exp(-0.1 s / 1 s) and is drawn as a miss again with 0.2.
     assert stays["lasting"] == pytest.approx(1 - 0.8 * -np.expm1(-0.1), abs=0.03)
     both = {name: (each[:, 0] & each[:, 1]).mean() for name, each in errors.items()}
     assert both["alone"] == pytest.approx(0.04, abs=0.006)
     assert both["together"] == pytest.approx(0.2, abs=0.012)
 
 
-def test_one_more_person_view_or_frame_changes_nobody_else():
+def test_more_people_views_or_frames_change_no_other_keypoint():
     tie = {"life": 0.5, "views": 0.3, "limb": 0.3, "scatter_life": 0.2}
     small, large = world(frames=20, views=2, people=1), world(frames=30, views=3, people=2)
     one, more = (find(where, correlation=tie, scatter=0.4, miss=0.2, jitter=0.2) for where in (small, large))
@@ -299,7 +299,7 @@ def test_one_more_person_view_or_frame_changes_nobody_else():
     np.testing.assert_allclose(off[0], off[1][:20, :2, :1], atol=1e-9)
 
 
-def test_seeds():
+def test_equal_seeds_give_equal_keypoints():
     where = world(frames=5)
     first, again, other = (find(where, seed=seed, scatter=0.4).pixels for seed in (0, 0, 1))
     assert first.tobytes() == again.tobytes()
@@ -314,26 +314,26 @@ def test_overlap_of_boxes():
     assert iou.sum() == pytest.approx(2 * 50 / 150)
 
 
-def test_nobody():
+def test_no_people():
     found = find(world(people=0), scatter=0.4, miss=0.5)
     assert found.pixels.shape == (60, 3, 0, 17, 2)
 
 
 class TestRivals:
-    """A second peak is no better than the keypoint would be that is found there."""
+    """Second peaks have the same scatter as good keypoints."""
 
     SCATTER = 0.5
 
-    @pytest.mark.parametrize("dial", ["miss", "inversion", "swap"])
-    def test_what_is_found_elsewhere_has_its_rival_where_it_is_found_otherwise(self, dial):
-        where = world(frames=100, together=dial == "swap")
-        plain, wrong = find(where, scatter=self.SCATTER), find(where, scatter=self.SCATTER, **{dial: 0.2})
-        elsewhere = wrong.error == CLASSES[dial]
+    @pytest.mark.parametrize("parameter", ["miss", "inversion", "swap"])
+    def test_the_rival_of_a_displaced_joint_is_its_good_keypoint(self, parameter):
+        where = world(frames=100, together=parameter == "swap")
+        plain, wrong = find(where, scatter=self.SCATTER), find(where, scatter=self.SCATTER, **{parameter: 0.2})
+        elsewhere = wrong.error == CLASSES[parameter]
         assert elsewhere.sum() > 100
         np.testing.assert_allclose(wrong.rivals[elsewhere], plain.pixels[elsewhere])
         assert (units(where, plain)[elsewhere] > 0.05).mean() > 0.9
 
-    def test_an_unsure_joint_has_its_rival_as_far_from_its_counterpart_as_itself_from_the_joint(self):
+    def test_the_rival_of_a_hidden_joint_is_at_its_counterpart_with_the_same_scatter(self):
         where = world(frames=100, visibility=Visibility.SELF_OCCLUDED)
         found, true = find(where, scatter=self.SCATTER), where.views.pixels
         paired = np.arange(17) != MIRROR

@@ -1,4 +1,4 @@
-"""Phantoms: how many, how long, where, and what each dial leaves alone."""
+"""Phantoms: rates, lives, places, and independence of the parameters."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def ring(count=4, **more) -> Rig:
 
 
 def filmed(frames=400, views=4, people=2, seed=0) -> Views:
-    """People as pictures only, side by side, 60 pixels apart."""
+    """Return views of people side by side, 60 pixels apart, without rendering."""
     rng = np.random.default_rng(seed)
     size = np.array([80.0, 240.0])
     corner = np.array([100.0, 100.0]) + rng.uniform(0, 60, (frames, views, people, 2))
@@ -43,21 +43,21 @@ def filmed(frames=400, views=4, people=2, seed=0) -> Views:
     )
 
 
-def drawn(rig=None, pictures=None, /, *, seed=3, **dials):
+def drawn(rig=None, pictures=None, /, *, seed=3, **parameters):
     rig = rig or ring()
     pictures = filmed(views=len(rig)) if pictures is None else pictures
     draws = KeyedDraws(seed, STEP * np.arange(len(pictures)), len(rig))
-    return draw_phantoms(pictures, rig, Phantoms(**dials), draws)
+    return draw_phantoms(pictures, rig, Phantoms(**parameters), draws)
 
 
 def poses(found, frames=None) -> set[tuple[int, int, bytes]]:
-    """Where and when each one is, whatever its slot."""
+    """Return frame, view and keypoints of each phantom, without its slot."""
     places = np.argwhere(found.present[:frames]).tolist()
     return {(t, v, found.keypoints[t, v, s].tobytes()) for t, v, s in places}
 
 
-def within(count, trials, chance):
-    low, high = binom.interval(1 - 1e-6, trials, chance)
+def within(count, trials, probability):
+    low, high = binom.interval(1 - 1e-6, trials, probability)
     return low <= count <= high
 
 
@@ -73,14 +73,14 @@ MIXTURES = [
 
 
 class TestRates:
-    @pytest.mark.parametrize("dials", MIXTURES, ids=str)
+    @pytest.mark.parametrize("parameters", MIXTURES, ids=str)
     @pytest.mark.parametrize("rate", [0.1, 1.3])
-    def test_the_mean_number_in_a_picture_is_the_rate(self, rate, dials):
-        """Whatever the mixture. A phantom that lasts, or that many views share, counts as often: so the bound grows."""
+    def test_the_mean_number_in_a_picture_is_the_rate(self, rate, parameters):
+        """For any mixture. A phantom that lasts or is in several views counts several times, so the bound is wider."""
         rig, frames = ring(), 1500
-        found = drawn(rig, filmed(frames), rate=rate, **dials)
+        found = drawn(rig, filmed(frames), rate=rate, **parameters)
         expected = rate * frames * len(rig)
-        clump = (1 + 2 * dials.get("life", 0.0) / STEP) * (1 + dials.get("views", 0.0) * (len(rig) - 1))
+        clump = (1 + 2 * parameters.get("life", 0.0) / STEP) * (1 + parameters.get("views", 0.0) * (len(rig) - 1))
         assert abs(found.present.sum() - expected) < 4.5 * np.sqrt(clump * expected)
 
     def test_the_number_in_a_picture_is_poisson_distributed_from_the_first_frame_on(self):
@@ -92,27 +92,27 @@ class TestRates:
             assert abs(now.mean() - rate) < 5 * np.sqrt(rate / now.size)
             assert 0.75 < now.var() / rate < 1.3
         both = np.corrcoef(counts[:, 0].ravel(), counts[:, 10].ravel())[0, 1]
-        assert abs(both - np.exp(-1.0 / 2.0)) < 5 / np.sqrt(counts[:, 0].size)  # of M/M/infinity: exp(-lag / life)
+        assert abs(both - np.exp(-1.0 / 2.0)) < 5 / np.sqrt(counts[:, 0].size)  # of the M/M/∞ process: exp(-lag / life)
 
-    def test_the_share_that_stands_in_the_room_is_the_asked_one(self):
-        """In one picture alone means alone: with the same seed, without the room, what is left."""
+    def test_the_share_of_figures_in_the_room_is_the_configured_one(self):
+        """With the same seed and no figures, the phantoms in one picture only are left."""
         rig, views = ring(), filmed(1500)
         both = drawn(rig, views, rate=1.0, views=0.4).present.sum()
         alone = drawn(rig, views, rate=0.6).present.sum()
         share = (both - alone) / both
         assert abs(share - 0.4) < 0.05
 
-    def test_zero_means_none(self):
+    def test_there_are_no_phantoms_at_rate_zero(self):
         found = drawn(rate=0.0, life=1.0, views=0.5, parts=0.5)
         assert found.present.shape == (400, 4, 0)
 
-    def test_more_only_adds(self):
-        for dials in MIXTURES:
-            few, many = (poses(drawn(rate=rate, **dials)) for rate in (0.2, 0.9))
+    def test_a_higher_rate_only_adds(self):
+        for parameters in MIXTURES:
+            few, many = (poses(drawn(rate=rate, **parameters)) for rate in (0.2, 0.9))
             assert 200 < len(few) < len(many)
             assert few <= many
 
-    def test_a_rig_whose_axes_are_parallel(self):
+    def test_a_rig_with_parallel_axes(self):
         rig = Rig([Camera(np.diag([800.0, 800, 1]), np.eye(3), [0.5 * v, 0, 5], size=(800, 600)) for v in range(3)])
         found = drawn(rig, filmed(1000, 3), rate=0.5, views=1.0)
         assert np.isfinite(viewed_area(rig)[0]).all()
@@ -125,26 +125,26 @@ class TestRates:
 
 class TestLives:
     @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 8)), min_size=1, max_size=40))
-    def test_a_slot_holds_one_at_a_time_and_there_are_no_more_than_needed(self, spans):
+    def test_slots_hold_one_individual_at_a_time_and_are_as_few_as_possible(self, spans):
         born = np.array([b for b, _ in spans])
         last = born + [n for _, n in spans]
         slot = assign_slots(born, last)
-        thing, frame = frames_alive(born, last)
-        assert len(set(zip(slot[thing].tolist(), frame.tolist(), strict=True))) == len(thing)
+        individual, frame = frames_alive(born, last)
+        assert len(set(zip(slot[individual].tolist(), frame.tolist(), strict=True))) == len(individual)
         assert slot.max() + 1 == np.bincount(frame).max()
         for k in range(len(born)):
-            assert frame[thing == k].tolist() == list(range(born[k], last[k] + 1))
+            assert frame[individual == k].tolist() == list(range(born[k], last[k] + 1))
 
     @pytest.mark.parametrize("life", [0.0, 0.05, 0.5, 3.0])
-    def test_lives_are_as_long_as_asked(self, life):
-        """At the frames' times an exponential life is geometric: it lasts another frame with exp(-step / life)."""
+    def test_lives_have_the_configured_mean(self, life):
+        """In frames an exponential life is geometric: it lasts another frame with probability exp(-step / life)."""
         lives = BirthDeathProcess(KeyedDraws(1, STEP * np.arange(4000), 1), ("test",), life, max_rate=2.0)
         early = lives.born < 3500
         frames = (lives.last - lives.born + 1)[early]
         kept = np.exp(-STEP / life) if life else 0.0
         assert abs(frames.mean() - 1 / (1 - kept)) <= 5 * np.sqrt(kept) / (1 - kept) / np.sqrt(len(frames))
 
-    def test_phantoms_sit_still_while_they_live(self):
+    def test_phantoms_keep_their_place_during_their_life(self):
         life = 0.8
         found = drawn(ring(), filmed(1500), rate=0.5, life=life)
         before, after = found.present[:-1], found.present[1:]
@@ -155,7 +155,7 @@ class TestLives:
         moved = apart[same]
         assert np.nanmin(moved) > 0  # but not frozen
 
-    def test_without_a_life_every_frame_has_its_own(self):
+    def test_without_a_life_frames_are_independent(self):
         found = drawn(rate=1.0)
         both = found.present[:-1] & found.present[1:]
         apart = np.linalg.norm(found.keypoints[1:] - found.keypoints[:-1], axis=-1)
@@ -163,7 +163,7 @@ class TestLives:
 
 
 def ray_gaps(rig, found):
-    """How far rays (metres) pass by the nearest point to all rays of the same slot, frame and joint."""
+    """Return the largest distance, metres, of the rays of each slot, frame and joint from their nearest point."""
     gaps = []
     for t, s in np.ndindex(found.present.shape[0], found.present.shape[2]):
         for joint in range(0, 17, 4):
@@ -187,14 +187,14 @@ class TestInTheRoom:
         assert len(gaps) > 100
         assert gaps.max() < 1e-6
 
-    def test_rays_of_the_others_do_not(self):
+    def test_rays_of_phantoms_in_one_picture_do_not_meet(self):
         rig = ring()
         gaps = ray_gaps(rig, drawn(rig, filmed(80), rate=1.5, life=0.5))
         assert len(gaps) > 100
         assert np.median(gaps) > 0.05
 
     def test_every_view_that_contains_a_figure_sees_it(self):
-        """Triangulated from two views and projected into a third: on the image there means detected there."""
+        """Triangulated from two views and projected into a third: detected where the projection is on the image."""
         rig = ring(5)
         found = drawn(rig, filmed(200, 5), rate=0.5, views=1.0)
         checked = 0
@@ -207,12 +207,12 @@ class TestInTheRoom:
                 np.testing.assert_array_equal(
                     inside[: len(joints)] & found.present[t, view, s], found.scores[t, view, s, joints] > 0
                 )
-                if inside.sum() >= 7:  # of the 6 that make a figure one may lie at the very border
+                if inside.sum() >= 7:  # one of the 6 joints needed may lie at the border
                     assert found.present[t, view, s]
                     checked += 1
         assert checked > 100
 
-    def test_they_stand_where_the_cameras_look(self):
+    def test_figures_stand_where_the_cameras_look(self):
         rig = ring()
         middle, reach = viewed_area(rig)
         np.testing.assert_allclose(middle, 0.0, atol=0.05)
@@ -228,7 +228,7 @@ class TestInTheRoom:
         assert np.linalg.norm(ankles[:, :2] - middle, axis=1).max() > 0.6 * reach
         assert (np.abs(ankles[:, 2] - 0.1) < 0.25).mean() > 0.95
 
-    def test_a_view_more_leaves_those_in_one_picture_alone(self):
+    def test_more_views_change_no_phantom_in_one_picture(self):
         four = drawn(ring(4), rate=0.5)
         three = drawn(Rig(ring(4).cameras[:3]), rate=0.5)
         first = three.present.shape[2]
@@ -242,36 +242,36 @@ def meet(rig, views, pixels):
     return np.linalg.solve(across.sum(axis=0), (across @ rig.centers[list(views)][:, :, None]).sum(axis=0)[:, 0])
 
 
-def lent(found, views):
-    """Which phantoms have the upper body of somebody real, (T, V, S), within their jitter."""
+def borrowed(found, views):
+    """Return which phantoms have the upper body of a real person, (T, V, S), within their jitter."""
     upper = found.keypoints[..., None, :11, :] - views.pixels[:, :, None, :, :11]
     off = np.linalg.norm(upper, axis=-1).max(axis=-1).min(axis=-1)
     return found.present & (off < 0.04 * 300)
 
 
 class TestNumbers:
-    """What tells phantoms apart, for whatever is drawn about each."""
+    """Numbers that identify phantoms."""
 
-    DIALS = {"life": 0.5, "views": 0.5}  # noqa: RUF012
+    PARAMETERS = {"life": 0.5, "views": 0.5}  # noqa: RUF012
 
     @staticmethod
     def numbers(found):
-        """The number of each by where and when it is."""
+        """Return the number of each phantom by frame, view and keypoints."""
         places = np.argwhere(found.present).tolist()
         return {(t, v, found.keypoints[t, v, s].tobytes()): int(found.number[t, v, s]) for t, v, s in places}
 
     def test_more_phantoms_change_no_number(self):
-        few, many = (self.numbers(drawn(ring(), rate=rate, **self.DIALS)) for rate in (0.4, 1.5))
+        few, many = (self.numbers(drawn(ring(), rate=rate, **self.PARAMETERS)) for rate in (0.4, 1.5))
         assert len(many) > len(few) > 100
         assert few.items() <= many.items()
 
-    def test_a_figure_has_one_in_all_views_and_no_two_in_a_picture_have_the_same(self):
+    def test_a_figure_has_one_number_in_all_views_and_numbers_in_a_picture_are_unique(self):
         found = drawn(ring(), rate=1.5, life=0.5, views=1.0)
         alone = drawn(ring(), rate=1.5, life=0.5)
         for each in (found, alone):
             for t, v in np.argwhere(each.present.sum(axis=-1) > 1):
-                mine = each.number[t, v][each.present[t, v]]
-                assert len(np.unique(mine)) == len(mine)
+                numbers = each.number[t, v][each.present[t, v]]
+                assert len(np.unique(numbers)) == len(numbers)
         shared = np.where(found.present, found.number, -1)
         assert all(len(np.unique(slot[slot >= 0])) <= 1 for slot in shared.swapaxes(1, 2).reshape(-1, 4))
         views = [np.unique(np.where(alone.present, alone.number, -1)[:, v]) for v in range(4)]
@@ -279,13 +279,13 @@ class TestNumbers:
 
 
 class TestParts:
-    def test_the_share_made_of_parts_is_the_asked_one(self):
+    def test_the_share_made_of_parts_is_the_configured_one(self):
         views = filmed(1000)
         found = drawn(ring(), views, rate=0.5, parts=0.3)
-        assert within(lent(found, views).sum(), found.present.sum(), 0.3)
-        assert lent(drawn(ring(), views, rate=0.5), views).sum() == 0
+        assert within(borrowed(found, views).sum(), found.present.sum(), 0.3)
+        assert borrowed(drawn(ring(), views, rate=0.5), views).sum() == 0
 
-    def test_the_legs_are_the_neighbours(self):
+    def test_legs_are_those_of_the_neighbour(self):
         views = filmed(400)
         found = drawn(ring(), views, rate=0.5, parts=1.0)
         legs = found.keypoints[..., None, 11:, :] - views.pixels[:, :, None, :, 11:]
@@ -296,12 +296,12 @@ class TestParts:
         assert (first != second).all()
         assert 0.3 < first.mean() < 0.7
 
-    def test_who_is_alone_gives_the_legs_too_displaced(self):
+    def test_a_single_person_gives_displaced_legs(self):
         views = filmed(400, people=1)
         found = drawn(ring(), views, rate=0.5, parts=1.0)
         at = np.nonzero(found.present)
         legs = found.keypoints[at][:, 11:] - views.pixels[at[0], at[1], 0, 11:]
-        assert lent(found, views)[at].all()
+        assert borrowed(found, views)[at].all()
         shift = np.linalg.norm(np.nanmean(legs, axis=1), axis=-1)
         assert 5 < np.median(shift) < 60
         kept, whole = (
@@ -311,31 +311,31 @@ class TestParts:
         assert np.median(kept[inside] / whole[inside]) == pytest.approx(1.0, abs=0.05)
         assert 0.1 < np.std(np.log(kept[inside] / whole[inside])) < 0.2
 
-    def test_where_nobody_is_they_have_poses_of_their_own_at_the_same_rate(self):
+    def test_without_people_poses_are_separate_at_the_same_rate(self):
         empty = filmed(1000, people=0)
         found, plain = (drawn(ring(), empty, rate=0.5, parts=parts) for parts in (1.0, 0.0))
         assert found.present.sum() > 1500
         assert poses(found) == poses(plain)
 
-    def test_they_go_along_with_the_people(self):
+    def test_phantoms_of_parts_move_with_the_people(self):
         views = filmed(400)
         found = drawn(ring(), views, rate=0.5, parts=1.0, life=1.0)
-        assert lent(found, views)[found.present].all()
+        assert borrowed(found, views)[found.present].all()
 
-    def test_one_person_more_changes_only_those_made_of_that_one(self):
+    def test_one_more_person_changes_only_phantoms_of_its_parts(self):
         three = filmed(400, people=3)
         keys = ("pixels", "visibility", "boxes", "area_visible")
         two = Views(*(getattr(three, key)[:, :, :2] for key in keys), three.source)
         more, fewer = (drawn(ring(), views, rate=0.5, parts=1.0) for views in (three, two))
         np.testing.assert_array_equal(more.present, fewer.present)
         upper = [np.nan_to_num(found.keypoints[..., :11, :]) for found in (more, fewer)]
-        same = (np.abs(upper[0] - upper[1]) < 12).all(axis=(-1, -2))  # jitter goes by the height, legs and all
+        same = (np.abs(upper[0] - upper[1]) < 12).all(axis=(-1, -2))  # jitter is relative to the whole height
         changed = more.present & ~same
         assert within(changed.sum(), more.present.sum(), 1 / 3)
 
 
 class TestPoses:
-    def test_postures_stand_on_the_floor_and_have_two_sides_alike(self):
+    def test_postures_stand_on_the_floor_and_are_symmetric_on_average(self):
         joints = postures(np.random.default_rng(0).standard_normal((3000, NORMALS)))
         length = lambda a, b: np.linalg.norm(joints[:, a] - joints[:, b], axis=-1)  # noqa: E731
         for left, right in (((5, 7), (6, 8)), ((7, 9), (8, 10)), ((11, 13), (12, 14)), ((13, 15), (14, 16))):
@@ -345,12 +345,12 @@ class TestPoses:
         assert joints[..., 2].max() < 2.4
         assert (joints[:, 0, 0] > joints[:, 3:5, 0].mean(axis=1)).mean() > 0.99  # they face along x
         for left in (5, 7, 11, 13):
-            assert (joints[:, left, 1] > joints[:, left + 1, 1]).mean() > 0.99  # and their left is left
-            assert abs((joints[:, left, 1] + joints[:, left + 1, 1]).mean()) < 0.01  # neither side leans
+            assert (joints[:, left, 1] > joints[:, left + 1, 1]).mean() > 0.99  # with the left side at positive y
+            assert abs((joints[:, left, 1] + joints[:, left + 1, 1]).mean()) < 0.01  # no mean lean
         stature = joints[:, 1:3, 2].mean(axis=1)
         assert 1.45 < np.median(stature) < 1.70
 
-    def test_views_of_postures_fill_boxes_of_height_one(self):
+    def test_projected_postures_fill_boxes_of_height_one(self):
         rng = np.random.default_rng(0)
         joints = postures(rng.standard_normal((500, NORMALS)))
         flat = project_upright(joints, rng.uniform(0, 6.3, 500), rng.uniform(0, 0.5, 500))
@@ -359,8 +359,8 @@ class TestPoses:
         np.testing.assert_allclose(flat[..., 0].min(axis=1), -flat[..., 0].max(axis=1), atol=1e-12)
 
     @pytest.mark.parametrize("room", [0.0, 1.0])
-    def test_the_share_of_upright_poses_is_the_asked_one(self, room):
-        """An upright one has its nose over its ankles; joints anywhere have it so in half of all cases or fewer."""
+    def test_the_share_of_upright_poses_is_the_configured_one(self, room):
+        """Upright poses have the nose above the ankles; with joints anywhere, at most half of the poses have."""
 
         def topped(plausible):
             found = drawn(ring(), filmed(2000), rate=0.5, views=room, plausible=plausible)
@@ -378,7 +378,7 @@ class TestPoses:
         found = drawn(ring(), filmed(3000), rate=0.5, plausible=0.0)
         whole = (found.scores > 0).all(axis=-1)
         share = (found.keypoints[whole] - found.boxes[whole][:, None, :2]) / found.boxes[whole][:, None, 2:]
-        # Of 17 uniform draws, scaled to span 0..1, the extremes are 0 and 1 and the other 15 uniform between.
+        # Of 17 uniform draws scaled to span 0..1, the extremes are 0 and 1, and the other 15 are uniform between them.
         expected = (15 * 0.3 + 1) / 17
         for axis in (0, 1):
             below = (share[..., axis] < 0.3).mean()
@@ -386,7 +386,7 @@ class TestPoses:
 
 
 class TestReports:
-    def test_what_is_reported_holds_together(self):
+    def test_reported_fields_are_consistent(self):
         rig = ring()
         found = drawn(rig, rate=1.0, life=0.3, views=0.3, parts=0.3, plausible=0.7)
         t, v, s = np.nonzero(found.present)
@@ -405,7 +405,7 @@ class TestReports:
         assert (found.error == KeypointError.MISS).all()
 
     @pytest.mark.parametrize("room", [0.0, 1.0])
-    def test_scores_spread_as_asked_on_the_logit_scale(self, room):
+    def test_scores_have_the_configured_deviation_on_the_logit_scale(self, room):
         found = drawn(ring(), filmed(2000), rate=0.5, views=room, score=0.3, deviation=0.8)
         scores = found.scores[found.present & (found.scores > 0).all(axis=-1)]
         logit = np.log(scores / (1 - scores))
@@ -415,27 +415,27 @@ class TestReports:
         exact = drawn(rate=0.5, score=0.3, deviation=0.0)
         np.testing.assert_allclose(exact.scores[exact.present & (exact.scores > 0).all(axis=-1)], 0.3)
 
-    @pytest.mark.parametrize("dial", [{"score": 0.8}, {"deviation": 0.1}])
-    def test_scores_move_no_keypoint(self, dial):
+    @pytest.mark.parametrize("parameter", [{"score": 0.8}, {"deviation": 0.1}])
+    def test_score_parameters_change_no_keypoint(self, parameter):
         base = {"rate": 0.5, "views": 0.3, "parts": 0.3, "life": 0.5}
-        assert poses(drawn(**base)) == poses(drawn(**base, **dial))
+        assert poses(drawn(**base)) == poses(drawn(**base, **parameter))
 
-    def test_turning_a_dial_leaves_those_alone_that_it_does_not_take(self):
+    def test_a_parameter_changes_only_the_phantoms_that_it_takes(self):
         base = {"rate": 0.6, "life": 0.4}
         plain = poses(drawn(**base))
-        for dial, share in (({"views": 0.4}, 0.6), ({"parts": 0.4}, 0.6), ({"plausible": 0.6}, 0.6)):
-            kept = len(plain & poses(drawn(**base, **dial))) / len(plain)
+        for parameter, share in (({"views": 0.4}, 0.6), ({"parts": 0.4}, 0.6), ({"plausible": 0.6}, 0.6)):
+            kept = len(plain & poses(drawn(**base, **parameter))) / len(plain)
             assert abs(kept - share) < 0.15
 
-    def test_frames_more_at_the_end_change_nothing_before(self):
+    def test_more_frames_change_no_earlier_phantom(self):
         whole = filmed(300)
         part = Views(*(getattr(whole, k)[:120] for k in ("pixels", "visibility", "boxes", "area_visible", "source")))
-        dials = {"rate": 0.8, "life": 0.5, "views": 0.3, "parts": 0.3, "plausible": 0.8}
-        short, long = drawn(ring(), part, **dials), drawn(ring(), whole, **dials)
+        parameters = {"rate": 0.8, "life": 0.5, "views": 0.3, "parts": 0.3, "plausible": 0.8}
+        short, long = drawn(ring(), part, **parameters), drawn(ring(), whole, **parameters)
         assert len(poses(short)) > 200
         assert poses(short) == poses(long, 120)
 
-    def test_one_seed_is_one_result_and_another_is_another(self):
-        dials = {"rate": 0.5, "life": 0.5, "views": 0.3}
-        assert poses(drawn(**dials)) == poses(drawn(**dials))
-        assert not poses(drawn(**dials)) & poses(drawn(**dials, seed=4))
+    def test_equal_seeds_give_equal_results(self):
+        parameters = {"rate": 0.5, "life": 0.5, "views": 0.3}
+        assert poses(drawn(**parameters)) == poses(drawn(**parameters))
+        assert not poses(drawn(**parameters)) & poses(drawn(**parameters, seed=4))

@@ -14,9 +14,9 @@ from simharness.types.views import Visibility
 USUAL = {"good": 0.9, "jitter": 0.7, "miss": 0.4, "inversion": 0.6, "swap": 0.5}
 
 
-def scored(where=None, *, seed=1, dials=None, **config):
+def scored(where=None, *, seed=1, parameters=None, **config):
     where = where or world(frames=200, together=True)
-    dials = dials or {
+    parameters = parameters or {
         "scatter": 0.3,
         "jitter": 0.2,
         "miss": 0.2,
@@ -27,12 +27,12 @@ def scored(where=None, *, seed=1, dials=None, **config):
     conditions, tie = Conditions.of(where.views), Correlation()
     draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
     found = find_keypoints(
-        where.views, conditions, where.sequence, where.rig, Keypoints.model_validate(dials), tie, draws
+        where.views, conditions, where.sequence, where.rig, Keypoints.model_validate(parameters), tie, draws
     )
     return found, score_keypoints(found.error, found.guessed, conditions, Scores.model_validate(config), tie, draws)
 
 
-def test_by_default_every_keypoint_is_sure():
+def test_by_default_all_scores_are_one():
     found, scores = scored()
     absent = found.error == KeypointError.ABSENT
     assert (scores[~absent] == 1).all()
@@ -40,15 +40,15 @@ def test_by_default_every_keypoint_is_sure():
     assert absent.any()
 
 
-def test_scores_follow_the_error_that_was_drawn():
+def test_scores_follow_the_drawn_error():
     found, scores = scored(**USUAL)
     for kind in KeypointError:
-        mine = scores[found.error == kind]
-        assert len(mine) > 100
-        np.testing.assert_allclose(mine, USUAL.get(kind.name.lower(), 0.0))
+        chosen = scores[found.error == kind]
+        assert len(chosen) > 100
+        np.testing.assert_allclose(chosen, USUAL.get(kind.name.lower(), 0.0))
 
 
-def test_scores_spread_about_the_usual_on_the_logit_scale():
+def test_scores_have_the_configured_deviation_on_the_logit_scale():
     found, scores = scored(**USUAL, deviation=0.5)
     for kind, usual in USUAL.items():
         logits = scores[found.error == KeypointError[kind.upper()]]
@@ -58,20 +58,20 @@ def test_scores_spread_about_the_usual_on_the_logit_scale():
 
 
 @pytest.mark.parametrize(
-    ("dial", "of", "like"),
+    ("parameter", "error", "score"),
     [("overconfident", KeypointError.MISS, 0.9), ("underconfident", KeypointError.GOOD, 0.4)],
 )
-def test_some_misses_are_sure_and_some_hits_are_not(dial, of, like):
-    found, scores = scored(**USUAL, **{dial: 0.3})
+def test_some_misses_are_overconfident_and_some_good_keypoints_unsure(parameter, error, score):
+    found, scores = scored(**USUAL, **{parameter: 0.3})
     _, usual = scored(**USUAL)
-    mine = found.error == of
-    assert within((scores[mine] == like).sum(), mine.sum(), 0.3)
-    np.testing.assert_array_equal(scores[~mine], usual[~mine])
+    chosen = found.error == error
+    assert within((scores[chosen] == score).sum(), chosen.sum(), 0.3)
+    np.testing.assert_array_equal(scores[~chosen], usual[~chosen])
 
 
-def test_guesses_may_be_sure():
+def test_guesses_may_be_overconfident():
     where = world(frames=200, visibility=Visibility.OCCLUDED_BY_CLUTTER)
-    found, scores = scored(where, dials={"hallucinate": 0.5}, **USUAL, overconfident=1.0)
+    found, scores = scored(where, parameters={"hallucinate": 0.5}, **USUAL, overconfident=1.0)
     assert found.guessed.any()
     assert (scores[found.guessed] == 0.9).all()
 
@@ -79,17 +79,17 @@ def test_guesses_may_be_sure():
 def test_hidden_joints_and_kinds_of_joints_have_factors():
     seen = np.full((20, 3, 2, 17), Visibility.VISIBLE)
     seen[..., 7:9] = Visibility.SELF_OCCLUDED
-    _, scores = scored(world(frames=20, visibility=seen), dials={"scatter": 0.1}, good=0.8, hidden=0.5)
+    _, scores = scored(world(frames=20, visibility=seen), parameters={"scatter": 0.1}, good=0.8, hidden=0.5)
     np.testing.assert_allclose(scores[..., 7:9], 0.4)
     np.testing.assert_allclose(np.delete(scores, [7, 8], axis=-1), 0.8)
     _, scores = scored(
-        world(frames=20), dials={"scatter": 0.1}, good=0.8, joint={**dict.fromkeys(KINDS, 1.0), "hips": 0.5}
+        world(frames=20), parameters={"scatter": 0.1}, good=0.8, joint={**dict.fromkeys(KINDS, 1.0), "hips": 0.5}
     )
     for joint, name in enumerate(COCO17.joints):
         np.testing.assert_allclose(scores[..., joint], 0.4 if "hip" in name else 0.8)
 
 
-def test_scores_stay_in_range_and_what_is_reported_has_one():
+def test_scores_are_in_range_and_positive_where_reported():
     found, scores = scored(**USUAL, deviation=5.0, overconfident=0.3, underconfident=0.3)
     reported = found.error != KeypointError.ABSENT
     assert (scores[reported] >= MIN_SCORE).all()

@@ -13,7 +13,7 @@ SIZES = ("64x48", "96x72")
 
 
 def peaks(m=6, *, seed=0, scores=None, contested=0.0, **head):
-    """Detections with keypoints all over their boxes; for a share of them another place competes."""
+    """Return detections with keypoints anywhere in their boxes, a share of them with a rival."""
     rng = np.random.default_rng(seed)
     low, size = rng.uniform(-50, 800, (m, 2)), rng.uniform([40, 150], [200, 500], (m, 2))
     keypoints, others = low[:, None] + rng.random((2, m, 17, 2)) * size[:, None]
@@ -24,7 +24,7 @@ def peaks(m=6, *, seed=0, scores=None, contested=0.0, **head):
 
 class TestKeypoints:
     @pytest.mark.parametrize("size", SIZES)
-    def test_detections_from_the_maps_are_those_they_were_made_of(self, size):
+    def test_detections_read_from_the_maps_are_the_original_ones(self, size):
         made = peaks(20, contested=0.3, size=size)
         maps = made.heatmaps()
         assert maps.values.shape == (20, 17, *(int(cells) for cells in size.split("x")))
@@ -39,13 +39,13 @@ class TestKeypoints:
         st.floats(0.01, 1.0),
         st.integers(0, 1000),
     )
-    def test_the_strongest_mode_is_the_keypoint_whatever_the_head(self, size, width, floor, score, seed):
+    def test_the_strongest_mode_is_the_keypoint_for_any_head(self, size, width, floor, score, seed):
         made = peaks(2, seed=seed, scores=score, contested=0.5, size=size, width=width, floor=floor)
         maps = made.heatmaps()
         pixels, heights = maps.modes(3)
         np.testing.assert_allclose(pixels[:, :, 0], made.keypoints, atol=2e-3 * maps.stride.max())
         np.testing.assert_allclose(heights[:, :, 0], score, rtol=1e-3)
-        assert (heights[:, :, 2] == 0).all()  # the floor has no mode of its own
+        assert (heights[:, :, 2] == 0).all()  # the floor has no separate mode
         assert ((heights[:, :, 1] > 0) <= np.isfinite(made.rivals[..., 0])).all()
         assert maps.values.max() <= score + 1e-6
 
@@ -64,8 +64,8 @@ class TestKeypoints:
 
 
 class TestRivals:
-    def test_the_second_mode_is_the_rival_with_the_rest_of_the_chance(self):
-        """Where its bell rises above the first one's flank by cells, it is found as exactly as the first."""
+    def test_the_second_mode_is_the_rival_with_the_rest_of_the_probability(self):
+        """Where its peak is several cells away from the first, it is read as exactly as the first."""
         made = peaks(20, contested=1.0)
         maps = made.heatmaps()
         pixels, heights = maps.modes(2)
@@ -76,14 +76,14 @@ class TestRivals:
         np.testing.assert_allclose(heights[..., 1][far], expected[far], rtol=1e-3)
         np.testing.assert_allclose(pixels[..., 1, :][far], made.rivals[far], atol=0.01)
 
-    def test_near_ones_and_those_of_sure_joints_are_one_with_the_first(self):
+    def test_near_rivals_and_those_of_joints_with_score_one_have_no_peak(self):
         sure = peaks(20, contested=1.0, scores=1.0)
         near = peaks(20, contested=1.0, scores=0.6)
         near.rivals[:] = near.keypoints + 2.9 * 2.0 * near.heatmaps().stride[:, None] * [0, 1]
         for made in (sure, near, peaks(20, scores=0.6)):
             assert (made.heatmaps().modes(2)[1][..., 1] == 0).all()
 
-    def test_the_dial(self):
+    def test_rivals_limits_the_height_of_second_peaks(self):
         for most in (0.0, 0.2, 0.8):
             seconds = peaks(6, scores=0.5, contested=1.0, rivals=most).heatmaps().modes(2)[1][..., 1]
             assert (seconds <= most * 0.5 * 1.001).all()
@@ -91,7 +91,7 @@ class TestRivals:
 
 
 class TestAbsent:
-    def test_what_is_not_reported_stays_absent(self):
+    def test_absent_joints_stay_absent(self):
         made = peaks(6, contested=0.5, floor=0.2)
         made.keypoints[1, 3], made.scores[1, 3] = np.nan, 0.0
         made.keypoints[2], made.scores[2] = np.nan, 0.0
@@ -100,12 +100,12 @@ class TestAbsent:
         assert (read.detected == (made.scores > 0)).all()
         assert (maps.values[1, 3] == 0).all()
 
-    def test_the_floor_is_where_nothing_is_but_under_a_faint_peak(self):
+    def test_the_floor_is_lower_than_a_faint_peak(self):
         for score, height in ((0.9, 0.05), (0.06, 0.03)):
             values = peaks(scores=score, floor=0.05).heatmaps().values
             assert np.median(values) == pytest.approx(height, rel=0.1)
             assert values.min() > 0.85 * height
-            assert (np.diff(values, axis=-1) == 0).mean() < 0.01  # no plateaus, which take long to search for modes
+            assert (np.diff(values, axis=-1) == 0).mean() < 0.01  # no plateaus, in which modes are slow to search
         assert np.median(peaks(floor=0.0).heatmaps().values) < 1e-6
 
     def test_a_head_sees_nothing_outside_its_crop(self):
@@ -142,7 +142,7 @@ class TestAbsent:
 
 
 def looking_in(bearings):
-    """Cameras about the origin, 5 m away and 1 m above the floor."""
+    """Return cameras that face the origin from 5 m, 1 m above the floor."""
     cameras = []
     for angle in bearings:
         forward = -np.array([np.cos(angle), np.sin(angle), 0])
@@ -152,8 +152,8 @@ def looking_in(bearings):
     return Rig(cameras)
 
 
-def test_the_method_makes_use_of_rivals():
-    """Left and right knee swapped in one view: the second peaks there say where they are."""
+def test_the_method_uses_rivals():
+    """Left and right knee are exchanged in one view; its second peaks are at their true places."""
     rig = looking_in([0.0, 1.2, 2.6, 4.1])
     body = np.array(
         [[0, 0.12, 1.55], [0.03, 0.09, 1.59], [-0.03, 0.09, 1.59], [0.07, 0, 1.57], [-0.07, 0, 1.57]]

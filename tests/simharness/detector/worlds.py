@@ -1,4 +1,4 @@
-"""People in pictures without pictures: what a detector errs about does not depend on how the views were made."""
+"""Ground truth of people in pictures without rendering, for tests of the detector."""
 
 from dataclasses import dataclass
 
@@ -21,10 +21,10 @@ class World:
 
 
 def world(frames=60, views=3, people=2, *, visibility=Visibility.VISIBLE, height=300.0, together=False, rate=RATE):
-    """People with joints anywhere in boxes of ``height`` pixels; ``together`` they stand in one another's boxes."""
+    """Return people with joints anywhere in boxes of ``height`` pixels; ``together``: with overlapping boxes."""
     rig = Rig([Camera(np.diag([800.0, 800, 1]), np.eye(3), [0.5 * v, 0, 5], size=(1600, 900)) for v in range(views)])
     shape = (frames, views, people)
-    # Of every person a stream of its own, so that more people are more people.
+    # A separate stream for each person, so that more people change no other person.
     drawn = [np.random.default_rng(person).random((frames, views, 18, 2)) for person in range(people)]
     draws = np.stack(drawn, axis=2) if people else np.zeros((*shape, 18, 2))
     size = np.array([0.4 * height, height])
@@ -39,7 +39,7 @@ def world(frames=60, views=3, people=2, *, visibility=Visibility.VISIBLE, height
     return World(sequence, Views(pixels, seen, boxes, np.zeros(shape, int), source), rig)
 
 
-def within(count, trials, chance):
-    """Whether that many of independent trials is what a chance makes likely: but for one in a million."""
-    low, high = binom.interval(1 - 1e-6, trials, chance)
+def within(count, trials, probability):
+    """Return whether a count of independent trials is in the central interval of probability 1 - 1e-6."""
+    low, high = binom.interval(1 - 1e-6, trials, probability)
     return low <= count <= high

@@ -10,19 +10,19 @@ from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample, of_shelf
 from simharness.scenario.sections.detector import Detector
 
 
-def told(twin, *, frames=20, known=None, **dials):
-    sample = twin.detected(Detector.model_validate(dials), seed=3, known=known)
+def associated(twin, *, frames=20, known=None, **parameters):
+    sample = twin.detected(Detector.model_validate(parameters), seed=3, known=known)
     sample = Sample("part", sample.rig, sample.time[:frames], sample.reference[:frames], sample.detections[:frames])
     pixels = np.stack([camera.project(sample.reference) for camera in twin.rig], axis=1)
     return sample, associate(sample, pixels, sizes.boxes(sample.reference, twin.rig))
 
 
-def test_perfect_detections_go_to_their_own_person(twin):
-    _, found = told(twin)
-    there = (np.isfinite(found.keypoints[..., LIMB_JOINTS, 0]).sum(axis=-1) >= 3) & found.detected
-    assert there.mean() > 0.9
-    np.testing.assert_allclose(found.keypoints[there], np.where(
-        np.isfinite(found.keypoints[there]), twin.views.pixels[:20][there], np.nan
+def test_perfect_detections_are_associated_with_their_person(twin):
+    _, found = associated(twin)
+    detected = (np.isfinite(found.keypoints[..., LIMB_JOINTS, 0]).sum(axis=-1) >= 3) & found.detected
+    assert detected.mean() > 0.9
+    np.testing.assert_allclose(found.keypoints[detected], np.where(
+        np.isfinite(found.keypoints[detected]), twin.views.pixels[:20][detected], np.nan
     ))  # fmt: skip
     assert found.false.sum() == found.duplicates.sum() == 0
     assert found.unannotated.shape[1] == 0
@@ -31,26 +31,26 @@ def test_perfect_detections_go_to_their_own_person(twin):
     np.testing.assert_allclose(found.consensus[seen], twin.sequence.joints[:20][seen], atol=1e-3)
 
 
-def test_people_whom_nobody_annotated_are_strangers_and_not_false(twin):
+def test_people_without_annotation_are_not_false_positives(twin):
     known = np.ones((len(twin.sequence), 4), bool)
     known[:, 2] = False
-    _, found = told(twin, known=known)
+    _, found = associated(twin, known=known)
     assert not found.detected[:, :, 2].any()
     assert found.false.sum() <= 2  # of 100 pictures
     near = np.linalg.norm(found.unannotated - twin.sequence.joints[:20, 2, None], axis=-1)
     assert (np.nanmin(np.nanmean(near, axis=-1), axis=1) < 0.01).all()
 
 
-def test_phantoms_are_false_and_repetitions_are_not(twin):
-    _, found = told(twin, frames=100, phantoms={"rate": 0.5}, boxes={"duplicates": 0.2})
+def test_phantoms_are_false_positives_and_duplicates_are_not(twin):
+    _, found = associated(twin, frames=100, phantoms={"rate": 0.5}, boxes={"duplicates": 0.2})
     assert found.false.mean() == pytest.approx(0.5, abs=5 * np.sqrt(0.5 / 500))
     share = found.duplicates.sum() / found.detected.sum()
     assert share == pytest.approx(0.2, abs=5 * np.sqrt(0.16 / found.detected.sum()))
     assert ((found.false_scores > 0).any(axis=-1).sum(axis=-1) == found.false).all()
 
 
-def test_too_few_joints_are_a_fragment(twin):
-    sample, _ = told(twin, frames=3)
+def test_detections_with_too_few_joints_are_fragments(twin):
+    sample, _ = associated(twin, frames=3)
     scores = np.zeros((1, 17))
     scores[0, [0, 5]] = 0.5
     odd = Detections.from_keypoints([1], np.full((1, 17, 2), 50.0), scores)
@@ -62,7 +62,7 @@ def test_too_few_joints_are_a_fragment(twin):
     assert not found.detected.any()
 
 
-def test_a_simulation_tells_no_more_than_shelf(twin):
+def test_a_simulated_sample_has_no_more_truth_than_shelf(twin):
     known = np.ones((len(twin.sequence), 4), bool)
     known[:10, 1] = False
     sample = of_simulation(twin.sequence.joints, twin.sequence.time, twin.detected(Detector()).detections, twin.rig,
@@ -72,7 +72,7 @@ def test_a_simulation_tells_no_more_than_shelf(twin):
     assert sample.step == pytest.approx(0.04)
 
 
-def test_half_a_person_is_refused(twin):
+def test_partly_known_people_are_refused(twin):
     joints = twin.sequence.joints[:2].copy()
     joints[1, 3, 7] = np.nan
     with pytest.raises(
@@ -83,7 +83,7 @@ def test_half_a_person_is_refused(twin):
         Sample("bad", twin.rig, twin.sequence.time[:2], twin.sequence.joints[:2], [Detections.empty()])
 
 
-def test_shelf_joints_are_in_their_places(shared_data):
+def test_joints_of_shelf_are_mapped_to_coco(shared_data):
     from simharness.reality.shelf import read_shelf
 
     shelf = read_shelf(shared_data / "shelf", frames=range(300, 310))

@@ -17,27 +17,27 @@ def seen(twin):
     return joints, keypoints, oks_units(boxes(joints, twin.rig))
 
 
-def test_moved_is_what_the_detector_does(twin):
+def test_apply_bias_moves_joints_as_the_detector_does(twin):
     joints = twin.sequence.joints[:5]
     np.testing.assert_allclose(apply_bias(joints, EXPECTED), joints + world_offsets(joints, BIAS), atol=1e-12)
 
 
-def test_offsets_are_found_without_noise(twin):
+def test_offsets_are_exact_without_noise(twin):
     joints, keypoints, unit = seen(twin)
     np.testing.assert_allclose(fit_bias(LinearisedBias.of(joints, keypoints, unit, twin.rig)), EXPECTED, atol=2e-4)
 
 
-def test_and_among_misses_and_scatter(twin):
+def test_offsets_are_robust_to_misses_and_scatter(twin):
     joints, keypoints, unit = seen(twin)
     rng = np.random.default_rng(0)
     noise = 0.4 * rng.normal(size=keypoints.shape)
-    noise[rng.random(unit.shape) < 0.2] *= 20  # these are far off, all ways alike
+    noise[rng.random(unit.shape) < 0.2] *= 20  # these are far off, in all directions
     noisy = keypoints + unit[..., None] * noise
     noisy[rng.random(unit.shape) < 0.1] = np.nan
     np.testing.assert_allclose(fit_bias(LinearisedBias.of(joints, noisy, unit, twin.rig)), EXPECTED, atol=0.004)
 
 
-def test_a_kind_that_nobody_reports_has_no_offset(twin):
+def test_a_kind_of_joint_without_detections_has_no_offset(twin):
     joints, keypoints, unit = seen(twin)
     keypoints[..., np.array(KIND_OF_JOINT) == KINDS.index("knees"), :] = np.nan
     found = fit_bias(LinearisedBias.of(joints, keypoints, unit, twin.rig))

@@ -15,7 +15,7 @@ GOOD, JITTER, MISS, INVERSION, SWAP, ABSENT = KeypointError
 
 
 @given(st.floats(0, 12), st.floats(0, 2 * np.pi), st.integers(0, 16), st.integers(0, 1000))
-def test_classes_are_what_the_distances_say(far, turn, joint, seed):
+def test_classes_follow_from_distances(far, turn, joint, seed):
     rng = np.random.default_rng(seed)
     target, other, unit = rng.uniform(0, 100, (17, 2)), rng.uniform(0, 100, (17, 2)), rng.uniform(2, 20, 17)
     keypoints = target.copy()
@@ -24,10 +24,10 @@ def test_classes_are_what_the_distances_say(far, turn, joint, seed):
     def near(place):
         return np.linalg.norm(keypoints[joint] - place) / unit[joint]
 
-    own, mirrored, swapped = near(target[joint]), near(target[MIRROR[joint]]), near(other[joint])
-    if own < 1.14:
+    distance, mirrored, swapped = near(target[joint]), near(target[MIRROR[joint]]), near(other[joint])
+    if distance < 1.14:
         expected = GOOD
-    elif own < 2.35:
+    elif distance < 2.35:
         expected = JITTER
     elif min(mirrored, swapped) >= 1.14:
         expected = MISS
@@ -39,7 +39,7 @@ def test_classes_are_what_the_distances_say(far, turn, joint, seed):
 
 
 @pytest.mark.parametrize(("mirrored", "swapped", "expected"), [(0.3, 0.8, INVERSION), (0.8, 0.3, SWAP)])
-def test_between_the_counterpart_and_somebody_else_the_nearer_one_counts(mirrored, swapped, expected):
+def test_the_nearer_of_counterpart_and_neighbour_decides(mirrored, swapped, expected):
     target = np.zeros((17, 2))
     target[8] = [10.0, 0.0]  # the right elbow; the left one is at the origin
     keypoints, other = target.copy(), target + 50.0
@@ -48,7 +48,7 @@ def test_between_the_counterpart_and_somebody_else_the_nearer_one_counts(mirrore
     assert classify(keypoints, target, np.ones(17), other=other)[7] == expected
 
 
-def test_what_is_not_reported_or_unknown_is_absent():
+def test_joints_not_reported_or_unknown_are_absent():
     target = np.random.default_rng(0).uniform(0, 100, (17, 2))
     keypoints = target.copy()
     keypoints[3] = np.nan
@@ -58,7 +58,7 @@ def test_what_is_not_reported_or_unknown_is_absent():
     assert np.flatnonzero(error == ABSENT).tolist() == [3, 8]
 
 
-def test_misses_that_go_all_ways_fall_on_a_place_as_often_as_opposite_to_it():
+def test_isotropic_misses_fall_on_a_place_as_often_as_opposite_to_it():
     rng = np.random.default_rng(0)
     n = 20000
     target = np.zeros((n, 17, 2))
@@ -66,15 +66,15 @@ def test_misses_that_go_all_ways_fall_on_a_place_as_often_as_opposite_to_it():
     turn, far = rng.uniform(0, 2 * np.pi, (n, 17)), rng.uniform(2.35, 4.29, (n, 17))
     keypoints = np.stack([far * np.cos(turn), far * np.sin(turn)], axis=-1)
     error = classify(keypoints, target, np.ones((n, 17)), other=place)
-    taken, chance = (error == SWAP).sum(), opposite_hits(keypoints, target, place, np.ones((n, 17))).sum()
+    taken, opposite = (error == SWAP).sum(), opposite_hits(keypoints, target, place, np.ones((n, 17))).sum()
     assert taken > 10000
     assert not opposite_hits(keypoints, target, place, np.ones((n, 17)))[error == SWAP].any()
-    assert abs(int(taken) - int(chance)) < 5 * np.sqrt(taken + chance)
+    assert abs(int(taken) - int(opposite)) < 5 * np.sqrt(taken + opposite)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_drawn_labels_and_distances_agree(twin, seed):
-    """With the truth known: at least 95 % of the reported joints are of the class that was drawn."""
+    """At least 95 % of the reported joints have the drawn class when classified by distance."""
     config = Detector.model_validate(
         {
             "keypoints": {"scatter": 0.4, "jitter": 0.15, "miss": 0.1, "inversion": 0.06, "swap": 0.06},
@@ -91,14 +91,14 @@ def test_drawn_labels_and_distances_agree(twin, seed):
         v, p = detections.view, truth.person
         neighbour = conditions.neighbour[t, v, p]
         other = np.where((neighbour >= 0)[:, None, None], target[t, v, neighbour], np.nan)
-        told = classify(detections.keypoints, target[t, v, p], conditions.unit[t, v, p], other=other)
+        classified = classify(detections.keypoints, target[t, v, p], conditions.unit[t, v, p], other=other)
         reported = truth.error != ABSENT
-        agree += (told == truth.error)[reported].tolist()
-        kinds |= set(told[reported].tolist())
+        agree += (classified == truth.error)[reported].tolist()
+        kinds |= set(classified[reported].tolist())
     assert kinds == {GOOD, JITTER, MISS, INVERSION, SWAP}
     assert len(agree) > 5000
     assert np.mean(agree) > 0.95
 
 
-def test_the_mirror_is_the_skeletons():
+def test_mirror_is_that_of_the_skeleton():
     assert COCO17.joints[MIRROR[COCO17.index("left_knee")]] == "right_knee"

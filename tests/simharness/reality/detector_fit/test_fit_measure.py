@@ -65,24 +65,24 @@ def mean(measurement, key, kinds=LIMB_KINDS):
 
 
 @pytest.mark.parametrize(
-    ("key", "asked", "within"),
+    ("key", "expected", "within"),
     [
         ("keypoints.drop.visible", 0.05, 0.015),
         ("keypoints.drop.self_occluded", 0.3, 0.03),
         ("keypoints.drop.occluded", 0.6, 0.06),
-        ("keypoints.swap", 0.1, 0.025),  # somebody else may overlap more by the boxes that skeletons make
+        ("keypoints.swap", 0.1, 0.025),  # by boxes from skeletons, another person may overlap more
         ("keypoints.inversion", 0.08, 0.01),
         ("keypoints.miss", 0.1, 0.01),
         ("keypoints.jitter", 0.15, 0.015),
         ("keypoints.scatter", 0.4, 0.015),
     ],
 )
-def test_what_was_put_in_for_the_joints_is_measured(alone, key, asked, within):
-    assert mean(alone, key) == pytest.approx(asked, abs=within)
+def test_parameters_of_joints_are_recovered(alone, key, expected, within):
+    assert mean(alone, key) == pytest.approx(expected, abs=within)
 
 
 @pytest.mark.parametrize(
-    ("key", "asked", "within"),
+    ("key", "expected", "within"),
     [
         ("keypoints.stray", 0.3, 0.06),
         ("keypoints.self_occluded", 1.5, 0.2),
@@ -106,7 +106,7 @@ def test_what_was_put_in_for_the_joints_is_measured(alone, key, asked, within):
         ("bias.up.hips", 0.03, 0.003),
         ("bias.outward.wrists", -0.02, 0.003),
         ("bias.up.knees", 0.0, 0.003),
-        # Every frame and view by itself.
+        # Frames and views are independent.
         ("correlation.life", 0.0, 0.02),
         ("correlation.views", 0.0, 0.04),
         ("correlation.limb", 0.0, 0.1),
@@ -114,12 +114,12 @@ def test_what_was_put_in_for_the_joints_is_measured(alone, key, asked, within):
         ("correlation.scatter_views", 0.0, 0.03),
     ],
 )
-def test_and_for_the_rest(alone, key, asked, within):
-    assert alone[key].value == pytest.approx(asked, abs=within)
+def test_other_parameters_are_recovered(alone, key, expected, within):
+    assert alone[key].value == pytest.approx(expected, abs=within)
 
 
 @pytest.mark.parametrize(
-    ("key", "asked", "within"),
+    ("key", "expected", "within"),
     [
         ("correlation.life", 0.2, 0.04),
         ("correlation.views", 0.3, 0.1),
@@ -131,14 +131,14 @@ def test_and_for_the_rest(alone, key, asked, within):
         ("phantoms.life", 0.4, 0.25),
     ],
 )
-def test_what_errors_have_to_do_with_each_other_is_measured(together, key, asked, within):
-    assert together[key].value == pytest.approx(asked, abs=within)
+def test_correlations_and_lives_are_recovered(together, key, expected, within):
+    assert together[key].value == pytest.approx(expected, abs=within)
 
 
-def test_what_lasts_has_wider_intervals(alone, together):
+def test_lasting_errors_have_wider_intervals(alone, together):
     def width(measurement, kind):
-        figure = measurement[f"keypoints.jitter.{kind}"]
-        return (figure.high - figure.low) * np.sqrt(figure.count / figure.value)
+        value = measurement[f"keypoints.jitter.{kind}"]
+        return (value.high - value.low) * np.sqrt(value.count / value.value)
 
     assert np.mean([width(together, kind) / width(alone, kind) for kind in LIMB_KINDS]) > 1.5
 
@@ -152,21 +152,21 @@ def test_a_perfect_detector_has_no_errors(twin):
         assert found[f"share.drop.{kind}"].value < 0.002
     assert found["boxes.missed"].value == found["phantoms.rate"].value == found["boxes.duplicates"].value == 0
     assert not found["correlation.views"].known
-    never = found["keypoints.miss.knees"]  # what never happened may still happen
+    never = found["keypoints.miss.knees"]  # an error without an occurrence may still be possible
     assert never.value == 0
     assert 0 < never.high < 0.01
 
 
 def test_misses_are_not_taken_for_inversions_and_swaps(twin):
-    """Half of all joints are missed, and some of them land on another joint by chance."""
+    """Half of all joints are misses, and some of them are near another joint by chance."""
     config = Detector.model_validate({"keypoints": {"scatter": 0.2, "miss": 0.5}})
     found = measure(twin.detected(config), resamples=10)
     assert mean(found, "share.inversion") < 0.004
     assert mean(found, "share.swap") < 0.004
-    assert mean(found, "share.miss") == pytest.approx(0.5, abs=0.03)  # at the border some are taken for jitter
+    assert mean(found, "share.miss") == pytest.approx(0.5, abs=0.03)  # some near the border count as jitter
 
 
-def test_figures_agree_as_far_as_both_intervals_go():
+def test_values_agree_within_the_interval_of_their_difference():
     one = MeasuredValue(0.10, 0.07, 0.14, 100)
     assert one.agrees(MeasuredValue(0.15, 0.12, 0.2, 100))  # 0.05 = the hypotenuse of 0.04 and 0.03
     assert not one.agrees(MeasuredValue(0.1501, 0.12, 0.2, 100))
@@ -174,14 +174,14 @@ def test_figures_agree_as_far_as_both_intervals_go():
     assert MeasuredValue(0.15, 0.12, 0.2, 100).agrees(one)
 
 
-def test_the_profile_says_what_was_measured(twin, tmp_path):
+def test_the_profile_contains_the_measured_values(twin, tmp_path):
     sample = twin.detected(Detector.model_validate(ALONE), seed=1)
-    fitted = fit(sample, name="mine", command="a command", resamples=50)
-    write_profile(fitted, tmp_path / "mine.toml")
-    data = tomllib.loads((tmp_path / "mine.toml").read_text())
+    fitted = fit(sample, name="fitted", command="a command", resamples=50)
+    write_profile(fitted, tmp_path / "fitted.toml")
+    data = tomllib.loads((tmp_path / "fitted.toml").read_text())
     profile = Detector.model_validate(data)
-    assert profile == fitted.profile == Detector.model_validate(settings(fitted.real, name="mine"))
-    assert profile.name == "mine"
+    assert profile == fitted.profile == Detector.model_validate(settings(fitted.real, name="fitted"))
+    assert profile.name == "fitted"
     assert profile.keypoints.miss.wrists == pytest.approx(fitted.real["keypoints.miss.wrists"].value, abs=1e-4)
     assert profile.keypoints.drop.occluded.nose == pytest.approx(
         fitted.real["keypoints.drop.occluded.nose"].value, abs=1e-4
@@ -196,31 +196,31 @@ def test_the_profile_says_what_was_measured(twin, tmp_path):
         if line.startswith("knees = "):
             assert "; n = " in line
     with pytest.raises(ValueError, match=r"--out .*nowhere.*: cannot be written: No such file or directory"):
-        write_profile(fitted, tmp_path / "nowhere" / "mine.toml")
+        write_profile(fitted, tmp_path / "nowhere" / "fitted.toml")
 
 
-def test_nothing_to_measure_is_said(twin):
+def test_samples_without_people_or_detections_are_refused(twin):
     sample = twin.detected(Detector())
-    nobody = replace(sample, reference=np.full(sample.reference.shape, np.nan))
+    unknown = replace(sample, reference=np.full(sample.reference.shape, np.nan))
     with pytest.raises(ValueError, match="expected people with known joints, got none in 300 frames"):
-        measure(nobody)
+        measure(unknown)
     blind = replace(sample, detections=tuple(Detections.empty() for _ in sample.detections))
     with pytest.raises(ValueError, match="no detection is near any of the known people"):
         measure(blind)
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_a_profile_measured_on_its_own_simulation_is_given_back(twin, seed):
-    """The round trip without real data: measure, simulate with what was measured, measure again."""
+def test_a_profile_measured_on_its_own_simulation_is_recovered(twin, seed):
+    """Round trip without real data: measure, simulate with the measured profile, measure again."""
     first = fit(twin.detected(Detector.model_validate(TOGETHER), seed=seed), resamples=200)
     again = measure(twin.detected(first.profile, seed=seed + 10), resamples=200)
     different, compared = agreement(first.real, again)
     assert compared > 90
-    # Of independent figures 5 % would differ; but many hang together, so up to a tenth may.
+    # Of independent values 5 % would differ; many are correlated, so up to a tenth may.
     assert len(different) <= 0.1 * compared, different
 
 
-def test_another_profile_is_told_from_it(alone, together):
+def test_different_profiles_disagree(alone, together):
     """The round trip can fail."""
     different, compared = agreement(alone, together)
     assert len(different) > 0.3 * compared
@@ -237,7 +237,7 @@ def fitted(shelf):
 
 
 def settings_of(detector):
-    """All values of a detector, by dotted key."""
+    """Return all parameters of a detector by dotted key."""
     flat = {}
 
     def take(path, value):
@@ -255,30 +255,32 @@ def settings_of(detector):
 
 
 class TestShelf:
-    def test_a_real_detector_does_not_report_what_it_cannot_see(self, fitted):
+    def test_a_real_detector_does_not_report_hidden_joints(self, fitted):
         for kind in ("nose", "eyes", "ears"):
-            visible, own = (fitted.real[f"keypoints.drop.{sight}.{kind}"] for sight in ("visible", "self_occluded"))
+            visible, self_occluded = (
+                fitted.real[f"keypoints.drop.{occlusion}.{kind}"] for occlusion in ("visible", "self_occluded")
+            )
             assert visible.high < 0.1
-            assert own.low > 0.5
+            assert self_occluded.low > 0.5
         assert fitted.real["keypoints.drop.occluded.wrists"].low > fitted.real["keypoints.drop.visible.wrists"].high
         assert fitted.real["keypoints.drop.visible.shoulders"].high < 0.03
 
-    def test_the_profile_that_comes_with_the_project_is_this_one(self, fitted):
+    def test_the_shipped_profile_is_reproduced(self, fitted):
         """Made by `simharness fit-detector shelf FOLDER --out scenarios/detectors/openpose-shelf.toml`."""
         shipped = settings_of(read_profile("openpose-shelf"))
         made = settings_of(fitted.profile)
         assert shipped.keys() == made.keys()
-        for key, value in made.items():  # to the last digit but one, for sums differ by the machine
+        for key, value in made.items():  # except the last digit, because sums differ between machines
             assert shipped[key] == (pytest.approx(value, abs=2e-3) if isinstance(value, float) else value), key
 
-    def test_it_takes_hips_to_be_higher_than_the_truth_does(self, fitted):
+    def test_its_hips_are_higher_than_those_of_the_truth(self, fitted):
         assert 0.03 < fitted.real["bias.up.hips"].low < fitted.real["bias.up.hips"].high < 0.06
 
     @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-    def test_its_simulated_twin_is_measured_alike(self, shelf, fitted, seed):
-        """The round trip: on the rig of Shelf, four people of whom as many are known, 12 s.
+    def test_its_simulated_twin_agrees(self, shelf, fitted, seed):
+        """Round trip on the rig of Shelf: four people, as many known as in Shelf, 12 s.
 
-        Each figure is compared with the interval of the difference of both (95 %, so 1 of 20 may differ by chance, and
+        Each value is compared with the interval of the difference of both (95 %, so 1 of 20 may differ by chance, and
         they come in bunches): at least nine of ten must agree.
         """
         different, compared = agreement(fitted.real, twin_of(fitted, shelf, seed=seed))

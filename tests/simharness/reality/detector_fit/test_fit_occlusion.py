@@ -6,7 +6,7 @@ from simharness.reality.detector_fit.shelf_twin import count_occlusion
 from simharness.scenario.sections.detector import Detector
 
 
-def test_boxes_are_those_of_silhouettes(twin):
+def test_boxes_match_those_of_silhouettes(twin):
     drawn, made = twin.views.boxes, sizes.boxes(twin.sequence.joints, twin.rig)
     whole = (twin.views.visibility != 4).all(axis=-1)
     assert whole.sum() > 3000
@@ -15,7 +15,7 @@ def test_boxes_are_those_of_silhouettes(twin):
     assert np.quantile(abs(ratio - 1), 0.9) < 0.12
 
 
-def test_who_is_behind_the_camera_or_unknown_has_no_box(twin):
+def test_people_behind_the_camera_or_unknown_have_no_box(twin):
     joints = twin.sequence.joints[:2].copy()
     joints[0, 0] = np.nan
     made = sizes.boxes(joints, twin.rig)
@@ -23,19 +23,19 @@ def test_who_is_behind_the_camera_or_unknown_has_no_box(twin):
     assert (made[1, :, 0, 2] > 0).any()
 
 
-def test_what_skeletons_tell_is_as_right_as_CONFUSION_says(twin):
+def test_occlusion_from_skeletons_has_the_accuracy_of_CONFUSION(twin):
     sample = twin.detected(Detector.model_validate({"keypoints": {"scatter": 0.3, "drop": {"self_occluded": 0.3}}}))
     counted = count_occlusion(twin, sample)
     shares = counted / counted.sum(axis=-1, keepdims=True)
     assert counted.sum(axis=(0, 2)).min() > 1000
-    # Another scene than those that CONFUSION is of: it differs by a few per cent, and is right nine times of ten.
+    # The scene is none of those behind CONFUSION: shares differ by a few per cent, and 90 % are correct.
     labels = counted.sum(axis=-1, keepdims=True) + 0 * counted
     assert np.average(abs(shares - occlusion.CONFUSION), weights=labels) < 0.035
     assert np.trace(counted.sum(axis=0)) / counted.sum() > 0.9
     np.testing.assert_allclose(occlusion.CONFUSION.sum(axis=-1), 1.0)
 
 
-def test_a_face_that_detections_agree_on_turns_the_rest(twin):
+def test_triangulated_joints_of_the_face_turn_the_usual_face(twin):
     joints = twin.sequence.joints[:50]
     whole, normals = occlusion.complete_face(joints, joints)
     np.testing.assert_allclose(whole, joints)
@@ -49,7 +49,7 @@ def test_a_face_that_detections_agree_on_turns_the_rest(twin):
     assert worse < 0.1
 
 
-def test_what_is_off_the_picture_is_outside(twin):
+def test_joints_off_the_picture_are_outside(twin):
     joints = twin.sequence.joints[:5] + [50.0, 0, 0]
     labels = occlusion.occlusion_classes(*occlusion.complete_face(joints, joints), np.zeros((5, 0, 17, 3)), twin.rig)
     inside = np.stack([camera.inside(camera.project(joints)) for camera in twin.rig], axis=1)

@@ -28,24 +28,24 @@ def printed(show, *given):
 def test_the_table_has_every_kind_of_joint_with_its_interval(measured):
     text = printed(print_measurement, measured)
     classes = text[: text.index("Not reported")]
-    figure = measured["share.miss.wrists"]
+    value = measured["share.miss.wrists"]
     for kind in KINDS:
         assert sum(line.startswith(kind) for line in classes.splitlines()) == 1
     row = next(line for line in classes.splitlines() if line.startswith("wrists"))
-    assert f"{100 * figure.value:.1f}  {100 * figure.low:.1f}–{100 * figure.high:.1f}" in row
+    assert f"{100 * value.value:.1f}  {100 * value.low:.1f}–{100 * value.high:.1f}" in row
     nose = next(line for line in classes.splitlines() if line.startswith("nose"))
-    assert nose.count("–") == 6  # an interval of drops, and five figures that nobody knows
+    assert nose.count("–") == 6  # the interval of drops, and five unknown values
     assert "-0 " not in text
 
 
-def test_what_differs_is_named(measured):
+def test_differing_parameters_are_listed(measured):
     other = replace(measured, values={**measured.values, "boxes.missed": MeasuredValue(0.9, 0.8, 1.0, 10)})
     assert "parameters agree" in printed(print_agreement, measured, measured)
     assert "boxes.missed" not in printed(print_agreement, measured, measured)
     assert "boxes.missed" in printed(print_agreement, measured, other)
 
 
-def test_json_says_null_of_what_is_not_known(measured):
+def test_unknown_values_are_null_in_json(measured):
     summary = json.loads(json.dumps(measured.summary(), allow_nan=False))
     assert summary["figures"]["keypoints.miss.nose"]["value"] is None
     miss = summary["figures"]["keypoints.miss.knees"]

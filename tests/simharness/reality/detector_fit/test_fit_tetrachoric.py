@@ -11,20 +11,20 @@ from simharness.reality.detector_fit.tetrachoric import (
 
 
 @pytest.mark.parametrize(("p", "q"), [(0.5, 0.5), (0.1, 0.1), (0.02, 0.3), (0.9, 0.6)])
-def test_events_that_come_together_as_of_a_bivariate_normal(p, q):
+def test_joint_probability_of_a_bivariate_normal_distribution(p, q):
     h, k = norm.ppf([p, q])
-    chances = joint_probability(p, q)
-    assert chances[0] == pytest.approx(p * q)
+    probabilities = joint_probability(p, q)
+    assert probabilities[0] == pytest.approx(p * q)
     for index in (10, 25, 40, 50):
         rho = correlation_grid()[index]
         exact = multivariate_normal([0, 0], [[1, rho], [rho, 1]]).cdf([h, k])
-        assert chances[index] == pytest.approx(exact, rel=2e-3)
-    assert (np.diff(chances) >= 0).all()
-    assert chances[-1] == pytest.approx(min(p, q), rel=0.05)
+        assert probabilities[index] == pytest.approx(exact, rel=2e-3)
+    assert (np.diff(probabilities) >= 0).all()
+    assert probabilities[-1] == pytest.approx(min(p, q), rel=0.05)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.8])
-def test_the_correlation_behind_events_of_different_chances(rho):
+def test_the_correlation_is_recovered_from_events_of_different_probabilities(rho):
     rng = np.random.default_rng(0)
     both, expected = 0.0, np.zeros(len(correlation_grid()))
     for p, q in ((0.05, 0.05), (0.1, 0.3), (0.02, 0.2)):
@@ -36,7 +36,7 @@ def test_the_correlation_behind_events_of_different_chances(rho):
     assert np.isnan(tetrachoric_correlation(np.zeros(1), np.zeros((1, len(correlation_grid()))))[0])
 
 
-def test_lives_of_what_forgets_exponentially():
+def test_lives_are_recovered_from_exponential_autocorrelations():
     lags, step = np.array([1, 2, 4, 8, 16]), 0.04
     lives = np.array([0.1, 0.5, 2.0])
     autocorrelation = np.exp(-lags * step / lives[:, None])
