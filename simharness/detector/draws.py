@@ -88,7 +88,7 @@ class KeyedDraws:
         return self._mixed(key, (len(LIMB_OF_JOINT),), lives=lives, life=life, shared=shared, limb=limb)
 
     def autoregressive(self, *key: Key, shape: tuple[int, ...] = (), life: float = 0.0) -> Floats:
-        """Draw first-order autoregressive standard normal numbers, (T, *shape): correlation exp(-lag / life).
+        """Draw first-order autoregressive standard normal numbers, ``(T, *shape)``: correlation exp(-lag / life).
 
         Args:
             key: name of the numbers.
