@@ -6,8 +6,9 @@ by :data:`MODULES`.
 
 How to add an error, for example keypoints that are rounded to whole pixels:
 
-1. Parameters: a model in ``simharness/scenario/sections/detector.py`` and one field of ``Detector`` with it. The
-   default of every parameter means that the error does not occur::
+1. Parameters: a model in ``simharness/scenario/sections/detector.py`` and one field of ``Detector`` with it, then
+   ``simharness schema --out scenarios/schema.json``. The default of every parameter means that the error does not
+   occur::
 
        class Quantisation(Section):
            pixels: Amount = Field(0.0, description="px, grid that keypoints are rounded to; 0: not rounded")

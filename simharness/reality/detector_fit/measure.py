@@ -31,7 +31,7 @@ _COUNTED = {
 }
 """Sums that count the observations behind a parameter; the others are measured on all joints in the picture."""
 
-_SIGHTS = ("visible", "self_occluded", "occluded")
+_OCCLUSIONS = ("visible", "self_occluded", "occluded")
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def _count(key: str, sums: FrameSums) -> int:
     kind = KINDS.index(rest[-1]) if rest[-1] in KINDS else None
     if rest[0] in CLASSES and kind is not None:
         n = sums[f"n.{rest[0]}"][..., kind].sum(axis=0)
-        return int(n[_SIGHTS.index(rest[1])] if rest[1] in _SIGHTS else n.sum())
+        return int(n[_OCCLUSIONS.index(rest[1])] if rest[1] in _OCCLUSIONS else n.sum())
     if section == "scores":
         scores = sums["scores"] if kind is None else sums["scores"][..., kind, :]
         return int((scores[:, :, SCORED.index(rest[0])] if rest[0] in SCORED else scores).sum())

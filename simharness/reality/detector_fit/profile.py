@@ -73,7 +73,7 @@ def as_toml(measurement: Measurement, *, name: str = NAME, command: str = "") ->
     head = (
         f"Errors of a detector on {measurement.name}: measured on {measurement.frames} frames, {joints} joints of "
         f"{measurement.people:.2f} annotated people a frame. Behind each value: its 95 % interval (block bootstrap "
-        f"over time) and the number of joints, people or detections behind it. The face has no truth: its errors are "
+        f"over time) and the number n of joints, people or detections. The face has no truth: its errors are "
         f"those of {STAND_IN}, in units of its own sigmas; its drops and scores are measured."
     )
     lines = [*_wrapped(head)]
@@ -115,6 +115,7 @@ def _comment(key: str, measurement: Measurement) -> str:
 
 
 def _span(measured: MeasuredValue) -> str:
+    """Return the interval of a value as text."""
     return f"{measured.low:.3g} to {measured.high:.3g}"
 
 
@@ -133,4 +134,5 @@ def _rounded(key: str, value: float) -> float:
 
 
 def _wrapped(text: str) -> list[str]:
+    """Return a text as comment lines."""
     return [f"# {line}" for line in textwrap.wrap(text, 118)]
