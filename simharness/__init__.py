@@ -1,4 +1,4 @@
-"""Simulated people before simulated cameras, the truth about every joint, and scores of the method under test."""
+"""Simulated people, calibrated cameras and 2D detectors with exact ground truth, and scores of the method under test."""
 
 from __future__ import annotations
 
@@ -6,25 +6,46 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from simharness.interface import TrialResult, load_scenario, run_trial, score, simulate
     from simharness.scenario.sections.scenario import Scenario
+    from simharness.types.recording import Recording
     from simharness.types.sequence import Sequence
     from simharness.types.truth import KeypointError, Truth
     from simharness.types.views import Views, Visibility
 
-_HOMES = {
+_MODULES = {
     "KeypointError": "simharness.types.truth",
+    "Recording": "simharness.types.recording",
     "Scenario": "simharness.scenario.sections.scenario",
     "Sequence": "simharness.types.sequence",
+    "TrialResult": "simharness.interface",
     "Truth": "simharness.types.truth",
     "Views": "simharness.types.views",
     "Visibility": "simharness.types.views",
+    "load_scenario": "simharness.interface",
+    "run_trial": "simharness.interface",
+    "score": "simharness.interface",
+    "simulate": "simharness.interface",
 }
 
-__all__ = ["KeypointError", "Scenario", "Sequence", "Truth", "Views", "Visibility"]
+__all__ = [
+    "KeypointError",
+    "Recording",
+    "Scenario",
+    "Sequence",
+    "TrialResult",
+    "Truth",
+    "Views",
+    "Visibility",
+    "load_scenario",
+    "run_trial",
+    "score",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the public types when they are first asked for: `simharness --help` need not load numba."""
-    if name not in _HOMES:
+    """Import public names at their first use, so that `simharness --help` does not load numba."""
+    if name not in _MODULES:
         raise AttributeError(f"module 'simharness' has no attribute {name!r}; it has {', '.join(__all__)}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)
