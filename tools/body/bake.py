@@ -240,7 +240,7 @@ def soften(weights: Floats, faces: Integers, rounds: int = 6) -> Floats:
 
 
 def strongest(weights: Floats) -> tuple[Integers, Floats]:
-    """Return the four bones of every vertex with the largest weights, and these weights scaled to sum 1, each (N, 4)."""
+    """Return the four bones with the largest weights of every vertex and their weights scaled to sum 1, each (N, 4)."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :4]
     kept = np.take_along_axis(weights, order, 1)
     return order, kept / kept.sum(1, keepdims=True)
