@@ -139,11 +139,13 @@ def plan_tracks(
             return tuple(board.tracks[index] for index in range(len(requests)))
     count = sum(map(_people, requests))
     touching = f" ({refused} tracks kept that distance, but people or their props touched)" if refused else ""
+    grown = any(_square(request, half, limit, plan=0) > half for request in requests)
+    room = f" (recorded paths in {limit + SWAY:.2f} m, up to the walls)" if grown else ""
     raise ValueError(
         f"people.count = {count} people do not fit: at most {placed} could be placed in people.area = {area:g} m (half "
-        f"the side of a square) with people.spacing = {spacing:g} m between any two for {span[1] - span[0]:g} s"
-        f"{touching}; lower people.count{' or raise' if refused else ' or lower'} people.spacing, enlarge people.area, "
-        "or choose people.activities that need less room"
+        f"the side of a square){room} with people.spacing = {spacing:g} m between any two for {span[1] - span[0]:g} s"
+        f"{touching}; lower people.count{' or raise' if refused else ' or lower'} people.spacing, enlarge "
+        f"{'room.size' if grown else 'people.area'}, or choose people.activities that need less room"
     )
 
 

@@ -151,6 +151,11 @@ def test_a_recorded_path_longer_than_the_area_uses_the_room(count):
     assert np.abs(tracks[-1].place).max() <= 1.2 - SWAY
 
 
+def test_recorded_paths_that_do_not_fit_the_room_name_the_room():
+    with pytest.raises(ValueError, match=r"people.count = 9 .*recorded paths in 2.80 m.*enlarge room.size"):
+        plan_tracks(0, [STRAIGHT] * 9, area=1.2, spacing=0.8, span=SPAN, widest=2.8)
+
+
 def test_a_recorded_path_that_fits_stays_in_the_area():
     times = np.linspace(*SPAN, 50)
     plans = [plan_tracks(0, [STRAIGHT], area=3.0, spacing=0.8, span=SPAN, widest=widest) for widest in (None, 9.0)]
