@@ -1,4 +1,4 @@
-"""Small synthetic rigs and people, made without the simulator: what mvpose is tested on must not come from it."""
+"""Small synthetic rigs and people, made without the simulator, because tests of mvpose must not depend on it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def look_at(center, target, *, focal=800.0, size=(1280, 960), distortion=None, n
 
 
 def ring(count=5, *, radius=4.0, height=2.0, **kwargs):
-    """Cameras on a ring about the origin."""
+    """Cameras on a ring around the origin."""
     bearings = 2 * np.pi * np.arange(count) / count
     return Rig(
         [
@@ -40,7 +40,7 @@ def ring(count=5, *, radius=4.0, height=2.0, **kwargs):
 
 
 def crowd(count, *, spacing=1.0, seed=0):
-    """People in a row about the origin, turned at random and slightly posed at random: (count, 17, 3)."""
+    """People in a row at the origin, with random headings and sizes: (count, 17, 3)."""
     rng = np.random.default_rng(seed)
     people = []
     for k in range(count):
@@ -52,7 +52,7 @@ def crowd(count, *, spacing=1.0, seed=0):
 
 
 def detect(rig, people, *, noise=0.0, seed=0, shuffle=True):
-    """Project every person into every view: the detections, and the true person of each, (m,)."""
+    """Project all people into all views; return the detections and the true person of each, (m,)."""
     rng = np.random.default_rng(seed)
     pixels = rig.project(people)
     view, person = (index.ravel() for index in np.indices(pixels.shape[:2]))

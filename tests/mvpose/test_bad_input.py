@@ -1,4 +1,4 @@
-"""Damaged input through the whole method: a clear ValueError at the border, or everybody else still found."""
+"""Damaged input to the whole method: a clear ValueError, or all other people are still found."""
 
 from dataclasses import dataclass, replace
 
@@ -26,9 +26,9 @@ WILD = [np.nan, np.inf, -np.inf, 1e4, -1e6, 1e6, 1e12, 1e300, -1.7e308]
 
 @dataclass(frozen=True)
 class Frame:
-    """What is damaged: arrays as a careless caller might pass them, and the people who are there.
+    """Arrays to be damaged, as a careless caller might pass them, and the true people.
 
-    ``person`` is who each detection is of, -1 for nobody; ``touched`` are the people of whom any was damaged.
+    ``person`` is the person of each detection, -1 for none; ``touched`` are the people with a damaged detection.
     """
 
     rig: Rig
@@ -43,7 +43,7 @@ class Frame:
         return Detections.from_keypoints(self.view, self.keypoints, self.scores)
 
     def of(self, rows, **changes):
-        """Damaged detections."""
+        """Return the frame with changes to the detections of some rows."""
         who = set(self.person[rows].tolist()) - {-1}
         return replace(self, touched=self.touched | who, **changes)
 
@@ -77,7 +77,7 @@ def _pick(frame, rng, count=1):
 
 
 def joints_gone_wild(frame, rng):
-    """Some joints of two detections not finite, or anywhere up to the end of the floating-point numbers."""
+    """Some joints of two detections are not finite, or have any floating-point value."""
     rows, keypoints = _pick(frame, rng, 2), frame.keypoints.copy()
     for row in rows:
         joints = rng.choice(17, rng.integers(1, 5), replace=False)
@@ -104,14 +104,14 @@ def garbage_instead(frame, rng):
 
 
 def garbage_besides(frame, rng):
-    """Two in one view: in two they might by chance agree on a place, and be somebody."""
+    """Two in one view, because in two views they could agree on a place by chance and form a person."""
     middle, spread = rng.uniform(0, 960, (2, 1, 2)), rng.choice([0.0, 5.0, 80.0, 1e5], (2, 1, 1))
     view = np.full(2, rng.integers(len(frame.rig)))
     return frame.with_more(view, [-1, -1], middle + spread * rng.standard_normal((2, 17, 2)))
 
 
 def repeated(frame, rng):
-    """Detections said twice or three times: exactly, or half a pixel off."""
+    """Detections repeated once or twice, exactly or with errors of half a pixel."""
     rows = np.repeat(_pick(frame, rng, 4), rng.integers(1, 3))
     off = rng.choice([0.0, 0.5]) * rng.standard_normal((len(rows), 17, 2))
     return frame.with_more(frame.view[rows], frame.person[rows], frame.keypoints[rows] + off)
@@ -122,7 +122,7 @@ def view_empty(frame, rng):
 
 
 def view_blind(frame, rng):
-    """All detections of a view are there, without a single keypoint."""
+    """All detections of a view are present, but without keypoints."""
     rows, keypoints = np.flatnonzero(frame.view == rng.integers(len(frame.rig))), frame.keypoints.copy()
     keypoints[rows] = np.nan
     return frame.of(rows, keypoints=keypoints)
@@ -141,14 +141,14 @@ DAMAGE = [
 
 
 def twins(distortion):
-    """Five cameras, two of which stand in one point and look a little differently."""
+    """Five cameras, two of which stand in one point with slightly different directions."""
     rig = ring(5, distortion=distortion)
     twin = look_at(rig[0].center, [0.1, 0.2, 0.9], distortion=distortion, name="twin")
     return Rig([rig[0], twin, *rig.cameras[2:]])
 
 
 def far_from_the_origin(distortion):
-    """As a surveyor's coordinates have it: 500 km east, 5300 km north."""
+    """Survey coordinates: 500 km east, 5300 km north."""
     shift = np.array([5.0e5, 5.3e6, 400.0])
     return Rig(
         [Camera(c.K, c.R, c.t - c.R @ shift, c.distortion, c.size) for c in ring(5, distortion=distortion)]
@@ -156,7 +156,7 @@ def far_from_the_origin(distortion):
 
 
 def estimated(preset, frame, detections=None):
-    """The estimate, once what must hold of any input has been seen to hold."""
+    """Estimate, after checking the properties that hold for any input."""
     detections = frame.detections() if detections is None else detections
     estimate = Pipeline.preset(preset).estimate(frame.rig, detections)
     placed = estimate.scores > 0
@@ -173,17 +173,17 @@ def estimated(preset, frame, detections=None):
 
 
 def distances(estimate, people):
-    """Of every true person to an estimate of his own, each joint, (P, J), metres; infinite where nobody is there."""
+    """Joint errors of every true person and its assigned estimate, (P, J), metres; infinite without an estimate."""
     off = np.linalg.norm(estimate.joints[None] - people[:, None], axis=3)  # (P, n, J)
     result = np.full(people.shape[:2], np.inf)
     cost = np.nan_to_num(np.median(np.nan_to_num(off, nan=9.0), axis=2), posinf=9.0)
-    for true, mine in zip(*linear_sum_assignment(cost), strict=True):
-        result[true] = np.nan_to_num(off[true, mine], nan=np.inf)
+    for true, index in zip(*linear_sum_assignment(cost), strict=True):
+        result[true] = np.nan_to_num(off[true, index], nan=np.inf)
     return result
 
 
 def assert_found(estimate, frame):
-    """The untouched to every joint, everybody else on the whole."""
+    """Check every joint of undamaged people, and the median joint of the others."""
     off = distances(estimate, frame.people)
     untouched = [person for person in range(len(frame.people)) if person not in frame.touched]
     assert (np.median(off, axis=1) < 0.05).all()
@@ -194,7 +194,7 @@ def assert_found(estimate, frame):
 @pytest.mark.parametrize("damage", DAMAGE, ids=lambda damage: damage.__name__)
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_one_damage_costs_nobody(preset, damage, seed):
+def test_one_kind_of_damage_loses_no_person(preset, damage, seed):
     frame = damage(clean(seed), np.random.default_rng(seed + 1))
     estimate = estimated(preset, frame)
     assert_found(estimate, frame)
@@ -209,7 +209,7 @@ def test_one_damage_costs_nobody(preset, damage, seed):
     distortion=st.sampled_from([None, BARREL, WEBCAM]),
     world=st.sampled_from(["ring", "twins", "far"]),
 )
-def test_two_damages_on_an_odd_rig_cost_nobody(preset, seed, damages, distortion, world):
+def test_two_kinds_of_damage_on_an_unusual_rig_lose_no_person(preset, seed, damages, distortion, world):
     lost = sum(damage in (view_empty, view_blind) for damage in damages)
     assume(world != "twins" or lost < 2)  # two points of view and noise: too little for everybody
     rng = np.random.default_rng(seed)
@@ -225,7 +225,7 @@ def test_two_damages_on_an_odd_rig_cost_nobody(preset, seed, damages, distortion
 
 @pytest.mark.parametrize("preset", SEEING)
 @pytest.mark.parametrize("wild", WILD)
-def test_one_joint_gone_wild_in_one_view_costs_not_even_that_joint(preset, wild):
+def test_one_wild_keypoint_does_not_lose_its_joint(preset, wild):
     frame = clean(7)
     frame.keypoints[5, 9] = [wild, 300.0]
     frame.keypoints[0, 15] = [wild, wild]
@@ -240,7 +240,7 @@ EVERYWHERE = 1 / 3 * np.array([[0, 0, 0], [0, 0, 0], [1, 2, 5], [1e-5, 0, 0]])
 
 @st.composite
 def nonsense(draw):
-    """Arrays of the right shape with anything in them, and a rig that is only just one."""
+    """Arrays of the right shape with any values, and a barely valid rig."""
     count = draw(st.integers(0, 5))
     view = draw(arrays.arrays(np.int64, count, elements=st.integers(0, 3)))
     keypoints = draw(arrays.arrays(float, (count, 17, 2), elements=anything))
@@ -253,7 +253,7 @@ def nonsense(draw):
 @pytest.mark.parametrize("preset", SEEING)
 @settings(max_examples=25)
 @given(nonsense())
-def test_nonsense_gives_a_valid_estimate(preset, given):
+def test_random_arrays_give_a_valid_estimate(preset, given):
     rig, view, keypoints, scores = given
     detections = Detections.from_keypoints(view, keypoints, scores)
     frame = Frame(rig, np.zeros((0, 17, 3)), view, view, keypoints, scores)
@@ -262,7 +262,7 @@ def test_nonsense_gives_a_valid_estimate(preset, given):
 
 @pytest.mark.parametrize("preset", SEEING)
 def test_the_same_garbage_in_every_view_gives_a_valid_estimate(preset):
-    """All joints in one pixel, poses of one column, poses without extent: areas, bones and baselines of zero."""
+    """All joints in one pixel, poses in one column, poses without extent: zero areas, bones and baselines."""
     for rig in (ring(4), twins(BARREL)):
         views = len(rig)
         for pose in (np.full((17, 2), 600.0), np.linspace([600, 100], [600, 900], 17), rig[0].K[:2, 2] + np.eye(17, 2)):
@@ -273,7 +273,7 @@ def test_the_same_garbage_in_every_view_gives_a_valid_estimate(preset):
 
 
 @pytest.mark.parametrize("preset", SEEING)
-def test_everything_missing_is_nobody(preset):
+def test_missing_keypoints_give_no_people(preset):
     frame = clean(0)
     for changes in ({"keypoints": np.full_like(frame.keypoints, np.nan)}, {"scores": np.zeros_like(frame.scores)}):
         assert len(estimated(preset, replace(frame, **changes))) == 0
@@ -283,7 +283,7 @@ def test_everything_missing_is_nobody(preset):
 
 
 @pytest.mark.parametrize("preset", SEEING)
-def test_what_does_not_fit_is_refused_at_the_border(preset):
+def test_inconsistent_input_is_refused(preset):
     frame = clean(0)
     estimate = Pipeline.preset(preset).estimate
     with pytest.raises(ValueError, match="names view 4, but the rig has 3 cameras"):
@@ -297,8 +297,8 @@ def test_what_does_not_fit_is_refused_at_the_border(preset):
 
 
 @pytest.mark.parametrize("preset", SEEING)
-def test_another_skeleton_than_coco_works(preset):
-    """Nothing may take the number or the order of joints for granted."""
+def test_other_skeletons_work(preset):
+    """No stage assumes a number or order of joints."""
     frame, rows = clean(0), [16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9, 0, 1]
     keypoints, scores = frame.keypoints[:, rows], frame.scores[:, rows]
     detections = Detections.from_keypoints(frame.view, keypoints, scores, skeleton=SHELF14)
@@ -310,11 +310,11 @@ def test_another_skeleton_than_coco_works(preset):
 
 @pytest.mark.parametrize("preset", SEEING)
 def test_a_skeleton_with_bones_of_unknown_length_has_all_its_joints(preset):
-    """Nobody publishes how far the neck is from the middle of the hips: such a bone binds nothing."""
+    """The distance from neck to mid-hip is not published, so that bone is not constrained."""
     frame = clean(0, noise=1.0)
 
     def panoptic(joints):
-        """Of COCO-17 (..., 17, k), where the points in between are taken in the picture as in space."""
+        """Map COCO-17 (..., 17, k) to PANOPTIC19, with midpoints taken in the picture as in space."""
         return np.stack([joints[..., [COCO17.index(end) for end in ends], :].mean(axis=-2) for ends in PANOPTIC], -2)
 
     keypoints, people = panoptic(frame.keypoints), panoptic(frame.people)

@@ -11,7 +11,7 @@ LENSES = [np.zeros(5), [0.115, -0.219, 0.0012, 0.0086, 0.113], [-0.37, 0.15, 0.0
 
 
 def points_before(camera, count, seed):
-    """World points spread over the camera's image at 1 to 8 m."""
+    """World points spread over the image of the camera at 1 to 8 m."""
     rng = np.random.default_rng(seed)
     pixels = rng.uniform(0, 1, (count, 2)) * np.array(camera.size)
     xy = (pixels - camera.K[:2, 2]) / camera.K[[0, 1], [0, 1]]
@@ -28,7 +28,7 @@ def test_projection_agrees_with_opencv(distortion):
 
 
 @pytest.mark.parametrize("distortion", LENSES)
-def test_rays_undo_projection(distortion):
+def test_rays_invert_projection(distortion):
     camera = look_at([3, -2, 2.5], [0, 0, 1], distortion=distortion)
     points = points_before(camera, 200, 2)
     rays = camera.rays(camera.project(points))
@@ -40,7 +40,7 @@ def test_rays_undo_projection(distortion):
 
 
 def straight_to_the_centre(camera, xy, *, slack=0.0):
-    """Whether the lens keeps its orientation all the way from its centre to normalised points (n, 2)."""
+    """Return whether the lens does not fold between its centre and normalised points (n, 2)."""
     k1, k2, p1, p2, k3 = camera.distortion
     x, y = (np.linspace(0, 1, 500)[:, None] * axis for axis in np.moveaxis(xy, -1, 0))
     r2 = x * x + y * y
@@ -52,8 +52,8 @@ def straight_to_the_centre(camera, xy, *, slack=0.0):
 
 
 @given(st.integers(0, 10_000))
-def test_a_lens_is_undone_as_far_as_it_does_not_fold_and_nowhere_else(seed):
-    """Also lenses far stronger than a fit to an image would give, and points far outside any image."""
+def test_undistortion_is_exact_inside_the_fold_and_nan_outside(seed):
+    """Includes lenses much stronger than real ones, and points far outside any image."""
     rng = np.random.default_rng(seed)
     terms = rng.normal(size=5) * [0.3, 0.2, 0.003, 0.003, 0.1] * (rng.random(5) < 0.8)
     camera = Camera(np.eye(3), np.eye(3), np.zeros(3), terms, (2, 2))
@@ -68,7 +68,7 @@ def test_a_lens_is_undone_as_far_as_it_does_not_fold_and_nowhere_else(seed):
 
 
 @pytest.mark.parametrize("distortion", LENSES)
-def test_pixels_beyond_the_lens_are_no_rays_and_cost_the_others_nothing(distortion):
+def test_pixels_beyond_the_lens_have_no_ray_and_do_not_affect_others(distortion):
     camera = look_at([3, -2, 2.5], [0, 0, 1], distortion=distortion)
     points = points_before(camera, 50, 3)
     pixels = camera.project(points)
@@ -182,7 +182,7 @@ BAD_CAMERAS = {
 
 
 @pytest.mark.parametrize("name", BAD_CAMERAS)
-def test_a_calibration_that_is_none_is_refused(name):
+def test_an_invalid_calibration_is_refused(name):
     changes, message = BAD_CAMERAS[name]
     fields = {"K": GOOD.K, "R": GOOD.R, "t": GOOD.t, "size": (640, 480), **changes}
     with pytest.raises(ValueError, match=message) as error:
@@ -190,7 +190,7 @@ def test_a_calibration_that_is_none_is_refused(name):
     assert "camera 'left'" in str(error.value)
 
 
-def test_odd_calibrations_are_cameras_all_the_same():
+def test_unusual_calibrations_are_accepted():
     for K in (SKEWED, GOOD.K.astype(np.float32), GOOD.K + 1e-9, np.asfortranarray(GOOD.K)):
         camera = Camera(K, np.round(GOOD.R, 5), GOOD.t, size=np.array([640.0, 480.0]))
         assert camera.size == (640, 480)
@@ -201,7 +201,7 @@ def test_odd_calibrations_are_cameras_all_the_same():
     np.testing.assert_allclose(np.linalg.norm(np.cross(points - camera.center, rays), axis=1), 0, atol=1e-6)
 
 
-def test_rigs_that_are_none_are_refused():
+def test_invalid_rigs_are_refused():
     elsewhere = look_at([-4, 0, 1], [0, 0, 1])
     turned = Camera(GOOD.K, elsewhere.R, -elsewhere.R @ GOOD.center, size=(640, 480))
     with pytest.raises(ValueError, match="at least 2 cameras to triangulate, got 1"):
@@ -218,7 +218,7 @@ def test_rigs_that_are_none_are_refused():
         Rig(GOOD)
 
 
-def test_some_cameras_in_one_point_are_a_rig_and_say_nothing_of_each_other():
+def test_some_cameras_of_a_rig_may_stand_in_one_point():
     other = look_at([0, 4, 1], [0, 0, 1])
     twin = Camera(GOOD.K, GOOD.R, GOOD.t + 1e-13, size=GOOD.size)
     rig = Rig([GOOD, twin, other])

@@ -4,7 +4,7 @@ import pytest
 from mvpose.checks import as_array, seal
 
 
-def test_what_is_sealed_is_taken_as_it_is_and_nothing_else():
+def test_only_sealed_arrays_are_not_copied():
     fresh = np.zeros((2, 3))
     assert as_array(fresh, ("n", 3), "x") is not fresh
     seal(fresh)
@@ -14,12 +14,12 @@ def test_what_is_sealed_is_taken_as_it_is_and_nothing_else():
         as_array(fresh, ("n", 4), "x")
 
 
-def test_a_read_only_view_of_what_others_write_to_is_copied():
-    mine = np.zeros(3)
-    view = mine.view()
+def test_a_read_only_view_of_a_writeable_array_is_copied():
+    original = np.zeros(3)
+    view = original.view()
     seal(view)
     kept = as_array(view, ("n",), "x")
-    mine[0] = 1.0
+    original[0] = 1.0
     assert kept[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         kept[0] = 2.0

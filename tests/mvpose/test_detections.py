@@ -12,7 +12,7 @@ def one(**changes):
     return Detections(**{**fields, **changes})
 
 
-def test_missing_is_explicit_however_it_is_said():
+def test_missing_keypoints_are_marked_in_coordinates_and_scores():
     keypoints, scores = np.ones((1, 17, 2)), np.full((1, 17), 0.5)
     keypoints[0, 3, 1] = np.inf
     scores[0, 4] = 0.0
@@ -55,7 +55,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_no_detection_is_refused(name):
+def test_invalid_detections_are_refused(name):
     changes, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         one(**changes)
@@ -84,13 +84,13 @@ def test_arrays_are_frozen_and_laid_out_for_the_kernels():
         detections.keypoints[0, 0] = 5
 
 
-def test_whole_numbers_however_typed_are_views():
+def test_views_may_have_any_numeric_type():
     for view in ([1], [1.0], np.array([1], np.uint16), np.array([1], np.float32)):
         assert one(view=view).view.tolist() == [1]
 
 
 @pytest.mark.parametrize("far", [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e10, 1.7e308, None])
-def test_a_keypoint_at_the_end_of_the_world_is_missing(far):
+def test_a_keypoint_beyond_the_limit_is_missing(far):
     keypoints = np.ones((1, 17, 2)).tolist()
     keypoints[0][6][1] = far
     for detections in (one(keypoints=keypoints), Detections.from_keypoints([0], keypoints, np.full((1, 17), 0.5))):
@@ -105,7 +105,7 @@ def test_a_keypoint_a_million_pixels_away_was_detected():
     assert one(keypoints=keypoints).detected.all()
 
 
-def test_a_detection_without_evidence_is_one_all_the_same():
+def test_a_detection_without_keypoints_is_valid():
     for scores in (np.zeros((1, 17)), np.full((1, 17), np.nan), np.full((1, 17), 1e-300)):
         detections = Detections.from_keypoints([3], np.ones((1, 17, 2)), scores)
         assert not detections.detected.any()
@@ -113,7 +113,7 @@ def test_a_detection_without_evidence_is_one_all_the_same():
         assert detections.box_scores.tolist() == [0]
 
 
-def test_a_descriptor_that_is_not_finite_is_none():
+def test_a_descriptor_that_is_not_finite_is_missing():
     descriptors = np.ones((3, 4))
     descriptors[1, 2], descriptors[2] = np.inf, np.nan
     keypoints = np.ones((3, 17, 2))
@@ -121,7 +121,7 @@ def test_a_descriptor_that_is_not_finite_is_none():
     np.testing.assert_array_equal(kept.descriptors, [[1] * 4, [np.nan] * 4, [np.nan] * 4])
 
 
-def test_later_writes_to_the_caller_array_do_not_reach_in():
+def test_later_writes_by_the_caller_do_not_change_detections():
     keypoints = np.ones((1, 17, 2))
     detections = one(keypoints=keypoints)
     keypoints[:] = 7

@@ -20,7 +20,7 @@ def poses(keypoints, *, scores=None, view=None, box_scores=None, skeleton=COCO17
 
 
 def picture(height=200.0, at=(300.0, 100.0)):
-    """A standing person seen from the front, so many pixels high."""
+    """A standing person seen from the front, of the given height in pixels."""
     return np.asarray(at) + STANDING[:, 1:] * [1, -1] * height / 1.5
 
 
@@ -57,14 +57,14 @@ def by_definition(detections, threshold=0.9, least=3):
 
 
 @pytest.mark.parametrize("times", [1, 2, 5])
-def test_an_exact_repeat_leaves_one_in_every_view(times):
+def test_an_exact_repetition_is_removed_in_every_view(times):
     detections, person = detect(ring(5), crowd(4))
     view, keypoints, who = (np.repeat(each, times, axis=0) for each in (detections.view, detections.keypoints, person))
     keep = Duplicates()(poses(keypoints, view=view))
     assert sorted(zip(view[keep], who[keep], strict=True)) == sorted(zip(detections.view, person, strict=True))
 
 
-def test_people_side_by_side_stay_though_their_boxes_overlap():
+def test_people_with_overlapping_boxes_are_kept():
     one = picture()
     beside = picture(at=(330.0, 100.0))  # 27 px between hands of a person 53 px wide: OKS far below
     stooping = one.copy()
@@ -72,20 +72,20 @@ def test_people_side_by_side_stay_though_their_boxes_overlap():
     assert Duplicates()(poses([one, beside, stooping])).all()
 
 
-def test_nearly_equal_poses_are_one_and_the_same_pose_in_another_view_is_not():
+def test_nearly_equal_poses_are_merged_only_within_a_view():
     near = picture() + np.random.default_rng(0).normal(0, 1.5, (17, 2))
     assert Duplicates()(poses([picture(), near])).tolist() == [True, False]
     assert Duplicates()(poses([picture(), near], view=[0, 1])).all()
 
 
-def test_what_is_alike_scales_with_the_person():
+def test_the_similarity_scales_with_the_person():
     shift = np.array([3.0, 0.0])
     for height, alike in ((40, False), (200, True), (2000, True)):
         keep = Duplicates()(poses([picture(height), picture(height) + shift]))
         assert keep.tolist() == [True, not alike]
 
 
-def test_the_surest_stays():
+def test_the_most_confident_detection_is_kept():
     near = [picture() + [shift, 0.0] for shift in (0.0, 0.5, 1.0)]
     assert Duplicates()(poses(near, box_scores=[0.3, 0.9, 0.5])).tolist() == [False, True, False]
     scores = np.full((3, 17), 0.5)
@@ -94,7 +94,7 @@ def test_the_surest_stays():
     assert Duplicates()(poses(near)).tolist() == [True, False, False]  # all equal: the first
 
 
-def test_a_few_sure_joints_are_no_match_for_the_whole_person():
+def test_few_confident_joints_do_not_outrank_the_whole_person():
     scores = np.full((2, 17), 0.9)
     scores[1] = [0.97] * 5 + [0.0] * 12  # the face once more, surer than the person in the mean over what it has
     whole_and_face = poses([picture()] * 2, scores=scores)
@@ -103,14 +103,14 @@ def test_a_few_sure_joints_are_no_match_for_the_whole_person():
 
 
 def test_suppression_is_greedy_and_not_transitive():
-    """The middle one of three is like both others, which are not like each other."""
+    """The second of three poses is similar to both others, which are not similar to each other."""
     chain = [picture() + [shift, 0.0] for shift in (0.0, 3.0, 6.0)]
     assert Duplicates()(poses(chain[::2])).all()
     assert Duplicates()(poses(chain, box_scores=[0.9, 0.5, 0.4])).tolist() == [True, False, True]
     assert Duplicates()(poses(chain, box_scores=[0.4, 0.5, 0.4])).tolist() == [False, True, False]
 
 
-def test_a_wrong_joint_far_away_does_not_make_everybody_alike():
+def test_a_wrong_distant_joint_does_not_make_poses_similar():
     one, other = picture(), picture(at=(400.0, 100.0))
     for far in (1e3, 1e6, 1e8):
         for joint in ([0], [9, 10], [3, 9, 15, 16]):
@@ -125,7 +125,7 @@ def test_a_wrong_joint_far_away_does_not_make_everybody_alike():
     assert Duplicates()(poses([one, wrong])).tolist() == [True, False]  # sixteen of seventeen joints agree
 
 
-def test_two_joints_are_too_few_to_tell_and_three_are_not():
+def test_poses_are_compared_from_three_shared_joints_on():
     for count in (2, 3):
         scores = np.zeros((2, 17))
         scores[0] = 0.9
@@ -138,14 +138,14 @@ def test_two_joints_are_too_few_to_tell_and_three_are_not():
     assert Duplicates()(poses([picture()] * 2, scores=scores)).all()
 
 
-def test_a_pose_in_one_point_is_like_itself_alone():
+def test_a_pose_in_one_point_is_similar_only_to_itself():
     point = np.full((17, 2), 100.0)
     assert Duplicates()(poses([point, point, point + 1e-3, picture()])).tolist() == [True, False, True, True]
 
 
 @st.composite
 def crowded(draw):
-    """Detections of a few people, repeated with errors of every size, joints missing and joints astray."""
+    """Detections of a few people, repeated with errors of all sizes, and with missing and stray joints."""
     skeleton = draw(st.sampled_from([COCO17, SHELF14]))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count, joints = rng.integers(0, 21), len(skeleton)
@@ -178,7 +178,7 @@ def test_the_order_does_not_matter_where_scores_differ(detections, random):
     np.testing.assert_array_equal(shuffled, keep[order])
 
 
-def test_wrong_settings_are_refused():
+def test_invalid_parameters_are_refused():
     with pytest.raises(ValueError, match=r"threshold must be .* 0 to 1, got 1\.5"):
         Duplicates(threshold=1.5)
     with pytest.raises(ValueError, match="least_joints must be at least 1, got 0"):

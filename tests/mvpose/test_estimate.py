@@ -1,4 +1,4 @@
-"""Answers of a method, made of joints alone."""
+"""Estimates made from joints only."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def test_joints_alone_are_an_estimate():
 
 
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
-def test_nobody_is_an_empty_list(skeleton):
+def test_no_people_is_an_empty_list(skeleton):
     estimate = Estimate.of_joints([], scores=[], labels=[-1, -1], skeleton=skeleton)
     assert estimate.joints.shape == (0, len(skeleton), 3)
     assert estimate.scores.shape == (0, len(skeleton))
@@ -28,7 +28,7 @@ def test_nobody_is_an_empty_list(skeleton):
 
 
 @pytest.mark.parametrize("missing", [[None] * 3, [np.nan] * 3, [0.1, None, 0.3], [np.inf, 0.0, 0.0]])
-def test_a_joint_that_is_missing_has_no_place_and_no_score(missing):
+def test_a_missing_joint_is_nan_with_score_0(missing):
     joints = PEOPLE.tolist()
     joints[1][4] = missing
     estimate = Estimate.of_joints(joints, scores=np.full((2, 17), 0.7))
@@ -42,7 +42,7 @@ def test_scores_of_people_are_those_of_their_joints():
     assert (estimate.scores == [[0.2]] * 1 + [[0.9]] * 1).all()
 
 
-def test_what_else_is_known_is_kept():
+def test_optional_fields_are_kept():
     covariance = np.broadcast_to(np.eye(3), (2, 17, 3, 3))
     estimate = Estimate.of_joints(PEOPLE, labels=[1, 0, -1], covariance=covariance, timings={"total": 0.5})
     assert estimate.matching.labels_of(3).tolist() == [1, 0, -1]
@@ -51,7 +51,7 @@ def test_what_else_is_known_is_kept():
 
 
 @pytest.mark.parametrize(
-    ("joints", "more", "said"),
+    ("joints", "more", "message"),
     [
         (PEOPLE[:, :14], {}, r"joints must be \(n, 17, 3\), got \(2, 14, 3\)"),
         (PEOPLE[0], {}, r"joints must be \(n, 17, 3\), got \(17, 3\)"),
@@ -65,12 +65,12 @@ def test_what_else_is_known_is_kept():
         (PEOPLE, {"covariance": np.eye(3)}, r"covariance must be \(2, 17, 3, 3\), got \(3, 3\)"),
     ],
 )
-def test_what_is_wrong_is_said(joints, more, said):
-    with pytest.raises(ValueError, match=said):
+def test_invalid_fields_are_refused(joints, more, message):
+    with pytest.raises(ValueError, match=message):
         Estimate.of_joints(joints, **more)
 
 
-def test_labels_are_of_as_many_detections_or_of_none():
+def test_labels_cover_all_detections_or_none():
     assert Matching([0, -1]).labels_of(2).tolist() == [0, -1]
     assert Matching([0, -1]).covers(2)
     assert Matching([]).covers(0)

@@ -25,7 +25,7 @@ def single(values, *, origin=(0.0, 0.0), stride=(1.0, 1.0)):
 
 
 def by_hand(values, column, row):
-    """Bilinear interpolation of a map that goes on as zeros."""
+    """Bilinear interpolation of a map that is zero outside."""
     padded = np.pad(values, 1)
     column, row = column + 1, row + 1
     if not (0 <= column < padded.shape[1] - 1 and 0 <= row < padded.shape[0] - 1):
@@ -78,7 +78,7 @@ def test_every_map_has_its_own_modes_and_grid():
     assert np.isnan(pixels[[0, 1], [0, 1]]).all()
 
 
-def test_a_map_of_nothing_has_no_mode_and_a_level_one_has_one():
+def test_an_empty_map_has_no_mode_and_a_constant_map_has_one():
     assert (single(np.zeros((5, 7))).modes(2)[1] == 0).all()
     pixels, heights = single(np.full((5, 7), 0.5)).modes(2)
     np.testing.assert_allclose(pixels[0, 0, 0], [3, 2])
@@ -154,7 +154,7 @@ def test_sampling_is_bilinear_and_fades_to_zero(seed):
     assert maps.sample(pixels[:, :, 0, 0]).shape == (2, 3)
 
 
-def test_nowhere_and_far_away_are_zero():
+def test_heights_at_nan_and_far_away_are_zero():
     maps = single(np.ones((3, 3)))
     pixels = [[[[np.nan, 1], [np.inf, 1], [1e300, -1e300], [1, 1e9], [1, 1]]]]
     assert maps.sample(pixels).tolist() == [[[0, 0, 0, 0, 1]]]
@@ -187,7 +187,7 @@ def test_detections_from_heat_maps_carry_them():
     assert Detections.from_heatmaps([0, 1], maps, boxes=boxes).boxes.tolist() == boxes
 
 
-def test_what_is_no_heat_map_is_refused():
+def test_invalid_heat_maps_are_refused():
     good = np.ones((2, 17, 4, 4))
     with pytest.raises(ValueError, match=r"heat map values must be \(m, J, h, w\), got \(2, 17, 4\)"):
         Heatmaps(good[..., 0], np.zeros((2, 2)), np.ones((2, 2)))
@@ -222,7 +222,7 @@ def test_no_detections_have_no_maps():
     assert len(Detections.from_heatmaps([], maps)) == 0
 
 
-def test_a_joint_that_is_said_to_be_missing_is_whatever_its_map():
+def test_a_missing_keypoint_overrides_its_heat_map():
     rig, people = ring(4), crowd(2)
     detections, _ = detect(rig, people)
     values = np.tile(blobs((8.0, 12.0, 0.9), shape=(24, 16)), (len(detections), 17, 1, 1))

@@ -18,14 +18,14 @@ from mvpose.reconstruction import Noise, UnmatchedPictorialStructure
 
 
 def errors(estimate, people):
-    """Largest joint error of each true person against its one-to-one estimate, metres."""
+    """Largest joint error of each true person and the estimate assigned to it, metres."""
     distance = np.linalg.norm(estimate.joints[:, None] - people[None], axis=3).max(axis=2)
-    mine, true = linear_sum_assignment(distance)
-    return distance[mine, true]
+    estimated, true = linear_sum_assignment(distance)
+    return distance[estimated, true]
 
 
 def described(detections, person, *, noise=0.1, seed=0):
-    """With descriptors: a random direction a person, and noise in every detection."""
+    """Add descriptors: a random direction per person, and noise in every detection."""
     rng = np.random.default_rng(seed)
     looks = rng.standard_normal((person.max() + 1, 64))
     descriptors = looks[person] + noise * rng.standard_normal((len(person), 64))
@@ -34,7 +34,7 @@ def described(detections, person, *, noise=0.1, seed=0):
 
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize(("views", "count"), [(2, 1), (3, 2), (5, 4), (8, 6)])
-def test_everybody_is_found_where_they_are(preset, views, count):
+def test_all_people_are_found_at_their_positions(preset, views, count):
     rig = Rig(list(ring(max(views, 5)))[:views])  # two cameras that face each other cannot triangulate
     people = crowd(count)
     detections, person = detect(rig, people)
@@ -45,13 +45,13 @@ def test_everybody_is_found_where_they_are(preset, views, count):
     np.testing.assert_array_equal(labels[:, None] == labels, person[:, None] == person)
 
 
-def test_noise_of_three_pixels_costs_centimetres():
+def test_noise_of_three_pixels_causes_errors_of_centimetres():
     rig, people = ring(5), crowd(4)
     detections, _ = detect(rig, people, noise=3.0)
     assert errors(Pipeline().estimate(rig, detections), people).max() < 0.06
 
 
-def test_phantoms_become_nobody():
+def test_phantoms_give_no_people():
     rig, people = ring(5), crowd(2)
     detections, person = detect(rig, people)
     phantom = np.full((1, 17, 2), 200.0) + 60 * np.random.default_rng(0).standard_normal((17, 2))
@@ -65,7 +65,7 @@ def test_phantoms_become_nobody():
     assert estimate.matching.labels[-1] == -1
 
 
-def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
+def test_results_do_not_depend_on_detection_order_or_world_frame():
     rig, people = ring(4), crowd(3)
     detections, _ = detect(rig, people, noise=2.0)
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
@@ -79,7 +79,7 @@ def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
 
 
 @pytest.mark.parametrize("view", [[], [0], [0, 0, 0]])
-def test_nothing_to_match_is_nobody(view):
+def test_nothing_to_match_gives_no_people(view):
     keypoints = np.random.default_rng(0).uniform(0, 600, (len(view), 17, 2))
     estimate = Pipeline().estimate(ring(3), Detections.from_keypoints(view, keypoints, np.ones((len(view), 17))))
     assert estimate.joints.shape == (0, 17, 3)
@@ -87,7 +87,7 @@ def test_nothing_to_match_is_nobody(view):
 
 
 def test_appearance_decides_where_geometry_cannot():
-    """Two people in one spot, one of whom two views see and the other the other two: geometry takes them for one."""
+    """Two people at one place, each seen by two of four views: geometry merges them."""
     rig, people = ring(4), crowd(1)
     detections, _ = detect(rig, people, shuffle=False)
     person = np.array([0, 0, 1, 1])
@@ -117,7 +117,7 @@ def test_a_person_reported_twice_is_one_person(preset):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_a_face_reported_once_more_costs_no_joint(preset):
+def test_a_repeated_face_loses_no_joint(preset):
     rig, people = ring(4), crowd(2)
     detections, person = detect(rig, people, noise=2.0)
     twice = np.concatenate([np.arange(len(person))] * 2)
@@ -130,7 +130,7 @@ def test_a_face_reported_once_more_costs_no_joint(preset):
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, copy.copy, lambda each: pickle.loads(pickle.dumps(each))])
-def test_copies_are_as_frozen_as_what_they_are_of(copied):
+def test_copies_are_frozen(copied):
     rig, people = ring(3), crowd(2)
     detections, person = detect(rig, people)
     maps = Heatmaps(np.ones((len(person), 17, 2, 2)), np.zeros((len(person), 2)), np.ones((len(person), 2)))
@@ -164,7 +164,7 @@ def test_estimating_in_threads_gives_the_same():
 
 
 @pytest.mark.parametrize("swapped", [lambda rig, detections: (detections, rig), lambda rig, found: (list(rig), found)])
-def test_what_is_no_rig_is_said(swapped):
+def test_an_argument_that_is_not_a_rig_is_refused(swapped):
     rig = ring(3)
     with pytest.raises(ValueError, match=r"expected a mvpose\.Rig, got (Detections|list): estimate\(rig, detections\)"):
         Pipeline().estimate(*swapped(rig, detect(rig, crowd(1))[0]))
@@ -183,12 +183,12 @@ def test_what_is_no_rig_is_said(swapped):
         (lambda: UnmatchedPictorialStructure(reach=np.nan), "reach of the unmatched pictorial structure must be"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(make, message):
+def test_invalid_settings_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 
 
-def test_timings_add_up_and_the_estimate_is_whole():
+def test_timings_add_up_and_the_estimate_is_complete():
     rig = ring(5)
     estimate = Pipeline().estimate(rig, detect(rig, crowd(2))[0])
     stages = {"affinity", "matching", "reconstruction"}
@@ -199,13 +199,13 @@ def test_timings_add_up_and_the_estimate_is_whole():
     assert np.linalg.eigvalsh(estimate.covariance).min() > 0
 
 
-def test_an_unknown_preset_names_the_known_ones():
+def test_an_unknown_preset_lists_the_known_ones():
     with pytest.raises(ValueError, match="full, appearance, geometry, hungarian, no-3dps, no-matching, fast"):
         Pipeline.preset("best")
 
 
 def test_the_method_stands_alone():
-    """Mvpose runs on real cameras: importing it must bring in neither the simulator nor a renderer."""
+    """Importing mvpose must import neither the simulator nor a renderer."""
     strangers = ("simharness", "mujoco", "pyrender", "cv2", "polars")
     code = f"import sys, mvpose; print(*(m for m in {strangers} if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []

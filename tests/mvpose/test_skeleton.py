@@ -41,7 +41,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_skeleton_that_is_none_is_refused(name):
+def test_an_invalid_skeleton_is_refused(name):
     changes, message = BAD[name]
     good = {"joints": ("a", "b", "c"), "parents": (-1, 0, 1), "mirror": (0, 2, 1), "sigmas": (0.1, 0.1, 0.1)}
     assert len(Skeleton("limb", **good)) == 3
@@ -51,7 +51,7 @@ def test_a_skeleton_that_is_none_is_refused(name):
 
 
 def test_panoptic_is_in_the_order_of_its_files():
-    """joints19 of the CMU Panoptic dataset: spot checks of the published order, and one sigma a kind of joint."""
+    """joints19 of the CMU Panoptic dataset: checks of the published order, and equal sigmas for each kind of joint."""
     order = {
         0: "neck",
         1: "nose",
@@ -67,7 +67,7 @@ def test_panoptic_is_in_the_order_of_its_files():
         assert PANOPTIC19.sigmas[PANOPTIC19.index(joint)] == COCO17.sigmas[COCO17.index(joint)]
 
 
-def test_lists_make_a_skeleton_too():
+def test_a_skeleton_can_be_made_from_lists():
     lists = {key: list(getattr(SHELF14, key)) for key in ("joints", "parents", "mirror", "sigmas")}
     assert Skeleton("shelf14", **lists) == SHELF14
     assert hash(Skeleton("shelf14", **lists)) == hash(SHELF14)

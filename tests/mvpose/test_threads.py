@@ -1,4 +1,4 @@
-"""BLAS on one thread, for as long as anybody asks for it."""
+"""Limit of BLAS to one thread."""
 
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -9,8 +9,8 @@ def threads():
     return [library["num_threads"] for library in threadpool_info()]
 
 
-def test_who_leaves_first_lifts_no_limit_and_who_leaves_last_leaves_it_as_it_was():
-    """As two threads do that estimate at once."""
+def test_only_the_last_exit_lifts_the_limit():
+    """The order is that of two threads that estimate at the same time."""
     with threadpool_limits(limits=3):
         before = threads()
         assert max(before) > 1

@@ -1,4 +1,4 @@
-"""The benchmark's scenes, its arithmetic and its command line; nothing here is timed."""
+"""Scenes, arithmetic and command line of the benchmark; nothing is timed here."""
 
 import json
 import math
@@ -54,7 +54,7 @@ def test_people_have_the_bones_of_adults_and_stand_on_the_floor():
 
 
 @pytest.mark.parametrize(("views", "people"), [(2, 1), (5, 4), (31, 10), (31, 30)])
-def test_every_camera_has_everybody_in_the_image_from_2_to_2p5_metres(views, people):
+def test_every_camera_is_2_to_2p5_metres_high_and_sees_all_people(views, people):
     rig = ring(views, people)
     assert 2.0 - 1e-9 < rig.centers[:, 2].min() <= rig.centers[:, 2].max() <= 2.5
     for seed in range(20):
@@ -74,7 +74,7 @@ def test_a_larger_rig_contains_the_smaller_and_no_two_cameras_coincide_or_face_e
 
 
 @pytest.mark.parametrize("conditions", [LIVE, HARD])
-def test_keypoints_are_off_by_the_noise_asked_for_and_as_many_missing(conditions):
+def test_keypoints_have_the_requested_noise_and_misses(conditions):
     offsets, detected = [], []
     for scene in frames(6, 8, 8, conditions=conditions):
         real = scene.person >= 0
@@ -90,7 +90,7 @@ def test_keypoints_are_off_by_the_noise_asked_for_and_as_many_missing(conditions
 
 
 @pytest.mark.parametrize("conditions", [LIVE, HARD])
-def test_as_many_people_are_missed_as_asked_and_nobody_is_seen_twice_by_a_view(conditions):
+def test_people_are_missed_at_the_requested_rate_and_detected_once_per_view(conditions):
     seen = 0
     for scene in frames(10, 10, 20, conditions=conditions):
         count = Counter(zip(scene.detections.view.tolist(), scene.person.tolist(), strict=True))
@@ -100,7 +100,7 @@ def test_as_many_people_are_missed_as_asked_and_nobody_is_seen_twice_by_a_view(c
     assert binomtest(2000 - seen, 2000, conditions.people_missed).pvalue > 1e-4
 
 
-def test_every_view_has_its_phantom_labelled_nobody_who_stands_where_nobody_does():
+def test_every_view_has_a_phantom_away_from_all_people():
     exact = Conditions(noise=0.0, joints_missing=0.0, people_missed=0.5, phantoms=1)
     for scene in frames(5, 6, 10, conditions=exact):
         nobody = scene.person == -1
@@ -111,7 +111,7 @@ def test_every_view_has_its_phantom_labelled_nobody_who_stands_where_nobody_does
         assert np.linalg.norm(middle[:, None] - real, axis=2).min() >= CLEARANCE
 
 
-def test_phantoms_and_noise_change_nothing_but_themselves():
+def test_phantoms_and_noise_change_no_other_draw():
     clean, noisy = film(ring(4, 3), 3, conditions=EXACT), film(ring(4, 3), 3)
     np.testing.assert_array_equal(clean.joints, noisy.joints)
     haunted = film(ring(4, 3), 3, conditions=Conditions(0.0, 0.0, 0.0, phantoms=2))
@@ -197,21 +197,21 @@ def test_a_bar_is_full_at_the_top_and_grows_evenly_in_log(value, width):
     assert len(bar(value, 1, 1000, width=width)) == pytest.approx(width * np.log(value) / np.log(1000), abs=1)
 
 
-def test_a_terminal_without_symbols_gets_signs():
+def test_a_terminal_without_symbols_gets_ascii():
     text = "✓ ✗ ── █▍ 5×4"
     assert encodable(text, "utf-8") == text
     encodable(text, "ascii").encode("ascii")
     assert encodable(text, "ascii") == "+ ! -- ## 5x4"
 
 
-def test_the_memory_of_a_process_is_its_own():
-    """Not that of the process that started it, which a naive reading of getrusage includes."""
+def test_peak_memory_is_that_of_the_process_only():
+    """It excludes the memory of the parent process, which getrusage includes."""
     ballast = np.ones(40_000_000)  # 320 MB
     code = "from benchmarks.method.processes import peak_memory; print(peak_memory())"
     assert 10 < report(code) < 300 < ballast.nbytes / 1e6
 
 
-def test_a_process_that_fails_says_so():
+def test_a_failing_process_raises_its_error_output():
     with pytest.raises(RuntimeError, match="no such luck"):
         report("raise SystemExit('no such luck')")
 
@@ -247,7 +247,7 @@ def test_the_command_line_prints_a_section_and_writes_its_figures(tmp_path):
 
 
 def likely(views, people, factor):
-    """Milliseconds of both presets and their stages at a size, on a machine that takes ``factor`` times as long."""
+    """Milliseconds of both presets and their stages at a size, on a machine slower by ``factor``."""
     m = views * people
     totals = {"fast": factor * 0.04 * m**0.95, "full": factor * 0.2 * m**1.15}
     shares = {"total": 1.0, "affinity": 0.2, "matching": 0.5, "reconstruction": 0.3}
@@ -273,7 +273,7 @@ def likely_sweep(grows, sizes, factor):
 
 
 @pytest.mark.parametrize("factor", [1 / 8, 1 / 3, 1, 10, 100])
-def test_tables_fit_a_page_however_fast_the_machine(factor):
+def test_tables_fit_a_page_on_any_machine(factor):
     texts = [
         stages.table_of([likely_stages(*size, factor) for size in stages.SIZES]),
         published.table_of(
@@ -285,7 +285,7 @@ def test_tables_fit_a_page_however_fast_the_machine(factor):
     assert [max(map(len, text.splitlines())) <= WIDTH for text in texts] == [True] * 4
 
 
-def test_stages_and_curve_hold_what_is_asked(tmp_path):
+def test_stages_and_curve_are_complete(tmp_path):
     file = tmp_path / "figures.json"
     assert main(["--quick", "--only", "stages", "curve", "--json", str(file)]) == 0
     result = json.loads(file.read_text())
@@ -302,16 +302,16 @@ def test_stages_and_curve_hold_what_is_asked(tmp_path):
         )
 
 
-def test_the_figures_say_what_command_made_them_and_nothing_of_the_machine_s_folders(tmp_path, capsys):
+def test_the_result_has_the_command_without_folders(tmp_path, capsys):
     file = tmp_path / "made" / "a name.json"
-    asked = ["--only", "reid", "published", "--quick", "--json"]
-    assert main([*asked, str(file)]) == 0
+    options = ["--only", "reid", "published", "--quick", "--json"]
+    assert main([*options, str(file)]) == 0
     text = file.read_text()
-    assert shlex.split(json.loads(text)["command"]) == ["python", "-m", "benchmarks.method", *asked, file.name]
+    assert shlex.split(json.loads(text)["command"]) == ["python", "-m", "benchmarks.method", *options, file.name]
     assert str(tmp_path) not in text
 
 
-def test_published_sizes_carry_our_times_and_the_figures_of_others_in_their_own_columns(tmp_path):
+def test_published_sizes_have_our_times_and_other_times_in_separate_columns(tmp_path):
     file = tmp_path / "figures.json"
     assert main(["--quick", "--only", "published", "reid", "--json", str(file)]) == 0
     result = json.loads(file.read_text())
@@ -331,16 +331,16 @@ def test_published_sizes_carry_our_times_and_the_figures_of_others_in_their_own_
         assert row["crop"] * row["crops"] == pytest.approx(row["frame"], rel=0.5)
 
 
-def test_figures_of_others_stand_at_the_size_they_were_measured_at():
+def test_other_times_are_at_the_size_at_which_they_were_measured():
     assert [others_at(size)["released, matching + 3DPS"] for size in SIZES] == [8.4, 28, 75, 328, 5555]
     assert {len(figures) for figures in OTHERS.values()} == {len(SIZES)}
     for size in SIZES:  # a constraint more costs more, in one language; matching alone costs less than with 3DPS
-        told = others_at(size)
-        assert told["released, matching"] < told["released, matching + 3DPS"]
-        assert told["EasyMocap, matching, constrained"] < told["released, matching, constrained"]
+        times = others_at(size)
+        assert times["released, matching"] < times["released, matching + 3DPS"]
+        assert times["EasyMocap, matching, constrained"] < times["released, matching, constrained"]
 
 
-def test_an_unknown_section_names_the_known_ones(capsys):
+def test_an_unknown_section_lists_the_known_ones(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--only", "speed"])
     assert stop.value.code == 2

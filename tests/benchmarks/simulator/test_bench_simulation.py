@@ -1,4 +1,4 @@
-"""What the figures say, of figures made up."""
+"""Tables of the simulation benchmark, from made-up figures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from benchmarks.simulator.simulation import STAGES, SWEEPS, Size, table_of
 
 
 def sizes(*, power, build):
-    """A cost of (people x cameras) ** power microseconds for each of the stages."""
+    """Sizes with a cost of (people x cameras) ** power microseconds per stage."""
 
     def size(sweep, people, cameras, frames):
         cost = 1e-3 * (people * cameras) ** power
@@ -24,8 +24,8 @@ def test_exponents_are_those_of_the_cost(power):
 
 
 @pytest.mark.parametrize(("build", "mark"), [(3.9, "✓"), (4.0, "✗")])
-def test_the_target_counts_what_is_done_once(build, mark):
-    """60 microseconds of stages and the building: 253 frames a second, and 246."""
+def test_the_target_includes_the_build(build, mark):
+    """60 microseconds of stages plus the build give 253 and 246 frames per second."""
     (line,) = [line for line in table_of(sizes(power=1.0, build=build)).splitlines() if "frames per second" in line]
     assert line.split()[3] == f"{1e3 / (build + 0.06):.0f}"
     assert mark in line

@@ -1,4 +1,4 @@
-"""The benchmark's own reckoning; what it measures depends on the machine and is no matter for a test."""
+"""Tables and command line of the rendering benchmark; the figures depend on the machine and are not tested."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.simulator.rendering import Measurement, table_of
 from benchmarks.simulator.scenes import scenario
 
 
-def test_targets_are_judged_by_the_median_in_their_own_direction():
+def test_targets_are_compared_with_the_median():
     lines = table_of(
         [
             Measurement("quick enough", 8.0, 7.0, 9.0),

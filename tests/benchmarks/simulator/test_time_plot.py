@@ -1,4 +1,4 @@
-"""Table and curves of the running time say what was measured: read back from the text and from the picture."""
+"""Table and curves of the running time, read back from the text and the picture."""
 
 import json
 import re
@@ -26,14 +26,14 @@ SHARE = {"total": 1.1, "affinity": 0.2, "matching": 0.5, "reconstruction": 0.3}
 
 
 def point(views, people):
-    """All grow with views ** 1.5 and people ** 2."""
+    """Times that grow with views ** 1.5 and people ** 2."""
     size = views**1.5 * people**2
     ms = {preset: {cost: SCALE[preset] * SHARE[cost] * size for cost in COSTS} for preset in PRESETS}
     return Point(views, people, views * people, ms)
 
 
 def exponents(power):
-    """Not those of the points: so that it is seen where they come from."""
+    """Exponents that differ from those of the points, so that tests detect their source."""
     return {preset: {cost: power + SHARE[cost] + SCALE[preset] for cost in COSTS} for preset in PRESETS}
 
 
@@ -55,7 +55,7 @@ def made():
 
 
 def drawn(picture, line):
-    """Where the marks of a line lie, (n, 2), in the plot's own coordinates."""
+    """Positions of the marks of a line, (n, 2), in coordinates of the plot."""
     (group,) = picture.findall(f".//*[@id='{line}']")
     marks = [each for each in group.iter() if each.tag.endswith("}use")]
     assert all(mark.get(f"{XLINK}href") for mark in marks)
@@ -63,7 +63,7 @@ def drawn(picture, line):
 
 
 def check_curves(svg, result):
-    """In every plot one pair of logarithmic axes puts all marks where the figures are."""
+    """Check that in every plot one pair of logarithmic axes maps all figures to their marks."""
     picture = ElementTree.fromstring(svg)
     for grows in ("views", "people"):
         sweep = next(sweep for sweep in result.curve if sweep.grows == grows)
@@ -81,14 +81,14 @@ def check_curves(svg, result):
                 total = sum(list(paper.paper.values())[-stages:])  # affinity, which has the network, is the first
                 figures.append((getattr(paper.ours, grows), total))
             released = drawn(picture, f"{grows}-{preset}-released")
-            told = {
+            times = {
                 (getattr(each.ours, grows), each.others["released, matching + 3DPS"])
                 for each in result.published
                 if (each.ours.views == 5 if grows == "people" else each.ours.people != 10 or each.ours.views != 5)
             }
-            assert len(released) == len(told) > 0
+            assert len(released) == len(times) > 0
             marks.extend(released[np.argsort(released[:, 0])])
-            figures += sorted(told)
+            figures += sorted(times)
             marks, figures = np.array(marks), np.log10(np.array(figures))
             for axis, sign in ((0, 1), (1, -1)):  # y points down
                 slope, offset = np.polyfit(figures[:, axis], marks[:, axis], 1)
@@ -97,7 +97,7 @@ def check_curves(svg, result):
 
 
 def tables(text):
-    """The tables of a text by their first head and, where several share it, in their order: rows of cells."""
+    """Return the tables of a text in order, each as rows of cells."""
     found, last = [], None
     for line in text.splitlines():
         if not line.startswith("|"):
@@ -119,7 +119,7 @@ def number(cell):
     return float(cell.split()[0].rstrip(","))
 
 
-def test_curves_lie_where_the_figures_are():
+def test_curves_are_at_the_figures():
     check_curves(curves(made()), made())
 
 
@@ -140,7 +140,7 @@ def test_the_table_by_stage_is_of_the_paper_s_size_and_adds_up():
     assert (number(without[3]), number(whole[3])) == (80, 105)
 
 
-def test_the_table_of_sizes_sets_the_same_work_beside_each_other():
+def test_the_table_of_sizes_compares_equal_work():
     _, whole, alone, *_ = tables(markdown(made()))
     assert [row[0] for row in whole[1:]] == [row[0] for row in alone[1:]] == [f"{v} × {p}" for v, p in SIZES]
     for (views, people), row, matching in zip(SIZES, whole[1:], alone[1:], strict=True):
@@ -155,7 +155,7 @@ def test_the_table_of_sizes_sets_the_same_work_beside_each_other():
     assert [number(cell) for cell in alone[2][3:]] == [4.6, 526, 3.5]
 
 
-def test_growth_is_told_point_by_point_with_its_exponent():
+def test_growth_is_listed_by_point_with_its_exponent():
     *_, views, people = tables(markdown(made()))
     for table, power, sizes in ((views, 1.5, SWEEPS["views"]), (people, 2.0, SWEEPS["people"])):
         heads = [head.replace("`", "").split() for head in table[0][1:]]
@@ -163,25 +163,25 @@ def test_growth_is_told_point_by_point_with_its_exponent():
         assert len({(preset, cost) for preset, cost in heads}) == 8
         assert [row[0] for row in table[1:-1]] == [f"{v} × {p}" for v, p in sizes]
         column = table[0].index("`full` matching")
-        told = [number(row[column]) for row in table[1:-1]]
-        assert told == pytest.approx([0.005 * v**1.5 * p**2 for v, p in sizes], rel=5e-3)
+        times = [number(row[column]) for row in table[1:-1]]
+        assert times == pytest.approx([0.005 * v**1.5 * p**2 for v, p in sizes], rel=5e-3)
 
 
-def test_it_says_machine_command_seconds_and_whether_to_quote_it():
+def test_the_text_has_machine_command_and_duration():
     text = markdown(made())
-    for told in ("An Imagined Processor, 3 cores", "numpy 2.4.6", f"    {made().command}\n", "47 s"):
-        assert told in text
+    for part in ("An Imagined Processor, 3 cores", "numpy 2.4.6", f"    {made().command}\n", "47 s"):
+        assert part in text
     assert "do not quote" not in text
     assert "do not quote" in markdown(replace(made(), quick=True))
 
 
-def test_without_the_network_the_rest_is_told():
+def test_without_the_network_the_other_rows_remain():
     stages, *_ = tables(markdown(replace(made(), reid=[])))
     assert stages[1][1:3] == ["not measured"] * 2
     assert len(stages) == 6  # no sum with it
 
 
-def test_a_quick_run_of_the_benchmark_has_all_that_is_shown(tmp_path, capsys):
+def test_a_quick_run_has_all_sections_that_are_plotted(tmp_path, capsys):
     file, folder = tmp_path / "bench.json", tmp_path / "time"
     assert bench(["--quick", "--only", "published", "reid", "curve", "--json", str(file)]) == 0
     assert main([str(file), str(folder)]) == 0
@@ -193,9 +193,9 @@ def test_a_quick_run_of_the_benchmark_has_all_that_is_shown(tmp_path, capsys):
 
 
 def broken(change):
-    told = asdict(made())
-    change(told)
-    return json.dumps(told)
+    result = asdict(made())
+    change(result)
+    return json.dumps(result)
 
 
 @pytest.mark.parametrize(
@@ -203,21 +203,24 @@ def broken(change):
     [
         ("{", "Invalid JSON"),
         ("[]", "be an object"),
-        (broken(lambda told: told.pop("reid")), "reid"),
-        (broken(lambda told: told.update(published=[])), "paper"),
-        (broken(lambda told: told["curve"].pop(0)), "views"),
-        (broken(lambda told: told["curve"][0]["points"][0].update(people=7)), "only views"),
-        (broken(lambda told: told["curve"][1]["exponents"]["fast"].pop("total")), "people, fast: total"),
+        (broken(lambda result: result.pop("reid")), "reid"),
+        (broken(lambda result: result.update(published=[])), "paper"),
+        (broken(lambda result: result["curve"].pop(0)), "views"),
+        (broken(lambda result: result["curve"][0]["points"][0].update(people=7)), "only views"),
+        (broken(lambda result: result["curve"][1]["exponents"]["fast"].pop("total")), "people, fast: total"),
         (
-            broken(lambda told: told["curve"][1]["points"][2]["ms"]["full"].update(matching=0.0)),
+            broken(lambda result: result["curve"][1]["points"][2]["ms"]["full"].update(matching=0.0)),
             "full at 5 × 4: matching",
         ),
-        (broken(lambda told: told["published"][1]["ours"]["ms"]["fast"].update(total="soon")), "ours.ms.fast.total"),
-        (broken(lambda told: told["published"][1]["paper"].pop("matching")), "paper at 5 × 4: matching"),
-        (broken(lambda told: told["published"][0]["others"].clear()), "others at 3 × 3"),
+        (
+            broken(lambda result: result["published"][1]["ours"]["ms"]["fast"].update(total="soon")),
+            "ours.ms.fast.total",
+        ),
+        (broken(lambda result: result["published"][1]["paper"].pop("matching")), "paper at 5 × 4: matching"),
+        (broken(lambda result: result["published"][0]["others"].clear()), "others at 3 × 3"),
     ],
 )
-def test_figures_that_cannot_be_shown_get_one_message(tmp_path, capsys, text, why):
+def test_an_invalid_result_gets_one_message(tmp_path, capsys, text, why):
     file = tmp_path / "bench.json"
     file.write_text(text)
     assert main([str(file), str(tmp_path / "time")]) == 2
@@ -228,7 +231,7 @@ def test_figures_that_cannot_be_shown_get_one_message(tmp_path, capsys, text, wh
     assert not (tmp_path / "time").exists()
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path, capsys):
+def test_a_missing_file_is_named(tmp_path, capsys):
     assert main([str(tmp_path / "none.json"), str(tmp_path)]) == 2
     assert "none.json: No such file" in capsys.readouterr().err
 

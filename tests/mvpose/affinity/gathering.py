@@ -1,4 +1,4 @@
-"""Rooms full of people before cameras of any resolution, and what a moderately noisy detector makes of them."""
+"""Synthetic rooms with people, cameras of any resolution, and detections with moderate noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mvpose.rays import viewing_rays
 
 
 def people_in_a_room(count, *, half=2.0, gap=0.6, seed=0):
-    """People anywhere in a square room, ``gap`` metres apart at least, turned and posed at random: (count, 17, 3)."""
+    """Draw people in a square room, at least ``gap`` metres apart, with random headings and poses: (count, 17, 3)."""
     rng = np.random.default_rng(seed)
     spots: list[np.ndarray] = []
     while len(spots) < count:
@@ -29,7 +29,7 @@ def people_in_a_room(count, *, half=2.0, gap=0.6, seed=0):
 
 
 def rig_around(views, *, radius=5.0, size=(1280, 960), seed=0):
-    """Cameras of 75 degrees about the origin, not quite even in place and height."""
+    """Cameras of 75 degrees around the origin, with slightly irregular positions and heights."""
     rng = np.random.default_rng(seed)
     focal = 0.5 * size[0] / np.tan(np.radians(37.5))
     bearings = 2 * np.pi * (np.arange(max(views, 3)) + rng.uniform(-0.3, 0.3, max(views, 3))) / max(views, 3)
@@ -42,7 +42,7 @@ def rig_around(views, *, radius=5.0, size=(1280, 960), seed=0):
 
 
 def noisy(rig, people, *, seed=0, pixels=6.0, missed=0.1):
-    """Everybody in every view, keypoints off by ``pixels`` of an image 1000 wide and some missed; and who is who."""
+    """Detections of all people in every view, with noise of ``pixels`` in an image 1000 wide, and their people."""
     rng = np.random.default_rng(seed)
     width = np.array([camera.size[0] for camera in rig])
     exact = rig.project(people)
@@ -55,14 +55,14 @@ def noisy(rig, people, *, seed=0, pixels=6.0, missed=0.1):
 
 
 def labels(rig, detections, affinity=None):
-    """Who is who by geometry, or another affinity, and clustering."""
+    """Labels by clustering with the geometric or another affinity."""
     matrix = (affinity or GeometricAffinity())(rig, detections, viewing_rays(rig, detections))
     return match(matrix, detections.view, method="clustering").labels
 
 
 def pairwise_f1(found, person, view):
-    """F1 of "these two detections of different views are one person"."""
+    """F1 over pairs of detections of different views."""
     across = view[:, None] != view
-    said = (found[:, None] == found) & (found[:, None] >= 0) & across
+    matched = (found[:, None] == found) & (found[:, None] >= 0) & across
     true = (person[:, None] == person) & across
-    return 2 * (said & true).sum() / (said.sum() + true.sum())
+    return 2 * (matched & true).sum() / (matched.sum() + true.sum())

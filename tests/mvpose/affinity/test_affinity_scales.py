@@ -1,4 +1,4 @@
-"""The defaults serve every rig: people are found whatever the resolution, and however few they or their views are."""
+"""Default scales of the affinities: they hold for any resolution and any number of people and views."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ SIZES = [(360, 288), (1280, 960), (1032, 776), (3840, 2160)]
 @pytest.mark.parametrize("affinity", AFFINITIES, ids=lambda a: type(a).__name__)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(("views", "people"), [(2, 3), (3, 4), (5, 8), (12, 12)])
-def test_resolution_changes_nothing(affinity, size, views, people):
+def test_results_do_not_depend_on_resolution(affinity, size, views, people):
     rig = rig_around(views, size=size)
     f1 = []
     for seed in range(3):
@@ -42,7 +42,7 @@ def test_one_person_alone_is_one_person(affinity, views, size):
 
 
 @pytest.mark.parametrize("affinity", AFFINITIES, ids=lambda a: type(a).__name__)
-def test_an_empty_view_is_no_trouble(affinity):
+def test_an_empty_view_is_allowed(affinity):
     rig = rig_around(4)
     detections, person = noisy(rig, people_in_a_room(3))
     kept = detections.view != 1
@@ -51,7 +51,7 @@ def test_an_empty_view_is_no_trouble(affinity):
 
 
 @pytest.mark.parametrize("affinity", AFFINITIES, ids=lambda a: type(a).__name__)
-def test_all_in_one_view_or_none_at_all_is_nobody(affinity):
+def test_detections_of_a_single_view_give_no_people(affinity):
     rig = rig_around(4)
     detections, _ = noisy(rig, people_in_a_room(5))
     kept = detections.view == 2
@@ -72,8 +72,8 @@ def test_the_whole_method_finds_them(affinity, views, people):
     )
 
 
-def test_people_a_touch_apart_are_told_apart():
-    """Half a metre between neighbours, keypoints scattered as annotators scatter them."""
+def test_people_half_a_metre_apart_are_separated():
+    """Neighbours are half a metre apart; keypoints have the noise of human annotators."""
     rig = rig_around(5)
     f1 = []
     for seed in range(4):

@@ -32,7 +32,7 @@ def test_epipolar_distance_is_the_mean_over_both_lines():
     np.testing.assert_allclose(distance, distance.T)
 
 
-def test_a_distorted_lens_changes_nothing():
+def test_lens_distortion_does_not_change_the_distance():
     straight, bent = ring(3), ring(3, distortion=[-0.2, 0.05, 0.001, -0.001, 0.0])
     people = crowd(2, spacing=0.6)
     for rig in (straight, bent):
@@ -43,7 +43,7 @@ def test_a_distorted_lens_changes_nothing():
 
 
 def traced(camera, origin, direction, pixel, nearest):
-    """Distance from a pixel to the picture of a ray, walked point by point; infinite where it is out of sight."""
+    """Distance from a pixel to the image of a ray, sampled point by point; infinite where the ray is not visible."""
     along = nearest + np.concatenate([[0.0], np.geomspace(1e-4, 1e7, 20_000)])
     points = origin + along[:, None] * direction
     seen = camera.project(points[camera.depth(points) > 1e-9])
@@ -55,8 +55,8 @@ def traced(camera, origin, direction, pixel, nearest):
 
 
 @given(st.integers(0, 100_000))
-def test_the_distance_is_to_the_picture_of_the_ray(seed):
-    """Cameras anywhere, also behind each other: one joint, both ways, each in pixels of its own thousandth."""
+def test_the_distance_is_to_the_image_of_the_ray(seed):
+    """Cameras at any position, also behind each other: one joint, both directions, in normalised pixels."""
     rng = np.random.default_rng(seed)
     sizes = [(1280, 960), (500, 400)]
     rig = Rig([look_at(rng.uniform(-3, 3, 3), rng.uniform(-3, 3, 3), focal=0.6 * size[0], size=size) for size in sizes])
@@ -75,8 +75,8 @@ def test_the_distance_is_to_the_picture_of_the_ray(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_mean_over_joints_is_weighted_cut_off_and_mapped(seed):
-    """Joint by joint through detections that have but that joint; the rest by hand."""
+def test_joint_distances_are_saturated_weighted_and_mapped(seed):
+    """Distances of single joints come from detections with that joint only; the mean is computed by hand."""
     rig = rig_around(3, seed=seed)
     detections, _ = noisy(rig, people_in_a_room(2, half=0.6, seed=seed), seed=seed, pixels=12, missed=0.4)
     m = len(detections)
@@ -117,7 +117,7 @@ def test_epipolar_affinity_does_not_depend_on_resolution():
 
 
 def test_lines_that_meet_behind_a_camera_are_no_match():
-    """Two cameras side by side: a shift the wrong way keeps every joint on its line, but puts it behind both."""
+    """Two cameras side by side: a shift the wrong way keeps every joint on its line, but behind both cameras."""
     rig = Rig([look_at([5, y, 1], [0, y, 1]) for y in (-0.5, 0.5)])
     shift = {"ahead": 0.0, "behind": 400.0}  # the disparity ahead is 800 x 1 / 5 = 160 pixels
     values = {}
@@ -135,8 +135,8 @@ def test_lines_that_meet_behind_a_camera_are_no_match():
     assert values["behind"][1] == 0
 
 
-def test_a_little_past_infinity_is_still_a_match():
-    """Far away, noise makes rays diverge: the distance grows by pixels there, it does not jump."""
+def test_slightly_diverging_rays_still_match():
+    """Rays to distant people diverge with noise: the distance then grows continuously."""
     rig = Rig([look_at([60, y, 1], [0, y, 1]) for y in (-0.1, 0.1)])
     keypoints = rig.project(STANDING)
     keypoints[0, :, 0] -= 4 * np.sign(keypoints[0, 0, 0] - keypoints[1, 0, 0])  # the disparity is 2.7
@@ -146,7 +146,7 @@ def test_a_little_past_infinity_is_still_a_match():
 
 
 def test_joints_at_the_epipole_are_left_out():
-    """Cameras that face each other: near the other camera's image a line has no direction."""
+    """Cameras that face each other: an epipolar line has no defined direction near the epipole."""
     rig = Rig([look_at([5, 0, 1], [0, 0, 1]), look_at([-5, 0, 1], [0, 0, 1])])
     on_axis = np.tile([0.0, 0.0, 1.0], (17, 1)) + np.random.default_rng(0).normal(0, 0.02, (17, 3))
     off_axis = STANDING + [0, 0.8, 0]
@@ -179,7 +179,7 @@ def test_two_cameras_in_one_point_compare_pixels():
 
 
 @given(st.integers(0, 100_000))
-def test_anything_gives_an_affinity(seed):
+def test_any_detections_give_a_valid_affinity(seed):
     rng = np.random.default_rng(seed)
     size = (1280, 960)
     centers = rng.uniform(-2, 2, (4, 3))
@@ -197,8 +197,8 @@ def test_anything_gives_an_affinity(seed):
     assert (matrix[view[:, None] == view] == 0).all()
 
 
-def test_every_view_is_measured_in_its_own_width():
-    """One camera of 4K beside one of 360 x 288: a pixel of each counts as much as its share of the picture."""
+def test_distances_are_normalised_by_the_width_of_each_view():
+    """A 4K camera and one of 360 x 288: distances count as fractions of the width of each picture."""
     people = people_in_a_room(2)
     wide, narrow = rig_around(2), rig_around(2, size=(320, 240))
     mixed = Rig([wide[0], Camera(narrow[1].K, narrow[1].R, narrow[1].t, size=narrow[1].size)])

@@ -13,14 +13,14 @@ from mvpose.rays import viewing_rays
 
 
 def at_cosines(cosines, dimensions=64, seed=0):
-    """A unit vector, and others at the given cosines to it, in a random direction of space."""
+    """A random unit vector, and others at the given cosines to it."""
     rng = np.random.default_rng(seed)
     basis = np.linalg.qr(rng.standard_normal((dimensions, dimensions)))[0]
     return np.array([basis[0], *(c * basis[0] + np.sqrt(1 - c * c) * basis[k + 1] for k, c in enumerate(cosines))])
 
 
 def looks(person, *, dimensions=256, cosine=0.8, seed=0):
-    """Descriptors, (m, D): those of one person at a mean ``cosine`` to each other, strangers nearly at right angles."""
+    """Descriptors, (m, D): mean ``cosine`` for one person, nearly orthogonal for different people."""
     rng = np.random.default_rng(seed)
     own = rng.standard_normal((person.max() + 1, dimensions))[person]
     spread = rng.standard_normal((len(person), dimensions))
@@ -28,7 +28,7 @@ def looks(person, *, dimensions=256, cosine=0.8, seed=0):
 
 
 def everywhere(descriptors):
-    """Detections with these descriptors, each in a view of its own; and their affinity by appearance."""
+    """Affinity by appearance of detections with these descriptors, each in a separate view."""
     m = len(descriptors)
     rig = ring(max(m, 2))
     detections, _ = detect(rig, STANDING[None], shuffle=False)
@@ -47,7 +47,7 @@ def test_appearance_is_a_sigmoid_of_the_distance_of_unit_vectors():
 
 
 @pytest.mark.parametrize("factor", [1e-30, 1e-3, 1e6, 1e100])
-def test_the_length_of_a_descriptor_means_nothing(factor):
+def test_the_length_of_a_descriptor_does_not_matter(factor):
     descriptors = at_cosines([0.9, 0.6, 0.3])
     scaled = descriptors * np.array([1.0, factor, 1.0, 1 / factor])[:, None]
     np.testing.assert_allclose(everywhere(scaled)[1], everywhere(descriptors)[1], atol=1e-5)
@@ -64,7 +64,7 @@ def test_appearance_alone_needs_descriptors():
 
 @pytest.mark.parametrize("nothing", [0.0, np.nan, np.inf])
 @pytest.mark.parametrize("geometry", [GeometricAffinity(), EpipolarAffinity()])
-def test_a_detection_without_a_descriptor_is_judged_by_geometry_alone(nothing, geometry):
+def test_a_detection_without_a_descriptor_is_compared_by_geometry_only(nothing, geometry):
     rig = rig_around(4)
     detections, person = noisy(rig, people_in_a_room(3))
     descriptors = looks(person)
@@ -90,8 +90,8 @@ def test_a_detection_without_a_descriptor_is_judged_by_geometry_alone(nothing, g
     assert (np.abs(evidence - by_geometry)[~pairs] > 1e-3).any()
 
 
-def test_in_the_mean_geometry_has_a_veto_and_appearance_half_the_say():
-    """Everybody looks alike: nothing beyond the threshold is matched. Nobody does: near pairs lose affinity."""
+def test_rule_mean_is_zero_beyond_the_threshold_and_else_weighs_both_equally():
+    """Equal appearance does not match beyond the threshold; different appearance lowers the affinity of near pairs."""
     rig = rig_around(4)
     detections, person = noisy(rig, people_in_a_room(4))
     rays = viewing_rays(rig, detections)
@@ -108,7 +108,7 @@ def test_in_the_mean_geometry_has_a_veto_and_appearance_half_the_say():
 
 @pytest.mark.parametrize("rule", ["mean", "evidence"])
 @pytest.mark.parametrize("geometry", [GeometricAffinity(), EpipolarAffinity()])
-def test_without_descriptors_geometry_decides(rule, geometry):
+def test_without_descriptors_the_affinity_is_that_of_geometry(rule, geometry):
     rig = rig_around(4)
     detections, _ = noisy(rig, people_in_a_room(4))
     rays = viewing_rays(rig, detections)
@@ -118,7 +118,7 @@ def test_without_descriptors_geometry_decides(rule, geometry):
 
 
 def in_a_room(people=4, *, views=4, seed=0):
-    """Detections of people at random places with random looks, who they are, their rig and rays, and A_g."""
+    """Detections of people at random places with random descriptors, their people, rig, rays, and A_g."""
     rig = rig_around(views, seed=seed)
     detections, person = noisy(rig, people_in_a_room(people, seed=seed), seed=seed)
     detections = replace(detections, descriptors=looks(person, seed=seed))
@@ -127,7 +127,7 @@ def in_a_room(people=4, *, views=4, seed=0):
 
 
 def some(detections, rows):
-    """Some of the detections, or all in another order."""
+    """Select some of the detections, or reorder them."""
     picked = Detections.from_keypoints(detections.view[rows], detections.keypoints[rows], detections.scores[rows])
     return replace(picked, descriptors=detections.descriptors[rows])
 
@@ -137,8 +137,8 @@ def log_odds(affinity):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_evidence_is_how_much_nearer_than_its_rivals_a_pair_is(seed):
-    """Against the words of the definition, with some who have no descriptor and some who stand alone in a view."""
+def test_rule_evidence_follows_its_definition(seed):
+    """Compared with the definition, with some detections without descriptor and some alone in their view."""
     rig, everyone, person, _, _ = in_a_room(seed=seed)
     detections = some(everyone, (everyone.view != 0) | (person == 1))
     descriptors = detections.descriptors.copy()
@@ -167,8 +167,8 @@ def test_evidence_is_how_much_nearer_than_its_rivals_a_pair_is(seed):
     assert (fused[geometry == 0] == 0).all()
 
 
-def test_appearance_is_silent_where_rivals_look_the_same():
-    """Persons 0 and 1 are twins: geometry alone decides between them, but appearance still tells them from others."""
+def test_equal_rivals_give_no_appearance_evidence():
+    """Persons 0 and 1 look equal: geometry alone separates them, but appearance still separates them from others."""
     rig, detections, person, rays, geometry = in_a_room(views=5)
     twin = np.where(person == 1, 0, person)
     detections = replace(detections, descriptors=np.eye(4)[twin] + 0.3)
@@ -186,8 +186,8 @@ def test_appearance_is_silent_where_rivals_look_the_same():
 
 
 @pytest.mark.parametrize("descriptors", [np.ones, np.eye])
-def test_a_scene_without_contrast_is_left_to_geometry(descriptors):
-    """All look alike, or each pair as unlike as any: nobody is nearer than a rival."""
+def test_a_scene_without_contrast_is_matched_by_geometry(descriptors):
+    """All pairs are equally similar or equally different, so no detection is nearer than a rival."""
     rig, detections, person, rays, geometry = in_a_room()
     m = len(person)
     looking = descriptors((m, 8)) if descriptors is np.ones else descriptors(m)
@@ -196,10 +196,10 @@ def test_a_scene_without_contrast_is_left_to_geometry(descriptors):
     assert (geometry > 0.5).any()
 
 
-def test_who_looks_unlike_from_two_sides_is_kept():
-    """One's own distances are beyond the midpoint, and others yet farther: the mean loses nearly all, evidence none.
+def test_rule_evidence_keeps_people_who_look_different_from_two_sides():
+    """Distances of one person exceed the midpoint, others are yet larger: "mean" loses most pairs, "evidence" none.
 
-    So it was with crops of half-hidden people: a tenth of all true pairs.
+    This was observed on crops of half-hidden people, a tenth of all true pairs.
     """
     rig, detections, person, rays, geometry = in_a_room()
     detections = replace(detections, descriptors=looks(person, cosine=0.25))
@@ -209,7 +209,7 @@ def test_who_looks_unlike_from_two_sides_is_kept():
     assert FusedAffinity()(rig, detections, rays)[same].min() > 0.6
 
 
-def test_no_weight_is_geometry_and_more_weight_parts_more():
+def test_weight_0_is_geometry_and_larger_weights_separate_more():
     rig, detections, person, rays, geometry = in_a_room()
     detections = replace(detections, descriptors=looks(person))
     np.testing.assert_allclose(FusedAffinity(weight=0.0)(rig, detections, rays), geometry, atol=1e-12)
@@ -222,7 +222,7 @@ def test_no_weight_is_geometry_and_more_weight_parts_more():
     assert (heavy[other] < light[other]).all()
 
 
-def test_the_order_of_detections_means_nothing():
+def test_the_order_of_detections_does_not_matter():
     rig, detections, person, rays, _ = in_a_room()
     order = np.random.default_rng(1).permutation(len(person))
     mixed = some(detections, order)
@@ -233,7 +233,7 @@ def test_the_order_of_detections_means_nothing():
     )
 
 
-def test_a_rule_or_a_weight_that_cannot_be_is_refused():
+def test_an_invalid_rule_or_weight_is_refused():
     with pytest.raises(ValueError, match="rule must be 'evidence' or 'mean', got 'sum'"):
         FusedAffinity(rule="sum")
     for weight in (-0.1, np.nan, np.inf):
@@ -242,7 +242,7 @@ def test_a_rule_or_a_weight_that_cannot_be_is_refused():
 
 
 @given(st.integers(0, 100_000))
-def test_anything_gives_an_affinity(seed):
+def test_any_detections_give_a_valid_affinity(seed):
     rng = np.random.default_rng(seed)
     rig = rig_around(4, seed=seed)
     m, dimensions = rng.integers(0, 9), rng.integers(0, 5)
@@ -267,12 +267,12 @@ def test_anything_gives_an_affinity(seed):
 
 
 def two_in_one_spot(rig):
-    """Two people who hug: as far as rays can tell, one place and one pose."""
+    """Two people who hug: the same position and pose for rays."""
     return np.array([STANDING, STANDING + [0.05, 0.0, 0.0]])
 
 
 def two_in_one_plane(rig):
-    """Two people in a plane with both of the first two cameras: each is on the other's epipolar lines."""
+    """Two people in a plane with the first two cameras: each lies on the epipolar lines of the other."""
     one, other = rig.centers[:2]
     toward = -(one + other)[:2] / np.linalg.norm((one + other)[:2])
     # Small things at the cameras' height, so that all their joints are in (nearly) that one plane.
@@ -281,7 +281,7 @@ def two_in_one_plane(rig):
 
 
 @pytest.mark.parametrize(("views", "gather"), [(4, two_in_one_spot), (2, two_in_one_plane)])
-def test_appearance_tells_apart_whom_geometry_cannot(views, gather):
+def test_appearance_separates_people_whom_geometry_cannot(views, gather):
     rig = rig_around(views, seed=1) if gather is two_in_one_spot else type(ring(5))(list(ring(5))[:2])
     people = gather(rig)
     f1 = {"geometry": [], "fused": [], "appearance": []}
@@ -298,7 +298,7 @@ def test_appearance_tells_apart_whom_geometry_cannot(views, gather):
     assert np.mean(f1["geometry"]) < 0.9
 
 
-def test_geometry_tells_apart_who_wear_the_same():
+def test_geometry_separates_people_in_equal_clothes():
     rig = rig_around(4)
     detections, person = noisy(rig, people_in_a_room(4, gap=1.0))
     detections = replace(detections, descriptors=looks(np.zeros_like(person)))
@@ -307,7 +307,7 @@ def test_geometry_tells_apart_who_wear_the_same():
 
 
 def test_some_descriptors_are_better_than_none():
-    """Each third detection has none: pairs by geometry and pairs by both are on one scale and match together."""
+    """A third of the detections has no descriptor: affinities with and without appearance are on one scale."""
     rig = rig_around(5, seed=2)
     detections, person = noisy(rig, people_in_a_room(6), seed=2)
     descriptors = looks(person)

@@ -54,7 +54,7 @@ def test_parallel_and_diverging_rays_are_defined():
 
 @given(st.integers(0, 100_000), st.sampled_from([0.0, 1e-12, 1e-9, 1e-7]))
 def test_nearly_parallel_rays_are_parallel_ones(seed, angle):
-    """In any direction: rounding must not make a crossing of them."""
+    """Rounding must not make nearly parallel rays cross, in any direction."""
     rng = np.random.default_rng(seed)
     origin, direction, other, aside = rng.standard_normal((4, 3))
     direction /= np.linalg.norm(direction)
@@ -66,14 +66,14 @@ def test_nearly_parallel_rays_are_parallel_ones(seed, angle):
 
 @pytest.mark.parametrize("angle", [1e-1, 1e-2, 1e-3, 2e-4])
 def test_rays_at_a_small_angle_still_cross(angle):
-    """A thousand metres on, but they do."""
+    """They cross at a distance of a thousand metres."""
     toward = [-np.sin(angle), 0.0, np.cos(angle)]
     assert ray_distance(two_rays([0, 0, 0], [0, 0, 1], [0.3, 0, 0], toward))[0][0, 1] == pytest.approx(0, abs=1e-6)
     away = [np.sin(angle), 0.0, np.cos(angle)]
     assert ray_distance(two_rays([0, 0, 0], [0, 0, 1], [0.3, 0, 0], away))[0][0, 1] == pytest.approx(0.3, abs=1e-6)
 
 
-def test_true_matches_are_at_no_distance_and_others_are_not():
+def test_true_matches_have_distance_0_and_others_do_not():
     rig, people = ring(5), crowd(4)
     detections, person = detect(rig, people)
     same = (person[:, None] == person) & (detections.view[:, None] != detections.view)
@@ -84,7 +84,7 @@ def test_true_matches_are_at_no_distance_and_others_are_not():
     assert np.median(distance[(person[:, None] != person) & np.isfinite(distance)]) > 0.1
 
 
-def test_missing_joints_are_left_out_and_sure_joints_weigh_more():
+def test_missing_joints_are_left_out_and_confident_joints_weigh_more():
     rig = ring(2)
     people = crowd(1)
     pixels = rig.project(people[0])
@@ -101,7 +101,7 @@ def test_missing_joints_are_left_out_and_sure_joints_weigh_more():
 
 
 def by_hand(rays, *, midpoint, slope, threshold, saturation, least_joints, nearest, widest):
-    """The affinity matrix joint by joint: the least distance of two half-lines is inside or on an edge."""
+    """Affinity matrix computed joint by joint: the least distance of two half-lines is interior or on an edge."""
     m, joints = rays.weights.shape
     result, mean = np.zeros((m, m)), np.full((m, m), np.inf)
     for a, b in np.argwhere(rays.view[:, None] < rays.view):
@@ -128,7 +128,7 @@ def by_hand(rays, *, midpoint, slope, threshold, saturation, least_joints, neare
 
 
 def mutually_nearest(view, distance):
-    """The distances of pairs of two views that are nearer to each other than to anybody else there."""
+    """Distances of mutual nearest neighbours in pairs of views."""
     found = []
     for a, b in np.argwhere(np.isfinite(distance) & (view[:, None] < view)):
         if distance[a, b] == min(distance[a, view == view[b]].min(), distance[view == view[a], b].min()):
@@ -137,7 +137,7 @@ def mutually_nearest(view, distance):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_kernel_does_what_is_written(seed):
+def test_the_kernel_agrees_with_the_definition(seed):
     rig = rig_around(4, seed=seed)
     detections, _ = noisy(rig, people_in_a_room(3, half=1.0, seed=seed), seed=seed, pixels=15, missed=0.5)
     rng = np.random.default_rng(seed)
@@ -157,7 +157,7 @@ def test_the_kernel_does_what_is_written(seed):
 
 
 @given(st.integers(0, 100_000))
-def test_the_misfit_is_a_quantile_of_the_mutually_nearest(seed):
+def test_misfit_is_a_quantile_of_mutual_nearest_distances(seed):
     rng = np.random.default_rng(seed)
     view = rng.permutation(np.repeat(np.arange(4), rng.integers(0, 5, 4)))
     distance = rng.choice([np.inf, 1.0], (len(view), len(view)), p=[0.2, 0.8]) * rng.random((len(view), len(view)))
@@ -168,7 +168,7 @@ def test_the_misfit_is_a_quantile_of_the_mutually_nearest(seed):
 
 
 def shifted(rig, metres, seed=0):
-    """The rig as somebody believes it whose cameras all are some way off."""
+    """Believed rig with errors in all cameras."""
     rng = np.random.default_rng(seed)
     moved = []
     for camera in rig:
@@ -178,8 +178,8 @@ def shifted(rig, metres, seed=0):
     return Rig(moved)
 
 
-def test_a_rig_that_is_wrong_all_over_keeps_more_people_together():
-    """Cameras believed 20 cm off: of the pairs that matching makes, or should, more are right than at a fixed scale."""
+def test_an_adaptive_scale_helps_with_a_wrong_calibration():
+    """Calibration errors of 20 cm: precision and recall of matched pairs are better than at a fixed scale."""
     rig, found = ring(5), {1.0: [], 2.0: []}
     for seed in range(10):
         detections, person = detect(rig, crowd(4, spacing=1.2, seed=seed), noise=2.0, seed=seed)
@@ -195,8 +195,8 @@ def test_a_rig_that_is_wrong_all_over_keeps_more_people_together():
 
 
 @pytest.mark.parametrize("count", [1, 4])
-def test_a_rig_that_is_right_keeps_its_scale(count):
-    """Whatever phantoms there are: they are a minority of the mutually nearest, or too few to go by."""
+def test_a_correct_rig_keeps_the_fixed_scale(count):
+    """Phantoms are a minority of the mutual nearest neighbours, or too few pairs remain."""
     rig = ring(5)
     detections, _ = detect(rig, crowd(count, spacing=1.2), noise=3.0)
     rng = np.random.default_rng(1)
@@ -214,7 +214,7 @@ def test_a_rig_that_is_right_keeps_its_scale(count):
 
 
 @pytest.mark.parametrize("widest", [0.9, np.inf, np.nan])
-def test_a_scale_that_cannot_be_is_refused(widest):
+def test_an_invalid_scale_is_refused(widest):
     with pytest.raises(ValueError, match="widest of the geometric affinity must be at least 1"):
         GeometricAffinity(widest=widest)
 
@@ -239,7 +239,7 @@ def test_ray_affinity_does_not_depend_on_resolution():
     np.testing.assert_allclose(matrices[2], matrices[1], atol=1e-9)
 
 
-def test_same_view_and_far_pairs_have_no_affinity_at_all():
+def test_pairs_of_one_view_and_distant_pairs_have_affinity_0():
     rig = ring(4)
     detections, person = detect(rig, crowd(3, spacing=1.5), noise=2.0)
     affinity = affinities(rig, detections)
@@ -261,7 +261,7 @@ def test_a_view_that_the_rig_does_not_have_is_refused():
         viewing_rays(ring(3), detections)
 
 
-def test_one_wrong_limb_does_not_part_a_pose():
+def test_one_wrong_limb_does_not_separate_a_pair():
     rig = ring(2)
     pixels = rig.project(STANDING)
     pixels[1, [7, 9]] += 2000  # an arm far off the picture
@@ -280,8 +280,8 @@ def test_poses_with_too_few_joints_in_common_are_not_compared(common):
     assert affinities(rig, detections, GeometricAffinity(least_joints=0))[0, 1] > (0.9 if common else -1)
 
 
-def test_two_cameras_in_one_point_still_tell_directions_apart():
-    """A joint cannot be in the lens: seen from one point, people a metre apart differ, one person does not."""
+def test_two_cameras_in_one_point_still_separate_directions():
+    """Rays start in front of the lens: from one point, people a metre apart differ and one person does not."""
     here = [4.0, 0, 2]
     rig = Rig([look_at(here, [0, 0, 1]), look_at(here, [0.5, 0.5, 1]), look_at([0, 4.0, 2], [0, 0, 1])])
     people = np.array([STANDING, STANDING + [0, 1.2, 0]])
@@ -295,8 +295,8 @@ def test_two_cameras_in_one_point_still_tell_directions_apart():
 
 
 @given(st.integers(0, 100_000))
-def test_anything_gives_an_affinity(seed):
-    """Symmetric, 0 to 1, exactly 0 within a view, whatever the detector says; bad joints are missing joints."""
+def test_any_detections_give_a_valid_affinity(seed):
+    """The affinity is symmetric, 0 to 1, and 0 within a view for any detections; invalid joints count as missing."""
     rng = np.random.default_rng(seed)
     rig = rig_around(4, seed=seed)
     m = rng.integers(0, 9)

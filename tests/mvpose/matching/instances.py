@@ -1,4 +1,4 @@
-"""Matching problems: random affinities, and what noisy detectors leave of a crowd."""
+"""Matching problems: random affinities, and affinities of noisy detections of a crowd."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mvpose.rays import viewing_rays
 
 
 def instance(seed, *, views=5, people=4, noise=0.2, miss=0.2):
-    """Affinities about 0.8 for the same person and 0.2 otherwise, with noise and missed people."""
+    """Draw affinities of about 0.8 for the same person and 0.2 otherwise, with noise and missed people."""
     rng = np.random.default_rng(seed)
     view, person = np.array([(v, p) for v in range(views) for p in range(people) if rng.random() > miss]).T
     affinity = np.where(person[:, None] == person, 0.8, 0.2) + noise * rng.standard_normal((len(view), len(view)))
@@ -21,10 +21,10 @@ def instance(seed, *, views=5, people=4, noise=0.2, miss=0.2):
 
 
 def filmed(seed, *, views, people, noise=12.0, miss=0.3, phantoms=1):
-    """People 1 m apart in all directions, filmed from around, as affinity, view and person of each detection.
+    """Simulate people 1 m apart in a ring of cameras; return affinity, view and person of each detection.
 
-    Every keypoint is off by ``noise`` pixels, ``miss`` of the people are not seen in a view, and every view shows
-    ``phantoms`` people more that no other view shows (persons -1, -2, ...).
+    Keypoints have ``noise`` pixels of noise, a fraction ``miss`` of the people is missed in a view, and every view has
+    ``phantoms`` more people that no other view has (persons -1, -2, ...).
     """
     rng = np.random.default_rng(seed)
     side = int(np.ceil(np.sqrt(people)))
@@ -57,6 +57,6 @@ def sort_by_view(affinity, view, *more):
 def f1(labels, person, view):
     """Pairwise F1 of a grouping over pairs of different views."""
     across = view[:, None] != view
-    said = (labels[:, None] == labels) & (labels[:, None] >= 0) & across
+    matched = (labels[:, None] == labels) & (labels[:, None] >= 0) & across
     true = (person[:, None] == person) & across
-    return 2 * (said & true).sum() / (said.sum() + true.sum())
+    return 2 * (matched & true).sum() / (matched.sum() + true.sum())

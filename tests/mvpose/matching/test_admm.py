@@ -27,7 +27,7 @@ def reference(affinity, view, *, alpha, weight, rho=1.0, iterations=20_000):
 
 
 def lower_bound(result, view):
-    """The Lagrange dual at Y: no P of C has a lower objective. Minimised over C block by block, by assignment."""
+    """Lagrange dual at Y, a lower bound for all P of C; minimised over C block by block, by assignment."""
     Y = result.Y * min(1.0, result.weight / np.linalg.norm(result.Y, 2))
     saved = np.where(view[:, None] == view, 0.0, np.maximum(result.gain - Y, 0.0))
     total = np.trace(Y)
@@ -39,7 +39,7 @@ def lower_bound(result, view):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_constraints_hold_and_the_stop_is_honest(seed):
+def test_the_solution_is_feasible_and_converged(seed):
     affinity, view, _ = instance(seed)
     result = admm.solve(affinity, view)
     assert in_c(result.P, view)
@@ -52,9 +52,11 @@ def test_constraints_hold_and_the_stop_is_honest(seed):
 
 @pytest.mark.parametrize("iterations", [1, 2, 5, 11, 40])
 @pytest.mark.parametrize("start", ["cold", "warm"])
-def test_residuals_are_honest_whenever_it_stops(iterations, start):
-    """The primal one bounds how far P is from the nearest positive semidefinite matrix, the dual one how far Y is from
-    the nearest matrix of spectral norm lambda.
+def test_residuals_bound_the_errors_after_any_number_of_iterations(iterations, start):
+    """Bounds on the distances from the nearest matrices that meet the constraints exactly.
+
+    The primal residual bounds the distance of P from the nearest positive semidefinite matrix, the dual residual that
+    of Y from the nearest matrix of spectral norm lambda.
     """
     affinity, view = sort_by_view(*filmed(1, views=10, people=6)[:2])
     parts = cluster(affinity, view) if start == "warm" else None
@@ -70,7 +72,7 @@ def test_residuals_are_honest_whenever_it_stops(iterations, start):
     m=st.integers(1, 90), positive=st.floats(0, 1), expected=st.integers(0, 9), single=st.booleans(),
     seed=st.integers(0, 1000),
 )  # fmt: skip
-def test_the_spectral_step_misses_no_positive_eigenvalue(m, positive, expected, single, seed):
+def test_the_spectral_step_keeps_all_positive_eigenvalues(m, positive, expected, single, seed):
     """However many were expected; only the upper triangle is read."""
     rng = np.random.default_rng(seed)
     vectors = np.linalg.qr(rng.standard_normal((m, m)))[0]
@@ -94,7 +96,7 @@ def test_objective_is_that_of_a_long_fixed_step_run(seed, weight):
 
 @pytest.mark.parametrize(("views", "people", "noise"), [(5, 4, 12.0), (10, 10, 4.0), (10, 10, 12.0)])
 def test_the_dual_variable_proves_the_optimum(views, people, noise):
-    """A part of the spectrum missed, a projection not exact or a stop too early would leave a gap."""
+    """A missed part of the spectrum, an inexact projection or an early stop would leave a duality gap."""
     affinity, view = sort_by_view(*filmed(0, views=views, people=people, noise=noise)[:2])
     single = 2e-5  # the least tolerance at which the spectrum is computed in single precision
     result = admm.solve(affinity, view, parts=cluster(affinity, view), tolerance=single, most_iterations=5000)
@@ -105,7 +107,7 @@ def test_the_dual_variable_proves_the_optimum(views, people, noise):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_every_start_ends_at_the_same_optimum(seed):
+def test_the_optimum_does_not_depend_on_the_start(seed):
     affinity, view = sort_by_view(*filmed(seed, views=5, people=4)[:2])
     wrong = np.concatenate([np.arange(count) for count in np.bincount(view)])  # the k-th of every view are one person
     cold, *warm = (
@@ -118,8 +120,8 @@ def test_every_start_ends_at_the_same_optimum(seed):
         assert result.objective == pytest.approx(cold.objective, abs=2e-3)  # of which about 15 is gain
 
 
-def test_a_start_at_the_optimum_is_recognised_at_once():
-    """No gain within a person is negative and none between people positive: nothing can be better."""
+def test_a_start_at_the_optimum_converges_in_one_iteration():
+    """No gain within a person is negative and none between people is positive, so the start is optimal."""
     affinity, view, person = instance(0, noise=0.05)
     result = admm.solve(affinity, view, parts=person)
     assert result.iterations == 1
@@ -137,17 +139,17 @@ def test_the_relaxation_bounds_every_grouping_from_below():
     assert optimum <= -(gain * truth).sum() + 50 * len(view) + 1e-3
 
 
-def test_clear_affinities_give_the_true_permutation():
+def test_unambiguous_affinities_give_the_true_permutation():
     affinity, view, person = instance(0, noise=0.05)
     np.testing.assert_allclose(admm.solve(affinity, view).P, person[:, None] == person, atol=0.02)
 
 
 def test_cycle_consistency_overrules_a_pair():
-    """Detections 0, 1, 2 in three views: 0-2 alone looks wrong (0.3), but 0-1 and 1-2 vouch for it."""
+    """Detections 0, 1, 2 in three views: the affinity of 0-2 is low (0.3), but 0-1 and 1-2 support it."""
     affinity = np.array([[0, 0.9, 0.3], [0.9, 0, 0.9], [0.3, 0.9, 0]])
     assert admm.solve(affinity, np.arange(3)).P[0, 2] > 0.9
 
 
-def test_one_detection_and_none():
+def test_problems_with_one_detection_or_none():
     assert admm.solve(np.zeros((0, 0)), np.zeros(0, int)).P.shape == (0, 0)
     np.testing.assert_allclose(admm.solve(np.zeros((1, 1)), np.zeros(1, int)).P, 1)

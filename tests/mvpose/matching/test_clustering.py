@@ -9,7 +9,7 @@ from mvpose.matching.clustering import cluster
 
 
 def partitions(view):
-    """Every grouping of the detections with at most one of a view in a group, as labels."""
+    """Yield all groupings of the detections with at most one per view in a group, as labels."""
     if len(view) == 0:
         yield []
         return
@@ -28,8 +28,8 @@ def optimum(affinity, view):
 @pytest.mark.parametrize(
     ("make", "views", "people"), [(instance, 3, 3), (instance, 5, 2), (filmed, 3, 2), (filmed, 2, 4), (filmed, 4, 2)]
 )
-def test_small_instances_are_solved_nearly_always_exactly(make, views, people):
-    """Up to ten detections, by enumeration: what either method misses, and how often."""
+def test_small_instances_are_mostly_solved_exactly(make, views, people):
+    """Compared with enumeration for up to ten detections: frequency and size of the loss of both methods."""
     noise = {instance: 0.4, filmed: 12.0}[make]
     exact, total, best_total, count = {"clustering": 0, "admm": 0}, {"clustering": 0.0, "admm": 0.0}, 0.0, 0
     for seed in range(40):
@@ -52,7 +52,7 @@ def test_small_instances_are_solved_nearly_always_exactly(make, views, people):
 
 @pytest.mark.parametrize("noise", [None, 0.4])
 @pytest.mark.parametrize("seed", range(16))
-def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed, noise):
+def test_no_reassignment_of_a_view_and_no_join_improves_the_result(seed, noise):
     if noise is None:
         affinity, view, _ = filmed(seed, views=10, people=6)
     else:
@@ -62,10 +62,10 @@ def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed, noise):
     members = (part[:, None] == np.unique(part)).astype(float)
     beside = gain @ members  # of each detection, in each part, the members of its own view left out
     for one in np.unique(view):
-        mine = view == one
-        best = np.maximum(beside[mine], 0.0)
+        in_view = view == one
+        best = np.maximum(beside[in_view], 0.0)
         rows, columns = linear_sum_assignment(best, maximize=True)
-        assert best[rows, columns].sum() <= (beside * members)[mine].sum() + 1e-6
+        assert best[rows, columns].sum() <= (beside * members)[in_view].sum() + 1e-6
     between = members.T @ beside
     clash = members.T @ (view[:, None] == view) @ members > 0
     assert between[~clash].max(initial=0.0) <= 1e-6
@@ -78,8 +78,8 @@ def test_no_view_can_be_put_back_better_and_no_two_parts_joined(seed, noise):
 def test_clustering_and_admm_agree_on_hard_instances(views, people, seeds, margin):
     """Keypoints off by 12 px, 30 % misses, a phantom a view: objectives differ by at most 5 %, on average by 2 %.
 
-    (With twenty detections one wrong link is 5 %, so there it is up to 20 %.) Clustering is not the worse on average,
-    and both group better than pairs of views.
+    (With twenty detections one wrong link is 5 %, so the limit is 20 %.) Clustering is not worse on average, and both
+    group better than pairs of views.
     """
     ratios, scores = [], {"clustering": [], "admm": [], "hungarian": []}
     for seed in range(seeds):
@@ -96,8 +96,8 @@ def test_clustering_and_admm_agree_on_hard_instances(views, people, seeds, margi
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("views", "people", "seeds"), [(5, 4, 8), (10, 10, 2)])
-def test_both_come_near_what_the_dual_proves_possible(views, people, seeds):
-    """No grouping beats the relaxation; either method gets 90 % of it on any instance, and 96 % on average."""
+def test_both_methods_are_close_to_the_dual_bound(views, people, seeds):
+    """No grouping is better than the relaxation; both methods reach 90 % of it on each instance and 96 % on average."""
     reached = {"clustering": [], "admm": []}
     for seed in range(seeds):
         affinity, view = sort_by_view(*filmed(seed, views=views, people=people)[:2])
@@ -113,8 +113,8 @@ def test_both_come_near_what_the_dual_proves_possible(views, people, seeds):
 
 
 @pytest.mark.parametrize(("views", "people"), [(5, 4), (10, 6)])
-def test_on_noise_clustering_holds_its_own(views, people):
-    """Random affinities, at which ADMM's rounding errs: clustering loses at most 15 %, on average 1 %."""
+def test_clustering_is_close_to_admm_on_random_affinities(views, people):
+    """On random affinities, where the rounding of ADMM errs, clustering loses at most 15 %, and 1 % on average."""
     ratios = []
     for seed in range(16):
         affinity, view, _ = instance(seed, views=views, people=people, noise=0.4, miss=0.3)
@@ -126,7 +126,7 @@ def test_on_noise_clustering_holds_its_own(views, people):
 
 
 def test_cycle_consistency_beats_pairs_of_views():
-    """Noise that single pairs cannot see through, all views together can."""
+    """All views together resolve noise that single pairs of views cannot."""
     scores = {method: [] for method in ("admm", "clustering", "hungarian")}
     for seed in range(6):
         affinity, view, person = instance(seed, views=6, people=5, noise=0.35)

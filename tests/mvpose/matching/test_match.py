@@ -12,7 +12,7 @@ METHODS = ("admm", "clustering", "hungarian")
 
 @st.composite
 def anything(draw, most=14):
-    """Affinities of any values, ties, zeros and ones among them; views in any order, of any size."""
+    """Affinities with any values, including ties, zeros and ones; views of any size in any order."""
     rng = np.random.default_rng(draw(st.integers(0, 100_000)))
     view = rng.integers(0, draw(st.integers(1, most)), draw(st.integers(0, most))) * draw(st.sampled_from([1, 1000]))
     levels = draw(st.sampled_from([[0.0], [1.0], [0.5], [0.0, 1.0], [0.0, 0.3, 0.5, 0.7, 1.0], rng.random(200)]))
@@ -21,7 +21,7 @@ def anything(draw, most=14):
 
 
 def consistent(labels, view):
-    """At most one detection of a view in a person, at least two in all, numbered 0 to n - 1."""
+    """Return whether people have at most one detection per view, at least two in total, and numbers 0 to n - 1."""
     people = [view[labels == person] for person in range(labels.max(initial=-1) + 1)]
     return all(len(views) >= 2 and len(set(views.tolist())) == len(views) for views in people)
 
@@ -64,7 +64,7 @@ def test_rounding_is_consistent_whatever_p_is(case, threshold):
 
 
 def test_rounding_breaks_the_weakest_link_of_a_chain():
-    """0-1 and 1-2 say one person, but 0 and 2 are of one view."""
+    """0-1 and 1-2 match, but 0 and 2 are of one view."""
     view = np.array([0, 1, 0])
     P = np.array([[1, 0.9, 0.1], [0.9, 1, 0.6], [0.1, 0.6, 1]])
     assert round_to_people(P, view).tolist() == [0, 0, -1]
@@ -85,7 +85,7 @@ def test_matching_does_not_depend_on_the_order_of_detections(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nor_does_it_where_the_best_grouping_is_hard_to_find(method):
+def test_hard_matchings_do_not_depend_on_the_order_either(method):
     rng = np.random.default_rng(0)
     for seed in range(20):
         affinity, view, _ = sort_by_view(*filmed(seed, views=6, people=9))
@@ -109,7 +109,7 @@ def test_phantoms_are_pruned_and_one_person_is_found(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_views_are_matched_as_the_hungarian_algorithm_would(method):
-    """Greedy takes the 0.9; the best sum takes 0.8 + 0.8 (less alpha each)."""
+    """A greedy method takes 0.9; the best sum is 0.8 + 0.8 (minus alpha each)."""
     view = np.array([0, 0, 1, 1])
     affinity = np.zeros((4, 4))
     affinity[:2, 2:] = [[0.9, 0.8], [0.8, 0.1]]
@@ -117,7 +117,7 @@ def test_two_views_are_matched_as_the_hungarian_algorithm_would(method):
     assert match(affinity, view, method=method).labels.tolist() == [0, 1, 1, 0]
 
 
-def test_a_match_must_earn_more_than_alpha():
+def test_a_match_needs_an_affinity_above_alpha():
     affinity = np.array([[0, 0.6], [0.6, 0]])
     assert match(affinity, [0, 1], alpha=0.5).labels.tolist() == [0, 0]
     assert Matcher(alpha=0.7)(affinity, np.array([0, 1])).labels.tolist() == [-1, -1]
@@ -133,15 +133,15 @@ def test_any_kind_of_array_gives_the_same_people(method):
         assert match(same, view.tolist(), method=method).labels.tolist() == person.tolist()
 
 
-def test_rounding_errors_of_a_transpose_are_no_asymmetry():
+def test_rounding_errors_do_not_count_as_asymmetry():
     affinity = np.array([[0, 0.7, 0.7], [0.7, 0, 0.7], [0.7 + 1e-8, 0.7, 0]])
     assert match(affinity, [0, 1, 2], method="clustering").labels.tolist() == [0, 0, 0]
 
 
 @pytest.mark.parametrize("size", [2, 70])
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -0.1, 1.1, 0.6])
-def test_values_that_are_no_affinities_are_refused(size, wrong):
-    """Wherever they stand; 0.6 makes the matrix asymmetric."""
+def test_invalid_affinities_are_refused(size, wrong):
+    """At any position; 0.6 makes the matrix asymmetric."""
     for at in [(0, 1), (1, 0), (size - 1, 0), (0, size - 1)]:
         affinity = np.full((size, size), 0.5)
         affinity[at] = wrong

@@ -35,7 +35,7 @@ def test_the_result_is_in_c_and_projecting_again_changes_nothing(seed):
 
 
 @given(st.integers(0, 100_000))
-def test_no_point_of_c_is_nearer(seed):
+def test_the_projection_is_the_nearest_point_of_c(seed):
     """The variational inequality: <Y - X, Z - X> <= 0 for every Z of C characterises the projection X."""
     matrix, view = random_case(seed)
     result = project(matrix, view)
@@ -52,7 +52,7 @@ def test_no_point_of_c_is_nearer(seed):
 
 
 def test_two_by_two_block_by_hand():
-    """A block with all entries 1 has to share every row and column: 1/2 each."""
+    """A block of ones becomes 1/2 in every entry."""
     view = np.array([0, 0, 1, 1])
     np.testing.assert_allclose(project(np.ones((4, 4)), view)[:2, 2:], 0.5, atol=1e-9)
     lopsided = np.zeros((4, 4))
@@ -60,7 +60,7 @@ def test_two_by_two_block_by_hand():
     np.testing.assert_allclose(project(lopsided, view)[0, 2:], [0.7, 0.3], atol=1e-9)
 
 
-def test_rows_must_come_view_by_view():
+def test_rows_must_be_sorted_by_view():
     with pytest.raises(ValueError, match="sorted by view"):
         project(np.eye(3), [0, 1, 0])
     with pytest.raises(ValueError, match=r"must be \(3, 3\)"):

@@ -15,7 +15,7 @@ colours = st.tuples(numbers, numbers, numbers)
     st.text(), colours, colours, st.sampled_from(["rgb", "bgr"]), st.sampled_from(["stride", "span", "area"]),
     st.none() | st.tuples(st.integers(1, 999), st.integers(1, 999)), st.lists(st.text(min_size=1)), numbers,
 )  # fmt: skip
-def test_a_card_survives_its_journey_in_a_file(name, mean, std, order, cells, size, outputs, number):
+def test_a_card_round_trips_through_a_file(name, mean, std, order, cells, size, outputs, number):
     card = Card(
         name=name, mean=mean, std=std, color_order=order, cells=cells, size=size, outputs=tuple(outputs),
         midpoint=number, slope=number / 10, padding=number, peak=number,
@@ -23,7 +23,7 @@ def test_a_card_survives_its_journey_in_a_file(name, mean, std, order, cells, si
     assert Card.from_metadata({"stride": "32", "names": "{0: 'x'}", **card.to_metadata()}) == card
 
 
-def test_defaults_are_left_out_and_come_back():
+def test_default_fields_are_omitted_and_restored():
     assert Card().to_metadata() == {}
     assert Card.from_metadata({"author": "somebody"}) == Card()
 
@@ -59,7 +59,7 @@ def test_defaults_are_left_out_and_come_back():
         ({"cells": {}}, "cells must be one of"),
     ],
 )
-def test_what_cannot_be_is_refused(stated, message):
+def test_invalid_values_are_refused(stated, message):
     with pytest.raises(ValueError, match=f"card: {message}"):
         Card(**stated)
 
@@ -75,7 +75,7 @@ def test_what_cannot_be_is_refused(stated, message):
         ({"mvpose.std": '["a", "b", "c"]'}, "std must be three numbers"),
     ],
 )
-def test_a_bad_entry_of_a_file_is_refused(metadata, message):
+def test_an_invalid_metadata_entry_is_refused(metadata, message):
     with pytest.raises(ValueError, match=message):
         Card.from_metadata(metadata)
 
@@ -88,7 +88,7 @@ json_values = st.recursive(
 
 
 @given(st.sampled_from([field.name for field in fields(Card)]), json_values)
-def test_whatever_a_field_is_in_a_file_it_is_taken_or_refused_by_its_name(key, value):
+def test_any_metadata_value_is_accepted_or_refused_by_name(key, value):
     message = ""
     try:
         card = Card.from_metadata({f"mvpose.{key}": json.dumps(value)})

@@ -31,7 +31,7 @@ def test_a_crop_is_pillows_antialiased_resizing(x, y, w, h, width, height):
 
 
 @given(st.floats(-50, 90), st.floats(-30, 50), st.floats(1, 120), st.floats(1, 90))
-def test_what_is_outside_has_the_fill_and_what_is_inside_none_of_it(x, y, w, h):
+def test_only_pixels_outside_the_image_have_the_fill_colour(x, y, w, h):
     white = np.full((61, 97, 3), 255, np.uint8)
     size, fill = (16, 24), (1, 2, 3)
     result = crop(white, (x, y, w, h), size, fill=fill)
@@ -42,7 +42,7 @@ def test_what_is_outside_has_the_fill_and_what_is_inside_none_of_it(x, y, w, h):
 
 
 @given(st.floats(0.25, 6.0), st.floats(0.25, 6.0), st.floats(0, 1), st.floats(0, 1))
-def test_pixels_lie_where_the_placement_says(stride_x, stride_y, along, below):
+def test_crop_pixels_follow_the_placement(stride_x, stride_y, along, below):
     columns, rows = np.meshgrid(np.arange(256), np.arange(256))
     image = np.stack([columns, rows, 0 * rows], axis=2).astype(np.uint8)
     size = (20, 30)
@@ -54,8 +54,8 @@ def test_pixels_lie_where_the_placement_says(stride_x, stride_y, along, below):
     np.testing.assert_allclose(result[:, 0, 1], origin[1] + stride_y * np.arange(30), atol=0.51)
 
 
-def test_nothing_is_skipped_where_a_crop_shrinks():
-    """Stripes of one pixel are grey from afar, wherever the box begins; four neighbours would flicker."""
+def test_a_reducing_crop_is_antialiased():
+    """Stripes of one pixel become grey for any position of the box; interpolation of four pixels would flicker."""
     stripes = np.zeros((64, 64, 3), np.uint8)
     stripes[:, ::2] = 255
     for x in np.linspace(10, 12, 9):
@@ -63,7 +63,7 @@ def test_nothing_is_skipped_where_a_crop_shrinks():
 
 
 @pytest.mark.parametrize("middle", [15.5, 14.0])
-def test_a_mirrored_crop_is_the_crop_in_a_mirror(middle):
+def test_a_mirrored_placement_gives_the_mirrored_crop(middle):
     image = noise()
     placement = stretched(np.array([[20.3, 11.1, 50.2, 40.7]]), (32, 24))
     both = (placement, placement.mirrored(middle))
@@ -102,19 +102,19 @@ def test_a_crop_is_in_view_where_it_has_an_area_and_pixels_inside_its_image():
 
 
 @given(st.floats(-50, 90), st.floats(-30, 50), st.floats(1, 120), st.floats(1, 90), st.floats(0, 1))
-def test_the_share_in_view_is_that_of_pixels_that_are_not_filled(x, y, w, h, least):
+def test_the_fraction_in_view_counts_unfilled_pixels(x, y, w, h, least):
     white = np.full((61, 97, 3), 255, np.uint8)
     share = (crop(white, (x, y, w, h), (8, 16)) == 255).all(axis=2).mean()
     assert seen_in([white], [0], [(x, y, w, h)], least) == [0 < share >= least]
 
 
 @pytest.mark.parametrize("box", [(-1e9, -1e9, 3e9, 3e9), (10, 10, 1e-6, 1e-6), (639.4, 479.4, 3, 3)])
-def test_boxes_of_any_size_make_a_crop(box):
+def test_boxes_of_any_size_give_a_crop(box):
     image = np.full((480, 640, 3), 77, np.uint8)
     assert set(np.unique(crop(image, box, (64, 128)))) <= {0, 77}
 
 
-def test_crops_of_many_views_are_those_of_each():
+def test_crops_of_several_views_equal_those_of_single_views():
     images = [noise(), noise((40, 50))[::-1], noise((200, 30))]  # the second is not contiguous
     view = np.array([2, 0, 1, 0])
     boxes = np.array([[5, 5, 20, 20], [30, 2, 9, 50], [-5, 3, 20, 30], [0, 0, 90, 60]], float)
@@ -133,12 +133,12 @@ def test_crops_of_many_views_are_those_of_each():
         (np.zeros((4, 4, 3), np.uint8), "got one picture"),
     ],
 )
-def test_what_is_no_picture_is_refused(images, message):
+def test_an_invalid_picture_is_refused(images, message):
     with pytest.raises(ValueError, match=message):
         check_images(images, np.array([1]), np.ones((1, 4)))
 
 
-def test_boxes_and_views_that_are_none_are_refused():
+def test_invalid_boxes_and_views_are_refused():
     images = [np.zeros((4, 4, 3), np.uint8)]
     with pytest.raises(ValueError, match=r"boxes must be finite x, y, width, height, got .*nan.* for detection 1"):
         check_images(images, np.zeros(2, int), np.array([[0, 0, 1, 1], [0, np.nan, 1, 1]]))

@@ -40,7 +40,7 @@ def mean(pictures):
     ids=str,
 )
 @pytest.mark.parametrize("count", [0, 1, 5, 21])
-def test_a_network_sees_the_crops(tmp_path, options, count):
+def test_a_network_gets_the_normalised_crops(tmp_path, options, count):
     pictures = crops(count, options.get("size", (32, 64)))
     session = Session(mean_color(tmp_path / "net.onnx", **options), batch=4)
     assert session.shapes == ((3,),)
@@ -49,7 +49,7 @@ def test_a_network_sees_the_crops(tmp_path, options, count):
     np.testing.assert_allclose(result, mean(pictures), atol=1e-5)
 
 
-def test_the_card_may_stand_beside_the_file(tmp_path):
+def test_a_card_can_be_passed_separately(tmp_path):
     card = Card(mean=(0.1, 0.2, 0.3), std=(0.5, 0.6, 0.7))
     path = mean_color(tmp_path / "net.onnx", card=card, stated=Card())
     np.testing.assert_allclose(Session(path, card=card)(crops())[0], mean(crops()), atol=1e-5)
@@ -57,20 +57,20 @@ def test_the_card_may_stand_beside_the_file(tmp_path):
     assert Session(path).card == Card()
 
 
-def test_channels_come_in_the_order_of_the_card(tmp_path):
+def test_channels_are_in_the_order_of_the_card(tmp_path):
     card = Card(color_order="bgr")
     session = Session(mean_color(tmp_path / "net.onnx", card=card))
     assert session.card == card
     np.testing.assert_allclose(session(crops())[0], mean(crops())[:, ::-1], atol=1e-5)
 
 
-def test_half_precision_is_as_near_as_it_can_be(tmp_path):
+def test_half_precision_is_accurate_to_its_rounding(tmp_path):
     np.testing.assert_allclose(
         Session(mean_color(tmp_path / "net.onnx", half=True))(crops())[0], mean(crops()), atol=2e-3
     )
 
 
-def test_half_precision_weights_between_single_precision_ends(tmp_path):
+def test_half_precision_weights_with_single_precision_input_and_output(tmp_path):
     graph = Graph(("n", 3, 64, 32))
     graph.undo_normalisation(Card())
     graph.add("ReduceMean", axes=[2, 3], keepdims=0)
@@ -100,7 +100,7 @@ def test_a_session_can_be_sent_to_another_process(tmp_path):
     np.testing.assert_array_equal(twin(crops())[0], session(crops())[0])
 
 
-def test_importing_the_networks_brings_in_neither_onnxruntime_nor_opencv():
+def test_importing_networks_imports_neither_onnxruntime_nor_opencv():
     code = "import sys, mvpose.networks; print(*(m for m in ('onnxruntime', 'onnx', 'cv2') if m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
 
@@ -119,7 +119,7 @@ def broken(path, content):
     return path
 
 
-def test_a_file_that_is_missing_is_refused(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     for path in (tmp_path / "reid.onnx", tmp_path):
         with pytest.raises(ValueError, match=f"network {path}: no such file; expected an ONNX file"):
             Session(path)
@@ -127,14 +127,14 @@ def test_a_file_that_is_missing_is_refused(tmp_path):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(0, 1, exclude_max=True))
-def test_a_file_that_is_cut_off_anywhere_is_refused(tmp_path, share):
+def test_a_truncated_file_is_refused(tmp_path, share):
     whole = mean_color(tmp_path / "net.onnx").read_bytes()
     with pytest.raises(ValueError, match=r"cut\.onnx: cannot be loaded: it is truncated, is not an ONNX file"):
         Session(broken(tmp_path / "cut.onnx", whole[: int(share * len(whole))]))
 
 
 @pytest.mark.parametrize("content", [b"", b"not a network at all, but a letter", bytes(range(256)) * 40])
-def test_a_file_of_something_else_is_refused(tmp_path, content):
+def test_a_file_that_is_not_onnx_is_refused(tmp_path, content):
     with pytest.raises(ValueError, match="cannot be loaded: it is truncated, is not an ONNX file"):
         Session(broken(tmp_path / "net.onnx", content))
 
@@ -148,7 +148,7 @@ def test_a_file_of_something_else_is_refused(tmp_path, content):
         (("n", 4, 64, 32), "must have 3 channels"),
     ],
 )
-def test_an_input_that_is_no_picture_is_refused(tmp_path, shape, message):
+def test_an_input_of_another_shape_is_refused(tmp_path, shape, message):
     graph = Graph(shape)
     graph.output("features", shape)
     with pytest.raises(ValueError, match=message):
@@ -198,7 +198,7 @@ def test_an_output_that_is_not_finite_is_refused(tmp_path, half):
         Session(graph.save(tmp_path / "net.onnx"))
 
 
-def test_numbers_that_end_only_for_some_crop_are_refused_when_it_comes(tmp_path):
+def test_an_output_that_is_not_finite_for_one_crop_is_refused(tmp_path):
     graph = Graph(("n", 3, 64, 32))
     graph.undo_normalisation(Card())
     graph.add("ReduceMean", axes=[2, 3], keepdims=0)
@@ -214,7 +214,7 @@ def test_numbers_that_end_only_for_some_crop_are_refused_when_it_comes(tmp_path)
 
 
 def pretender(path, operation, **attributes):
-    """A file that says it takes any number of crops."""
+    """A file with an open batch size that only works for one crop."""
     graph = Graph(("n", 3, 64, 32))
     graph.add("ReduceMean", axes=[2, 3], keepdims=0)
     graph.add(operation, *([graph.last, np.array([1, 3])] if operation == "Reshape" else [graph.last]), **attributes)
@@ -222,7 +222,7 @@ def pretender(path, operation, **attributes):
     return graph.save(path)
 
 
-def test_a_batch_that_fails_is_refused_and_one_by_one_it_works(tmp_path):
+def test_a_failing_batch_is_refused_and_batch_1_works(tmp_path):
     path = pretender(tmp_path / "net.onnx", "Reshape")
     with pytest.raises(ValueError, match="fails on a batch of 2; if it takes one crop at a time, open it with batch=1"):
         Session(path)
@@ -274,8 +274,8 @@ def test_providers_and_counts(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:Specified provider")
-def test_cuda_that_does_not_come_up_is_refused_where_it_is_asked_for(tmp_path, monkeypatch):
-    """Onnxruntime lists what it was built with, and takes the CPU where that does not start."""
+def test_cuda_that_cannot_be_started_is_refused_if_requested(tmp_path, monkeypatch):
+    """Onnxruntime lists providers that it was built with, and falls back to the CPU if one does not start."""
     path = mean_color(tmp_path / "net.onnx")
     if "CUDAExecutionProvider" in onnxruntime.get_available_providers():
         pytest.skip("CUDA is there")
@@ -288,13 +288,13 @@ def test_cuda_that_does_not_come_up_is_refused_where_it_is_asked_for(tmp_path, m
 
 
 def apart(path):
-    """A network whose weights lie in a file of their own."""
+    """A network with weights in a separate file."""
     model = load(mean_color(path))
     save(model, path, save_as_external_data=True, location="weights.bin", size_threshold=0)
     return path, path.with_name("weights.bin")
 
 
-def test_weights_that_are_missing_or_cut_off_are_named(tmp_path):
+def test_missing_or_truncated_external_weights_are_reported(tmp_path):
     path, weights = apart(tmp_path / "net.onnx")
     np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)
     weights.write_bytes(weights.read_bytes()[:-1])
@@ -305,7 +305,7 @@ def test_weights_that_are_missing_or_cut_off_are_named(tmp_path):
 
 
 @pytest.mark.parametrize("newer", ["opset", "format"])
-def test_a_file_of_a_newer_onnx_says_so_wherever_it_lies(tmp_path, newer):
+def test_a_file_of_a_newer_onnx_version_is_reported(tmp_path, newer):
     folder = tmp_path / "external data"
     folder.mkdir()
     model = load(mean_color(folder / "net.onnx"))
@@ -320,7 +320,7 @@ def test_a_file_of_a_newer_onnx_says_so_wherever_it_lies(tmp_path, newer):
         Session(folder / "net.onnx")
 
 
-def test_an_input_that_is_open_everywhere_is_fed_colours_first_and_says_so_where_that_fails(tmp_path):
+def test_an_input_without_fixed_shape_is_given_channels_first(tmp_path):
     card = Card(size=(32, 64))
     for channels_last in (False, True):
         graph = Graph(("n", "a", "b", "c"))
@@ -339,7 +339,7 @@ def test_an_input_that_is_open_everywhere_is_fed_colours_first_and_says_so_where
 
 
 def carded(path):
-    """A network with a card beside it."""
+    """A network with a model card beside it."""
     digest = hashlib.sha256(mean_color(path).read_bytes()).hexdigest()
     path.with_suffix(".json").write_text(json.dumps({"name": "ours", "sha256": digest}))
     return path, digest
@@ -347,7 +347,7 @@ def carded(path):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(0, 1, exclude_max=True), st.integers(1, 255))
-def test_one_byte_that_is_not_of_the_card_is_refused(tmp_path, where, change):
+def test_one_changed_byte_is_refused_by_the_digest(tmp_path, where, change):
     path, digest = carded(tmp_path / "net.onnx")
     assert Session(path).size == (32, 64)
     content = bytearray(path.read_bytes())
@@ -360,7 +360,7 @@ def test_one_byte_that_is_not_of_the_card_is_refused(tmp_path, where, change):
         Session(path)
 
 
-def test_the_shipped_network_cut_off_within_its_card_is_refused(tmp_path):
+def test_the_shipped_network_truncated_in_its_metadata_is_refused(tmp_path):
     for suffix in (".onnx", ".json"):
         (tmp_path / "reid").with_suffix(suffix).write_bytes(DEFAULT.with_suffix(suffix).read_bytes())
     path = tmp_path / "reid.onnx"
@@ -374,7 +374,7 @@ def test_the_shipped_network_cut_off_within_its_card_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "beside", ["", "[1]", "5", "not JSON", "{}", '{"sha256": null}', '{"sha256": 7}', '{"task": "pose"}', "\xff"]
 )
-def test_json_that_states_no_digest_is_no_card(tmp_path, beside):
+def test_json_without_a_digest_is_ignored(tmp_path, beside):
     path = mean_color(tmp_path / "net.onnx")
     path.with_suffix(".json").write_bytes(beside.encode("latin-1"))
     np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)

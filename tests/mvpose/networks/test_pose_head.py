@@ -38,8 +38,8 @@ def shrinks(head, box):
 )  # fmt: skip
 @example("stride", True, 10.0, 10.0, 300.0, 30.0, 0.5, 0.5)
 @example("simcc", True, 10.0, 10.0, 30.0, 300.0, 0.5, 0.5)
-def test_keypoints_are_where_the_dot_is(heads, kind, flip, x, y, w, h, across, down):
-    """To a tenth of a pixel (a quarter is asked), through crops of any aspect, place and size, in every convention."""
+def test_keypoints_are_at_the_dot(heads, kind, flip, x, y, w, h, across, down):
+    """Accurate to a tenth of a pixel (required: a quarter), for any aspect, position and size, in every convention."""
     head, box = heads[kind, flip], (x, y, w, h)
     dot = np.array([x + across * w, y + down * h])
     deviation = 1.5 * max(shrinks(head, box), 1)
@@ -54,8 +54,8 @@ def test_keypoints_are_where_the_dot_is(heads, kind, flip, x, y, w, h, across, d
     np.testing.assert_allclose(np.minimum(heights[0, :, 0], 1), found.scores[0], atol=0.01)
 
 
-def test_a_convention_taken_for_another_is_off_by_what_it_says(heads, tmp_path):
-    """At four pixels a cell: 1.5 pixels of the input in the middle of an axis, and a mirror does not hide it."""
+def test_the_wrong_cell_convention_causes_the_documented_error(heads, tmp_path):
+    """With cells of four pixels the error is 1.5 input pixels at the middle of an axis, also with the flip test."""
     area = heads["area", False].session.path
     wrong = PoseHead(Session(area, card=Card(cells="stride")))
     box = (100, 100, 192 / 1.25, 256 / 1.25)  # a pixel of the input for a pixel of the image
@@ -65,8 +65,8 @@ def test_a_convention_taken_for_another_is_off_by_what_it_says(heads, tmp_path):
 
 
 @pytest.mark.parametrize("kind", [PLAIN, SIMCC])
-def test_every_box_has_its_own_pose(heads, kind):
-    """Two people in one view, one in another: each box finds the dot within it."""
+def test_every_box_gets_a_separate_pose(heads, kind):
+    """Two people in one view, one in another: each box gives the dot within it."""
     spots = np.array([[120, 100], [400, 300], [220, 350]], float)
     boxes = np.array([[70, 20, 100, 160], [330, 200, 140, 210], [190, 300, 60, 110]], float)
     images = [picture(SIZE, *((*spot, 2, WHITE) for spot in spots[:2])), None, picture(SIZE, (*spots[2], 2, WHITE))]
@@ -82,7 +82,7 @@ def test_every_box_has_its_own_pose(heads, kind):
 
 @pytest.mark.parametrize("kind", [PLAIN, SIMCC])
 @pytest.mark.parametrize("flip", [False, True])
-def test_a_box_of_nothing_has_no_keypoint_and_harms_no_other(heads, kind, flip):
+def test_an_empty_box_has_no_keypoint_and_does_not_affect_others(heads, kind, flip):
     image = picture(SIZE, (300, 200, 3, WHITE))
     good = (250, 100, 100, 200)
     nothing = [(250, 100, 0, 200), (250, 100, 100, 0), (700, 100, 50, 50), (0, -60, 50, 50), (50, 50, 60, 60)]
@@ -99,7 +99,7 @@ def test_a_box_of_nothing_has_no_keypoint_and_harms_no_other(heads, kind, flip):
 
 
 @pytest.mark.parametrize("kind", [PLAIN, SIMCC])
-def test_no_box_is_no_detection(heads, kind):
+def test_no_boxes_give_no_detections(heads, kind):
     found = heads[kind, True].detect([np.zeros((480, 640, 3), np.uint8)], [], np.zeros((0, 4)))
     assert len(found) == 0
     assert found.keypoints.shape == (0, 17, 2)
@@ -109,15 +109,15 @@ GAINS = np.linspace(0.1, 0.8, 17)
 
 
 def assert_heights(scores, gains):
-    """The graph gives the highest cell the height of the gain; the peak is as much higher as it is off that cell."""
+    """The highest cell has the height of the gain; the peak is higher according to its offset from that cell."""
     ratio = scores / gains
     assert 0.999 < ratio.mean() < np.exp(0.5 * 2 * (0.5 / 1.5) ** 2)  # half a cell off both ways, deviation 1.5 cells
     assert np.ptp(ratio) < 1e-3
 
 
 @pytest.mark.parametrize("simcc", [False, True])
-def test_heights_are_scores_and_the_flip_test_means_mirror_pairs(tmp_path, simcc):
-    """A joint's map in the mirror is that of its counterpart: their mean has the mean height."""
+def test_heights_are_scores_and_the_flip_test_averages_mirror_pairs(tmp_path, simcc):
+    """The mirrored map of a joint is that of its counterpart, so the average has the mean height."""
     path = (simcc_dots if simcc else dots)(tmp_path / "head.onnx", gains=GAINS)
     image, box = picture(SIZE, (300, 200, 3, WHITE)), (250, 100, 100, 200)
     plain, flipped = (PoseHead(path, flip=flip).detect([image], [0], [box]) for flip in (False, True))
@@ -134,7 +134,7 @@ def test_channels_may_come_last(tmp_path):
     assert_heights(found.scores[0], GAINS)
 
 
-def test_a_peak_of_its_own_scale_is_stated_on_the_card(tmp_path):
+def test_the_card_gives_the_scale_of_peaks(tmp_path):
     image, box = picture(SIZE, (300, 200, 3, WHITE)), (250, 100, 100, 200)
     path = dots(tmp_path / "head.onnx", card=Card(peak=255.0), gains=GAINS)
     assert_heights(PoseHead(path).detect([image], [0], [box]).scores[0], GAINS)
@@ -144,7 +144,7 @@ def test_a_peak_of_its_own_scale_is_stated_on_the_card(tmp_path):
         PoseHead(Session(path, card=Card())).detect([image], [0], [box])
 
 
-def test_what_is_negative_is_nothing(tmp_path):
+def test_negative_heights_count_as_0(tmp_path):
     path = dots(tmp_path / "head.onnx", gains=[-0.5] * 2 + [1.0] * 15)
     found = PoseHead(path).detect([picture(SIZE, (300, 200, 3, WHITE))], [0], [(250, 100, 100, 200)])
     assert (found.scores[0, :2] == 0).all()
@@ -153,7 +153,7 @@ def test_what_is_negative_is_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("padding", [1.0, 1.25, 2.0])
-def test_padding_lets_the_head_see_beyond_the_box(heads, padding):
+def test_padding_extends_the_crop_beyond_the_box(heads, padding):
     head = PoseHead(Session(heads[PLAIN, False].session.path, card=Card(padding=padding)))
     box, image = (250, 100, 90, 120), picture(SIZE, (295, 80, 3, WHITE))  # a sixth of the height above the box
     found = head.detect([image], [0], [box])
@@ -174,7 +174,7 @@ def test_without_likelihoods_the_keypoints_are_the_same(heads, kind):
 
 
 @pytest.mark.parametrize("down", [0.5, 1.6])
-def test_the_less_sure_of_two_vectors_is_the_score(tmp_path, down):
+def test_the_lower_peak_of_two_vectors_is_the_score(tmp_path, down):
     head = PoseHead(simcc_dots(tmp_path / "head.onnx", gains=(0.6,) * 17, down=down))
     found = head.detect([picture(SIZE, (300, 200, 3, WHITE))], [0], [(250, 100, 100, 200)])
     lower = 0.6 * min(down, 1)
@@ -182,7 +182,7 @@ def test_the_less_sure_of_two_vectors_is_the_score(tmp_path, down):
     np.testing.assert_allclose(found.likelihoods.modes(1)[1], lower, rtol=0.01)
 
 
-def test_the_outer_product_of_two_peaks_cannot_tell_which_belong_together(heads):
+def test_the_outer_product_of_two_peaks_has_four_peaks(heads):
     spots = np.array([[290.0, 150.0], [310.0, 250.0]])
     image = picture(SIZE, *((*spot, 3, WHITE) for spot in spots))
     found = heads[SIMCC, False].detect([image], [0], [(200, 100, 200, 200)])
@@ -201,8 +201,8 @@ def test_fixed_batches_give_the_same(heads, tmp_path):
 
 @pytest.mark.parametrize("preset", ["full", "fast"])
 @pytest.mark.parametrize("kind", [PLAIN, SIMCC])
-def test_from_pictures_to_people(tmp_path, preset, kind):
-    """Three dots in space, filmed by five cameras: a red hip, a green knee, a blue ankle."""
+def test_people_are_estimated_from_pictures(tmp_path, preset, kind):
+    """Three dots in space, seen by five cameras: a red hip, a green knee, a blue ankle."""
     leg = Skeleton("leg", ("left_hip", "left_knee", "left_ankle"), (-1, 0, 1), (0, 1, 2), (0.1, 0.1, 0.1))
     make = dots if kind == PLAIN else simcc_dots
     head = PoseHead(make(tmp_path / "head.onnx", gains=(1.0,) * 3, by_color=True), skeleton=leg)
@@ -224,7 +224,7 @@ def test_from_pictures_to_people(tmp_path, preset, kind):
 # What is refused.
 
 
-def test_another_network_in_its_place_is_refused(tmp_path):
+def test_a_network_of_another_kind_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"heat maps \(n, 17, h, w\), or SimCC .* got 'features' \(n, 3\)"):
         PoseHead(mean_color(tmp_path / "reid.onnx"))
 
@@ -239,7 +239,7 @@ def test_another_skeleton_is_refused(tmp_path, make):
     np.testing.assert_allclose(found.keypoints[0], np.tile([300, 200], (14, 1)), atol=0.25)
 
 
-def test_exchanged_vectors_are_refused_and_named_in_order_they_work(tmp_path):
+def test_exchanged_vectors_are_refused_and_can_be_ordered(tmp_path):
     path = simcc_dots(tmp_path / "head.onnx")
     swapped = Card(outputs=("simcc_y", "simcc_x"))
     with pytest.raises(ValueError, match="512 wide and 384 high, which is not the aspect of the input, 192 x 256"):
@@ -259,7 +259,7 @@ def test_maps_of_another_aspect_are_refused(tmp_path):
         PoseHead(graph.save(tmp_path / "head.onnx"), skeleton=skeleton)
 
 
-def test_bad_input_is_refused_at_the_border(heads):
+def test_invalid_input_is_refused(heads):
     head, image = heads[PLAIN, False], np.zeros((480, 640, 3), np.uint8)
     with pytest.raises(ValueError, match=r"boxes must be \(1, 4\), got \(2, 4\)"):
         head.detect([image], [0], np.ones((2, 4)))
@@ -273,7 +273,7 @@ def test_bad_input_is_refused_at_the_border(heads):
 
 @pytest.mark.parametrize("simcc", [False, True])
 def test_a_crop_without_a_pixel_in_the_image_has_no_keypoint(tmp_path, simcc):
-    """A head sees black there and would put keypoints into it; with pixels it says itself how sure it is."""
+    """The crop would be black, and the head would still give keypoints."""
     head = PoseHead((simcc_dots if simcc else dots)(tmp_path / "net.onnx"))
     image = np.full((480, 640, 3), 255, np.uint8)
     boxes = [[639.4, 100, 60, 80], [-1e9, -1e9, 3e9, 3e9], [1e308, 0, 1e308, 5], [630, 100, 60, 80], [5, 5, 60, 80]]

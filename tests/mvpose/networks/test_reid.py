@@ -24,7 +24,7 @@ def unit(vectors):
 
 
 def dressed(order=(0, 1, 2, 3)):
-    """A picture with somebody of one colour in each box, one pixel wider than it."""
+    """A picture with a person of one colour in each box, one pixel larger than the box."""
     image = picture((640, 480), background=90)
     for (x, y, w, h), color in zip(BOXES.astype(int), COLORS[list(order)], strict=True):
         image[y - 1 : y + h + 2, x - 1 : x + w + 2] = color
@@ -54,7 +54,7 @@ def test_a_descriptor_depends_on_its_box_alone(reid, order, many):
     "box",
     [(100, 100, 0, 50), (100, 100, 50, 0), (640, 0, 50, 50), (-60, 0, 50, 50), (0, 480, 50, 50), (1e8, 1e8, 1e3, 1e3)],
 )
-def test_a_box_of_nothing_has_no_descriptor_and_harms_no_other(reid, box):
+def test_an_empty_box_has_no_descriptor_and_does_not_affect_others(reid, box):
     image = dressed()
     result = reid.descriptors([image], [0, 0, 0], [BOXES[0], box, BOXES[1]])
     assert np.isnan(result[1]).all()
@@ -65,8 +65,8 @@ def test_a_box_of_nothing_has_no_descriptor_and_harms_no_other(reid, box):
 @given(
     st.sampled_from(["left", "right", "top", "bottom"]), st.floats(0.002, 0.9), st.floats(40, 200), st.floats(40, 200)
 )
-def test_strangers_of_whom_a_sliver_is_in_the_image_do_not_match(reid, side, share, w, h):
-    """With less than a good part of the box there is no descriptor; with more it is not that of the fill."""
+def test_boxes_mostly_outside_the_image_do_not_match(reid, side, share, w, h):
+    """With too small a part of the box there is no descriptor; with more it is not that of the fill."""
     x, y = {
         "left": (-0.5 - w * (1 - share), 100), "right": (639.5 - w * share, 100),
         "top": (100, -0.5 - h * (1 - share)), "bottom": (100, 479.5 - h * share),
@@ -78,8 +78,8 @@ def test_strangers_of_whom_a_sliver_is_in_the_image_do_not_match(reid, side, sha
     assert not one @ other > 0.95
 
 
-def test_beyond_the_image_is_the_mean_color_of_the_training(reid):
-    """A box half outside a red picture is half red, half what normalises to zero."""
+def test_pixels_outside_the_image_have_the_mean_colour_of_the_training(reid):
+    """A box half outside a red picture is half red and half the colour that normalises to zero."""
     image = np.full((480, 640, 3), (255, 0, 0), np.uint8)
     (result,) = reid.descriptors([image], [0], [(-50.5, 100, 100, 200)])
     np.testing.assert_allclose(result, unit(0.5 * np.array([1.0, 0, 0]) + 0.5 * np.array(Card().mean)), atol=2e-3)
@@ -96,19 +96,19 @@ def test_detections_get_the_descriptors_of_their_boxes(reid):
     assert reid.describe(Detections.empty(), []).descriptors.shape == (0, 3)
 
 
-def test_what_pooling_leaves_is_a_descriptor_too(tmp_path):
+def test_an_output_with_pooled_axes_is_a_descriptor(tmp_path):
     pooled = ReId(mean_color(tmp_path / "net.onnx", pooled=True))
     np.testing.assert_allclose(pooled.descriptors([dressed()], np.zeros(4), BOXES), unit(COLORS), atol=2e-3)
 
 
 @pytest.mark.parametrize("batch", [1, 3, 16])
-def test_a_file_with_a_batch_of_its_own_gives_the_same(tmp_path, reid, batch):
+def test_a_fixed_batch_size_gives_the_same_descriptors(tmp_path, reid, batch):
     fixed = ReId(mean_color(tmp_path / "net.onnx", batch=batch))
     given = [dressed()], np.zeros(4), BOXES
     np.testing.assert_allclose(fixed.descriptors(*given), reid.descriptors(*given), atol=1e-6)
 
 
-def test_an_answer_of_zeros_is_no_descriptor(tmp_path):
+def test_an_output_of_zeros_is_no_descriptor(tmp_path):
     graph = Graph(("n", 3, 64, 32))
     graph.undo_normalisation(Card())
     graph.add("ReduceMean", axes=[2, 3], keepdims=0)
@@ -122,7 +122,7 @@ def test_an_answer_of_zeros_is_no_descriptor(tmp_path):
 
 
 def test_the_scale_of_distances_is_on_the_card(tmp_path, reid):
-    """From the card of a file to the affinity of a pipeline."""
+    """The scale on the card becomes that of the affinity of a pipeline."""
     assert reid.affinity == AppearanceAffinity()
     card = Card(name="ours", midpoint=0.8, slope=0.05)
     stated = ReId(mean_color(tmp_path / "net.onnx", card=card))
@@ -139,7 +139,7 @@ def test_the_scale_of_distances_is_on_the_card(tmp_path, reid):
     assert full.affinity.appearance.midpoint == 0.8
 
 
-def test_another_network_in_its_place_is_refused(tmp_path):
+def test_a_network_of_another_kind_is_refused(tmp_path):
     heads = dots(tmp_path / "pose.onnx")
     with pytest.raises(ValueError, match=r"must be descriptors \(n, D\) .* got \(n, 17, 64, 48\); pass a re-ID"):
         ReId(heads)
@@ -156,7 +156,7 @@ def test_another_network_in_its_place_is_refused(tmp_path):
         ReId(Session(path, card=Card(outputs=("score",))))
 
 
-def test_bad_input_is_refused_at_the_border(reid):
+def test_invalid_input_is_refused(reid):
     with pytest.raises(ValueError, match=r"boxes must be \(2, 4\), got \(1, 4\)"):
         reid.descriptors([dressed()], [0, 0], BOXES[:1])
     with pytest.raises(ValueError, match="images must hold a picture for every view, got 1 pictures"):

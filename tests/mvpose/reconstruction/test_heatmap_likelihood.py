@@ -12,7 +12,7 @@ STRIDE, WIDTH = 4.0, 2.0  # pixels a cell; deviation of a blob in cells
 
 
 def blobs(pixels, heights, *, cells=64):
-    """Heat maps with Gaussian blobs at pixels (m, J, B, 2) of the given heights (m, J, B), cropped about each pose."""
+    """Heat maps with Gaussian blobs at pixels (m, J, B, 2) of the given heights (m, J, B), cropped around each pose."""
     origin = np.nanmin(pixels, axis=(1, 2)) - 20.0
     stride = np.maximum((np.nanmax(pixels, axis=(1, 2)) + 20.0 - origin) / (cells - 1), STRIDE)
     grid = np.arange(cells)
@@ -36,8 +36,8 @@ def test_clean_maps_give_the_pose_below_the_size_of_a_cell(distortion):
     assert np.linalg.norm(reconstruct(rig, maps) - STANDING, axis=1).max() < 0.015
 
 
-def test_the_second_mode_is_taken_where_the_other_views_and_the_bones_want_it():
-    """Two of four views take the left wrist for the right one, surely; keypoints alone cannot know better."""
+def test_the_second_mode_is_chosen_by_other_views_and_the_bone_prior():
+    """Two of four views confidently exchange the wrists; keypoints alone cannot resolve this."""
     rig = Rig(list(ring(7))[:4])
     truth = rig.project(STANDING)
     wrong = truth.copy()
@@ -53,7 +53,7 @@ def test_the_second_mode_is_taken_where_the_other_views_and_the_bones_want_it():
     assert np.linalg.norm(joints[9] - STANDING[9]) > 0.1 or scores[9] < 0.7 * scores[10]
 
 
-def test_a_map_that_missed_the_joint_costs_the_floor_and_no_more():
+def test_a_map_without_the_joint_has_the_likelihood_of_the_floor():
     rig = ring(4)
     maps = blobs(rig.project(STANDING)[:, :, None], np.full((4, 17, 1), 1.0))
     values = maps.values.copy()
@@ -78,7 +78,7 @@ def test_a_map_that_missed_the_joint_costs_the_floor_and_no_more():
     assert np.linalg.norm(reconstruct(rig, maps)[9] - STANDING[9]) < 0.02
 
 
-def test_proposals_are_sorted_by_what_the_maps_say():
+def test_proposals_are_sorted_by_the_heat_maps():
     rig = ring(3)
     maps = blobs(rig.project(STANDING)[:, :, None], np.full((3, 17, 1), 0.9))
     modes = viewing_rays(rig, Detections.from_heatmaps(np.arange(3), maps)).modes

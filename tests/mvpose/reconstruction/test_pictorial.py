@@ -21,12 +21,12 @@ from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb
 
 
 def reconstruct(rays, method=None):
-    """Joints, scores and covariances of the one person that all rays are of."""
+    """Joints, scores and covariances of the single person to whom all rays belong."""
     return (each[0] for each in (method or PictorialStructure())(rays, np.zeros(len(rays), int), COCO17))
 
 
 def total(states, unary, chosen, parents, length, deviation, count):
-    """The log-posterior of a choice, written out; joints without states take no part."""
+    """Log-posterior of a choice, written out; joints without states are left out."""
     value = 0.0
     for joint, parent in enumerate(parents):
         if count[joint] == 0:
@@ -39,7 +39,7 @@ def total(states, unary, chosen, parents, length, deviation, count):
 
 
 @given(st.integers(0, 100_000))
-def test_max_product_is_the_best_of_all_combinations(seed):
+def test_max_product_finds_the_best_combination(seed):
     rng = np.random.default_rng(seed)
     joints, most = 6, 4
     parents = np.array([-1] + [rng.integers(0, k) for k in range(1, joints)])
@@ -57,7 +57,7 @@ def test_max_product_is_the_best_of_all_combinations(seed):
 
 
 def wrong_elbow(rig):
-    """A person whose left elbow two views of four put in one same wrong place, half a metre off."""
+    """Rays of a person with the left elbow at the same wrong place, half a metre off, in two of four views."""
     pixels = rig.project(STANDING)
     far = STANDING[7] + [0.4, 0.4, 0.1]  # across the line of sight of both
     for view in (0, 1):
@@ -67,7 +67,7 @@ def wrong_elbow(rig):
     return viewing_rays(rig, Detections.from_keypoints(np.arange(len(rig)), pixels, scores))
 
 
-def test_the_prior_overrules_views_that_agree_on_an_impossible_limb():
+def test_the_prior_rejects_an_impossible_limb_that_two_views_agree_on():
     rays = wrong_elbow(ring(4))
     by_itself, _, _ = reconstruct(rays, Triangulation())
     in_structure, _, _ = reconstruct(rays)
@@ -75,7 +75,7 @@ def test_the_prior_overrules_views_that_agree_on_an_impossible_limb():
     assert np.linalg.norm(in_structure[7] - STANDING[7]) < 0.05
 
 
-def test_a_joint_without_evidence_is_missing_and_does_not_disturb_the_rest():
+def test_a_joint_without_evidence_is_missing_and_does_not_affect_others():
     rig = ring(4)
     scores = np.full((4, 17), 0.9)
     scores[:, 11] = 0  # a hip in the middle of the tree
@@ -92,7 +92,7 @@ HEADLONG = STANDING * [1, -1, -1] + [0, 0, 1.7]
 
 
 def seen_by_one(rig, body, joints, view=0):
-    """A body whose named joints one view alone sees."""
+    """Rays of a body with some joints seen by a single view."""
     scores = np.full((len(rig), 17), 0.9)
     for joint in joints:
         scores[np.arange(len(rig)) != view, joint] = 0
@@ -100,7 +100,7 @@ def seen_by_one(rig, body, joints, view=0):
 
 
 @pytest.mark.parametrize("body", [STANDING, LYING, HEADLONG], ids=["standing", "lying", "headlong"])
-def test_a_joint_of_one_view_lies_on_its_ray_where_its_limb_hangs_down_the_trunk(body):
+def test_a_single_view_joint_lies_on_its_ray_at_the_depth_nearer_to_the_trunk_direction(body):
     rig = ring(4)
     rays = seen_by_one(rig, body, (9, 13, 15))  # a wrist; knee and ankle, which hang on each other
     joints, scores, covariance = reconstruct(rays)
@@ -120,8 +120,8 @@ def test_a_joint_of_one_view_lies_on_its_ray_where_its_limb_hangs_down_the_trunk
         assert sight @ covariance[joint] @ sight > 4 * sight @ covariance[0] @ sight
 
 
-def test_of_two_depths_the_nearer_is_taken_where_the_trunk_is_unknown():
-    """Neither hips nor head are seen: a wrist is at the nearer point a bone away."""
+def test_without_trunk_direction_the_nearer_depth_is_taken():
+    """Neither hips nor head are seen: the wrist is placed at the nearer of the two depths."""
     rig = ring(4)
     scores = np.full((4, 17), 0.9)
     scores[:, :5], scores[:, 11:] = 0, 0
@@ -132,15 +132,15 @@ def test_of_two_depths_the_nearer_is_taken_where_the_trunk_is_unknown():
     assert (joints[9] - joints[7]) @ sight < -0.05
 
 
-def test_the_neck_tells_where_hips_of_one_view_are():
-    """Lying or standing, the hips are beyond the shoulders as seen from the head."""
+def test_the_head_gives_the_trunk_direction_for_single_view_hips():
+    """Lying or standing, the hips lie on the side of the shoulders opposite to the head."""
     for body in (STANDING, LYING, HEADLONG):
         joints, _, _ = reconstruct(seen_by_one(ring(4), body, range(11, 17)))
         assert np.linalg.norm(joints[11:13] - body[11:13], axis=1).max() < 0.25
 
 
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14, PANOPTIC19], ids=lambda skeleton: skeleton.name)
-def test_limbs_hang_in_every_skeleton(skeleton):
+def test_limbs_have_a_direction_prior_in_every_skeleton(skeleton):
     limbs = {joint for joint in skeleton.joints if joint.split("_")[-1] in ("elbow", "wrist", "knee", "ankle")}
     hanging = {
         joint
@@ -148,13 +148,13 @@ def test_limbs_hang_in_every_skeleton(skeleton):
         if concentration
     }
     assert limbs <= hanging <= limbs | {"left_hip", "right_hip"}
-    told = dict(zip(skeleton.joints, trunk_segments(skeleton), strict=True))
-    assert (told["left_shoulder"], told["right_hip"], told["left_wrist"]) == (1, 2, 0)
-    assert 3 in told.values()
+    segments = dict(zip(skeleton.joints, trunk_segments(skeleton), strict=True))
+    assert (segments["left_shoulder"], segments["right_hip"], segments["left_wrist"]) == (1, 2, 0)
+    assert 3 in segments.values()
 
 
-def test_how_a_bone_hangs_is_von_mises_fisher():
-    """Whichever end asks; the integral over the sphere of the density with its constant is 1."""
+def test_the_direction_prior_is_von_mises_fisher():
+    """The likelihood is the same from both ends, and the normalised density integrates to 1 over the sphere."""
     rng = np.random.default_rng(3)
     directions = rng.standard_normal((200_000, 3))
     down = np.array([0.6, 0.0, -0.8])
@@ -168,8 +168,8 @@ def test_how_a_bone_hangs_is_von_mises_fisher():
     assert direction_log_likelihood(directions[0], np.zeros(3), True, 3.0, np.zeros(3)) == 0.0
 
 
-def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():
-    """The forearm is raised towards the one camera that sees the wrist, and hanging arms are likelier."""
+def test_the_covariance_of_a_single_view_joint_covers_its_other_depth():
+    """The forearm is raised towards the only camera that sees the wrist, although hanging arms are likelier."""
     rig, body = ring(4), STANDING.copy()
     away = (body[7] - rig.centers[0]) / np.linalg.norm(body[7] - rig.centers[0])
     across = np.cross(away, [0.0, 0.0, 1.0])
@@ -187,8 +187,8 @@ def test_the_doubt_about_a_joint_of_one_view_reaches_to_its_other_depth():
 
 
 @pytest.mark.parametrize("concentration", [0.0, 2.0])
-def test_the_doubt_is_the_squared_distance_of_the_other_depth_times_how_likely_that_is(concentration):
-    """A shoulder and, hanging from it at 45 degrees, an elbow that only a camera 4 m along y has."""
+def test_depth_ambiguity_is_squared_distance_times_probability(concentration):
+    """A shoulder and, at 45 degrees below it, an elbow that only a camera 4 m away along y sees."""
     joints = np.array([[0.0, 0.0, 1.4], [0.0, 0.2, 1.2]])
     origin, sight = np.array([[0.0, -4.0, 1.2]]), np.array([0.0, 1.0, 0.0])
     directions = np.array([[[[0.0, 4.0, 0.2]]], [[sight]]])
@@ -219,8 +219,8 @@ def log_posterior(joints, rays):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_refinement_climbs_and_never_runs_away(seed):
-    """Two views nearly in line, many joints of one view only, noise: where a linearised step can overshoot."""
+def test_refinement_raises_the_posterior_and_does_not_diverge(seed):
+    """Two views nearly in line, many single-view joints, and noise: a case where linearised steps can overshoot."""
     rng = np.random.default_rng(seed)
     rig = Rig(list(ring(7))[:3])
     pixels = rig.project(STANDING) + rng.normal(0, 15, (3, 17, 2))
@@ -240,14 +240,14 @@ def test_refinement_climbs_and_never_runs_away(seed):
     assert np.nanmax(np.linalg.norm(whole - STANDING, axis=1)) < 1.5
 
 
-def test_the_prior_pulls_an_average_adult_little():
+def test_the_prior_moves_an_average_adult_by_little():
     rig = ring(5)
     rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False)[0])
     joints, _, _ = reconstruct(rays)
     assert np.linalg.norm(joints - STANDING, axis=1).max() < 0.015
 
 
-def test_many_views_keep_the_likeliest_states():
+def test_with_many_views_the_likeliest_states_are_kept():
     rig = ring(14)  # 91 pairs
     rays = viewing_rays(rig, detect(rig, STANDING[None], shuffle=False, noise=2.0)[0])
     few, _, _ = reconstruct(rays, PictorialStructure(most_states=8))
@@ -256,7 +256,7 @@ def test_many_views_keep_the_likeliest_states():
 
 
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
-def test_bone_lengths_are_symmetric_and_human(skeleton):
+def test_bone_lengths_are_symmetric_and_plausible(skeleton):
     mean, deviation = bone_lengths(skeleton)
     for joint, mirrored in enumerate(skeleton.mirror):
         if skeleton.mirror[skeleton.parents[joint]] == skeleton.parents[mirrored]:
@@ -270,7 +270,7 @@ def test_bone_lengths_are_symmetric_and_human(skeleton):
         assert (wrong < 3 * np.array([deviation[c] for _, c in skeleton.edges])).all()
 
 
-def test_every_pair_of_views_proposes_and_near_ones_are_one():
+def test_every_pair_of_views_proposes_and_near_proposals_are_merged():
     rig = ring(5)
     pixels = rig.project(STANDING)
     pixels[4, 9] += [300, 0]  # one view is wrong about the wrist
@@ -286,7 +286,7 @@ def test_every_pair_of_views_proposes_and_near_ones_are_one():
 
 
 @given(st.integers(0, 100_000))
-def test_marginals_are_those_of_the_whole_gaussian(seed):
+def test_marginals_equal_those_of_the_joint_gaussian(seed):
     """Belief propagation on the tree against the inverse of the whole 3J x 3J information matrix."""
     rng = np.random.default_rng(seed)
     skeletal = tree(COCO17)
@@ -314,15 +314,15 @@ def test_marginals_are_those_of_the_whole_gaussian(seed):
 
 
 @pytest.mark.parametrize("stature", [0.65, 1.0, 1.2])
-def test_the_prior_takes_the_size_of_the_person(stature):
-    """A child of 1.1 m: the adult prior stretches what few noisy views say of it, the personal one does not."""
+def test_the_prior_adapts_to_the_size_of_the_person(stature):
+    """A child of 1.1 m: the adult prior stretches the pose from few noisy views, the personal prior does not."""
     rig, body = Rig(list(ring(7))[:3]), stature * STANDING
     errors = {True: [], False: []}
     for seed in range(12):
         rays = viewing_rays(rig, detect(rig, body[None], shuffle=False, noise=6.0, seed=seed)[0])
-        for personal, mine in errors.items():
+        for personal, values in errors.items():
             joints, _, _ = reconstruct(rays, PictorialStructure(personal=personal))
-            mine.append(np.linalg.norm(joints - body, axis=1).mean())
+            values.append(np.linalg.norm(joints - body, axis=1).mean())
     if stature == 1.0:
         assert np.mean(errors[True]) < 1.1 * np.mean(errors[False])
     else:
@@ -332,10 +332,10 @@ def test_the_prior_takes_the_size_of_the_person(stature):
 @pytest.mark.parametrize("method", [Triangulation(), PictorialStructure()])
 @pytest.mark.parametrize("share", [0.3, 0.7, 1.2])
 def test_the_true_joint_is_in_the_90_percent_ellipsoid(method, share):
-    """Keypoints that scatter less or more than the error model says, some hidden, some grossly wrong.
+    """Keypoints with errors smaller or larger than the error model, some hidden, some grossly wrong.
 
-    85 to 95 % is what calibration means here; of the chi-square of three degrees of freedom, 6.25 is the 90 %
-    quantile.
+    Calibrated means 85 to 95 % here; 6.25 is the 90 % quantile of the chi-square distribution with three degrees of
+    freedom.
     """
     rng, inside = np.random.default_rng(int(10 * share)), []
     for _ in range(60):

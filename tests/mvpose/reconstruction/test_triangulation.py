@@ -20,7 +20,7 @@ def rays_of(rig, pixels, scores=None):
 
 
 def triangulate(rays, **kwargs):
-    """Joints, scores and covariances of the one person that all rays are of."""
+    """Joints, scores and covariances of the single person to whom all rays belong."""
     return (each[0] for each in Triangulation(**kwargs)(rays, np.zeros(len(rays), int), COCO17))
 
 
@@ -34,7 +34,7 @@ def test_exact_pixels_give_the_exact_point(views, x, y):
     assert (scores > 0.8).all()
 
 
-def test_a_wrong_view_is_left_out_not_averaged_in():
+def test_a_wrong_view_is_left_out():
     rig = ring(5)
     pixels = rig.project(STANDING)
     pixels[2, 9] += [150, -80]
@@ -43,7 +43,7 @@ def test_a_wrong_view_is_left_out_not_averaged_in():
     assert scores[9] == pytest.approx(0.8 * scores[10], rel=0.02)  # four views of five vouch for it
 
 
-def test_a_joint_of_one_view_is_missing_not_invented():
+def test_a_single_view_joint_is_missing():
     rig = ring(4)
     pixels, scores = rig.project(STANDING), np.full((4, 17), 0.9)
     scores[1:, 9] = 0
@@ -55,7 +55,7 @@ def test_a_joint_of_one_view_is_missing_not_invented():
     assert np.isfinite(np.delete(joints, [9, 10], axis=0)).all()
 
 
-def test_covariance_is_long_along_the_line_of_sight_and_short_across():
+def test_covariance_is_largest_along_the_line_of_sight():
     near = ring(12, radius=5.0)
     rig = type(near)([near[0], near[1]])  # two cameras 30 degrees apart: depth is worst known
     _, _, covariance = triangulate(rays_of(rig, rig.project(STANDING)))
@@ -65,7 +65,7 @@ def test_covariance_is_long_along_the_line_of_sight_and_short_across():
     assert values[2] > 5 * values[1] > 0
 
 
-def test_two_rays_that_meet_behind_the_cameras_are_no_joint():
+def test_rays_that_meet_behind_the_cameras_give_no_joint():
     rig = Rig([look_at([4, y, 1], [0, y, 1]) for y in (-0.5, 0.5)])  # side by side; image right is world +y
     pixels = rig.project(STANDING)
     pixels[:, 9] = [[100, 480], [1180, 480]]  # the left camera sees the wrist on its left, the right on its right
@@ -76,7 +76,7 @@ def test_two_rays_that_meet_behind_the_cameras_are_no_joint():
 
 
 def test_consensus_is_as_likely_as_the_best_of_all_pairs():
-    """A third of the views wrong by up to metres: hardly ever is a point of a pair likelier than the one found."""
+    """A third of the views is wrong by up to metres; a point of a pair is hardly ever likelier than the result."""
     worse, trials = 0, 400
     for seed in range(trials):
         rng = np.random.default_rng(seed)
@@ -112,7 +112,7 @@ def test_the_all_view_point_is_the_weighted_least_squares_solution():
         np.testing.assert_allclose(joints[j], np.linalg.lstsq(rows, right, rcond=None)[0], atol=1e-9)
 
 
-def test_the_best_pair_leaves_a_wrong_view_out_and_averages_nothing():
+def test_best_pair_leaves_a_wrong_view_out():
     rig = ring(5)
     pixels = rig.project(STANDING)
     pixels[2, 9] += [150, -80]
@@ -126,7 +126,7 @@ def test_the_best_pair_leaves_a_wrong_view_out_and_averages_nothing():
     assert np.linalg.norm(of_two - STANDING, axis=1).mean() > np.linalg.norm(of_all - STANDING, axis=1).mean()
 
 
-def test_people_do_not_disturb_each_other():
+def test_people_do_not_affect_each_other():
     rig = ring(4)
     detections, person = detect(rig, np.stack([STANDING, STANDING + [1, 0, 0]]), noise=3.0)
     rays = viewing_rays(rig, detections)
@@ -140,7 +140,7 @@ def test_people_do_not_disturb_each_other():
 
 @pytest.mark.parametrize("scale", [0.3, 1.0, 2.0])
 def test_error_scales_follow_the_residuals(scale):
-    """Many joints with misfits of a known size: the scale is found to within its own uncertainty."""
+    """The scale of many joints with known misfits is estimated within its uncertainty."""
     rights = np.full(17, 20.0)
     misfit = scale * np.random.default_rng(0).chisquare(2 * 20 - 3, 17) * 0.9  # the tail is not seen
     np.testing.assert_allclose(np.median(joint_scales(misfit, rights)), scale, rtol=0.15)

@@ -21,20 +21,20 @@ def find(rig, detections):
 
 
 def errors(joints, people):
-    """Largest joint error of each true person against its one-to-one estimate, metres."""
+    """Largest joint error of each true person and the estimate assigned to it, metres."""
     distance = np.linalg.norm(joints[:, None] - people[None], axis=3).max(axis=2)
-    mine, true = linear_sum_assignment(distance)
-    return distance[mine, true]
+    estimated, true = linear_sum_assignment(distance)
+    return distance[estimated, true]
 
 
 def consistent(labels, view):
-    """At most one detection of a view in a person, at least two in all, numbered 0 to n - 1."""
+    """Return whether people have at most one detection per view, at least two in total, and numbers 0 to n - 1."""
     people = [view[labels == person] for person in range(labels.max(initial=-1) + 1)]
     return all(len(views) >= 2 and len(set(views.tolist())) == len(views) for views in people)
 
 
 @pytest.mark.parametrize(("views", "count"), [(2, 1), (5, 4), (8, 6)])
-def test_everybody_is_found_where_they_are(views, count):
+def test_all_people_are_found_at_their_positions(views, count):
     rig = Rig(list(ring(max(views, 5)))[:views])  # two cameras that face each other cannot triangulate
     people = crowd(count)
     detections, person = detect(rig, people)
@@ -49,14 +49,14 @@ def test_everybody_is_found_where_they_are(views, count):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_noise_of_three_pixels_costs_centimetres(seed):
+def test_noise_of_three_pixels_causes_errors_of_centimetres(seed):
     rig, people = ring(5), crowd(4, seed=seed)
     joints, _, _, _ = find(rig, detect(rig, people, noise=3.0, seed=seed)[0])
     assert len(joints) == 4
     assert errors(joints, people).max() < 0.07
 
 
-def test_nobody_comes_of_nothing_of_one_view_or_of_missing_keypoints():
+def test_no_people_without_detections_of_two_views():
     rig = ring(5)
     detections, _ = detect(rig, crowd(3))
     alone = detections.view == 2
@@ -72,8 +72,8 @@ def test_nobody_comes_of_nothing_of_one_view_or_of_missing_keypoints():
         assert labels.tolist() == [-1] * len(nobody)
 
 
-def test_a_joint_of_one_view_is_missing_not_invented_and_cuts_nothing_off():
-    """The left shoulder too, on which the face, both arms and both legs hang."""
+def test_a_single_view_joint_is_missing_and_disconnects_no_other():
+    """Also the left shoulder, the root of face, arms and legs."""
     rig, people = ring(5), crowd(3)
     detections, person = detect(rig, people)
     scores = detections.scores.copy()
@@ -82,16 +82,16 @@ def test_a_joint_of_one_view_is_missing_not_invented_and_cuts_nothing_off():
     joints, scores, covariance, labels = find(
         rig, Detections.from_keypoints(detections.view, detections.keypoints, scores)
     )
-    mine = labels[person == 1][0]
-    assert np.isnan(joints[mine, [5, 16]]).all()
-    assert np.isnan(covariance[mine, [5, 16]]).all()
-    assert (scores[mine, [5, 16]] == 0).all()
+    index = labels[person == 1][0]
+    assert np.isnan(joints[index, [5, 16]]).all()
+    assert np.isnan(covariance[index, [5, 16]]).all()
+    assert (scores[index, [5, 16]] == 0).all()
     others = np.delete(np.arange(17), [5, 16])
-    assert np.linalg.norm(joints[mine] - people[1], axis=1)[others].max() < 0.04
-    assert np.isfinite(np.delete(joints, mine, axis=0)).all()
+    assert np.linalg.norm(joints[index] - people[1], axis=1)[others].max() < 0.04
+    assert np.isfinite(np.delete(joints, index, axis=0)).all()
 
 
-def test_phantoms_become_nobody():
+def test_phantoms_give_no_people():
     rig, people = ring(5), crowd(3)
     detections, person = detect(rig, people, noise=1.0)
     phantoms = np.random.default_rng(0).uniform(100, 860, (5, 17, 2))
@@ -106,7 +106,7 @@ def test_phantoms_become_nobody():
     assert errors(joints, people).max() < 0.05
 
 
-def test_a_detection_reported_twice_makes_no_second_person():
+def test_a_repeated_detection_gives_no_second_person():
     rig, people = ring(5), crowd(2)
     detections, _ = detect(rig, people)
     twice = [np.concatenate([a, a]) for a in (detections.view, detections.keypoints, detections.scores)]
@@ -116,7 +116,7 @@ def test_a_detection_reported_twice_makes_no_second_person():
     assert consistent(labels, twice[0])
 
 
-def test_a_detection_with_left_and_right_exchanged_makes_no_second_person():
+def test_a_detection_with_left_and_right_exchanged_gives_no_second_person():
     rig, star = ring(5), STANDING.copy()
     star[7:11, 1:] = [[0.43, 1.38], [-0.43, 1.38], [0.69, 1.38], [-0.69, 1.38]]
     star[13:17, 1] = [0.2, -0.2, 0.35, -0.35]
@@ -127,7 +127,7 @@ def test_a_detection_with_left_and_right_exchanged_makes_no_second_person():
     assert np.linalg.norm(joints[0] - star, axis=1)[5:].max() < 0.15  # the others outvote them: wrists are 1.4 m apart
 
 
-def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
+def test_results_do_not_depend_on_detection_order_or_world_frame():
     rig, people = ring(4), crowd(3)
     detections, _ = detect(rig, people, noise=2.0)
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
@@ -146,7 +146,7 @@ def test_the_order_of_detections_and_the_place_of_the_world_do_not_matter():
 
 @st.composite
 def garbage(draw):
-    """A crowd of which much is hidden, misplaced, taken from one's neighbour or reported twice."""
+    """A crowd with hidden, misplaced, exchanged and repeated keypoints."""
     rng = np.random.default_rng(draw(st.integers(0, 100_000)))
     rig = ring(draw(st.integers(2, 5)))
     detections, _ = detect(rig, crowd(draw(st.integers(0, 4)), spacing=0.4, seed=rng.integers(1000)), noise=8.0)
@@ -164,7 +164,7 @@ def garbage(draw):
 
 
 @given(garbage())
-def test_labels_are_consistent_whatever_comes_in(case):
+def test_labels_are_consistent_for_any_input(case):
     rig, detections = case
     joints, scores, covariance, labels = find(rig, detections)
     assert labels.shape == (len(detections),)
@@ -178,7 +178,7 @@ def test_labels_are_consistent_whatever_comes_in(case):
 
 
 @given(garbage())
-def test_a_joint_of_a_pose_has_two_views_or_more_and_one_keypoint_of_each(case):
+def test_every_joint_of_a_pose_has_one_keypoint_in_two_or_more_views(case):
     rig, detections = case
     rays = viewing_rays(rig, detections)
     order = np.argsort(rays.view, kind="stable")
@@ -191,7 +191,7 @@ def test_a_joint_of_a_pose_has_two_views_or_more_and_one_keypoint_of_each(case):
 
 
 @given(st.integers(0, 100_000))
-def test_the_best_pose_is_the_best_of_all_connected_choices(seed):
+def test_best_pose_is_the_best_connected_choice(seed):
     rng = np.random.default_rng(seed)
     joints = 5
     parents = np.array([-1] + [rng.integers(0, k) for k in range(1, joints)])
@@ -208,7 +208,7 @@ def test_the_best_pose_is_the_best_of_all_connected_choices(seed):
     space = Hypotheses(start, np.zeros((len(owner), 3)), nothing, nothing, np.zeros(0), link_start, link, cost)
 
     def worth(choice):
-        """Of a choice of states; -inf for one that is not connected."""
+        """Value of a choice of states; -inf for one that is not connected."""
         total, tops = 0.0, 0
         for joint, state in enumerate(choice):
             if state < 0:
@@ -218,8 +218,8 @@ def test_the_best_pose_is_the_best_of_all_connected_choices(seed):
             if parent < 0:
                 tops += 1
                 continue
-            mine = range(link_start[state], link_start[state + 1])
-            total -= min((cost[k] for k in mine if link[k] == parent), default=np.inf)
+            links = range(link_start[state], link_start[state + 1])
+            total -= min((cost[k] for k in links if link[k] == parent), default=np.inf)
         return total if tops <= 1 else -np.inf
 
     chosen, bound = _best_pose(np.arange(joints), parents, unary, space)
@@ -230,11 +230,11 @@ def test_the_best_pose_is_the_best_of_all_connected_choices(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_without_matching_a_limb_goes_to_a_neighbour_where_matching_keeps_it(seed):
+def test_without_matching_a_limb_is_taken_from_a_neighbour(seed):
     """Why the paper matches first (section 4.2).
 
-    Two people queue closely. Three views do not see the rear one's left wrist; that of the one in front, which all
-    see, is not too far away for a forearm. The one in front is seen less surely, so the rear one chooses first.
+    Two people queue closely. Three views miss the left wrist of the rear one; that of the one in front, which all
+    see, is within reach of a forearm. The one in front has lower scores, so the rear one is reconstructed first.
     """
     rig = ring(5)
     rear, front = people = np.array([STANDING, STANDING + [0.25, 0, 0]])
