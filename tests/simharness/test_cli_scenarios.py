@@ -113,10 +113,50 @@ class TestShow:
         assert result.stderr.startswith(f"error: --set {text}: ")
         assert len(result.stderr.splitlines()) == 1
 
+    @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
+    def test_comments_fit_a_terminal_of_80_columns(self, simharness, path):
+        lines = simharness("show", str(path)).stdout.splitlines()
+        assert max(len(line) for line in lines if " # " in line) <= 80
+
     def test_a_study_is_not_run_as_a_scenario(self, simharness, study):
         result = simharness("run", str(study))
         assert result.exit_code == 2
         assert f"simharness study {study}" in result.stderr
+
+
+class TestNames:
+    """A shipped scenario is named without its folder, wherever the user is."""
+
+    @pytest.fixture(autouse=True)
+    def elsewhere(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+
+    def test_show_takes_a_name(self, simharness):
+        shown = tomllib.loads(simharness("show", "gathering").stdout)
+        assert shown["people"]["count"] == load(SCENARIOS / "gathering.toml").people.count
+
+    @pytest.mark.parametrize(
+        "command",
+        [
+            ["run"],
+            ["render"],
+            ["export"],
+            ["show"],
+            ["study"],
+            ["check", "--baseline", "baseline.json"],
+            ["evaluate", "seeds"],
+        ],
+    )
+    def test_every_command_refuses_an_unknown_name_with_the_nearest(self, simharness, tmp_path, command):
+        result = simharness(*command, "quikstart")
+        assert result.exit_code == 2
+        assert result.stderr.startswith("error: quikstart: no such scenario; did you mean quickstart? ")
+        assert not list(tmp_path.iterdir())
+
+    def test_check_takes_a_name(self, simharness):
+        result = simharness("check", "ci", "--baseline", "none.json")
+        assert result.exit_code == 2
+        assert result.stderr.startswith("error: --baseline none.json: no such file")
 
 
 class TestSchema:
