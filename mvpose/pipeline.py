@@ -65,7 +65,7 @@ class Pipeline:
 
     @staticmethod
     def preset(name: str, *, appearance: AppearanceAffinity | None = None) -> Estimator:
-        """Return one of the presets in :data:`PRESETS`: the rows of the paper's ablation, and a fast one.
+        """Return one of the presets in ``PRESETS``: the rows of the paper's ablation, and a fast one.
 
         Args:
             name: name of the preset.

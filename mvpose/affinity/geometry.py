@@ -42,7 +42,7 @@ class GeometricAffinity:
             Without it, all rays of two cameras side by side would pass each other closely in front of the lenses,
             whichever person they show.
         widest: greatest factor by which midpoint, slope and threshold grow together in a frame where all rays meet
-            badly because the calibration or the clocks are off. The factor is the ratio of :func:`misfit` to the value
+            badly because the calibration or the clocks are off. The factor is the ratio of ``misfit`` to the value
             that keypoint errors explain, at least 1; ``widest=1`` turns this off. Beyond 2, two people who do not
             touch would match.
 

@@ -1,7 +1,7 @@
 """Decoding of pose head outputs to positions in the images.
 
 Heads are trained with one of three conventions for the input pixel of an output cell; see
-:attr:`mvpose.networks.card.Card.cells`. The wrong convention causes errors of up to 2 pixels of the input.
+``cells`` of :class:`mvpose.networks.card.Card`. The wrong convention causes errors of up to 2 pixels of the input.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Cells:
 
     @classmethod
     def from_convention(cls, convention: str, count: int, extent: int) -> Cells:
-        """Create the cells of an axis of ``extent`` pixels by a convention of :attr:`Card.cells`."""
+        """Create the cells of an axis of ``extent`` pixels by a convention of ``Card.cells``."""
         if convention == "span":
             return cls(0.0, (extent - 1) / max(count - 1, 1), count)
         step = extent / count

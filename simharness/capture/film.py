@@ -1,7 +1,8 @@
 """Filming of a scene: ground truth of every picture of every camera.
 
 Frames are processed one at a time (posed, rendered, labelled), and only the content of :class:`Views` is kept. They are
-independent of each other, so several processes can film parts, which :meth:`Views.concatenate` joins.
+independent of each other, so several processes can film parts, which :meth:`~simharness.types.views.Views.concatenate`
+joins.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ class DescriptorModel:
 
     @classmethod
     def fitted(cls, distances: Mapping[str, Any]) -> Self:
-        """Return the model fitted to measured distances: ``distances`` of a card (:mod:`tools.reid.metrics`).
+        """Return the model fitted to measured distances: ``distances`` of a card (``tools.reid.metrics``).
 
         Least squares over the mean cosines of all bins, each weighted by its share of the pairs of its kind, and over
         the standard deviations of the cosines of one person's pairs.

@@ -1,8 +1,8 @@
 """Registry of detector errors: the ordered steps that turn perfect detections into those of a real detector.
 
 :func:`simharness.detector.detect.detect` begins with the perfect detections of all people
-(:meth:`DetectionBlock.of_people`) and runs every registered step on them, ordered by :class:`Stage` and within a stage
-by :data:`MODULES`.
+(:meth:`~simharness.detector.detection_block.DetectionBlock.of_people`) and runs every registered step on them, ordered
+by :class:`Stage` and within a stage by :data:`MODULES`.
 
 How to add an error, for example keypoints that are rounded to whole pixels:
 
@@ -33,7 +33,7 @@ Rules for a step:
 - It keeps the fields consistent: where a keypoint is not reported, its coordinates are NaN, its score 0 and its error
   class ABSENT; a slot without a reported keypoint is not ``present``; where a keypoint moves far, ``error`` follows
   (:func:`simharness.detector.error_classes.classify`). Appended slots go behind the others
-  (:meth:`DetectionBlock.concatenate`).
+  (:meth:`~simharness.detector.detection_block.DetectionBlock.concatenate`).
 - Random numbers come from ``context.draws``, under a key that begins with the name of the step, and never from
   another generator. Draw the whole block first and mask it afterwards, so that the draws depend on nothing but the key
   and the shape of the sequence. Then a parameter at zero changes nothing, and a parameter that is raised adds errors

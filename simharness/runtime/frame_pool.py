@@ -22,7 +22,7 @@ class FrameFunction(Protocol[Result_co]):
     """What can be mapped over frames: gets consecutive frame indices, keeps nothing between calls.
 
     It is pickled once for each worker, so what it carries (a model, a sequence) travels once and not with
-    every chunk: a frozen dataclass with ``__call__`` or a :func:`functools.partial` of a module's function.
+    every chunk: a frozen dataclass with ``__call__`` or a ``functools.partial`` of a module's function.
     """
 
     def __call__(self, frames: range, /) -> Result_co:

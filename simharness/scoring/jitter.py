@@ -2,7 +2,8 @@
 
 With the error e(t) = estimate - truth of a joint, its jitter at t is ``|e(t - 1) - 2 e(t) + e(t + 1)|``. People may
 move as they like and an estimate may be off or lag behind evenly: neither shakes. Independent noise of standard
-deviation s along each axis makes each component s sqrt(6), and the mean of the norm s sqrt(6) x sqrt(8 / pi), about 3.9 s.
+deviation s along each axis makes each component s sqrt(6), and the mean of the norm s sqrt(6) x sqrt(8 / pi), about
+3.9 s.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from simharness.types.random_streams import stream
 Alternative = Literal["two-sided", "greater", "less"]
 
 EXACT = 12
-"""So many pairs that differ are flipped in every way that there is; of more, :data:`DRAWS` ways are drawn."""
+"""So many pairs that differ are flipped in every way that there is; of more, ``DRAWS`` ways are drawn."""
 
 DRAWS = 20_000
 

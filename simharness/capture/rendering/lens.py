@@ -148,8 +148,8 @@ def project_to_image(camera: Camera, points: ArrayLike, *, near: float = 0.0) ->
     """Project world points (..., 3) to pixels (..., 2); NaN where ``camera`` does not image the point.
 
     A point is not imaged where it is less than ``near`` metres in front of the camera centre, or beyond the angle at
-    which the polynomial of the lens folds over: :meth:`Camera.project` gives such directions a second, wrong position
-    inside the picture.
+    which the polynomial of the lens folds over: :meth:`mvpose.Camera.project` gives such directions a second, wrong
+    position inside the picture.
     """
     # Row by row rather than by a matrix product: BLAS may round differently from one process to the next.
     x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)

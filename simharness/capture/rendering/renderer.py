@@ -31,7 +31,7 @@ class Image:
         rgb: colours, (h, w, 3) uint8; zeros if no colour was requested.
         depth: distance along the optical axis, metres, (h, w) float32; +inf without a surface.
         ids: index of the visible mesh, (h, w) int16; -1 without a surface.
-        parts: label of the visible face from :attr:`Mesh.parts`, (h, w) int8; -1 without a label or surface. None if
+        parts: label of the visible face from ``Mesh.parts``, (h, w) int8; -1 without a label or surface. None if
             not requested.
     """
 
@@ -70,7 +70,8 @@ class Renderer(Protocol):
         Args:
             camera: any camera.
             meshes: meshes of the scene. Pass the same objects for all views: renderers prepare them once. Between
-                frames move meshes with :meth:`Mesh.moved`: the arrays that it shares are prepared only once.
+                frames move meshes with :meth:`~simharness.types.mesh.Mesh.moved`: the arrays that it shares are
+                prepared only once.
             color: whether to shade the picture; without it ``Image.rgb`` is zeros and rendering is faster.
             lighting: lighting of the scene.
             parts: whether to label the parts.

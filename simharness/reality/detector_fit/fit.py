@@ -44,7 +44,7 @@ def fit(sample: Sample, *, name: str = NAME, command: str = "", resamples: int =
         seed: seed of the resamples.
 
     Raises:
-        ValueError: see :func:`measure`.
+        ValueError: see :func:`~simharness.reality.detector_fit.measure.measure`.
     """
     real = measure(sample, resamples=resamples, seed=seed)
     profile = Detector.model_validate(settings(real, name=name))

