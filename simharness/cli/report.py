@@ -11,7 +11,7 @@ import typer
 from simharness.cli.exit_codes import after_reading, border
 
 if TYPE_CHECKING:
-    from simharness.report.study.worst_frames import Frame
+    from simharness.report.study.worst_frames import WorstFrame
     from simharness.study.result_folder import Results
 
 
@@ -114,7 +114,7 @@ def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
     write_rerun(again, path)
 
 
-def _chosen(results: Results, trial: str | None) -> Frame:
+def _chosen(results: Results, trial: str | None) -> WorstFrame:
     """Return the worst frame of a trial, or of all trials."""
     from simharness.report.study.worst_frames import worst_frames
 

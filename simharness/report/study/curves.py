@@ -125,7 +125,7 @@ def grid(first: Factor, second: Factor, variant: str, score: str) -> Floats | No
 
 
 @dataclass(frozen=True)
-class Breaking:
+class FactorBreakingPoint:
     """Breaking point of one variant along one factor.
 
     Attributes:
@@ -135,7 +135,7 @@ class Breaking:
         threshold: last value of the score that is still good.
         rising: whether the score gets worse as the factor grows; else it gets worse as the factor shrinks.
         point: value of the factor at the threshold; the ends of its interval are ascending.
-        tried: lowest and highest value of the factor.
+        swept: lowest and highest value of the factor.
     """
 
     factor: str
@@ -144,10 +144,12 @@ class Breaking:
     threshold: float
     rising: bool
     point: BreakingPoint
-    tried: tuple[float, float]
+    swept: tuple[float, float]
 
 
-def breaking(factor: Factor, variants: Sequence[str], score: str, threshold: float) -> list[Breaking]:
+def factor_breaking_points(
+    factor: Factor, variants: Sequence[str], score: str, threshold: float
+) -> list[FactorBreakingPoint]:
     """Return the value of a numeric factor at which each variant's score passes the threshold.
 
     A factor may do harm as it grows (clutter) or as it shrinks (cameras); the end with the worse score decides.
@@ -168,6 +170,6 @@ def breaking(factor: Factor, variants: Sequence[str], score: str, threshold: flo
             mirrored = breaking_point(-values[::-1], table[:, ::-1], threshold, better=better)
             flipped = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
             point = BreakingPoint(flipped[0], flipped[1], flipped[2], mirrored.why)
-        tried = (float(values[0]), float(values[-1]))
-        points.append(Breaking(factor.key, variant, score, threshold, rising, point, tried))
+        swept = (float(values[0]), float(values[-1]))
+        points.append(FactorBreakingPoint(factor.key, variant, score, threshold, rising, point, swept))
     return points

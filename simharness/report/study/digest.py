@@ -16,7 +16,7 @@ import polars as pl
 
 from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study import plots, tables
-from simharness.report.study.curves import Factor, breaking, cases_of, factors, factors_by_case, panels
+from simharness.report.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
 from simharness.report.study.digest_text import HEADS, PRINTED, markdown
 from simharness.report.study.failure_rates import failure_rates
 from simharness.report.study.page import THRESHOLDS
@@ -160,7 +160,7 @@ def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[st
             for score, threshold in thresholds.items()
             for factor in swept
             if factor.numeric
-            for each in breaking(factor, names, score, threshold)
+            for each in factor_breaking_points(factor, names, score, threshold)
         ],
     }
 

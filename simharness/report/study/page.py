@@ -13,8 +13,8 @@ from markupsafe import Markup
 from simharness.report.documents import fill_template
 from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
-from simharness.report.study.curves import Factor, breaking, factors_by_case, grid, panels
-from simharness.report.study.worst_frames import Shown, show, worst_frames
+from simharness.report.study.curves import Factor, factor_breaking_points, factors_by_case, grid, panels
+from simharness.report.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.atomic_files import write_whole
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
@@ -76,7 +76,9 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
             raise ValueError(f"--threshold {score}: no such score; expected one of {', '.join(SCORES)}")
 
 
-def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: Mapping[str, float] = THRESHOLDS) -> str:
+def render_study(
+    results: Results, *, shown: Sequence[WorstFramePictures] = (), thresholds: Mapping[str, float] = THRESHOLDS
+) -> str:
     """Return the page of a study.
 
     Args:
@@ -101,8 +103,8 @@ def render_study(results: Results, *, shown: Sequence[Shown] = (), thresholds: M
         max_errors=_MAX_ERRORS,
         columns=tables.COLUMNS,
         headline=tables.headline(trials, variants),
-        compared=tables.compared(trials, variants) if len(variants) > 1 and seeds > 1 else {},
-        every=tables.every(trials, variants),
+        compared=tables.differences(trials, variants) if len(variants) > 1 and seeds > 1 else {},
+        every=tables.all_scores(trials, variants),
         cases=tables.cases(trials, variants),
         tabs=[SCORES[key] for key in CURVES],
         curves=[
@@ -243,7 +245,7 @@ def _breaking(
         for case, factor in by_case.items():
             for score, threshold in thresholds.items() if factor.numeric else ():
                 info = SCORES[score]
-                points = {each.variant: each for each in breaking(factor, variants, score, threshold)}
+                points = {each.variant: each for each in factor_breaking_points(factor, variants, score, threshold)}
                 past = "under" if info.better == "higher" else "over"
                 rows.append(
                     {

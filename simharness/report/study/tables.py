@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from simharness.report.run.headline import NOTHING
-from simharness.report.study.curves import Breaking
+from simharness.report.study.curves import FactorBreakingPoint
 from simharness.report.study.failure_rates import NOT_BLAMED
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
@@ -75,7 +75,7 @@ def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
     """Return the headline table: a row for each variant, a cell for each of :data:`COLUMNS`.
 
     A mean is over the settings where the score applies to that variant, and these may differ between variants. So the
-    difference between two variants is the one of :func:`compared`, not the difference of these means.
+    difference between two variants is the one of :func:`differences`, not the difference of these means.
     """
     rows = {}
     for variant in variants:
@@ -86,7 +86,7 @@ def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
     return rows
 
 
-def every(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
+def all_scores(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[ScoreInfo, list[Cell]]]:
     """Return the table of all scores that apply to any variant: a row for each score, a cell for each variant.
 
     Means are over the settings where the score applies to that variant, as in :func:`headline`.
@@ -108,13 +108,13 @@ def cases(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, dict[str, 
     return {name: headline(trials.filter(pl.col("case") == name), variants) for name in names}
 
 
-def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
+def differences(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Cell]]:
     """Return the differences of the other variants from the first, paired by seed, over the settings that both have.
 
     A cell is strong where the p value, adjusted by Holm's method over all cells, is below :data:`SIGNIFICANT`. Time is
     not tested, because other work on the machine changes it.
     """
-    differences: list[tuple[str, ScoreInfo, Any]] = []
+    tests: list[tuple[str, ScoreInfo, Any]] = []
     first, *others = variants
     base = trials.filter(pl.col("variant") == first)
     setting = [column for column in trials.columns if column not in (*SCORES, *_OF_A_VARIANT)]  # with the seed
@@ -124,11 +124,11 @@ def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
         for info in COLUMNS:
             both = pairs.drop_nulls([info.key, f"{info.key}{_OTHER}"])
             before, after = by_seed(both, info.key), by_seed(both, f"{info.key}{_OTHER}")
-            differences.append((variant, info, paired(list(before.values()), list(after.values()))))
-    tested = [each for each in differences if each[1].key != "time_ms"]
+            tests.append((variant, info, paired(list(before.values()), list(after.values()))))
+    tested = [each for each in tests if each[1].key != "time_ms"]
     adjusted = dict(zip([(each[0], each[1].key) for each in tested], holm([each[2].p for each in tested]), strict=True))
     rows: dict[str, list[Cell]] = {variant: [] for variant in others}
-    for variant, info, pair in differences:
+    for variant, info, pair in tests:
         if not pair.n:
             rows[variant].append(Cell(NOTHING))
             continue
@@ -141,15 +141,15 @@ def compared(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
 
 
 def _signed(value: float, score: ScoreInfo) -> str:
-    """Return a difference with its sign, as a typographic minus; zero has no sign."""
+    """Return a difference with its sign; the minus is typographic, and zero has no sign."""
     return signed(value, score.digits).replace("-", "−")
 
 
-def breaking_cell(breaking: Breaking | None) -> Cell:
+def breaking_cell(breaking: FactorBreakingPoint | None) -> Cell:
     """Return the cell of a breaking point."""
     if breaking is None:
         return Cell(NOTHING)
-    low, high = breaking.tried
+    low, high = breaking.swept
     point = breaking.point
     side = "above" if breaking.rising else "below"
     small = ""

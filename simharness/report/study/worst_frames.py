@@ -28,7 +28,7 @@ SHOWN = 4
 
 
 @dataclass(frozen=True)
-class Frame:
+class WorstFrame:
     """A frame of a trial with the result of one variant.
 
     Attributes:
@@ -47,7 +47,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Shown:
+class WorstFramePictures:
     """Pictures of a worst frame.
 
     Attributes:
@@ -65,7 +65,7 @@ class Shown:
     command: str
 
 
-def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
+def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:
     """Return the frames with the highest cost for the first variant with results, by falling cost.
 
     There is one frame of each setting; where there are fewer settings than ``count``, one frame of each trial.
@@ -83,12 +83,12 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
     )
     settings = {row["trial"]: row for row in results.trials.iter_rows(named=True)}
     keys = [*(("case",) if any(results.trials["case"]) else ()), *results.info["factors"]]
-    first: dict[str, Frame] = {}
-    rest: list[Frame] = []
+    first: dict[str, WorstFrame] = {}
+    rest: list[WorstFrame] = []
     for row in frames.iter_rows(named=True):
         about = settings[row["trial"]]
         setting = {key: about[key] for key in keys}
-        frame = Frame(row["trial"], variant, row["frame"], row["cost"], setting | {"seed": about["seed"]})
+        frame = WorstFrame(row["trial"], variant, row["frame"], row["cost"], setting | {"seed": about["seed"]})
         if str(setting) in first:
             rest.append(frame)
         else:
@@ -99,8 +99,8 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[Frame]:
 
 
 def show(
-    results: Results, frames: list[Frame], *, progress: Callable[[int], None] = lambda frames: None
-) -> Iterator[tuple[Shown, Replay]]:
+    results: Results, frames: list[WorstFrame], *, progress: Callable[[int], None] = lambda frames: None
+) -> Iterator[tuple[WorstFramePictures, Replay]]:
     """Run the trials of frames again and draw the frames; trials without pictures are rasterised for this.
 
     Raises:
@@ -125,7 +125,7 @@ def show(
         picture = Picture(f"{number}. {setting}", _caption(results, frame, again), rgb)
         assert study is not None
         command = _command(study, scenario)
-        yield Shown(picture, skeleton_view_3d(again, frame.frame), setting, frame.trial, command), again
+        yield WorstFramePictures(picture, skeleton_view_3d(again, frame.frame), setting, frame.trial, command), again
         progress(1)
 
 
@@ -138,7 +138,7 @@ def _command(study: Study, scenario: Scenario) -> str:
     return shlex.join(["simharness", "render", str(study.path), *sets, "--seed", str(scenario.seed), *layers])
 
 
-def _caption(results: Results, frame: Frame, again: Replay) -> str:
+def _caption(results: Results, frame: WorstFrame, again: Replay) -> str:
     row = results.frames.row(
         by_predicate=(pl.col("trial") == frame.trial)
         & (pl.col("variant") == frame.variant)

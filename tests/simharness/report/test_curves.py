@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 from made_study import make_study
 
-from simharness.report.study.curves import breaking, factors, factors_by_case, grid, panels
+from simharness.report.study.curves import factor_breaking_points, factors, factors_by_case, grid, panels
 
 VARIANTS = ("full", "fast")
 SEEDS_ADD = np.mean([0.0, 0.5, 1.0, 0.0])  # mean offset of PCP over four seeds
@@ -112,17 +112,17 @@ def test_what_does_not_vary_is_no_factor(tmp_path):
 
 def test_a_score_that_falls_as_the_factor_shrinks_breaks_below(tmp_path):
     (factor,) = factors(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
-    full, fast = breaking(factor, VARIANTS, "pcp", 80.0)
+    full, fast = factor_breaking_points(factor, VARIANTS, "pcp", 80.0)
     assert not full.rising
     assert full.point.value == pytest.approx((80 - 60 - SEEDS_ADD) / 5)
     assert fast.point.value == pytest.approx((84 - 60 - SEEDS_ADD) / 5)
     assert full.point.low < full.point.value < full.point.high
-    assert full.tried == (2.0, 5.0)
+    assert full.swept == (2.0, 5.0)
 
 
 def test_a_score_that_falls_as_the_factor_grows_breaks_above(tmp_path):
     (factor,) = factors(make_study(tmp_path, factors={"clutter.boxes": [0, 2, 6]}, slope=-5.0))
-    full, _ = breaking(factor, VARIANTS, "pcp", 40.0)
+    full, _ = factor_breaking_points(factor, VARIANTS, "pcp", 40.0)
     assert full.rising
     assert full.point.value == pytest.approx((60 + SEEDS_ADD - 40) / 5)
 
@@ -131,7 +131,7 @@ def test_the_same_curve_mirrored_breaks_at_the_mirrored_value(tmp_path):
     """Breaking above and below are one computation: values change their sign, and the ends are exchanged."""
     (down,) = factors(make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}))
     (up,) = factors(make_study(tmp_path, factors={"cameras.count": [-5, -3, -2]}, slope=-5.0))
-    one, other = breaking(down, ["full"], "pcp", 80.0)[0], breaking(up, ["full"], "pcp", 80.0)[0]
+    (one,), (other,) = (factor_breaking_points(factor, ["full"], "pcp", 80.0) for factor in (down, up))
     assert (one.rising, other.rising) == (False, True)
     assert one.point.value == pytest.approx(-other.point.value)
     assert (one.point.low, one.point.high) == pytest.approx((-other.point.high, -other.point.low), abs=0.02)
@@ -140,5 +140,5 @@ def test_the_same_curve_mirrored_breaks_at_the_mirrored_value(tmp_path):
 @pytest.mark.parametrize(("threshold", "why"), [(50.0, "never"), (99.0, "at once")])
 def test_without_a_breaking_point_in_the_range_the_reason_is_given(tmp_path, threshold, why):
     (factor,) = factors(make_study(tmp_path))
-    (full,) = breaking(factor, ["full"], "pcp", threshold)
+    (full,) = factor_breaking_points(factor, ["full"], "pcp", threshold)
     assert (full.point.value, full.point.why) == (None, why)

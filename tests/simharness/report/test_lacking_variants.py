@@ -7,7 +7,7 @@ import pytest
 from made_study import make_study
 
 from simharness.report.study.page import render_study
-from simharness.report.study.tables import compared
+from simharness.report.study.tables import differences
 from simharness.report.study.worst_frames import worst_frames
 
 
@@ -27,7 +27,7 @@ def test_a_difference_is_over_the_trials_that_both_have(tmp_path, variant):
     # PCP grows by 5 per camera and is lower by 4 for "fast" in every trial, so the difference is 4 in all subsets.
     results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, seeds=4)
     hard = results.trials.filter(pl.col("cameras.count") == 5, pl.col("seed") < 3)["trial"].unique().to_list()
-    (cells,) = compared(lacking(results, variant, hard).trials, ("full", "fast")).values()
+    (cells,) = differences(lacking(results, variant, hard).trials, ("full", "fast")).values()
     assert cells[0].text == "−4.0"
 
 

@@ -268,4 +268,4 @@ class TestCommand:
         assert "there is no folder" in self.refused(ran.folder, "--out", tmp_path / "no" / "page.html")
 
     def test_a_trial_without_a_recording(self, ran):
-        assert "without --rerun" in self.refused(ran.folder, "--trial", "0")
+        assert "add --rerun FILE" in self.refused(ran.folder, "--trial", "0")

@@ -5,7 +5,7 @@ import polars as pl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.report.study.tables import COLUMNS, compared
+from simharness.report.study.tables import COLUMNS, differences
 
 KEYS = [info.key for info in COLUMNS]
 AT = KEYS.index("mpjpe_mm")
@@ -24,7 +24,7 @@ def trials_of(rows):
 
 
 def difference(rows):
-    return compared(trials_of(rows), ["A", "B"])["B"][AT]
+    return differences(trials_of(rows), ["A", "B"])["B"][AT]
 
 
 def written(cell):
