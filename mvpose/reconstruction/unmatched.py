@@ -45,7 +45,7 @@ class UnmatchedPictorialStructure:
         agreement: greatest distance between two rays that propose a state, in standard deviations.
         reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
         least_joints: least number of joints of a person on which two or more views agree. It exceeds the five joints
-            of a face: they lie within a few centimetres, so all five agree where the rays of two faces meet by chance.
+            of a face: they lie within a hand's breadth, so all five agree where the rays of two faces meet by chance.
         apart: least mean distance between corresponding joints of two people, metres; a chest is 0.25 m deep
             (ANSUR II). A nearer pose is the same person found again, with left and right exchanged or not.
         most_states: greatest number of states that a keypoint proposes, the likeliest ones.
