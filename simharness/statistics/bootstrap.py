@@ -1,8 +1,8 @@
-"""Confidence intervals of figures from recordings, in which one frame is much like the next.
+"""Block bootstrap: confidence intervals of figures from recordings, in which consecutive frames are correlated.
 
-Frames are drawn in blocks that are longer than what lasts (a block bootstrap; Künsch, Annals of Statistics 1989), and
-everything that was seen in a frame goes together. Figures that are functions of sums over frames are computed for all
-resamples at once: ``f(weights @ sums)``.
+Frames are drawn in blocks longer than the correlation (Künsch, "The jackknife and the bootstrap for general stationary
+observations", Annals of Statistics 1989); all quantities of a frame are drawn together. Figures that are functions of
+sums over frames are computed for all resamples at once: ``f(weights @ sums)``.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from mvpose.arrays import Floats
 from simharness.types.random_streams import stream
 
 BLOCK = 1.0
-"""Seconds, the usual length of a block: poses, occlusions and most errors last less."""
+"""Default length of a block, seconds: longer than poses, occlusions and most errors last."""
 
 
 def blocks(time: ArrayLike, *, block: float = BLOCK) -> int:
-    """How many blocks of ``block`` seconds there are in frames at ``time`` (T,) seconds; at least 1."""
+    """Return the number of blocks of ``block`` seconds in frames at ``time`` (T,) seconds; at least 1."""
     frames = len(np.asarray(time))
-    return max(1, round(frames / _length(np.asarray(time, float), block))) if frames else 1
+    return max(1, round(frames / _frames_per_block(np.asarray(time, float), block))) if frames else 1
 
 
 def block_weights(time: ArrayLike, *, block: float = BLOCK, resamples: int = 1000, seed: int = 0) -> Floats:
-    """How often each frame counts in each resample, (R, T); a row sums to T.
+    """Return how many times each resample contains each frame, (R, T); each row sums to T.
 
-    Blocks begin anywhere and run on from the last frame to the first, so that every frame counts equally.
+    A block can begin at any frame and continues from the last frame at the first, so that all frames have equal weight.
 
     Args:
-        time: of the frames, (T,) seconds, evenly spaced.
-        block: length of the blocks, seconds.
-        resamples: R.
-        seed: of the draws.
+        time: times of the frames, (T,) seconds, evenly spaced.
+        block: length of a block, seconds.
+        resamples: number of resamples, R.
+        seed: seed of the draws.
 
     Raises:
         ValueError: no frames.
@@ -42,7 +42,7 @@ def block_weights(time: ArrayLike, *, block: float = BLOCK, resamples: int = 100
     frames = len(time)
     if not frames:
         raise ValueError("no frames to resample")
-    length = _length(time, block)
+    length = _frames_per_block(time, block)
     count = -(-frames // length)
     starts = stream(seed, "bootstrap").integers(frames, size=(resamples, count))
     drawn = (starts[:, :, None] + np.arange(length)).reshape(resamples, -1)[:, :frames] % frames
@@ -51,19 +51,19 @@ def block_weights(time: ArrayLike, *, block: float = BLOCK, resamples: int = 100
 
 
 def resampled(sums: ArrayLike, weights: Floats) -> Floats:
-    """Sums over the frames of each resample, (R, ...), of what each frame adds, (T, ...)."""
+    """Return the sums over the frames of each resample, (R, ...), from the contribution of each frame, (T, ...)."""
     sums = np.asarray(sums, float)
     return (weights @ sums.reshape(len(sums), -1)).reshape(len(weights), *sums.shape[1:])
 
 
 def interval(values: ArrayLike, *, level: float = 0.95, blocks: int | None = None) -> tuple[Floats, Floats]:
-    """Percentile interval of resampled figures (R, ...): two arrays (...); NaN among the values is left out.
+    """Return the percentile interval of resampled figures (R, ...) as two arrays (...), low and high; NaN is ignored.
 
     Args:
-        values: the figure of each resample.
-        level: how often the interval should hold the truth.
-        blocks: how many independent blocks there were: the fewer, the wider, as Student's t is wider than the normal
-            distribution (expanded percentiles; Hesterberg, The American Statistician 2015). None: not widened.
+        values: figure of each resample.
+        level: coverage probability of the interval.
+        blocks: number of independent blocks. The fewer, the wider the interval, in the ratio of Student's t to the
+            normal distribution (expanded percentiles; Hesterberg, The American Statistician 2015). None: not widened.
     """
     values = np.asarray(values, float)
     tail = (1 - level) / 2
@@ -78,7 +78,7 @@ def interval(values: ArrayLike, *, level: float = 0.95, blocks: int | None = Non
     return low, high
 
 
-def _length(time: Floats, block: float) -> int:
-    """Frames in a block."""
+def _frames_per_block(time: Floats, block: float) -> int:
+    """Return the number of frames in a block."""
     step = (time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else block
     return int(np.clip(round(block / step), 1, len(time))) if step > 0 else 1

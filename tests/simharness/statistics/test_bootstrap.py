@@ -6,11 +6,11 @@ from simharness.statistics.bootstrap import block_weights, blocks, interval, res
 TIME = np.arange(300) / 25
 
 
-def test_a_resample_has_as_many_frames_and_every_frame_counts_alike():
+def test_a_resample_has_as_many_frames_and_all_frames_have_equal_weight():
     weights = block_weights(TIME, resamples=4000)
     assert weights.shape == (4000, 300)
     assert (weights.sum(axis=1) == 300).all()
-    # A frame counts as often as 12 blocks of 25 of 300 hold it: 1 on average, with the variance of a binomial.
+    # Each of the 12 blocks of 25 contains a given one of 300 frames with probability 1/12: binomial, mean 1.
     np.testing.assert_allclose(weights.mean(axis=0), 1.0, atol=5 * np.sqrt(12 * (1 / 12) * (11 / 12) / 4000))
 
 
@@ -30,28 +30,28 @@ def test_sums_of_a_resample_are_those_of_its_frames():
     np.testing.assert_allclose(resampled(values, weights), expected)
 
 
-def test_one_seed_is_one_resample():
+def test_a_seed_determines_the_resamples():
     np.testing.assert_array_equal(block_weights(TIME, resamples=3, seed=4), block_weights(TIME, resamples=3, seed=4))
     assert (block_weights(TIME, resamples=3, seed=4) != block_weights(TIME, resamples=3, seed=5)).any()
 
 
-def test_intervals_hold_the_mean_of_what_lasts_and_frames_alone_do_not():
-    """A share that forgets in 0.2 s, 300 recordings of 12 s: a 95 % interval holds its mean about as often."""
+def test_block_intervals_cover_the_mean_of_correlated_frames_and_frame_intervals_do_not():
+    """AR(1) noise with a correlation time of 0.2 s, 300 recordings of 12 s: a 95 % interval covers its mean about as often."""
     rng = np.random.default_rng(1)
     kept = np.exp(-0.04 / 0.2)
     noise = rng.normal(size=(300, 300))
     for frame in range(1, 300):
         noise[frame] = kept * noise[frame - 1] + np.sqrt(1 - kept**2) * noise[frame]
-    held = {}
+    covered = {}
     for block in (1.0, 0.0):
         weights = block_weights(TIME, block=block, resamples=400)
         low, high = interval(resampled(noise, weights) / 300, blocks=blocks(TIME, block=block))
-        held[block] = ((low <= 0) & (high >= 0)).mean()
-    assert held[1.0] > 0.89  # binomial: 0.95 would give less than 0.91 once in 2000
-    assert held[0.0] < 0.65
+        covered[block] = ((low <= 0) & (high >= 0)).mean()
+    assert covered[1.0] > 0.89  # binomial: 0.95 would give less than 0.91 once in 2000
+    assert covered[0.0] < 0.65
 
 
-def test_fewer_blocks_make_wider_intervals_and_unknown_ones_are_left_out():
+def test_fewer_blocks_make_wider_intervals_and_nan_is_ignored():
     values = np.random.default_rng(2).normal(size=(20000, 1))
     plain, few, many = (interval(values, blocks=count) for count in (None, 6, 10000))
     np.testing.assert_allclose(np.ravel(plain), [-1.96, 1.96], atol=0.06)

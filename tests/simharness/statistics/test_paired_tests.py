@@ -1,0 +1,105 @@
+"""Sign-flip tests of pairs, and Holm's correction."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simharness.statistics.paired_tests import DRAWS, holm, paired
+
+
+def by_enumeration(change, alternative):
+    sums = [
+        sum(s * c for s, c in zip(signs, change, strict=True))
+        for signs in itertools.product((1, -1), repeat=len(change))
+    ]
+    observed, tolerance = sum(change), 1e-9
+    extreme = {
+        "greater": [each >= observed - tolerance for each in sums],
+        "less": [each <= observed + tolerance for each in sums],
+        "two-sided": [abs(each) >= abs(observed) - tolerance for each in sums],
+    }
+    return sum(extreme[alternative]) / len(sums)
+
+
+@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
+@given(change=st.lists(st.integers(-5, 5).map(float), min_size=1, max_size=8))
+def test_p_is_the_share_of_all_signs_that_are_as_extreme(change, alternative):
+    before = np.linspace(50, 90, len(change))
+    result = paired(before, before + change, alternative=alternative)
+    assert result.p == pytest.approx(by_enumeration(change, alternative), abs=1e-12)
+    assert result.difference == pytest.approx(np.mean(change))
+
+
+def test_twelve_pairs_that_all_fall_have_p_of_one_in_4096():
+    before = np.arange(12.0)
+    fallen = paired(before, before - np.linspace(1, 2, 12), alternative="less")
+    assert fallen.p == 1 / 4096
+    assert paired(before, before - np.linspace(1, 2, 12)).p == 2 / 4096
+    assert fallen.high < 0
+    # Pairs without difference do not change p, however many.
+    many = np.concatenate([before, np.zeros(200)])
+    assert paired(many, many - np.concatenate([np.linspace(1, 2, 12), np.zeros(200)]), alternative="less").p == 1 / 4096
+
+
+def test_drawn_signs_agree_with_all_signs():
+    rng = np.random.default_rng(3)
+    change = rng.normal(0.45, 1.0, 16)
+    flips = 1 - 2 * ((np.arange(2**16)[:, None] >> np.arange(16)) & 1)
+    exact = np.mean(flips @ change >= change.sum() - 1e-9)
+    result = paired(np.zeros(16), change, alternative="greater")
+    assert 0.01 < exact < 0.3
+    assert abs(result.p - exact) < 4 * math.sqrt(exact * (1 - exact) / DRAWS)
+    assert paired(np.zeros(16), change, alternative="greater").p == result.p  # the draws are keyed
+    assert paired(np.zeros(100), np.ones(100), alternative="greater").p == 1 / (1 + DRAWS)
+
+
+def test_no_change_is_no_evidence():
+    same = paired(np.arange(50.0), np.arange(50.0))
+    assert (same.difference, same.p, same.n) == (0.0, 1.0, 50)
+    none = paired([None, 1.0], [2.0, None])
+    assert (none.p, none.n) == (1.0, 0)
+
+
+def test_random_differences_are_significant_no_more_often_than_the_level():
+    rng = np.random.default_rng(8)
+    for pairs in (10, 20):
+        p = np.array([paired(np.zeros(pairs), rng.standard_t(3, pairs)).p for _ in range(200)])
+        assert (p <= 0.05).mean() < 0.05 + 2.5 * math.sqrt(0.05 * 0.95 / 200)
+        assert 0.4 < p.mean() < 0.6
+
+
+def test_bad_arguments_of_paired_are_refused():
+    with pytest.raises(ValueError, match=r"got 2 and 3"):
+        paired([1, 2, 3], [1, 2])
+    with pytest.raises(ValueError, match="two-sided, greater or less"):
+        paired([1], [2], alternative="worse")
+
+
+def rejected_step_by_step(p, level):
+    """Return the indices that Holm's procedure rejects, step by step."""
+    rejected = set()
+    for step, index in enumerate(sorted(range(len(p)), key=p.__getitem__)):
+        if p[index] > level / (len(p) - step):
+            break
+        rejected.add(index)
+    return rejected
+
+
+def test_holm_by_hand():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([]) == []
+    assert holm([0.7, 0.8]) == [1.0, 1.0]
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        holm([0.5, float("nan")])
+
+
+@given(
+    p=st.lists(st.integers(0, 997).map(lambda i: i / 997), min_size=1, max_size=12),
+    level=st.sampled_from([0.0101, 0.0502, 0.2003]),
+)
+def test_holm_agrees_with_the_step_by_step_procedure(p, level):
+    assert {i for i, adjusted in enumerate(holm(p)) if adjusted <= level} == rejected_step_by_step(p, level)
