@@ -148,7 +148,7 @@ def _headline(results: Results) -> Table:
 
     from simharness.report.study.tables import by_seed
     from simharness.scoring.catalogue import HEADLINE, SCORES
-    from simharness.statistics.comparison import mean_interval
+    from simharness.statistics.intervals import mean_interval
 
     factors = results.info["factors"] if len(results.info["factors"]) == 1 else []
     keys = [*(("case",) if any(results.trials["case"]) else ()), *factors, "variant"]

@@ -42,7 +42,7 @@ from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import HEADLINE, SCORES
 from simharness.statistics.bootstrap import block_weights, interval
-from simharness.statistics.comparison import Alternative, holm, paired
+from simharness.statistics.paired_tests import Alternative, holm, paired
 
 Verdict = Literal["worse", "better", "same"]
 

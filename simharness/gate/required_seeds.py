@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from simharness.scenario.study_definition import Study
-from simharness.statistics.comparison import DRAWS
+from simharness.statistics.paired_tests import DRAWS
 
 
 def least_p(seeds: int) -> float:

@@ -11,7 +11,8 @@ import polars as pl
 
 from mvpose.arrays import Floats
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.comparison import BreakingPoint, Interval, breaking_point, mean_interval
+from simharness.statistics.breaking_points import BreakingPoint, breaking_point
+from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results
 
 

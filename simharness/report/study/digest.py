@@ -22,7 +22,7 @@ from simharness.report.study.failure_rates import failure_rates
 from simharness.report.study.page import THRESHOLDS
 from simharness.runtime.atomic_files import appearing
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.comparison import Interval, mean_interval
+from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results
 from simharness.trial.provenance import PROVENANCE
 

@@ -15,7 +15,7 @@ from simharness.report.figures.svg_plots import FAINT, INK, LINE, VARIANT_COLORS
 from simharness.report.study.factor_names import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
-from simharness.statistics.comparison import Interval
+from simharness.statistics.intervals import Interval
 
 KIND_COLORS: Mapping[str, Color] = {
     "missed": "#8b93a1",

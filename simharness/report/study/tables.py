@@ -14,7 +14,8 @@ from simharness.report.study.curves import FactorBreakingPoint
 from simharness.report.study.failure_rates import NOT_BLAMED
 from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES, ScoreInfo
-from simharness.statistics.comparison import Interval, holm, mean_interval, paired
+from simharness.statistics.intervals import Interval, mean_interval
+from simharness.statistics.paired_tests import holm, paired
 
 COLUMNS: tuple[ScoreInfo, ...] = tuple(
     SCORES[key] for key in ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts", "time_ms")

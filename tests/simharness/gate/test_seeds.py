@@ -9,7 +9,7 @@ from simharness.gate.runner import baseline_of
 from simharness.gate.suite import fingerprint
 from simharness.gate.trial_command import TrialKey, name_of, scenes_of
 from simharness.scenario.study_definition import load_study
-from simharness.statistics.comparison import paired
+from simharness.statistics.paired_tests import paired
 
 
 @pytest.mark.parametrize("seeds", [1, 2, 5, 12, 13, 20])

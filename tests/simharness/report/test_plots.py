@@ -12,7 +12,7 @@ from simharness.report.run import plots
 from simharness.report.study import plots as study_plots
 from simharness.scenario.sections.scenario import Cameras
 from simharness.scoring.catalogue import SCORES
-from simharness.statistics.comparison import Interval
+from simharness.statistics.intervals import Interval
 from simharness.world.rigs.layouts import build_rig
 
 COLORS = ["#336699", "#996633", "#339966"]

@@ -181,7 +181,7 @@ class TestCode:
             ("simharness/report/run/page.py", set()),
             ("simharness/study/trial_store.py", set()),
             ("simharness/trial/run_trial.py", set()),
-            ("simharness/statistics/comparison.py", set()),
+            ("simharness/statistics/intervals.py", set()),
             ("simharness/scenario/sweep.py", set()),
             ("simharness/world/scene/__pycache__/build.cpython-311.pyc", set()),
         ],
