@@ -13,8 +13,8 @@
     ``variant``, a column for each factor, named by its key, one for each of
     :data:`simharness.scoring.catalogue.SCORES`, ``seconds``, and ``scenario``, the resolved scenario as JSON.
 `frames.parquet`, `people.parquet`, `failures.parquet`
-    ``trial``, ``variant``, and the columns of :class:`simharness.trial.variant_result.VariantResult`. Settings that make the
-    same trial share its rows.
+    ``trial``, ``variant``, and the columns of :class:`simharness.trial.variant_result.VariantResult`. Settings that
+    make the same trial share its rows.
 `report.html`
     for people.
 """
