@@ -22,7 +22,7 @@ from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 
 _FRAMES = 3  # frames in which projections are checked
-_PICTURES = 0.01  # share of the pictures that are rendered again
+_PICTURES, _PICTURES_LEAST = 0.01, 3  # share and least number of the pictures that are rendered again
 _DEVIATIONS = 4.0  # standard deviations of a count that are allowed beside its expected value
 _PIXELS = 0.01  # between two projections of one point
 _SHARE = 0.98  # of the visible joints must be found where they should be: outlines are ragged
@@ -39,7 +39,7 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
     """Check a simulated trial before its detections are made.
 
     Clocks and calibration are checked in whole. Projections are checked in three frames, rendered pictures in one per
-    cent of all, at least one: the audit costs less than two per cent of a trial.
+    cent of all, at least three: the audit costs less than two per cent of a trial.
 
     Args:
         scenario: the scenario that was requested.
@@ -63,9 +63,9 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
 
 
 def sampled_pictures(exposures: ExposureSchedule, seed: int) -> list[tuple[int, int]]:
-    """Return frame and view of the delivered pictures that an audit renders again: one per cent, at least one."""
+    """Return frame and view of the delivered pictures that an audit renders again: one per cent, at least three."""
     delivered = np.argwhere(exposures.delivered)
-    count = max(1, round(_PICTURES * len(delivered)))
+    count = max(_PICTURES_LEAST, round(_PICTURES * len(delivered)))
     chosen = stream(seed, "audit", "pictures").permutation(len(delivered))[:count]
     return [(int(frame), int(view)) for frame, view in delivered[np.sort(chosen)]]
 

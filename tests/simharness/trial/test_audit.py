@@ -7,7 +7,10 @@ import pytest
 
 from mvpose import Rig
 from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
-from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks
+from simharness.scenario.study_definition import load_study
+from simharness.study.runner import run_study
+from simharness.trial.audit import AuditError, audit, check_calibration, check_clocks, sampled_pictures
+from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import CaptureFrames
 from simharness.types.views import Visibility
@@ -143,3 +146,47 @@ def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, sh
         wide = Rig([replace(camera, K=camera.K @ scale) for camera in exposures.believed_rig])
         with pytest.raises(AuditError, match="focal length"):
             check_calibration(faults, replace(exposures, believed_rig=wide))
+
+
+def moved_projections(monkeypatch, pixels):
+    """Let the truth in the pictures be off by some pixels, as a wrong projection would have it."""
+    captured = CaptureFrames.__call__
+
+    def wrong(self, frames):
+        views = captured(self, frames)
+        return replace(views, pixels=views.pixels + pixels)
+
+    monkeypatch.setattr(CaptureFrames, "__call__", wrong)
+
+
+def test_a_wrong_projection_fails_the_trials_of_a_study(tmp_path, monkeypatch):
+    path = tmp_path / "tiny.toml"
+    path.write_text(
+        'extends = "quickstart"\nname = "tiny"\nseeds = 2\nduration = 0.4\nrate = 5.0\nvariants = ["fast"]\n'
+        'rendering.renderer = "rays"\npeople.count = 2\n'
+    )
+    study = load_study(path)
+    moved_projections(monkeypatch, 0.5)
+    results = run_study(study, out=tmp_path / "out")
+    assert [failed["seed"] for failed in results.info["failed"]] == [0, 1]
+    assert all(failed["error"].startswith("audit: projection: frame ") for failed in results.info["failed"])
+    assert results.trials.is_empty()
+    monkeypatch.undo()
+    assert run_study(study, out=tmp_path / "out").info["failed"] == []
+
+
+@pytest.mark.parametrize("until", ["detect", "estimate", "score", "classify", "blame"])
+def test_every_goal_is_audited(monkeypatch, until):
+    scenario = small(rendering=Rendering(renderer="rays"))
+    moved_projections(monkeypatch, 0.5)
+    with pytest.raises(AuditError, match=r"^audit: projection"):
+        run_trial(scenario, until=until)
+
+
+def test_pictures_are_sampled_by_the_seed_and_in_all_frames(ready):
+    chosen = [sampled_pictures(ready.exposures, seed) for seed in range(200)]
+    assert chosen[3] == sampled_pictures(ready.exposures, 3)
+    assert {len(pictures) for pictures in chosen} == {3}
+    assert {picture for pictures in chosen for picture in pictures} == set(
+        map(tuple, np.argwhere(ready.exposures.delivered).tolist())
+    )

@@ -196,13 +196,13 @@ class TestLoading:
 
     @pytest.mark.parametrize("name", PRESETS)
     def test_no_name_of_a_preset_is_free(self, name):
-        with pytest.raises(ValueError, match=rf"^method\.estimators\.{name}: that is a preset"):
+        with pytest.raises(ValueError, match=rf"^method\.estimators\.{name}: this is the name of a preset"):
             estimators_of(Method(estimators=Estimators(**{name: "mine.py:Mine"})))
 
     def test_the_nearest_variant_is_named_be_it_ones_own(self):
         method = Method(variants=("moin",), estimators=Estimators(mine="mine.py:Mine"))
         with pytest.raises(
-            ValueError, match=r"^method\.variants: there is no 'moin'; did you mean mine\? .*full.*mine"
+            ValueError, match=r"^method\.variants: unknown variant 'moin'; did you mean mine\? .*full.*mine"
         ):
             estimators_of(method)
 
@@ -269,7 +269,7 @@ class TestAnswers:
 class TestInTrials:
     def test_a_trial_that_fails_says_who_and_where(self, scenario):
         broken = load(scenario('[method.estimators]\nown = "mine.py:Broken"', "own"))
-        with pytest.raises(RunError, match=r"^frame \d: own \(.*mine\.py:Broken\): ZeroDivisionError"):
+        with pytest.raises(RunError, match=r"^estimate: frame \d: own \(.*mine\.py:Broken\): ZeroDivisionError"):
             measure(broken)
 
     def test_it_scores_as_the_preset_that_it_is(self, scenario):
@@ -311,9 +311,9 @@ class TestInTrials:
         path = scenario('detector.heatmaps.size = "64x48"\n[method.estimators]\nown = "mine.py:Mine"', "own")
         trial = build_trial(load(path))
         _, detected = simulated(trial.scenario)
-        estimating = EstimateFrames(trial.exposures.believed_rig, tuple(detected), trial.pipelines)
-        assert estimating.seen(0, "own").likelihoods is not None
-        assert estimating.seen(0, "fast").likelihoods is None
+        estimation = EstimateFrames(trial.exposures.believed_rig, tuple(detected), trial.pipelines)
+        assert estimation.input_of(0, "own").likelihoods is not None
+        assert estimation.input_of(0, "fast").likelihoods is None
 
     def test_it_can_be_asserted(self, scenario):
         path = scenario('[method.estimators]\nown = "mine.py:Silent"', "own")

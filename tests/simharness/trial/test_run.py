@@ -16,6 +16,7 @@ from simharness.scenario.load import fingerprint
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Cameras, Clutter, Detector, Method, People, Rendering, Scenario
 from simharness.scoring.summary import VariantScores
+from simharness.trial import run_trial
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages import build_trial as trial
 from simharness.trial.stages.build_trial import build_trial
@@ -124,12 +125,12 @@ def test_nothing_found_is_a_valid_run(tmp_path, sections, people):
     assert "<svg" in (folder / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("stage", ["simulate", "Filming", "detect", "score_variant", "write_run"])
+@pytest.mark.parametrize("stage", ["simulate", "CaptureFrames", "detect", "assess", "write_run"])
 def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     def broken(*_args, **_options):
         raise ValueError("of our own making")
 
-    monkeypatch.setattr(running, stage, broken)
+    monkeypatch.setattr(running if stage == "write_run" else run_trial, stage, broken)
     with pytest.raises(RunError, match="ValueError: of our own making"):
         run(tiny(), out=tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -153,7 +154,7 @@ class TestPrepare:
     @pytest.mark.parametrize(
         ("scenario", "said"),
         [
-            (tiny(cameras=Cameras(count=1)), "at least 2 cameras"),
+            (tiny(cameras=Cameras(count=1)), "expected at least 2"),
             (tiny(cameras=Cameras(count=2, radius=4.0)), "cam0.*wall"),
             (tiny(method=Method(variants=("full", "best"))), "method.variants: .*'best'"),
         ],
