@@ -16,7 +16,7 @@ from benchmarks.method.published import RELEASED, Comparison
 from benchmarks.simulator.result import SWEPT, Result, read
 from benchmarks.simulator.table import markdown
 from simharness.report.figures.svg_plots import INK, STAGE_COLORS, Color, legend_above, plot_sheet, svg_plot
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 
 _SIZE = (4.5, 3.9)  # inches of 72 px
 _RELEASED_COLOR, _PAPER_COLOR = "#d9643a", "#8a63c9"
@@ -41,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     options.folder.mkdir(parents=True, exist_ok=True)
-    write_whole(options.folder / "table.md", markdown(result).encode())
-    write_whole(options.folder / "curves.svg", curves(result).encode())
+    write_atomic(options.folder / "table.md", markdown(result).encode())
+    write_atomic(options.folder / "curves.svg", curves(result).encode())
     return 0
 
 

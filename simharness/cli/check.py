@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import BAD_INPUT, REGRESSION, after_reading, border
+from simharness.cli.exit_codes import BAD_INPUT, REGRESSION, exit_on_error, run_errors_only
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simharness.gate.gate_result import Check, Failed
+    from simharness.gate.gate_result import FailedCase, GateResult
     from simharness.scenario.study_definition import Study
 
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
@@ -53,7 +53,7 @@ def check(
     per frame, relative to a reference kernel. Trials that fail to run fail the
     check as well.
     """
-    with border():
+    with exit_on_error():
         from simharness.gate.baseline import check_place
         from simharness.scenario.study_definition import load_study
 
@@ -74,7 +74,7 @@ def check(
         from simharness.runtime.progress import reporter
 
         before = baseline_of(study, baseline)
-        with after_reading(), reporter() as bars:
+        with run_errors_only(), reporter() as bars:
             result = check_suite(study, before, workers=workers, reporter=bars)
         _print(result, Console())
         unwritten = _write(result, reports)
@@ -84,7 +84,7 @@ def check(
         raise typer.Exit(BAD_INPUT)
 
 
-def _write(result: Check, reports: Mapping[str, Path]) -> bool:
+def _write(result: GateResult, reports: Mapping[str, Path]) -> bool:
     """Write the reports independently of each other; return whether one could not be written, after a message."""
     from simharness.gate.baseline import write_text
     from simharness.gate.junit import junit
@@ -108,7 +108,7 @@ def _update(study: Study, path: Path, workers: int) -> None:
     from simharness.runtime.progress import reporter
 
     require_seeds(study)
-    with after_reading(), reporter() as bars:
+    with run_errors_only(), reporter() as bars:
         done = run_suite(study, workers=workers, reporter=bars)
     if done.failed:
         message = f"{_list_failed(done.failed)}\n{path} was not written, because it would lack these trials"
@@ -124,7 +124,7 @@ def _update(study: Study, path: Path, workers: int) -> None:
     )
 
 
-def _print(check: Check, console: Console) -> None:
+def _print(check: GateResult, console: Console) -> None:
     """Print the result of a check."""
     from rich.text import Text
 
@@ -138,7 +138,7 @@ def _print(check: Check, console: Console) -> None:
     if check.failed:
         write(_list_failed(check.failed))
     for kind, style in (("worse", "red"), ("better", "green")):
-        changes = check.comparison.that_are(kind)  # type: ignore[arg-type]
+        changes = check.comparison.with_verdict(kind)  # type: ignore[arg-type]
         for change in changes[:_LISTED]:
             write(Text.assemble((f"{kind:<6}", style), " ", sentence(change, check.gate)))
         if len(changes) > _LISTED:
@@ -146,10 +146,10 @@ def _print(check: Check, console: Console) -> None:
     for variant in check.variants:
         console.print()
         console.print(_table(check, variant))
-    write(f"\n{check.pointer}\n  {check.command}")
+    write(f"\n{check.worst_description}\n  {check.command}")
 
 
-def _table(check: Check, variant: str) -> Table:
+def _table(check: GateResult, variant: str) -> Table:
     """Return the headline scores of a variant over the whole suite."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -161,7 +161,7 @@ def _table(check: Check, variant: str) -> Table:
     for column in ("now", "baseline", "difference (95 %)", "allowed"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("")
-    for change in check.comparison.of(variant):
+    for change in check.comparison.changes_of(variant):
         table.add_row(
             title(change.score),
             number(change.score, change.after),
@@ -173,7 +173,7 @@ def _table(check: Check, variant: str) -> Table:
     return table
 
 
-def _list_failed(failed: Sequence[Failed]) -> str:
+def _list_failed(failed: Sequence[FailedCase]) -> str:
     lines = [f"failed {each.case}, seed {each.seed}: {each.error}" for each in failed[:_LISTED]]
     more = [f"failed and {len(failed) - _LISTED} more"] if len(failed) > _LISTED else []
     return "\n".join([*lines, *more])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import after_reading, border, write_json
+from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
 from simharness.cli.options import JsonFile, Overrides, ScenarioFile, command_line
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def shelf(
 
     FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
     """
-    with border():
+    with exit_on_error():
         start = perf_counter()
         from mvpose.pipeline import NEED_DESCRIPTORS
         from simharness.reality.evaluation import evaluate, print_evaluation
@@ -67,7 +67,7 @@ def shelf(
             )
         data = read_shelf(folder)
         with (
-            after_reading(),
+            run_errors_only(),
             reporter() as bars,
             bars.stage("evaluate", len(data) * len(pipelines)) as advance,
         ):
@@ -88,7 +88,7 @@ def twin(
     json_file: JsonFile = None,
 ) -> None:
     """Shelf and its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
-    with border():
+    with exit_on_error():
         start = perf_counter()
         from simharness.reality.shelf import read_shelf
         from simharness.reality.twin import compare, print_comparison
@@ -111,7 +111,7 @@ def evaluate_seeds(
     json_file: JsonFile = None,
 ) -> None:
     """A scenario at many seeds: PCP of its variants, of all people and of each person, with intervals."""
-    with border():
+    with exit_on_error():
         start = perf_counter()
         from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at
         from simharness.reality.seed_evaluation import print_seeds

@@ -19,11 +19,11 @@ FAILED = 3
 
 
 @contextlib.contextmanager
-def border() -> Iterator[None]:
+def exit_on_error() -> Iterator[None]:
     """Turn errors into messages and exit codes.
 
     A ValueError means bad input, because code that works on validated input raises a RunError instead:
-    :func:`simharness.report.run.result_folder.run` and :func:`after_reading` ensure it.
+    :func:`simharness.report.run.result_folder.run` and :func:`run_errors_only` ensure it.
     """
     console = Console(stderr=True)
     try:
@@ -40,7 +40,7 @@ def border() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def after_reading() -> Iterator[None]:
+def run_errors_only() -> Iterator[None]:
     """Turn every error into a RunError: the input has been validated."""
     from simharness.runtime.errors import RunError
 
@@ -56,9 +56,9 @@ def write_json(summary: dict[str, Any], path: Path) -> None:
     Raises:
         ValueError: the file cannot be written.
     """
-    from simharness.runtime.atomic_files import write_whole
+    from simharness.runtime.atomic_files import write_atomic
 
     try:
-        write_whole(path, (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
+        write_atomic(path, (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())
     except OSError as error:
         raise ValueError(f"--json {path}: cannot be written: {error.strerror}") from None

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simharness.cli.exit_codes import border
+from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
 
 
@@ -31,7 +31,7 @@ def export(
     It appears, when it is complete, in FOLDER/NAME and replaces an earlier
     export there; manifest.json describes it.
     """
-    with border():
+    with exit_on_error():
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 

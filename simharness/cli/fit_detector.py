@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import after_reading, border, write_json
+from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
 
 app = typer.Typer(no_args_is_help=True, help="Measure a real detector and write a profile with its errors.")
 
@@ -32,7 +32,7 @@ def fit_shelf(
 
     FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
     """
-    with border():
+    with exit_on_error():
         from simharness.reality.detector_fit.fit import fit, twin_of, write_profile
         from simharness.reality.detector_fit.plot import plot_comparison
         from simharness.reality.detector_fit.sample import of_shelf
@@ -46,7 +46,7 @@ def fit_shelf(
         print_measurement(fitted.real, Console())
         summary = {"real": fitted.real.summary()}
         if figure is not None:
-            with after_reading():
+            with run_errors_only():
                 simulated = twin_of(fitted, sample)
             plot_comparison([fitted.real, simulated], figure)
             print_agreement(fitted.real, simulated, Console())

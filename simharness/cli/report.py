@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simharness.cli.exit_codes import after_reading, border
+from simharness.cli.exit_codes import exit_on_error, run_errors_only
 
 if TYPE_CHECKING:
     from simharness.report.study.worst_frames import WorstFrame
@@ -58,7 +58,7 @@ def report(
 
     The trials of the worst frames are run again to make their pictures.
     """
-    with border():
+    with exit_on_error():
         if trial is not None and rerun is None:
             raise ValueError("--trial: chooses the trial that --rerun writes; add --rerun FILE, or remove --trial")
         if rerun is not None and digest is not None:
@@ -109,7 +109,7 @@ def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
     require_sdk()
     frame = _chosen(results, trial)
     scenario = results.scenario_of(frame.trial)
-    with after_reading():
+    with run_errors_only():
         again = replay(scenario, frame.variant)
     write_rerun(again, path)
 

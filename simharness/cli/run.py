@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import border
+from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def run(
     The results appear, when they are complete, in a folder NAME-HASH:
     report.html for people, other files for programs.
     """
-    with border():
+    with exit_on_error():
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 
@@ -83,7 +83,7 @@ def render(
     They appear, when they are complete, in FOLDER/NAME: CAMERA/0000.png, ...
     or CAMERA.mp4, and mosaic.
     """
-    with border():
+    with exit_on_error():
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 

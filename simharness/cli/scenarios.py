@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from simharness.cli.exit_codes import border
+from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import Overrides, ScenarioFile, Seed
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def add_to(app: typer.Typer) -> None:
 
 def scenarios() -> None:
     """List the shipped scenarios, and the rigs and detector profiles with which a scenario may begin."""
-    with border():
+    with exit_on_error():
         from simharness.scenario.presets import PROFILES, RIGS, summary_of
         from simharness.scenario.resolution import read_plan
         from simharness.scenario.shipped import shipped_folder
@@ -55,7 +55,7 @@ def show(
     seed: Seed = None,
 ) -> None:
     """Print a scenario as TOML with all its defaults; of a study its factors, its number of trials and its base."""
-    with border():
+    with exit_on_error():
         from simharness.scenario.outline import outline
         from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
 
@@ -74,7 +74,7 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of scenario files, with which editors complete and validate them."""
-    with border():
+    with exit_on_error():
         from simharness.scenario.schema import dumps
 
         if out is None:

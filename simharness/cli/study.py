@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from simharness.cli.exit_codes import FAILED, after_reading, border
+from simharness.cli.exit_codes import FAILED, exit_on_error, run_errors_only
 from simharness.cli.options import Overrides, ScenarioFile, command_line
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def study(
     resumes where it stopped. The results appear, when all trials are finished,
     in a folder NAME: report.html for people, Parquet tables for programs.
     """
-    with border(), _stopping():
+    with exit_on_error(), _stopping():
         from simharness.scenario.study_definition import LIMIT, load_study
 
         limits = None if yes else LIMIT
@@ -106,7 +106,7 @@ def merge(
     into: Annotated[Path, typer.Option(metavar="STORE", help="The store to which they are copied.", file_okay=False)],
 ) -> None:
     """Copy the finished trials of several stores into one: of the parts of a study (--shard) on several machines."""
-    with border(), _stopping():
+    with exit_on_error(), _stopping():
         from simharness.study.merge import merge as merge_stores
 
         merged = merge_stores(stores, into)
@@ -199,7 +199,7 @@ def _report(results: Results) -> None:
     from simharness.report.study.worst_frames import SHOWN
     from simharness.runtime.progress import reporter
 
-    with after_reading(), reporter() as bars, bars.stage("report", SHOWN) as advance:
+    with run_errors_only(), reporter() as bars, bars.stage("report", SHOWN) as advance:
         page = write_report(results, progress=advance)
     _write(f"report: {page}")
 

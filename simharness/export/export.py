@@ -20,7 +20,7 @@ from simharness.export.layout import Layout, check_place
 from simharness.export.manifest import manifest
 from simharness.formats.openpose import people_file
 from simharness.formats.panoptic_poses import body_scene, confidences
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
@@ -85,7 +85,7 @@ def export(scenario: Scenario, plan: Export, *, reporter: Reporter | None = None
     joints = sequence.of_skeleton(PANOPTIC19)
     picture_source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures else None
     frames = range(0, scenario.frames, plan.every)
-    with Stages(reporter).stage("write", len(frames)) as advance, appearing(plan.folder) as partial:
+    with Stages(reporter).stage("write", len(frames)) as advance, atomic_folder(plan.folder) as partial:
         layout = Layout(partial, scenario.name)
         layout.make_folders(names, pictures=plan.pictures)
         layout.scenario.write_text(dumps(scenario), encoding="utf-8")

@@ -15,7 +15,7 @@ from mvpose import Detections, Estimate
 from simharness.capture.picture import PictureSource
 from simharness.report.figures.mosaic import mosaic
 from simharness.report.run.pictures import annotate
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_trial import Goal, run_trial
@@ -84,7 +84,7 @@ def render(scenario: Scenario, footage: Footage, *, out: Path, reporter: Reporte
     frames = range(0, scenario.frames, footage.every)
     names = [*(camera.name for camera in trial.exposures.believed_rig), "mosaic"]
     folder = out / scenario.name
-    with reporter.stage("render", len(frames)) as advance, appearing(folder) as partial, ExitStack() as stack:
+    with reporter.stage("render", len(frames)) as advance, atomic_folder(folder) as partial, ExitStack() as stack:
         write: Callable[[str, int, Rgb], None] = _Stills(partial)
         if footage.video:
             write = stack.enter_context(_Films(partial, rate=scenario.rate / footage.every))

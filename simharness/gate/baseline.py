@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from simharness.gate.trial_command import TrialKey
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 from simharness.scoring.catalogue import HEADLINE
 
 TIME = "time_ratio"
@@ -76,7 +76,7 @@ def write_text(text: str, path: Path, *, option: str) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, text.encode())
+        write_atomic(path, text.encode())
     except OSError as error:
         raise ValueError(f"{option} {path}: cannot be written: {error.strerror}") from None
 

@@ -94,7 +94,7 @@ class Comparison:
     changes: tuple[Change, ...]
     cases: tuple[str, ...]
 
-    def that_are(self, verdict: Verdict) -> tuple[Change, ...]:
+    def with_verdict(self, verdict: Verdict) -> tuple[Change, ...]:
         """Changes of a verdict: of the whole suite first, those that lost most first."""
         found = (change for change in self.changes if change.verdict == verdict)
         return tuple(sorted(found, key=lambda change: (change.case is not None, -abs(change.loss))))
@@ -104,7 +104,7 @@ class Comparison:
         """Losses beyond their tolerances of which so few seeds cannot tell whether they are by chance."""
         return tuple(change for change in self.changes if change.undecided and change.loss > 0)
 
-    def of(self, variant: str, case: str | None = None) -> tuple[Change, ...]:
+    def changes_of(self, variant: str, case: str | None = None) -> tuple[Change, ...]:
         """Changes of a variant over the whole suite or one case."""
         return tuple(change for change in self.changes if (change.variant, change.case) == (variant, case))
 

@@ -10,7 +10,7 @@ from simharness.scenario.sections.gate import Gate
 
 
 @dataclass(frozen=True)
-class Failed:
+class FailedCase:
     """A trial that could not be run.
 
     Attributes:
@@ -25,7 +25,7 @@ class Failed:
 
 
 @dataclass(frozen=True)
-class Check:
+class GateResult:
     """A suite that was run and compared with its baseline.
 
     Attributes:
@@ -44,7 +44,7 @@ class Check:
     variants: tuple[str, ...]
     gate: Gate
     comparison: Comparison
-    failed: tuple[Failed, ...]
+    failed: tuple[FailedCase, ...]
     trials: int
     worst: TrialKey
     command: str
@@ -53,12 +53,12 @@ class Check:
     @property
     def passed(self) -> bool:
         """Nothing got worse, and every trial ran."""
-        return not self.failed and not self.comparison.that_are("worse")
+        return not self.failed and not self.comparison.with_verdict("worse")
 
     @property
     def verdict(self) -> str:
         """What it comes to, in a few words."""
-        worse = len(self.comparison.that_are("worse"))
+        worse = len(self.comparison.with_verdict("worse"))
         said = [
             f"{worse} regression{'s' * (worse > 1)}" if worse else "",
             f"{len(self.failed)} of {self.trials} trials could not be run" if self.failed else "",
@@ -71,7 +71,7 @@ class Check:
         return verdict
 
     @property
-    def pointer(self) -> str:
+    def worst_description(self) -> str:
         """What the command is of."""
-        why = "lost most" if self.comparison.that_are("worse") else "has the lowest PCP"
+        why = "lost most" if self.comparison.with_verdict("worse") else "has the lowest PCP"
         return f"the trial that {'could not be run' if self.failed else why}: {self.worst}"

@@ -9,14 +9,14 @@ from xml.etree import ElementTree
 from simharness.gate.baseline import TIME
 from simharness.gate.change_text import sentence
 from simharness.gate.compare import Change
-from simharness.gate.gate_result import Check
+from simharness.gate.gate_result import GateResult
 
 WHOLE, SPEED = "whole suite", "time of the method"
 
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
 
-def junit(check: Check) -> str:
+def junit(check: GateResult) -> str:
     """The report, XML.
 
     A regression is a failure of its case, with all that got worse; a trial that could not be run is an error of its
@@ -41,9 +41,9 @@ def _of(case: str | None) -> Callable[[Change], bool]:
     return lambda change: change.case == case and change.score != TIME
 
 
-def _add(suite: ElementTree.Element, check: Check, name: str, belongs: Callable[[Change], bool]) -> None:
+def _add(suite: ElementTree.Element, check: GateResult, name: str, belongs: Callable[[Change], bool]) -> None:
     """Add a test case, of the changes that belong there."""
-    worse = list(filter(belongs, check.comparison.that_are("worse")))
+    worse = list(filter(belongs, check.comparison.with_verdict("worse")))
     undecided = list(filter(belongs, check.comparison.undecided))
     case = ElementTree.SubElement(suite, "testcase", classname=f"simharness.{_clean(check.suite)}", name=_clean(name))
     # Without cases of its own the suite is one case, and what failed in it belongs there.
@@ -58,7 +58,7 @@ def _add(suite: ElementTree.Element, check: Check, name: str, belongs: Callable[
         ElementTree.SubElement(case, "system-out").text = _clean(said)
 
 
-def _sentences(changes: Sequence[Change], check: Check) -> str:
+def _sentences(changes: Sequence[Change], check: GateResult) -> str:
     return "\n".join(sentence(change, check.gate) for change in changes)
 
 

@@ -6,30 +6,30 @@ from collections.abc import Iterator
 
 from simharness.gate.change_text import allowed, difference, number, sentence, title
 from simharness.gate.compare import Change
-from simharness.gate.gate_result import Check
+from simharness.gate.gate_result import GateResult
 
 _LISTED = 20  # of each kind: a bug that breaks everything breaks a hundred scores
 
 
-def markdown(check: Check) -> str:
+def markdown(check: GateResult) -> str:
     """The summary: the verdict, what got worse, what got better, the headline scores, how to run the worst trial."""
     return "\n".join(_lines(check)) + "\n"
 
 
-def _lines(check: Check) -> Iterator[str]:
+def _lines(check: GateResult) -> Iterator[str]:
     yield f"## {check.suite}: {check.verdict}"
     yield ""
     yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline seed by seed."
     yield from _list("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed])
     for heading, verdict in (("Worse", "worse"), ("Better", "better")):
-        changes = check.comparison.that_are(verdict)  # type: ignore[arg-type]
+        changes = check.comparison.with_verdict(verdict)  # type: ignore[arg-type]
         yield from _list(heading, [sentence(change, check.gate) for change in changes])
     undecided = [sentence(change, check.gate) for change in check.comparison.undecided]
     yield from _list("Worse, but too few seeds to judge", undecided)
     for variant in check.variants:
         yield from _table(check, variant)
     yield ""
-    yield f"{check.pointer[0].upper()}{check.pointer[1:]}"
+    yield f"{check.worst_description[0].upper()}{check.worst_description[1:]}"
     yield ""
     yield "```sh"
     yield check.command
@@ -48,17 +48,17 @@ def _list(heading: str, lines: list[str]) -> Iterator[str]:
         yield f"- and {len(lines) - _LISTED} more"
 
 
-def _table(check: Check, variant: str) -> Iterator[str]:
+def _table(check: GateResult, variant: str) -> Iterator[str]:
     yield ""
     yield f"### {_escaped(variant)}"
     yield ""
     yield "| score | now | baseline | difference (95 %) | allowed | |"
     yield "|:--|--:|--:|--:|--:|:--|"
-    for change in check.comparison.of(variant):
+    for change in check.comparison.changes_of(variant):
         yield f"| {' | '.join(_escaped(cell) for cell in _cells(change, check))} |"
 
 
-def _cells(change: Change, check: Check) -> tuple[str, ...]:
+def _cells(change: Change, check: GateResult) -> tuple[str, ...]:
     after, before = (number(change.score, value) for value in (change.after, change.before))
     verdict = "" if change.verdict == "same" else f"**{change.verdict}**"
     return title(change.score), after, before, difference(change), allowed(change, check.gate), verdict

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from simharness.gate.baseline import Measurement, read_baseline
 from simharness.gate.compare import Comparison, compare
-from simharness.gate.gate_result import Check
+from simharness.gate.gate_result import GateResult
 from simharness.gate.required_seeds import require_seeds
 from simharness.gate.suite import SuiteRun, fingerprint, run_suite
-from simharness.gate.trial_command import TrialKey, command_of, name_of, scenes_of
+from simharness.gate.trial_command import TrialKey, command_of, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter
 from simharness.scenario.study_definition import Study
 
@@ -33,7 +33,7 @@ def baseline_of(study: Study, path: Path) -> Measurement:
     return baseline
 
 
-def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Reporter | None = None) -> Check:
+def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Reporter | None = None) -> GateResult:
     """Run a suite and compare it with its baseline.
 
     Args:
@@ -46,7 +46,7 @@ def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Re
     done = run_suite(study, workers=workers, reporter=reporter)
     comparison = compare(baseline, done.measurement(study), study.gate)
     worst = _worst_trial(done, comparison, study.variants[0])
-    return Check(
+    return GateResult(
         suite=study.name,
         variants=study.variants,
         gate=study.gate,
@@ -63,7 +63,7 @@ def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> TrialK
     """The trial to look at: one that could not be run, one that lost most, or else that of the lowest PCP."""
     if done.failed:
         return TrialKey(done.failed[0].case, done.failed[0].seed, variant)
-    if worse := comparison.that_are("worse"):
+    if worse := comparison.with_verdict("worse"):
         return worse[0].worst
     scores = {trial: scores["pcp"] for trial, scores in done.scores.items() if trial.variant == variant}
     return min(scores, key=lambda trial: (scores[trial] is None, scores[trial] or 0.0))
@@ -72,7 +72,9 @@ def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> TrialK
 def _what_differs(baseline: Measurement, study: Study) -> str:
     """In a few words."""
     now = {
-        TrialKey(name_of(setting, study), seed, name) for setting, seed in scenes_of(study) for name in study.variants
+        TrialKey(setting_name(setting, study), seed, name)
+        for setting, seed in settings_at_seeds(study)
+        for name in study.variants
     }
     gone, new = sorted(baseline.scores.keys() - now), sorted(now - baseline.scores.keys())
     said = [

@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from simharness.gate.baseline import TIME, Measurement
-from simharness.gate.gate_result import Failed
+from simharness.gate.gate_result import FailedCase
 from simharness.gate.reference_kernel import time_reference
-from simharness.gate.trial_command import TrialKey, name_of, scenes_of
+from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study
 from simharness.study.measure import StoredTrial, TrialOutput
-from simharness.study.scheduler import TrialSuccess, Unit, work_off
+from simharness.study.scheduler import TrialSuccess, Unit, run_units
 from simharness.trial.identity import trial_identity
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of
@@ -34,7 +34,7 @@ class SuiteRun:
     """
 
     scores: Mapping[TrialKey, Scores]
-    failed: tuple[Failed, ...]
+    failed: tuple[FailedCase, ...]
 
     def measurement(self, study: Study) -> Measurement:
         """What a baseline keeps of it."""
@@ -55,20 +55,20 @@ def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = Non
     estimators_of(study.base.method)  # better now than at every trial
     units: dict[str, Unit] = {}
     places: dict[str, list[tuple[str, int]]] = {}  # two settings may come to the same scenario
-    for setting, seed in scenes_of(study):
+    for setting, seed in settings_at_seeds(study):
         scenario = study.at(setting, seed)
         unit = Unit(trial_identity(scenario), scenario, study.variants)
         units[unit.trial] = unit
-        places.setdefault(unit.trial, []).append((name_of(setting, study), seed))
+        places.setdefault(unit.trial, []).append((setting_name(setting, study), seed))
     scores: dict[TrialKey, Scores] = {}
-    failed: list[Failed] = []
+    failed: list[FailedCase] = []
     with (reporter or Silence()).stage("check", study.trials) as advance:
-        for result in work_off(units.values(), measure_beside_reference, workers=workers):
+        for result in run_units(units.values(), measure_beside_reference, workers=workers):
             for case, seed in places[result.unit.trial]:
                 if isinstance(result, TrialSuccess):
                     scores |= {TrialKey(case, seed, name): each.scores for name, each in result.output.results.items()}
                 else:
-                    failed.append(Failed(case, seed, result.error))
+                    failed.append(FailedCase(case, seed, result.error))
                 advance(1, failed=int(not isinstance(result, TrialSuccess)))
     return SuiteRun(scores, tuple(failed))
 
@@ -109,7 +109,7 @@ def fingerprint(study: Study) -> str:
     """
     said = {
         "settings": {
-            name_of(setting, study): setting.scenario.model_dump(
+            setting_name(setting, study): setting.scenario.model_dump(
                 mode="json", exclude_defaults=True, exclude={"name", "description", "seed", "method"}
             )
             for setting in study.settings

@@ -22,7 +22,7 @@ class TrialKey(NamedTuple):
     """One variant at one setting and seed.
 
     Attributes:
-        case: the name of the setting, from :func:`name_of`.
+        case: the name of the setting, from :func:`setting_name`.
         seed: its seed.
         variant: of the method.
     """
@@ -35,14 +35,14 @@ class TrialKey(NamedTuple):
         return f"{self.case}, seed {self.seed}, {self.variant}"
 
 
-def scenes_of(study: Study) -> Iterator[tuple[Setting, int]]:
+def settings_at_seeds(study: Study) -> Iterator[tuple[Setting, int]]:
     """Every setting at every seed."""
     for seed in study.seeds:
         for setting in study.settings:
             yield setting, seed
 
 
-def name_of(setting: Setting, study: Study) -> str:
+def setting_name(setting: Setting, study: Study) -> str:
     """What a setting is called among its like: its case and its factors; the study's name where it has neither."""
     factors = ", ".join(f"{key} = {json.dumps(value)}" for key, value in setting.factors.items())
     return ", ".join(filter(None, (setting.case, factors))) or study.name
@@ -54,7 +54,7 @@ def command_of(study: Study, trial: TrialKey) -> str:
     Raises:
         ValueError: the study has no such trial.
     """
-    setting = next((each for each in study.settings if name_of(each, study) == trial.case), None)
+    setting = next((each for each in study.settings if setting_name(each, study) == trial.case), None)
     if setting is None or trial.seed not in study.seeds:
         raise ValueError(f"{study.path} has no trial {trial}")
     sets = [part for override in overrides(study, setting) for part in ("--set", override)]

@@ -56,8 +56,8 @@ def map_frames(
         raise ValueError(f"workers must be at least 1, got {workers}")
     chunks = list(_chunks(frames, workers))
     if workers == 1 or len(chunks) < 2:
-        return list(_map_here(function, chunks, progress))
-    return _map_there(function, chunks, min(workers, len(chunks)), progress)
+        return list(_map_in_process(function, chunks, progress))
+    return _map_in_pool(function, chunks, min(workers, len(chunks)), progress)
 
 
 def _chunks(frames: range, workers: int) -> Iterator[range]:
@@ -66,7 +66,7 @@ def _chunks(frames: range, workers: int) -> Iterator[range]:
         yield frames[start : start + length]
 
 
-def _map_here(
+def _map_in_process(
     function: FrameFunction[Result], chunks: Sequence[range], progress: Callable[[int], None]
 ) -> Iterator[Result]:
     with threadpoolctl.threadpool_limits(1):
@@ -80,7 +80,7 @@ def _map_here(
             progress(len(chunk))
 
 
-def _map_there(
+def _map_in_pool(
     function: FrameFunction[Result], chunks: Sequence[range], workers: int, progress: Callable[[int], None]
 ) -> list[Result]:
     spawn = multiprocessing.get_context("spawn")

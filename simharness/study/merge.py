@@ -10,7 +10,7 @@ from simharness.study.trial_store import Store, is_store
 
 
 @dataclass(frozen=True)
-class Merged:
+class MergeResult:
     """What was merged.
 
     Attributes:
@@ -24,7 +24,7 @@ class Merged:
     damaged: tuple[Path, ...]
 
 
-def merge(sources: Sequence[Path], into: Path) -> Merged:
+def merge(sources: Sequence[Path], into: Path) -> MergeResult:
     """Copy the whole entries of stores into another.
 
     Args:
@@ -50,4 +50,4 @@ def merge(sources: Sequence[Path], into: Path) -> Merged:
                 copied += 1
             else:
                 damaged.append(source.file_of(identity))
-    return Merged(copied, there, tuple(damaged))
+    return MergeResult(copied, there, tuple(damaged))

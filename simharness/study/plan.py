@@ -11,7 +11,7 @@ from simharness.trial.identity import entry_identity, estimator_code, trial_iden
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedTrial:
     """A trial of a study.
 
     Attributes:
@@ -29,15 +29,15 @@ class Planned:
     entries: Mapping[str, str]
 
 
-def plan(study: Study) -> list[Planned]:
+def plan(study: Study) -> list[PlannedTrial]:
     """All trials of a study: every setting at the first seed, then at the second, for half a study is of use then."""
     places = study.base.method.estimators.places
     own = {variant: estimator_code(places[variant]) if variant in places else "" for variant in study.variants}
     return [_planned(study, setting, seed, own) for seed in study.seeds for setting in study.settings]
 
 
-def _planned(study: Study, setting: Setting, seed: int, own: Mapping[str, str]) -> Planned:
+def _planned(study: Study, setting: Setting, seed: int, own: Mapping[str, str]) -> PlannedTrial:
     scenario = study.at(setting, seed)
     trial = trial_identity(scenario)
     entries = {variant: entry_identity(trial, variant, code) for variant, code in own.items()}
-    return Planned(setting, seed, scenario, trial, entries)
+    return PlannedTrial(setting, seed, scenario, trial, entries)

@@ -9,14 +9,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.study_definition import Study, Value
 from simharness.study.measure import StoredTrial
 from simharness.study.measure import measure as measure_trial
-from simharness.study.plan import Planned, plan
+from simharness.study.plan import PlannedTrial, plan
 from simharness.study.result_folder import Results, read_study, write_study
-from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, told, work_off
+from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.study_file import document
 from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, State, Store, StoreError
@@ -48,7 +48,7 @@ class FailedTrial:
 
 
 @dataclass(frozen=True)
-class Tally:
+class StudyOutcome:
     """What became of the trials of a study.
 
     Attributes:
@@ -92,7 +92,7 @@ def run_study(
         study: what to run.
         out: where the folder named as the study goes. It appears when it is whole, in the place of an earlier one.
         store: the folder of finished trials; ``out / "store"`` by default.
-        workers: processes; see :func:`simharness.study.scheduler.work_off`.
+        workers: processes; see :func:`simharness.study.scheduler.run_units`.
         scheduler: address of a Dask scheduler, instead.
         reporter: receiver of progress, a step a trial.
         command: how the user asked for this.
@@ -119,7 +119,7 @@ def run_study(
     rows = [(each, entry) for each in ordered for entry in _entries(opened, each, failed=each.trial in failed)]
     info = _info(study, tally, command)
     try:
-        with appearing(folder) as partial:
+        with atomic_folder(folder) as partial:
             write_study(partial, info, tables(rows, study.factors), document(study))
     except OSError as error:
         raise StoreError(
@@ -138,7 +138,7 @@ def run_shard(
     scheduler: str | None = None,
     reporter: Reporter | None = None,
     measure: Measure = measure_trial,
-) -> Tally:
+) -> StudyOutcome:
     """Run one of ``n`` parts of a study, into a store alone: ``simharness merge`` puts the stores together.
 
     Args:
@@ -162,14 +162,14 @@ def run_shard(
 
 
 def _run(
-    planned: Sequence[Planned],
+    planned: Sequence[PlannedTrial],
     store: Store,
     *,
     workers: int,
     scheduler: str | None,
     reporter: Reporter | None,
     measure: Measure,
-) -> Tally:
+) -> StudyOutcome:
     """Measure what the store lacks."""
     start = perf_counter()
     different = {each.trial: each for each in _different(planned)}
@@ -179,7 +179,7 @@ def _run(
     try:
         with (
             (reporter or Silence()).stage("trials", len(different), done=kept) as advance,
-            closing(work_off(units, measure, workers=workers, scheduler=scheduler)) as results,
+            closing(run_units(units, measure, workers=workers, scheduler=scheduler)) as results,
         ):
             for result in results:
                 each = different[result.unit.trial]
@@ -197,10 +197,10 @@ def _run(
         finished = sum(all(map(store.holds, different[unit.trial].entries.values())) for unit in units)
         raise Interrupted(kept + finished, len(different)) from None
     losses = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)
-    return Tally(len(different), kept, run, losses, damaged, perf_counter() - start)
+    return StudyOutcome(len(different), kept, run, losses, damaged, perf_counter() - start)
 
 
-def _different(planned: Sequence[Planned]) -> Iterator[Planned]:
+def _different(planned: Sequence[PlannedTrial]) -> Iterator[PlannedTrial]:
     """The first of those that are the same trial."""
     seen: set[str] = set()
     for each in planned:
@@ -209,7 +209,7 @@ def _different(planned: Sequence[Planned]) -> Iterator[Planned]:
             yield each
 
 
-def _unit(store: Store, planned: Planned) -> Unit:
+def _unit(store: Store, planned: PlannedTrial) -> Unit:
     """Return the work that is left of a trial: no variants where nothing is."""
     entries = {variant: store.read(identity) for variant, identity in planned.entries.items()}
     left = tuple(name for name, entry in entries.items() if entry is None or entry.state is not State.CURRENT)
@@ -223,7 +223,7 @@ def _unit(store: Store, planned: Planned) -> Unit:
     return Unit(planned.trial, planned.scenario, left, stored)
 
 
-def _keep(store: Store, planned: Planned, success: TrialSuccess) -> None:
+def _keep(store: Store, planned: PlannedTrial, success: TrialSuccess) -> None:
     """Store a finished unit. Detections come first: an entry without them could never be scored again."""
     output = success.output
     if output.archive.detected:
@@ -234,13 +234,13 @@ def _keep(store: Store, planned: Planned, success: TrialSuccess) -> None:
         store.write(planned.entries[variant], entry)
 
 
-def _note(store: Store, planned: Planned, failure: TrialFailure) -> None:
+def _note(store: Store, planned: PlannedTrial, failure: TrialFailure) -> None:
     for variant in failure.unit.variants:
         noted = {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback}
         store.write_failure(planned.entries[variant], noted)
 
 
-def _failed(planned: Planned, failure: TrialFailure) -> FailedTrial:
+def _failed(planned: PlannedTrial, failure: TrialFailure) -> FailedTrial:
     lost = [part for part in failure.parts if isinstance(part, TrialFailure)]
     return FailedTrial(
         trial=planned.trial,
@@ -248,11 +248,11 @@ def _failed(planned: Planned, failure: TrialFailure) -> FailedTrial:
         factors=dict(planned.setting.factors),
         seed=planned.seed,
         variants=tuple(variant for part in lost for variant in part.unit.variants),
-        error=told(lost, planned.entries),
+        error=error_text(lost, planned.entries),
     )
 
 
-def _entries(store: Store, planned: Planned, *, failed: bool) -> Iterator[Entry]:
+def _entries(store: Store, planned: PlannedTrial, *, failed: bool) -> Iterator[Entry]:
     """What the store has of a trial; all of it, but of one that failed.
 
     Raises:
@@ -269,7 +269,7 @@ def _entries(store: Store, planned: Planned, *, failed: bool) -> Iterator[Entry]
             )
 
 
-def _info(study: Study, tally: Tally, command: str | None) -> dict[str, Any]:
+def _info(study: Study, tally: StudyOutcome, command: str | None) -> dict[str, Any]:
     return {
         "name": study.name,
         "description": study.description,

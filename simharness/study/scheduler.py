@@ -100,7 +100,7 @@ class TrialFailure:
         return self.alone or (self,)
 
 
-def work_off(
+def run_units(
     units: Collection[Unit], measure: Measure, *, workers: int = 1, scheduler: str | None = None
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """Measure units, each until it is done or has failed for good, and yield them as they come.
@@ -124,10 +124,10 @@ def work_off(
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     if scheduler is None and workers == 1:
-        yield from _work_here(units, measure)
+        yield from _run_in_process(units, measure)
     elif units:
         with _client(min(workers, len(units)), scheduler) as client:
-            yield from _work_there(units, measure, client)
+            yield from _run_on_cluster(units, measure, client)
 
 
 def attempt(measure: Measure, unit: Unit) -> TrialSuccess | TrialFailure:
@@ -141,7 +141,7 @@ def attempt(measure: Measure, unit: Unit) -> TrialSuccess | TrialFailure:
     return TrialSuccess(unit, output, perf_counter() - start)
 
 
-def told(failures: Iterable[TrialFailure], variants: Collection[str]) -> str:
+def error_text(failures: Iterable[TrialFailure], variants: Collection[str]) -> str:
     """The errors of failures in a line, with whose they are, but where all variants have the same one.
 
     Args:
@@ -156,21 +156,21 @@ def told(failures: Iterable[TrialFailure], variants: Collection[str]) -> str:
     return "; ".join(f"{', '.join(names)}: {error}" for error, names in whose.items())
 
 
-def _divided(failure: TrialFailure) -> list[Unit]:
+def _split_by_variant(failure: TrialFailure) -> list[Unit]:
     """The variants of a unit that has failed for good, each a unit; none where that would tell nothing new."""
     if failure.final or len(failure.unit.variants) < 2:
         return []
     return [replace(failure.unit, variants=(variant,)) for variant in failure.unit.variants]
 
 
-def _joined(together: TrialFailure, alone: Iterable[TrialSuccess | TrialFailure]) -> TrialSuccess | TrialFailure:
+def _join_parts(together: TrialFailure, alone: Iterable[TrialSuccess | TrialFailure]) -> TrialSuccess | TrialFailure:
     """What came of a unit that failed: what its variants did one by one."""
     unit = together.unit
     alone = tuple(sorted(alone, key=lambda each: unit.variants.index(each.unit.variants[0])))
     done = [each for each in alone if isinstance(each, TrialSuccess)]
     lost = [each for each in alone if isinstance(each, TrialFailure)]
     if lost:
-        return TrialFailure(unit, told(lost, unit.variants), lost[0].traceback, alone=alone)
+        return TrialFailure(unit, error_text(lost, unit.variants), lost[0].traceback, alone=alone)
     output = TrialOutput(
         {variant: each for part in done for variant, each in part.output.results.items()},
         TrialArchive(
@@ -181,29 +181,31 @@ def _joined(together: TrialFailure, alone: Iterable[TrialSuccess | TrialFailure]
     return TrialSuccess(unit, output, sum(each.seconds for each in done))
 
 
-def _work_here(units: Iterable[Unit], measure: Measure) -> Generator[TrialSuccess | TrialFailure, None, None]:
+def _run_in_process(units: Iterable[Unit], measure: Measure) -> Generator[TrialSuccess | TrialFailure, None, None]:
     for unit in units:
-        result = _persist(unit, measure)
-        if isinstance(result, TrialFailure) and (parts := _divided(result)):
-            result = _joined(result, [_persist(part, measure, together=result) for part in parts])
+        result = _attempt_repeatedly(unit, measure)
+        if isinstance(result, TrialFailure) and (parts := _split_by_variant(result)):
+            result = _join_parts(result, [_attempt_repeatedly(part, measure, together=result) for part in parts])
         yield result
 
 
-def _persist(unit: Unit, measure: Measure, together: TrialFailure | None = None) -> TrialSuccess | TrialFailure:
+def _attempt_repeatedly(
+    unit: Unit, measure: Measure, together: TrialFailure | None = None
+) -> TrialSuccess | TrialFailure:
     """Attempt a unit until it is done or has failed for good; ``together``: the failure that it is a part of."""
     for _ in range(ATTEMPTS):
         result = attempt(measure, unit)
-        if isinstance(result, TrialSuccess) or result.final or _again(result, together):
+        if isinstance(result, TrialSuccess) or result.final or _repeats_error(result, together):
             break
     return result
 
 
-def _again(failure: TrialFailure, together: TrialFailure | None) -> bool:
+def _repeats_error(failure: TrialFailure, together: TrialFailure | None) -> bool:
     """Whether a variant fails by itself as it did, :data:`ATTEMPTS` times, with the others."""
     return together is not None and failure.error == together.error
 
 
-def _work_there(
+def _run_on_cluster(
     units: Iterable[Unit], measure: Measure, client: Client
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
     """As many units are on their way as the cluster has threads: more would wait at workers that may die under them.
@@ -243,13 +245,13 @@ def _work_there(
         if isinstance(result, TrialFailure):
             tried = unit.trial, unit.variants
             failed[tried] += max(1, result.deaths) if alone else 1
-            if not (result.final or failed[tried] >= ATTEMPTS or _again(result, whole)):
+            if not (result.final or failed[tried] >= ATTEMPTS or _repeats_error(result, whole)):
                 if result.deaths:
                     suspects.append(unit)
                 else:
                     submit(unit)
                 continue
-            if whole is None and (divided := _divided(result)):
+            if whole is None and (divided := _split_by_variant(result)):
                 together[unit.trial], finished[unit.trial] = result, []
                 (suspects if alone or result.deaths else parts).extend(divided)
                 continue
@@ -258,7 +260,7 @@ def _work_there(
             continue
         finished[unit.trial].append(result)
         if len(finished[unit.trial]) == len(whole.unit.variants):
-            yield _joined(whole, finished.pop(unit.trial))
+            yield _join_parts(whole, finished.pop(unit.trial))
 
 
 def _completed() -> Any:
@@ -298,7 +300,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
         with _connected(scheduler) as client:
             yield client
         return
-    # A worker that dies is told of at once, for _work_there decides what then. Nothing is logged: it is told of here.
+    # Report a dead worker at once: _run_on_cluster decides what follows, and reports it, so nothing is logged.
     quiet = {"distributed.scheduler.allowed-failures": 0, "logging": {"distributed": "critical"}}
     with (
         dask.config.set(quiet),
@@ -313,7 +315,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
         ) as cluster,
         Client(cluster) as client,
     ):
-        client.register_plugin(_deaf_to_interrupts())
+        client.register_plugin(_interrupt_shield())
         yield client
 
 
@@ -341,7 +343,7 @@ def _connected(scheduler: str) -> Iterator[Client]:
         yield client
 
 
-def _deaf_to_interrupts() -> Any:
+def _interrupt_shield() -> Any:
     """Ctrl-C reaches all processes of a terminal; only this one is to act on it."""
     from distributed import WorkerPlugin
 

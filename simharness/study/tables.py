@@ -10,14 +10,14 @@ import polars as pl
 
 from simharness.scenario.study_definition import Value
 from simharness.scoring.catalogue import SCORES
-from simharness.study.plan import Planned
+from simharness.study.plan import PlannedTrial
 from simharness.study.result_folder import Tables
 from simharness.study.trial_store import Entry
 
 _FIRST = ("trial", "case", "varied", "seed", "variant")
 
 
-def tables(rows: Sequence[tuple[Planned, Entry]], factors: Sequence[str]) -> Tables:
+def tables(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) -> Tables:
     """The tables of a study.
 
     Args:
@@ -31,7 +31,7 @@ def tables(rows: Sequence[tuple[Planned, Entry]], factors: Sequence[str]) -> Tab
     )
 
 
-def _trials(rows: Sequence[tuple[Planned, Entry]], factors: Sequence[str]) -> pl.DataFrame:
+def _trials(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) -> pl.DataFrame:
     texts: dict[str, str] = {}
     for planned, _ in rows:
         texts.setdefault(planned.trial, planned.scenario.model_dump_json())

@@ -31,7 +31,7 @@ from typing import Any
 
 import polars as pl
 
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 from simharness.runtime.errors import RunError
 from simharness.trial.identity import code
 from simharness.trial.variant_result import VariantResult
@@ -233,7 +233,7 @@ class Store:
     def _write(self, path: Path, content: bytes) -> None:
         try:
             path.parent.mkdir(exist_ok=True)
-            write_whole(path, content)
+            write_atomic(path, content)
         except OSError as error:
             raise StoreError(
                 f"store {self.folder}: cannot be written to: {error.strerror}. What is finished is kept: make room, "
@@ -252,7 +252,7 @@ class Store:
                     f"store {self.folder}: this folder is not empty and no store of trials (it has {strange[0]} and no "
                     "store.json): name another folder"
                 ) from None
-            return write_whole(file, json.dumps({"what": "simharness trials", "format": FORMAT}).encode())
+            return write_atomic(file, json.dumps({"what": "simharness trials", "format": FORMAT}).encode())
         except (ValueError, KeyError, TypeError):
             said = None
         if said != FORMAT:

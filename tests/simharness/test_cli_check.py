@@ -156,8 +156,8 @@ def test_improvements_are_said(check, baseline, monkeypatch):
 @pytest.mark.slow
 def test_the_command_that_it_prints_runs_the_worst_trial(check, baseline, tmp_path):
     result = check()
-    *_, pointer, command = result.stdout.splitlines()
-    case, seed = pointer.removeprefix("the trial that has the lowest PCP: ").split(", ")[:2]
+    *_, description, command = result.stdout.splitlines()
+    case, seed = description.removeprefix("the trial that has the lowest PCP: ").split(", ")[:2]
     worst = min((row["pcp"], row["case"], row["seed"]) for row in json.loads(baseline.read_text())["trials"])
     assert (case, seed) == (worst[1], f"seed {worst[2]}")
     program, *words = shlex.split(command)
@@ -212,13 +212,14 @@ class TestBadInput:
         """A baseline as a file, of a suite that need not be run for it."""
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
-        from simharness.gate.trial_command import TrialKey, name_of, scenes_of
+        from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
         from simharness.scenario.study_definition import load_study
 
         (tmp_path / "small.toml").write_text(SMALL)
         study = load_study(tmp_path / "small.toml")
         scores = {
-            TrialKey(name_of(setting, study), seed, "fast"): dict.fromkeys(KEPT, 1.0) for setting, seed in scenes_of(study)
+            TrialKey(setting_name(setting, study), seed, "fast"): dict.fromkeys(KEPT, 1.0)
+            for setting, seed in settings_at_seeds(study)
         }
         write_baseline(Measurement("small", fingerprint(study), "1", scores), tmp_path / "small.json")
         return tmp_path / "small.json"

@@ -17,7 +17,7 @@ from typing import Any
 from mvpose.pipeline import NEED_DESCRIPTORS
 from simharness.reality.evaluation import ACTORS
 from simharness.reality.published_scores import ABLATION, COMPARISON
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.trial.provenance import PROVENANCE
 from tools.paper_tables.text import markdown
 
@@ -143,7 +143,7 @@ def write_tables(tables: Mapping[str, Any], folder: Path) -> None:
         raise ValueError(f"--out {folder}: exists and holds no tables of the paper; name another folder")
     text = json.dumps(tables, indent=1, ensure_ascii=False, allow_nan=False)
     try:
-        with appearing(folder) as partial:
+        with atomic_folder(folder) as partial:
             (partial / "tables.json").write_text(text + "\n", encoding="utf-8")
             (partial / "tables.md").write_text(markdown(tables), encoding="utf-8")
     except OSError as error:

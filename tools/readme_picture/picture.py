@@ -26,7 +26,7 @@ from simharness.report.figures.palette import TRUTH, css, person_color
 from simharness.report.run.pictures import Picture
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of
@@ -320,7 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         digest = _read_digest(options.digest)
         drawn = overview(read_run(options.run), digest, frame=options.frame, views=options.views)
-        write_whole(options.picture, drawn.encode())
+        write_atomic(options.picture, drawn.encode())
     except (OSError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

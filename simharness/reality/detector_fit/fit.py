@@ -9,7 +9,7 @@ from simharness.reality.detector_fit.measure import RESAMPLES, Measurement, meas
 from simharness.reality.detector_fit.profile import NAME, as_toml, settings
 from simharness.reality.detector_fit.sample import Sample
 from simharness.reality.detector_fit.shelf_twin import film_shelf_twin
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 from simharness.scenario.sections.detector import Detector
 
 FITTED_SECTIONS = ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms")
@@ -58,7 +58,7 @@ def write_profile(fitted: Fit, path: str | Path) -> None:
         ValueError: it cannot be written.
     """
     try:
-        write_whole(Path(path), fitted.text.encode())
+        write_atomic(Path(path), fitted.text.encode())
     except OSError as error:
         raise ValueError(f"--out {path}: cannot be written: {error.strerror}") from None
 

@@ -10,7 +10,7 @@ import polars as pl
 
 from simharness.report.run.film import animate, animated_frames
 from simharness.report.run.pictures import draw_pictures, outlines
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import fingerprint
@@ -68,7 +68,7 @@ def run(
         page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation)
         advance(1)
     folder = out / f"{scenario.name}-{fingerprint(scenario)}"
-    with stages.stage("write", 1), appearing(folder) as partial:
+    with stages.stage("write", 1), atomic_folder(folder) as partial:
         write_run(record, partial)
         (partial / "report.html").write_text(page, encoding="utf-8")
         if pictures:

@@ -20,7 +20,7 @@ from simharness.report.study.curves import Factor, cases_of, factor_breaking_poi
 from simharness.report.study.digest_text import HEADS, PRINTED, markdown
 from simharness.report.study.failure_rates import failure_rates
 from simharness.report.study.page import THRESHOLDS
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results
@@ -53,7 +53,7 @@ def write_digest(results: Results, folder: Path, *, thresholds: Mapping[str, flo
     if folder.exists() and not (folder / "digest.json").is_file():
         raise ValueError(f"{folder} exists and holds no digest; name another folder")
     numbers = digest(results, thresholds=thresholds)
-    with appearing(folder) as partial:
+    with atomic_folder(folder) as partial:
         text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False)
         (partial / "digest.json").write_text(text + "\n", encoding="utf-8")
         (partial / "table.md").write_text(markdown(numbers), encoding="utf-8")

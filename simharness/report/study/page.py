@@ -15,7 +15,7 @@ from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, factor_breaking_points, factors_by_case, grid, panels
 from simharness.report.study.worst_frames import WorstFramePictures, show, worst_frames
-from simharness.runtime.atomic_files import write_whole
+from simharness.runtime.atomic_files import write_atomic
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
 from simharness.scoring.catalogue import SCORES
@@ -59,7 +59,7 @@ def write_report(
     shown = [picture for picture, _ in show(results, worst_frames(results), progress=progress)]
     page = render_study(results, shown=shown, thresholds=thresholds)
     try:
-        write_whole(out, page.encode())
+        write_atomic(out, page.encode())
     except OSError as error:
         raise ValueError(f"{out}: cannot be written: {error.strerror}") from None
     return out

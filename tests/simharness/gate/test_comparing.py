@@ -34,7 +34,7 @@ def measured(change=lambda trial: {}, *, cases=CASES, seeds=12, variants=("fast"
 
 
 def regressions(change, gate=GATE, **size):
-    return compare(measured(**size), measured(change, **size), gate).that_are("worse")
+    return compare(measured(**size), measured(change, **size), gate).with_verdict("worse")
 
 
 def named(changes):
@@ -55,13 +55,13 @@ def test_every_score_is_guarded_in_its_own_direction(score, variant):
     bad = -1 if SCORES[score].better == "higher" else 1
     step = 1.5 * getattr(GATE.tolerance, score)
     worse = compare(measured(), measured(lambda t: {score: bad * step} if t.variant == variant else {}), GATE)
-    assert (score, variant, None) in named(worse.that_are("worse"))
-    assert {change.score for change in worse.that_are("worse")} == {score}
-    assert {change.variant for change in worse.that_are("worse")} == {variant}
-    assert not worse.that_are("better")
+    assert (score, variant, None) in named(worse.with_verdict("worse"))
+    assert {change.score for change in worse.with_verdict("worse")} == {score}
+    assert {change.variant for change in worse.with_verdict("worse")} == {variant}
+    assert not worse.with_verdict("better")
     better = compare(measured(), measured(lambda t: {score: -bad * step} if t.variant == variant else {}), GATE)
-    assert named(better.that_are("better")) == named(worse.that_are("worse"))
-    assert not better.that_are("worse")
+    assert named(better.with_verdict("better")) == named(worse.with_verdict("worse"))
+    assert not better.with_verdict("worse")
 
 
 def test_within_its_tolerance_nothing_is_a_regression_however_certain():
@@ -75,8 +75,8 @@ def test_a_small_mean_of_large_changes_is_within_its_tolerance():
         return {"pcp": 0.6 if trial.seed == 4 else -1.09}
 
     comparison = compare(measured(), measured(change), GATE)
-    assert not comparison.that_are("worse")
-    assert comparison.of("full")[0].p < GATE.level  # which it is in spite of, over the whole suite
+    assert not comparison.with_verdict("worse")
+    assert comparison.changes_of("full")[0].p < GATE.level  # which it is in spite of, over the whole suite
 
 
 def test_a_large_change_of_few_trials_is_not_significant():
@@ -155,14 +155,15 @@ def test_what_moves_whole_seeds_at_random_is_called_a_regression_no_more_often_t
         return {"pcp": 80.0 + moved} if score == "pcp" else {TIME: math.exp(moved)}
 
     fail = [
-        bool(compare(*flipped(signs, size), gate).that_are("worse")) for signs in itertools.product((-1, 1), repeat=6)
+        bool(compare(*flipped(signs, size), gate).with_verdict("worse"))
+        for signs in itertools.product((-1, 1), repeat=6)
     ]
     assert 0 < np.mean(fail) <= gate.level
 
 
 def test_over_the_whole_suite_a_seed_is_a_pair_and_its_cases_weigh_alike():
     before, after = measured(), measured(lambda trial: {"pcp": -1.0 * trial.seed * CASES.index(trial.case)})
-    whole = compare(before, after, GATE).of("full")[0]
+    whole = compare(before, after, GATE).changes_of("full")[0]
     assert (whole.score, whole.n) == ("pcp", 12)
     assert whole.difference == pytest.approx(-5.5 * 5.0, abs=1e-3)
     assert whole.after - whole.before == pytest.approx(whole.difference, abs=1e-9)
@@ -187,16 +188,16 @@ def test_a_loss_that_so_few_seeds_cannot_show_is_undecided():
         return {key: -30.0 if SCORES[key].better == "higher" else 30.0 for key in HEADLINE}
 
     few = compare(measured(seeds=6), measured(fall, seeds=6), GATE)
-    assert not few.that_are("worse")
+    assert not few.with_verdict("worse")
     assert {change.score for change in few.undecided} == set(HEADLINE)
     assert {change.loss > 1 for change in few.undecided} == {True}
     enough = compare(measured(), measured(fall), GATE)
     assert not enough.undecided
-    assert len(enough.that_are("worse")) == len(few.undecided)
+    assert len(enough.with_verdict("worse")) == len(few.undecided)
     gain = compare(measured(fall, seeds=6), measured(seeds=6), GATE)
     assert not gain.undecided
     mixed = compare(measured(), measured(lambda t: {"pcp": -9.0 if t.seed % 2 else 4.0}), GATE)
-    assert not mixed.that_are("worse")
+    assert not mixed.with_verdict("worse")
     assert not mixed.undecided  # twelve seeds could have shown it, and did not
 
 
@@ -243,7 +244,7 @@ def test_trials_and_scores_that_only_one_side_has_are_left_out():
     comparison = compare(before, Measurement("suite", "0123456789", "1.0", scores), GATE)
     assert {change.n for change in comparison.changes} == {11}  # seeds, of a case and of the whole
     assert "mpjpe_mm" not in {change.score for change in comparison.changes}
-    assert ("pcp", "full", None) in named(comparison.that_are("worse"))
+    assert ("pcp", "full", None) in named(comparison.with_verdict("worse"))
 
 
 def test_regressions_come_whole_suite_first_and_worst_first():

@@ -9,7 +9,7 @@ import pytest
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.change_text import difference
 from simharness.gate.compare import compare
-from simharness.gate.gate_result import Check, Failed
+from simharness.gate.gate_result import FailedCase, GateResult
 from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
 from simharness.gate.trial_command import TrialKey
@@ -34,7 +34,7 @@ def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")
     before = Measurement("ci", "0" * 10, "1", {trial: dict(usual) for trial in trials})
     after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
     comparison = compare(before, Measurement("ci", "0" * 10, "1", after), Gate())
-    return Check("ci", ("full", "fast"), Gate(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
+    return GateResult("ci", ("full", "fast"), Gate(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
 
 
 def crowded(trial):
@@ -60,7 +60,7 @@ def test_a_difference_that_rounds_to_zero_has_no_sign():
     """MPJPE has differences of both signs below the last digit that is printed."""
     jitter = {seed: 0.003 * (-1) ** seed - 0.001 for seed in range(12)}
     check = made(lambda trial: {"mpjpe_mm": jitter[trial.seed]})
-    (change,) = (each for each in check.comparison.of("full") if each.score == "mpjpe_mm")
+    (change,) = (each for each in check.comparison.changes_of("full") if each.score == "mpjpe_mm")
     assert change.low < change.difference < 0 < change.high
     assert difference(change) == "0.0 (0.0 to 0.0)"
 
@@ -91,13 +91,13 @@ class TestJUnit:
         assert "×2.00" in cases[SPEED].find("failure").get("message")
 
     def test_what_could_not_be_run_is_an_error(self):
-        failed = [Failed("crowd", 3, "no \x00 room & <more>\nin two lines")]
+        failed = [FailedCase("crowd", 3, "no \x00 room & <more>\nin two lines")]
         suite, cases = cases_of(made(failed=failed))
         assert suite.get("errors") == "1"
         assert "no ? room & <more>" in cases["crowd"].find("error").text
 
     def test_a_suite_without_cases_is_one_case(self):
-        _, cases = cases_of(made(lambda trial: {"pcp": -5}, cases=("only",), failed=[Failed("only", 1, "no")]))
+        _, cases = cases_of(made(lambda trial: {"pcp": -5}, cases=("only",), failed=[FailedCase("only", 1, "no")]))
         assert list(cases) == [WHOLE, SPEED]
         assert cases[WHOLE].find("error") is not None
 
@@ -159,8 +159,8 @@ class TestMarkdown:
             True,
             "no regression, but 4 losses beyond tolerance that 5 seeds are too few to judge",
         ),
-        (made(failed=[Failed("base", 0, "no")]), False, "1 of 36 trials could not be run"),
-        (made(slower, failed=[Failed("base", 0, "no")]), False, "4 regressions, 1 of 36 trials could not be run"),
+        (made(failed=[FailedCase("base", 0, "no")]), False, "1 of 36 trials could not be run"),
+        (made(slower, failed=[FailedCase("base", 0, "no")]), False, "4 regressions, 1 of 36 trials could not be run"),
     ],
 )
 def test_the_verdict(check, passed, verdict):
@@ -168,6 +168,8 @@ def test_the_verdict(check, passed, verdict):
 
 
 def test_what_the_command_is_of():
-    assert made().pointer == "the trial that has the lowest PCP: base, seed 0, full"
-    assert made(crowded).pointer.startswith("the trial that lost most")
-    assert replace(made(), failed=(Failed("base", 0, "no"),)).pointer.startswith("the trial that could not be run")
+    assert made().worst_description == "the trial that has the lowest PCP: base, seed 0, full"
+    assert made(crowded).worst_description.startswith("the trial that lost most")
+    assert replace(made(), failed=(FailedCase("base", 0, "no"),)).worst_description.startswith(
+        "the trial that could not be run"
+    )

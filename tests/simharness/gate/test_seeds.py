@@ -7,7 +7,7 @@ from simharness.gate.baseline import KEPT, Measurement, write_baseline
 from simharness.gate.required_seeds import least_p, least_seeds
 from simharness.gate.runner import baseline_of
 from simharness.gate.suite import fingerprint
-from simharness.gate.trial_command import TrialKey, name_of, scenes_of
+from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.scenario.study_definition import load_study
 from simharness.statistics.paired_tests import paired
 
@@ -37,7 +37,11 @@ def read(tmp_path):
         path = tmp_path / "few.toml"
         path.write_text(f'name = "few"\nseeds = {seeds}\n[gate]\nlevel = {level}\n')
         study = load_study(path)
-        trials = [TrialKey(name_of(setting, study), seed, name) for setting, seed in scenes_of(study) for name in KEPT]
+        trials = [
+            TrialKey(setting_name(setting, study), seed, name)
+            for setting, seed in settings_at_seeds(study)
+            for name in KEPT
+        ]
         scores = {trial: dict.fromkeys(KEPT, 1.0) for trial in trials}
         write_baseline(Measurement("few", fingerprint(study), "1", scores), tmp_path / "few.json")
         return baseline_of(study, tmp_path / "few.json")

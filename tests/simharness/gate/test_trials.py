@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from simharness.gate.trial_command import TrialKey, command_of, name_of, overrides, scenes_of
+from simharness.gate.trial_command import TrialKey, command_of, overrides, setting_name, settings_at_seeds
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 
@@ -40,11 +40,11 @@ def study(request, tmp_path):
 
 def test_the_command_of_a_trial_runs_its_scenario(study):
     assert len(study.settings) > 10
-    for setting, seed in scenes_of(study):
+    for setting, seed in settings_at_seeds(study):
         if seed != study.seeds[-1]:
             continue
         program, run, path, *words = shlex.split(
-            command_of(study, TrialKey(name_of(setting, study), seed, study.variants[0]))
+            command_of(study, TrialKey(setting_name(setting, study), seed, study.variants[0]))
         )
         assert (program, run, words[-2:]) == ("simharness", "run", ["--seed", str(seed)])
         assert set(words[:-2:2]) == {"--set"}
@@ -56,17 +56,20 @@ def test_a_file_of_one_scenario_needs_no_overrides(tmp_path):
     path.write_text('name = "one"\n')
     study = load_study(path)
     assert overrides(study, study.settings[0]) == []
-    assert name_of(study.settings[0], study) == "one"
+    assert setting_name(study.settings[0], study) == "one"
 
 
 def test_names_of_settings_differ(study):
-    names = [name_of(setting, study) for setting in study.settings]
+    names = [setting_name(setting, study) for setting in study.settings]
     assert len(set(names)) == len(names)
-    scenes = list(scenes_of(study))
+    scenes = list(settings_at_seeds(study))
     assert len(scenes) == study.trials
 
 
 def test_a_trial_of_another_study_has_no_command(study):
-    for trial in (TrialKey("nobody", study.seeds[0], "full"), TrialKey(name_of(study.settings[0], study), 99, "full")):
+    for trial in (
+        TrialKey("nobody", study.seeds[0], "full"),
+        TrialKey(setting_name(study.settings[0], study), 99, "full"),
+    ):
         with pytest.raises(ValueError, match="has no trial"):
             command_of(study, trial)

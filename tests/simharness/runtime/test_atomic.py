@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from simharness.runtime.atomic_files import appearing
+from simharness.runtime.atomic_files import atomic_folder
 
 
 def test_a_folder_appears_at_the_end_only(tmp_path):
     folder = tmp_path / "deep" / "run"
-    with appearing(folder) as partial:
+    with atomic_folder(folder) as partial:
         (partial / "a").write_text("1")
         assert not folder.exists()
     assert [path.name for path in folder.iterdir()] == ["a"]
@@ -20,7 +20,7 @@ def test_a_folder_appears_at_the_end_only(tmp_path):
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_an_error_leaves_nothing(tmp_path, error):
     def write() -> None:
-        with appearing(tmp_path / "run") as partial:
+        with atomic_folder(tmp_path / "run") as partial:
             (partial / "a").write_text("1")
             raise error
 
@@ -31,7 +31,7 @@ def test_an_error_leaves_nothing(tmp_path, error):
 
 def test_an_error_leaves_the_old_folder_as_it_was(tmp_path):
     def write(text: str, *, fail: bool) -> None:
-        with appearing(tmp_path / "run") as partial:
+        with atomic_folder(tmp_path / "run") as partial:
             (partial / "a").write_text(text)
             if fail:
                 raise RuntimeError
@@ -44,7 +44,7 @@ def test_an_error_leaves_the_old_folder_as_it_was(tmp_path):
 
 def test_a_new_folder_replaces_the_old_one_whole(tmp_path):
     for name in ("a", "b"):
-        with appearing(tmp_path / "run") as partial:
+        with atomic_folder(tmp_path / "run") as partial:
             (partial / name).touch()
     assert [path.name for path in tmp_path.rglob("*")] == ["run", "b"]
 
@@ -52,8 +52,8 @@ def test_a_new_folder_replaces_the_old_one_whole(tmp_path):
 def test_a_killed_process_leaves_nothing_that_looks_finished(tmp_path):
     code = (
         "import os, pathlib, sys\n"
-        "from simharness.runtime.atomic_files import appearing\n"
-        "with appearing(pathlib.Path(sys.argv[1])) as partial:\n"
+        "from simharness.runtime.atomic_files import atomic_folder\n"
+        "with atomic_folder(pathlib.Path(sys.argv[1])) as partial:\n"
         "    (partial / 'summary.json').touch()\n"
         "    os._exit(9)\n"
     )

@@ -15,7 +15,7 @@ from simharness.runtime.errors import RunError
 from simharness.study.measure import TrialOutput
 from simharness.study.plan import plan
 from simharness.study.runner import run_study
-from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, work_off
+from simharness.study.scheduler import ATTEMPTS, TrialFailure, TrialSuccess, Unit, run_units
 from simharness.study.trial_store import Store
 from simharness.trial.identity import entry_identity
 
@@ -67,10 +67,10 @@ class TestOneByOne:
     @pytest.mark.slow
     @pytest.mark.parametrize("error", [RunError("boom"), "kill"], ids=["raises", "kills its worker"])
     def test_whoever_fails_among_workers_is_lost_alone(self, tmp_path, error):
-        self.check(work_off(units_of(tmp_path, 2), Broken({"fast": error}), workers=2))
+        self.check(run_units(units_of(tmp_path, 2), Broken({"fast": error}), workers=2))
 
     def test_whoever_fails_in_this_process_is_lost_alone(self, tmp_path):
-        self.check(work_off(units_of(tmp_path, 2), Broken({"fast": RunError("boom")})))
+        self.check(run_units(units_of(tmp_path, 2), Broken({"fast": RunError("boom")})))
 
     @staticmethod
     def check(results):
@@ -93,12 +93,12 @@ class TestOneByOne:
                 assert measured[variant].scores == made_up(result.unit.scenario, variant).scores
 
     def test_what_fails_only_together_is_whole_in_the_end(self, tmp_path):
-        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken({"fast": MemoryError()}, least=2))
+        (result,) = run_units(units_of(tmp_path, 2)[1:], Broken({"fast": MemoryError()}, least=2))
         assert isinstance(result, TrialSuccess)
         assert tuple(result.output.results) == VARIANTS
 
     def test_it_costs_one_attempt_more_for_each_variant(self, tmp_path):
-        list(work_off(units_of(tmp_path, 2)[1:], Broken({"fast": RunError("boom")}, tmp_path / "calls")))
+        list(run_units(units_of(tmp_path, 2)[1:], Broken({"fast": RunError("boom")}, tmp_path / "calls")))
         together = f"1 {'+'.join(VARIANTS)}"
         assert (tmp_path / "calls").read_text().splitlines() == [
             *[together] * ATTEMPTS,
@@ -106,13 +106,15 @@ class TestOneByOne:
         ]
 
     def test_what_the_scenario_is_to_blame_for_is_tried_once(self, tmp_path):
-        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken({"fast": ValueError("nobody fits")}, tmp_path / "calls"))
+        (result,) = run_units(
+            units_of(tmp_path, 2)[1:], Broken({"fast": ValueError("nobody fits")}, tmp_path / "calls")
+        )
         assert (result.error, result.parts) == ("nobody fits", (result,))
         assert len((tmp_path / "calls").read_text().splitlines()) == 1
 
     def test_a_variant_that_was_alone_is_not_tried_more_often(self, tmp_path):
         unit = units_of(tmp_path, 2, variants=("fast",))[1:]
-        (result,) = work_off(unit, Broken({"fast": RunError("boom")}, tmp_path / "calls"))
+        (result,) = run_units(unit, Broken({"fast": RunError("boom")}, tmp_path / "calls"))
         assert result.error == "boom"
         assert len((tmp_path / "calls").read_text().splitlines()) == ATTEMPTS
 
@@ -125,7 +127,7 @@ class TestOneByOne:
         ],
     )
     def test_errors_are_told_with_whose_they_are(self, tmp_path, errors, said):
-        (result,) = work_off(units_of(tmp_path, 2)[1:], Broken(errors))
+        (result,) = run_units(units_of(tmp_path, 2)[1:], Broken(errors))
         assert result.error == said
 
 

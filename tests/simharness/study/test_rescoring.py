@@ -51,7 +51,6 @@ def stages(monkeypatch):
 @pytest.fixture
 def code(monkeypatch):
     """Change digests of the code: ``code(scores="x")``."""
-
     own = identity.code()
 
     def change(**digests):

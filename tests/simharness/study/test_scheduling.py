@@ -7,7 +7,7 @@ from fakes import ALWAYS, Fake, called, made_up, study_of, times
 
 from simharness.study import scheduler as scheduling
 from simharness.study.plan import plan
-from simharness.study.scheduler import TrialFailure, TrialSuccess, Unit, work_off
+from simharness.study.scheduler import TrialFailure, TrialSuccess, Unit, run_units
 
 
 def units_of(folder, seeds):
@@ -21,7 +21,7 @@ def by_seed(results):
 class TestHere:
     def test_results_come_in_order(self, tmp_path):
         units = units_of(tmp_path, 4)
-        results = list(work_off(units, Fake(tmp_path / "calls")))
+        results = list(run_units(units, Fake(tmp_path / "calls")))
         assert [result.unit for result in results] == units
         for result in results:
             assert isinstance(result, TrialSuccess)
@@ -31,12 +31,12 @@ class TestHere:
     @pytest.mark.parametrize(("times_raised", "calls"), [(1, 2), (2, 3)])
     def test_what_fails_now_and_then_is_done(self, tmp_path, times_raised, calls):
         fake = Fake(tmp_path / "calls", {1: ("raise", times_raised)})
-        assert all(isinstance(result, TrialSuccess) for result in work_off(units_of(tmp_path, 3), fake))
+        assert all(isinstance(result, TrialSuccess) for result in run_units(units_of(tmp_path, 3), fake))
         assert times(fake.calls) == {0: 1, 1: calls, 2: 1}
 
     def test_what_always_fails_is_given_up(self, tmp_path):
         fake = Fake(tmp_path / "calls", {1: ("raise", ALWAYS), 2: ("refuse", ALWAYS)})
-        results = by_seed(work_off(units_of(tmp_path, 4), fake))
+        results = by_seed(run_units(units_of(tmp_path, 4), fake))
         assert {seed for seed, result in results.items() if isinstance(result, TrialFailure)} == {1, 2}
         assert results[1].error == "ZeroDivisionError: by zero"
         assert "ZeroDivisionError" in results[1].traceback
@@ -45,7 +45,7 @@ class TestHere:
 
     def test_work_is_begun_when_it_is_asked_for(self, tmp_path):
         fake = Fake(tmp_path / "calls")
-        results = work_off(units_of(tmp_path, 4), fake)
+        results = run_units(units_of(tmp_path, 4), fake)
         assert called(fake.calls) == []
         next(results)
         results.close()
@@ -53,14 +53,14 @@ class TestHere:
 
     def test_fewer_than_one_worker_is_refused(self, tmp_path):
         with pytest.raises(ValueError, match="at least 1, got 0"):
-            next(work_off([], Fake(tmp_path / "calls"), workers=0))
+            next(run_units([], Fake(tmp_path / "calls"), workers=0))
 
 
 @pytest.mark.slow
 def test_workers_that_die_cost_a_retry(tmp_path):
     harm = {1: ("kill", 1), 3: ("raise", ALWAYS), 4: ("raise", 1), 5: ("refuse", ALWAYS)}
     fake = Fake(tmp_path / "calls", harm, seconds=0.05)
-    results = by_seed(work_off(units_of(tmp_path, 10), fake, workers=2))
+    results = by_seed(run_units(units_of(tmp_path, 10), fake, workers=2))
     assert set(results) == set(range(10))
     failed = {seed: result for seed, result in results.items() if isinstance(result, TrialFailure)}
     assert set(failed) == {3, 5}
@@ -86,7 +86,7 @@ class TestClusters:
             dask.config.set({"distributed.scheduler.allowed-failures": 0}),
             LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster,
         ):
-            results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
+            results = by_seed(run_units(units, fake, scheduler=cluster.scheduler_address))
         assert isinstance(results[0], TrialFailure)
         assert "worker process died" in results[0].error
         assert isinstance(results[1], TrialSuccess)
@@ -100,9 +100,9 @@ class TestClusters:
 
         units, fake = units_of(tmp_path, 5), Fake(tmp_path / "calls", {1: ("raise", 1), 2: ("raise", ALWAYS)})
         with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=":0") as cluster:
-            results = by_seed(work_off(units, fake, scheduler=cluster.scheduler_address))
+            results = by_seed(run_units(units, fake, scheduler=cluster.scheduler_address))
             assert {seed for seed, result in results.items() if isinstance(result, TrialFailure)} == {2}
-            again = list(work_off(units[:1], fake, scheduler=cluster.scheduler_address))
+            again = list(run_units(units[:1], fake, scheduler=cluster.scheduler_address))
         assert len(again) == 1
         assert times(fake.calls) == {0: 2, 1: 2, 2: 3 + 2, 3: 1, 4: 1}
 
@@ -110,7 +110,7 @@ class TestClusters:
     def test_one_that_is_not_there_is_said(self, tmp_path, monkeypatch, address):
         monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)
         with pytest.raises(ValueError, match=f"--scheduler {address}: no Dask scheduler"):
-            next(work_off(units_of(tmp_path, 1), Fake(tmp_path / "calls"), scheduler=address))
+            next(run_units(units_of(tmp_path, 1), Fake(tmp_path / "calls"), scheduler=address))
 
     def test_one_without_workers_or_with_others_is_said(self, tmp_path, monkeypatch):
         from distributed import LocalCluster
@@ -119,10 +119,10 @@ class TestClusters:
         unit, fake = units_of(tmp_path, 1), Fake(tmp_path / "calls")
         with LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster:
             with pytest.raises(ValueError, match="it has no workers"):
-                next(work_off(unit, fake, scheduler=cluster.scheduler_address))
+                next(run_units(unit, fake, scheduler=cluster.scheduler_address))
             cluster.scale(1)
             monkeypatch.setattr(scheduling, "_FIRST_WORKER", 60)
             monkeypatch.setattr(scheduling, "code", object)  # of which no two are equal
             with pytest.raises(ValueError, match="another version of simharness"):
-                next(work_off(unit, fake, scheduler=cluster.scheduler_address))
+                next(run_units(unit, fake, scheduler=cluster.scheduler_address))
         assert called(fake.calls) == []
