@@ -99,7 +99,7 @@ def files_of(folder: Path) -> Iterator[Path]:
     for file in folder.rglob("*"):
         inside = file.relative_to(folder).parts
         generated = any(part in _GENERATED or part.endswith(".egg-info") for part in inside)
-        packaging = len(inside) == 1 and file.suffix in (".toml", ".md")
+        packaging = len(inside) == 1 and file.name in ("pyproject.toml", "README.md", "LICENSE")
         if file.is_file() and not generated and not packaging and not file.name.startswith("."):
             yield file
 
