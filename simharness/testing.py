@@ -34,41 +34,78 @@ def assert_robust(
     variant: str = "full",
     seeds: int | Sequence[int] | None = None,
     workers: int = 1,
+    keep: Path | str | None = None,
     **thresholds: float,
 ) -> None:
-    """Run a scenario file, all its cases at all its seeds, and assert what a variant of the method scores on average.
+    """Run all cases of a scenario file at all seeds, and assert mean scores of one variant of the method.
 
     Args:
-        scenario: the file.
-        variant: of the method.
-        seeds: how many, or which; by default the file's.
+        scenario: name of a shipped scenario, or the path of a file.
+        variant: variant of the method.
+        seeds: number of seeds, or a list; the file's by default.
         workers: processes that share the trials.
-        thresholds: by the keys of :data:`simharness.scoring.catalogue.SCORES`, in the units that are said there. Where
-            more is better, the least that the mean over all trials may be; where less is better, the most.
+        keep: folder in which finished trials are kept, as ``simharness study --out`` keeps them. A second run measures
+            only what has changed, and ``simharness report`` shows what happened. By default nothing is kept.
+        thresholds: by the keys of :data:`simharness.scoring.catalogue.SCORES`, in their units: the least allowed mean
+            over all trials where more is better, the largest where less is better.
 
     Raises:
-        AssertionError: a mean is past its threshold, or a score applies to no trial. The message has the numbers, the
-            worst case, and the command that runs the worst trial.
-        ValueError: no threshold, one that is no finite number, a score that does not exist, or a scenario file with
-            mistakes.
-        RunError: a trial could not be run.
+        AssertionError: a mean beyond its threshold, or a score that applies to no trial. The message has the numbers,
+            the worst case, and the command that runs the worst trial.
+        ValueError: no threshold, one that is no finite number, an unknown score, or mistakes in the scenario file.
+        RunError: a trial that could not be run.
     """
+    __tracebackhide__ = True  # pytest then shows the caller's line
     from simharness.scenario.study_definition import load_study
 
     _check(thresholds)
     study = load_study(scenario, seeds=seeds, variants=[variant])
-
-    from simharness.gate.suite import run_suite
-    from simharness.runtime.errors import RunError
-
-    done = run_suite(study, workers=workers)
-    if done.failed:
-        first = done.failed[0]
-        what = f"{len(done.failed)} of {study.trials} trials could not be run, the first"
-        raise RunError(f"{scenario}: {what} {first.case}, seed {first.seed}: {first.error}")
-    wrong = [said for key, limit in thresholds.items() if (said := _wrong(key, limit, done.scores, study))]
+    scores = _measured(study, workers) if keep is None else _kept(study, Path(keep), workers)
+    wrong = [message for key, limit in thresholds.items() if (message := _wrong(key, limit, scores, study))]
     if wrong:
         raise AssertionError("\n".join([f"{scenario}, {variant}, {study.trials} trials", *wrong]))
+
+
+def _measured(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, float | None]]:
+    """Run a study without a store."""
+    from simharness.gate.suite import run_suite
+
+    done = run_suite(study, workers=workers)
+    _require_all([(each.case, each.seed, each.error) for each in done.failed], study)
+    return done.scores
+
+
+def _kept(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
+    """Run what is not finished of a study in a folder."""
+    from simharness.gate.trial_command import TrialKey, setting_name
+    from simharness.study.plan import plan
+    from simharness.study.runner import run_study
+
+    planned = plan(study)
+    results = run_study(study, out=folder, workers=workers)
+    names = {(each.trial, each.seed): setting_name(each.setting, study) for each in planned}
+    _require_all(
+        [(names[each["trial"], each["seed"]], each["seed"], each["error"]) for each in results.info["failed"]], study
+    )
+    rows = {(row["trial"], row["variant"]): row for row in results.trials.iter_rows(named=True)}
+    return {
+        TrialKey(setting_name(each.setting, study), each.seed, variant): {
+            key: rows[each.trial, variant][key] for key in SCORES
+        }
+        for each in planned
+        for variant in study.variants
+    }
+
+
+def _require_all(failed: Sequence[tuple[str, int, str]], study: Study) -> None:
+    """Raise a RunError if trials failed: (case, seed, error)."""
+    __tracebackhide__ = True
+    from simharness.runtime.errors import RunError
+
+    if failed:
+        case, seed, error = failed[0]
+        count = f"{len(failed)} of {study.trials} trials could not be run, the first"
+        raise RunError(f"{study.path}: {count} {case}, seed {seed}: {error}")
 
 
 def _check(thresholds: Mapping[str, float]) -> None:

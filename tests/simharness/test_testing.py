@@ -1,15 +1,18 @@
 """A scenario file as an assertion."""
 
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from suites import SMALL, remember_scenes
 
 from simharness.gate import suite
-from simharness.runtime.frame_pool import RunError
-from simharness.scenario.toml_reader import ScenarioError
+from simharness.runtime.errors import RunError
+from simharness.scenario.toml_files import ScenarioError
 from simharness.testing import assert_robust
+from simharness.trial import run_trial
 
 
 @pytest.fixture
@@ -71,10 +74,10 @@ def test_a_file_or_a_variant_that_does_not_exist(small, tmp_path):
 
 
 def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
-    def fail(scenario, variants, *, blame):
+    def fail(scenario, *, variants, until):
         raise RunError("the ceiling came down")
 
-    monkeypatch.setattr(suite, "measure", fail)
+    monkeypatch.setattr(suite, "run_trial", fail)
     with pytest.raises(RunError, match="2 of 2 trials could not be run, the first phantoms, seed 0: the ceiling"):
         assert_robust(small, seeds=1, variant="fast", pcp=0)
 
@@ -82,12 +85,35 @@ def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
 def test_a_score_that_applies_to_nothing_does_not_pass(small, monkeypatch):
     class Nothing:
         def __init__(self, variant):
-            from simharness.gate.trial_command import Trial
+            from simharness.gate.trial_command import TrialKey
             from simharness.scoring.catalogue import SCORES
 
             self.failed = ()
-            self.scores = {Trial("crowd", 0, variant): dict.fromkeys(SCORES)}
+            self.scores = {TrialKey("crowd", 0, variant): dict.fromkeys(SCORES)}
 
     monkeypatch.setattr(suite, "run_suite", lambda study, workers: Nothing(*study.variants))
     with pytest.raises(AssertionError, match="MPJPE applies to none of the trials"):
         assert_robust(small, seeds=1, variant="fast", mpjpe_mm=1000)
+
+
+@pytest.mark.slow
+def test_kept_trials_are_not_run_again(small, tmp_path, monkeypatch):
+    thresholds = {"pcp": 60, "recall": 80, "ghosts": 2.0}
+    assert_robust(small, variant="fast", seeds=2, keep=tmp_path / "kept", **thresholds)
+    monkeypatch.setattr(run_trial, "build_variants", None)  # not callable: nothing may run
+    assert_robust(small, variant="fast", seeds=2, keep=tmp_path / "kept", **thresholds)
+    with pytest.raises(AssertionError, match=r"PCP is [\d.]+ %, expected at least 99.9; worst case"):
+        assert_robust(small, variant="fast", seeds=2, keep=tmp_path / "kept", pcp=99.9)
+
+
+def test_the_traceback_ends_at_the_callers_line(tmp_path):
+    (tmp_path / "test_users.py").write_text(
+        "from simharness import testing\n"
+        "testing._measured = lambda study, workers: (_ for _ in ()).throw(AssertionError('PCP is 1'))\n"
+        "def test_it():\n"
+        "    testing.assert_robust('quickstart', pcp=90)\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_users.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "testing.assert_robust('quickstart', pcp=90)" in done.stdout
+    assert "_check(thresholds)" not in done.stdout

@@ -168,7 +168,7 @@ def test_a_wrong_projection_fails_the_trials_of_a_study(tmp_path, monkeypatch):
     study = load_study(path)
     moved_projections(monkeypatch, 0.5)
     results = run_study(study, out=tmp_path / "out")
-    assert [failed["seed"] for failed in results.info["failed"]] == [0, 1]
+    assert len(results.info["failed"]) == 2
     assert all(failed["error"].startswith("audit: projection: frame ") for failed in results.info["failed"])
     assert results.trials.is_empty()
     monkeypatch.undo()
