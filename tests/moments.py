@@ -1,4 +1,4 @@
-"""Recordings made without the simulator: people seen exactly by cameras on a ring, and what is said of them."""
+"""Recordings made without the simulator: exact detections of people by a ring of cameras, and estimates of them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ sys.path.append(str(Path(__file__).parent / "mvpose"))
 
 from people import crowd, ring
 
-__all__ = ["crowd", "moment", "recorded", "ring", "said"]
+__all__ = ["crowd", "estimate_of", "moment", "recorded", "ring"]
 
 
 def moment(rig, people, *, visibility=Visibility.VISIBLE):
-    """The exact detections of one frame, a view after the other and in it a person after the other, and the truth."""
+    """Return the exact detections of one frame, ordered by view, then by person, and the truth."""
     pixels = rig.project(people)
     inside = np.stack([camera.inside(pixels[view]) for view, camera in enumerate(rig)])
     view, person = (index.ravel() for index in np.indices(pixels.shape[:2]))
@@ -40,11 +40,11 @@ def moment(rig, people, *, visibility=Visibility.VISIBLE):
 
 
 def recorded(rig, *moments):
-    """A recording of some frames, each a pair of detections and truth."""
+    """Return a recording of frames given as pairs of detections and truth."""
     detections, truth = zip(*moments, strict=True)
     return Recording(np.arange(len(moments)) / 10.0, rig, detections, truth)
 
 
-def said(joints, labels):
-    """An estimate of n people, (n, 17, 3)."""
+def estimate_of(joints, labels):
+    """Return an estimate of n people from joints (n, 17, 3) and labels of the detections."""
     return Estimate(joints, np.isfinite(joints).all(axis=-1).astype(float), Matching(np.asarray(labels)))

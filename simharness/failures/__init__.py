@@ -1,1 +1,1 @@
-"""What is wrong with estimates: classes of failures, and the stage of the method to blame for each."""
+"""Failures of estimates: their classes, and the stage of the method to blame for each."""

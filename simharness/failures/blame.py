@@ -1,16 +1,15 @@
-"""Which stage of the method a failure is to blame on: the truth is put in for one after the other.
+"""Stage to blame for each failure, found by replacing one stage after the other by the truth.
 
-A frame with failures is estimated again, and the first substitution that mends a failure names its stage:
+A frame with failures is estimated again, and the first substitution that removes a failure determines its stage:
 
-- detection: a perfect detector's report of the same pictures in place of the real one. What real detectors miss because
-  it is hidden counts here, too.
+- detection: perfect detections of the same pictures in place of the real ones. Misses of hidden people count here, too.
 - matching: perfect detections and the true labels.
-- reconstruction: nothing of that mends it. What is left is reconstruction itself, and what it is given besides
-  detections: a calibration that is off, pictures that are late, and too few views that have the joint in the picture.
-- method: the last two, of a method that cannot be told labels: one from elsewhere, of which no stages are known.
+- reconstruction: neither removes the failure. The cause is reconstruction itself or its other input: a wrong
+  calibration, late pictures, or too few views with the joint inside the picture.
+- method: matching or reconstruction of a user-defined estimator, which takes no labels and whose stages are unknown.
 
-With perfect detections little is left to mend, so one more substitution stands beside that order: the real detections
-with the true labels, which says what a perfect matching alone would save.
+Perfect detections remove most failures, so matching rarely gets the blame. One more substitution stands beside that
+order: the real detections with the true labels, which shows what a perfect matching alone would remove.
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ from mvpose import COCO17, Detections, Estimate, Rig
 from mvpose.pipeline import Estimator
 from simharness.failures.classification import Failure, FailureKind, failures_of_frame
 from simharness.failures.substitution import perfect_detections, true_labels, with_labels
-from simharness.pairing.distance import mean_distances
+from simharness.pairing.pairing import mean_distances
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 
 
 class Stage(StrEnum):
-    """The stages of the method, in the order in which the truth is put in for them."""
+    """Stages of the method, in the order in which they are replaced by the truth."""
 
     DETECTION = "detection"
     MATCHING = "matching"
@@ -45,12 +44,12 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True)
 class Blamed:
-    """A failure and its cause.
+    """Failure and the stage to blame.
 
     Attributes:
-        failure: what went wrong.
-        stage: the first stage for which the truth mends it.
-        matching_alone: whether true labels of the real detections mend it; None for a method that cannot be told them.
+        failure: the failure.
+        stage: first stage whose replacement by the truth removes it.
+        matching_alone: whether true labels of the real detections remove it; None for a method that takes no labels.
     """
 
     failure: Failure
@@ -58,7 +57,7 @@ class Blamed:
     matching_alone: bool | None
 
 
-_OF_THE_WHOLE = (FailureKind.MISSED, FailureKind.MERGED, FailureKind.SPLIT)
+_WHOLE_PERSON = (FailureKind.MISSED, FailureKind.MERGED, FailureKind.SPLIT)
 
 FAILURE_SCHEMA: dict[str, Any] = {
     "frame": pl.Int64,
@@ -69,99 +68,99 @@ FAILURE_SCHEMA: dict[str, Any] = {
     "joints": pl.List(pl.String),
     "error_mm": pl.Float64,
 }
-"""The columns of :func:`failure_table`."""
+"""Columns and types of :func:`failure_table`."""
 
 
 def blame(
     recording: Recording, estimator: Estimator, estimates: Sequence[Estimate], failures: Sequence[Failure]
 ) -> list[Blamed]:
-    """Find the stage of every failure. Frames without failures cost nothing, the others three estimations at most.
+    """Find the stage to blame for every failure; each frame with failures is estimated three more times at most.
 
-    Somebody missed, merged or split is mended when they are none of these any more, though a joint of theirs may still
-    be displaced: where every second person has some such joint, one who is found is found all the same. A swapped limb
-    or a displaced joint is mended when nothing is wrong with the person. Of the ghosts of a frame as many are mended as
-    there are fewer: those furthest from the ones that are left.
+    A missed, merged or split person is no longer a failure of that class as soon as the person is none of the three,
+    even with a displaced joint, because displaced joints are frequent. A swapped limb or a displaced joint is removed
+    when the person has no failure at all. If a frame has k ghosts fewer than before, k ghosts are removed: those
+    furthest from the remaining ones.
 
     Args:
-        recording: T frames, as they were estimated. Heat maps are used if the detections carry them.
-        estimator: the method. If it is none of mvpose's pipelines, true labels cannot be put in, and what perfect
-            detections do not mend is the method's.
-        estimates: what it said of the frames, T.
-        failures: :func:`simharness.failures.classification.find_failures` of these.
+        recording: T frames, as they were estimated. Heat maps are used if the detections have them.
+        estimator: the method. Only pipelines of mvpose take true labels; for others, failures that perfect detections
+            do not remove are blamed on the method.
+        estimates: estimates of the method, T.
+        failures: :func:`simharness.failures.classification.find_failures` of these estimates.
 
     Returns:
-        The failures in the same order.
+        Failures with stages, in the same order.
     """
-    result: list[Blamed] = []
+    blamed: list[Blamed] = []
     for frame, group in itertools.groupby(failures, key=lambda failure: failure.frame):
-        scene = _Scene(recording.rig, recording.detections[frame], recording.truth[frame])
-        result += _blame_frame(scene, estimator, estimates[frame], list(group))
-    return result
+        inputs = _FrameInput(recording.rig, recording.detections[frame], recording.truth[frame])
+        blamed += _blame_frame(inputs, estimator, estimates[frame], list(group))
+    return blamed
 
 
 @dataclass(frozen=True)
-class _Scene:
-    """A frame with some detections, real or not."""
+class _FrameInput:
+    """One frame with real or perfect detections."""
 
     rig: Rig
     detections: Detections
     truth: Truth
 
-    def mends(self, estimator: Estimator, before: Estimate, failures: Sequence[Failure]) -> list[bool]:
-        """Which of the failures of a frame, estimated otherwise before, are none in this scene."""
-        estimate = estimator.estimate(self.rig, self.detections)
-        left = failures_of_frame(self.rig, self.detections, self.truth, estimate)
-        kinds = {failure.person: failure.kind for failure in left}
-        laid = _laid(before, _ghosts(failures), estimate, _ghosts(left))
+    def removes(self, estimator: Estimator, before: Estimate, failures: Sequence[Failure]) -> list[bool]:
+        """Estimate this input, and return which of the failures of an earlier estimate of the frame are gone."""
+        after = estimator.estimate(self.rig, self.detections)
+        remaining = failures_of_frame(self.rig, self.detections, self.truth, after)
+        kinds = {failure.person: failure.kind for failure in remaining}
+        removed_ghosts = _removed_ghosts(before, _ghosts(failures), after, _ghosts(remaining))
         return [
-            failure.estimate in laid
+            failure.estimate in removed_ghosts
             if failure.kind is FailureKind.GHOST
-            else _mended(failure.kind, kinds.get(failure.person))
+            else _removed(failure.kind, kinds.get(failure.person))
             for failure in failures
         ]
 
 
-def _mended(before: FailureKind, after: FailureKind | None) -> bool:
-    """Whether somebody who was wrong in one way is no longer, now that they are wrong in another or not at all."""
-    return after is None or (before in _OF_THE_WHOLE and after not in _OF_THE_WHOLE)
+def _removed(before: FailureKind, after: FailureKind | None) -> bool:
+    """Return whether a person's failure is removed, if the person now has failure ``after``, or none."""
+    return after is None or (before in _WHOLE_PERSON and after not in _WHOLE_PERSON)
 
 
 def _blame_frame(
-    real: _Scene, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure]
+    real: _FrameInput, estimator: Estimator, estimate: Estimate, failures: Sequence[Failure]
 ) -> Iterable[Blamed]:
-    perfect = _Scene(real.rig, *perfect_detections(real.detections, real.truth))
-    by_detection = perfect.mends(estimator, estimate, failures)
+    perfect = _FrameInput(real.rig, *perfect_detections(real.detections, real.truth))
+    by_detection = perfect.removes(estimator, estimate, failures)
     by_matching = [False] * len(failures)
-    left = Stage.RECONSTRUCTION
-    told = with_labels(estimator, true_labels(perfect.detections, perfect.truth))
-    if told is None:
-        left = Stage.METHOD
+    last = Stage.RECONSTRUCTION
+    labelled = with_labels(estimator, true_labels(perfect.detections, perfect.truth))
+    if labelled is None:
+        last = Stage.METHOD
     elif not all(by_detection):
-        by_matching = perfect.mends(told, estimate, failures)
-    alone: list[bool | None] = [None] * len(failures)
-    told = with_labels(estimator, true_labels(real.detections, real.truth))
-    if told is not None:
-        alone = list(real.mends(told, estimate, failures))
-    for failure, detection, matching, saved in zip(failures, by_detection, by_matching, alone, strict=True):
-        stage = Stage.DETECTION if detection else Stage.MATCHING if matching else left
-        yield Blamed(failure, stage, saved)
+        by_matching = perfect.removes(labelled, estimate, failures)
+    matching_alone: list[bool | None] = [None] * len(failures)
+    labelled = with_labels(estimator, true_labels(real.detections, real.truth))
+    if labelled is not None:
+        matching_alone = list(real.removes(labelled, estimate, failures))
+    for failure, detection, matching, alone in zip(failures, by_detection, by_matching, matching_alone, strict=True):
+        stage = Stage.DETECTION if detection else Stage.MATCHING if matching else last
+        yield Blamed(failure, stage, alone)
 
 
 def _ghosts(failures: Sequence[Failure]) -> list[int]:
     return [failure.estimate for failure in failures if failure.kind is FailureKind.GHOST]
 
 
-def _laid(before: Estimate, ghosts: list[int], after: Estimate, left: list[int]) -> set[int]:
-    """Which ghosts are gone: all but the ones that, one to one, are nearest to those that are left."""
-    distance = mean_distances(before.joints[ghosts], after.joints[left])
-    stay, _ = linear_sum_assignment(np.minimum(distance, 1e6))  # two that share no joint are far apart
+def _removed_ghosts(before: Estimate, ghosts: list[int], after: Estimate, remaining: list[int]) -> set[int]:
+    """Return the removed ghosts: all except those paired one to one with the nearest remaining ghosts."""
+    distance = mean_distances(before.joints[ghosts], after.joints[remaining])
+    stay, _ = linear_sum_assignment(np.minimum(distance, 1e6))  # infinite where two ghosts share no joint
     return set(ghosts) - {ghosts[index] for index in stay}
 
 
 def failure_table(failures: Iterable[Failure | Blamed]) -> pl.DataFrame:
-    """A row for each failure, columns as :data:`FAILURE_SCHEMA`: joints by name, -1 for a ghost's person.
+    """Return a table with a row for each failure and the columns of :data:`FAILURE_SCHEMA`.
 
-    Nobody is to blame (null) for failures that were not looked into.
+    Joints are given by name; the person of a ghost is -1; the stage of a failure without blame is null.
     """
     return pl.DataFrame([_row(each) for each in failures], schema=FAILURE_SCHEMA, orient="row")
 
@@ -175,18 +174,20 @@ def _row(each: Failure | Blamed) -> tuple[Any, ...]:
 
 
 def failure_scores(table: pl.DataFrame, frames: int) -> dict[str, float | None]:
-    """``failures_<kind>``, of each kind a frame, and ``blame_<stage>``, percent of the failures; None without any whose
-    stage is known, and of the stages of a method that are not.
+    """Return the scores of failures: ``failures_<kind>`` per frame, and ``blame_<stage>`` in percent of the failures.
+
+    ``blame_<stage>`` is None without blamed failures; for a method whose stages are unknown, matching and
+    reconstruction are None.
 
     Args:
-        table: of :func:`failure_table`.
-        frames: how many were judged.
+        table: table of :func:`failure_table`.
+        frames: number of frames that were classified.
 
     Raises:
         ValueError: no frames.
     """
     if frames < 1:
-        raise ValueError(f"failures are counted over one frame or more, got {frames}")
+        raise ValueError(f"failures must be counted over one frame or more, got {frames}")
     kinds, stages = table["kind"].to_list(), table["stage"].drop_nulls().to_list()
     scores: dict[str, float | None] = {f"failures_{kind}": kinds.count(kind) / frames for kind in FailureKind}
     unknown = {Stage.MATCHING, Stage.RECONSTRUCTION} if Stage.METHOD in stages else set()

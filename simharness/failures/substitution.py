@@ -1,4 +1,4 @@
-"""The truth put in for a stage of the method: what a perfect detector reports, and who is who."""
+"""Substitutes for stages of the method: perfect detections and true labels."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from simharness.types.views import Visibility
 
 
 def perfect_detections(detections: Detections, truth: Truth) -> tuple[Detections, Truth]:
-    """What a perfect detector reports of the pictures of a frame, and the truth about that.
+    """Return the perfect detections of a frame and the truth of these detections.
 
-    Everybody who has a joint in a picture is found in it, with those joints exactly where they are in that picture,
-    hidden or not, as the profile "perfect" finds them; nobody else is. Scores are 1 and there are no heat maps. A
-    detection has the descriptor of the real one of the same person and view, of the surest if there are several; NaN,
-    that is none, where there is no real one: geometry places such a one, and a method that uses descriptors alone
-    cannot.
+    Every person with a joint inside a picture is detected there, with the joints inside at their exact pixels, hidden
+    or not, as by the detector profile "perfect"; there are no other detections. Scores are 1; there are no heat maps.
+    A detection has the descriptor of the real detection of the same person in the same view (if several, of the one
+    with the highest box score). Without a real detection the descriptor is NaN: geometry can still match such a
+    detection, a method that uses descriptors alone cannot.
 
     Args:
-        detections: the real ones.
-        truth: about them.
+        detections: the real detections.
+        truth: truth of the frame and of the real detections.
     """
     inside = truth.visibility != Visibility.OUTSIDE
     view, person = np.nonzero(inside.any(axis=-1))
     reported = inside[view, person]
     descriptors = None
     if detections.descriptors is not None:
-        real = _surest(detections, truth)[view, person]
+        real = _highest_scored(detections, truth)[view, person]
         descriptors = np.full((len(view), detections.descriptors.shape[1]), np.nan)
         descriptors[real >= 0] = detections.descriptors[real[real >= 0]]
     perfect = Detections(
@@ -50,40 +50,40 @@ def perfect_detections(detections: Detections, truth: Truth) -> tuple[Detections
 
 
 def true_labels(detections: Detections, truth: Truth) -> Integers:
-    """What a perfect matching says of m detections, (m,): the people who are found in two views or more, from 0.
+    """Return the labels of a perfect matching of m detections, (m,): people detected in two or more views, from 0.
 
-    Of several detections of one person in one view the surest is the person's. The others, phantoms, and people whom
-    a single view finds, are -1.
+    Of several detections of a person in one view, the one with the highest score has the label. The others, phantoms,
+    and people detected in a single view have label -1.
     """
-    surest = _surest(detections, truth)
-    found = surest >= 0
-    found &= found.sum(axis=0) > 1
+    highest = _highest_scored(detections, truth)
+    detected = highest >= 0
+    detected &= detected.sum(axis=0) > 1
     labels = np.full(len(detections), -1)
-    number = np.cumsum(found.any(axis=0)) - 1
-    labels[surest[found]] = np.broadcast_to(number, found.shape)[found]
+    number = np.cumsum(detected.any(axis=0)) - 1
+    labels[highest[detected]] = np.broadcast_to(number, detected.shape)[detected]
     return labels
 
 
 def with_labels(estimator: Estimator, labels: Integers) -> Pipeline | None:
-    """A method that is told who is who, and does the rest by itself; None for one whose stages are not known.
+    """Return a pipeline with given labels in place of its matching; None for a method whose stages are unknown.
 
-    One that goes without matching does by itself what it is told here, so its place is taken by matching and
-    pictorial structure, as in the preset "full".
+    A pipeline without matching assigns detections during reconstruction, so it is replaced by the preset "full" (3D
+    pictorial structures) with the given labels.
 
     Args:
         estimator: the method.
-        labels: person of each detection that it will get, (m,).
+        labels: label of each detection of its input, (m,).
     """
     estimator = getattr(estimator, "loaded", estimator)  # a user-defined estimator may be a pipeline
     if isinstance(estimator, UnmatchedPipeline):
         estimator = Pipeline()
     if not isinstance(estimator, Pipeline):
         return None
-    return replace(estimator, affinity=_unasked, matching=_Told(labels))
+    return replace(estimator, affinity=_no_affinity, matching=_FixedMatching(labels))
 
 
-class _Told:
-    """A matching that needs no affinities."""
+class _FixedMatching:
+    """Matching with given labels; ignores affinities."""
 
     def __init__(self, labels: Integers) -> None:
         self._labels = labels
@@ -92,16 +92,17 @@ class _Told:
         return Matching(self._labels)
 
 
-def _unasked(rig: Rig, detections: Detections, rays: Rays) -> Floats:
+def _no_affinity(rig: Rig, detections: Detections, rays: Rays) -> Floats:
     return np.zeros((len(detections), len(detections)))
 
 
-def _surest(detections: Detections, truth: Truth) -> Integers:
-    """The detection of each person in each view with the greatest box score (of equals, the greatest mean score, then
-    the first), (V, P); -1 where there is none.
+def _highest_scored(detections: Detections, truth: Truth) -> Integers:
+    """Return the detection of each person in each view with the highest box score, (V, P); -1 where there is none.
+
+    Ties are broken by the mean keypoint score, then by the order of the detections.
     """
-    surest = np.full(truth.boxes.shape[:2], -1)
-    rising = np.lexsort((-np.arange(len(detections)), detections.scores.sum(axis=1), detections.box_scores))
-    rising = rising[truth.person[rising] >= 0]
-    surest[detections.view[rising], truth.person[rising]] = rising  # of repeated places the last stays
-    return surest
+    highest = np.full(truth.boxes.shape[:2], -1)
+    ascending = np.lexsort((-np.arange(len(detections)), detections.scores.sum(axis=1), detections.box_scores))
+    ascending = ascending[truth.person[ascending] >= 0]
+    highest[detections.view[ascending], truth.person[ascending]] = ascending  # the last of repeated indices stays
+    return highest

@@ -1,1 +1,1 @@
-"""Estimates paired one to one with the true people of a frame."""
+"""One-to-one pairs of true and estimated people of a frame."""

@@ -1,7 +1,7 @@
-"""One-to-one scores of 3D people: who was found, who was missed, who was made up, and how far off.
+"""One-to-one pairs of true and estimated 3D people: found and missed people, ghosts, and the error of each pair.
 
-True and estimated people are paired by the Hungarian method on mean joint distance; a pair further apart than
-500 mm is none (the rule of Panoptic's recall, Tu et al., ECCV 2020).
+People are paired by the Hungarian method on mean joint distance. A distance over 500 mm makes no pair (the rule of
+Panoptic's recall, Tu et al., ECCV 2020).
 """
 
 from __future__ import annotations
@@ -12,21 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.pairing.distance import mean_distances
 
-LIMIT = 0.5  # metres
+LIMIT = 0.5
+"""Largest mean joint distance of a pair, metres."""
 
 
 @dataclass(frozen=True)
 class Pairing:
-    """True people of one frame and the estimates that are theirs.
+    """True people of one frame and the estimates paired with them.
 
     Attributes:
-        estimate: index of the estimate of every true person, (P,); -1 where missed or not there.
-        error: MPJPE of the pair over the joints that both have, (P,), metres; NaN where there is no pair.
-        present: which of the P are there, that is have at least one defined joint, (P,).
-        estimates: how many estimates there are.
+        estimate: index of the estimate paired with each true person, (P,); -1 where the person is missed or absent.
+        error: MPJPE of each pair over the joints that both have, (P,), metres; NaN without a pair.
+        present: which of the P people are in the frame, that is have at least one defined joint, (P,).
+        estimates: number of estimates.
     """
 
     estimate: NDArray[np.int64]
@@ -36,40 +37,40 @@ class Pairing:
 
     @property
     def people(self) -> int:
-        """True people who are there."""
+        """Number of true people in the frame."""
         return int(self.present.sum())
 
     @property
     def found(self) -> int:
-        """True people with an estimate of their own."""
+        """Number of true people paired with an estimate."""
         return int((self.estimate >= 0).sum())
 
     @property
     def missed(self) -> int:
-        """True people without one."""
+        """Number of true people without an estimate."""
         return self.people - self.found
 
     @property
     def ghosts(self) -> int:
-        """Estimates that are nobody's."""
+        """Number of estimates that match no person."""
         return self.estimates - self.found
 
 
 def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pairing:
-    """Pair the people of one frame: as many pairs as the limit allows, at the least total distance.
+    """Pair the people of one frame: the largest number of pairs within the limit, at the least total distance.
 
     Args:
-        truth: (P, J, 3), metres; NaN where undefined. A person without any defined joint is not there.
-        estimate: (n, J, 3), metres; NaN where missing.
-        limit: the largest mean joint distance of a pair, metres.
+        truth: joints, (P, J, 3), metres; NaN where undefined. A person without any defined joint is absent.
+        estimate: joints, (n, J, 3), metres; NaN where missing.
+        limit: largest mean joint distance of a pair, metres.
 
     Raises:
-        ValueError: a wrong shape, or two skeletons.
+        ValueError: a wrong shape, or different skeletons.
     """
     truth = as_array(truth, ("P", "J", 3), "truth")
     estimate = as_array(estimate, ("n", truth.shape[1], 3), "estimate")
     distance = mean_distances(truth, estimate)
-    # A pair over the limit costs more than any change among the allowed ones can save.
+    # A pair over the limit costs more than any change among the allowed pairs can save.
     forbidden = 1.0 + 2.0 * limit * min(distance.shape)
     rows, columns = linear_sum_assignment(np.where(distance <= limit, distance, forbidden))
     allowed = distance[rows, columns] <= limit
@@ -79,3 +80,24 @@ def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pair
     error[rows] = distance[rows, columns]
     present = np.isfinite(truth).all(axis=-1).any(axis=-1)
     return Pairing(partner, error, present, len(estimate))
+
+
+def mean_distances(truth: Floats, estimate: Floats) -> Floats:
+    """Return the mean distance of each true person from each estimate, over the joints that both have.
+
+    Args:
+        truth: joints, (P, J, 3), metres; NaN where undefined.
+        estimate: joints, (n, J, 3), metres; NaN where missing.
+
+    Returns:
+        Distances, (P, n), metres; infinite where the two share no joint.
+    """
+    return mean_where_shared(np.linalg.norm(truth[:, None] - estimate[None], axis=-1))
+
+
+def mean_where_shared(distance: Floats) -> Floats:
+    """Return the mean over joints of distances (..., J), without those that are NaN; infinite where all are NaN."""
+    shared = np.isfinite(distance)
+    count = shared.sum(axis=-1)
+    total = np.where(shared, distance, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)

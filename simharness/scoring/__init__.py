@@ -1,1 +1,1 @@
-"""Truth against estimates: body parts, people, pairs of detections, and the summary of them all."""
+"""Scores of estimates against the truth."""

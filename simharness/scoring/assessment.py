@@ -1,4 +1,4 @@
-"""All that one variant's answers to one recording are worth: the scores, and the tables by frame and by person."""
+"""Assessment of one variant on one recording: scores, and tables by frame and by person."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
 from simharness.pairing.pairing import Pairing
 from simharness.scoring.average_precision import average_precision, nearest_people
-from simharness.scoring.bones import bone_errors
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.frame import FrameScore, score_frame
-from simharness.scoring.jitter import jitter
+from simharness.scoring.joint_errors import bone_errors, jitter, joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
-from simharness.scoring.pck import joint_errors, pck, pck_area
+from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
@@ -29,29 +28,29 @@ from simharness.types.views import Visibility
 Labels = NDArray[np.int64]
 Scores = dict[str, float | None]
 
-_PAIRS = ("pairs_correct", "pairs_wrong", "pairs_lost")
-_IN_SIGHT = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
+_PAIR_COLUMNS = ("pairs_correct", "pairs_wrong", "pairs_lost")
+_SEEN_OR_SELF_OCCLUDED = (Visibility.VISIBLE, Visibility.SELF_OCCLUDED)
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """What one variant's answers are worth.
+    """Scores and tables of one variant on one recording.
 
     Attributes:
-        scores: every one of :data:`simharness.scoring.catalogue.SCORES` but those of failures, in that order; None
-            where one does not apply.
+        scores: all of :data:`simharness.scoring.catalogue.SCORES` except those of failures, in that order; None where
+            a score does not apply.
         frames: a row for each frame: ``frame``, ``time`` (s); ``people``, ``estimates``, ``found``, ``missed``,
             ``ghosts``; ``pcp`` (percent), ``mpjpe_mm``; ``pairs_correct``, ``pairs_wrong``, ``pairs_lost``,
-            ``violations``, ``merged``, ``split``; ``phantoms`` and how many of them were ``admitted``; and
+            ``violations``, ``merged``, ``split``; ``phantoms`` and the number of them that were ``admitted``; and
             ``time_affinity_ms``, ``time_matching_ms``, ``time_reconstruction_ms``, ``time_ms``. Null, never NaN,
-            where something does not apply.
-        people: a row for each frame and true person who is there: ``frame``, ``person``; ``found``, ``error_mm`` (the
-            mean over joints), ``pcp`` (percent); ``worst_joint`` by name and its error ``worst_mm``, of the joints
-            that were placed; ``visible_views``, the views in which half of the joints or more are in sight, that is
-            hidden by nothing but the person. Errors are null where the person is missed.
-        errors: of every joint of every true person, (T, P, 17), metres: infinite where missed or not placed, NaN where
-            the truth does not say where it is. :func:`simharness.scoring.pck.pck` makes the curve of them.
-        variant_scores: the scores of every frame, for summaries.
+            where a column does not apply.
+        people: a row for each frame and true person present in it: ``frame``, ``person``; ``found``, ``error_mm``
+            (mean over joints), ``pcp`` (percent); ``worst_joint``, the name of the estimated joint with the largest
+            error, and that error, ``worst_mm``; ``visible_views``, the number of views in which at least half of the
+            joints are visible or self-occluded. Errors are null where the person is missed.
+        errors: errors of all joints of all true people, (T, P, 17), metres: infinite where the estimate is missing, NaN
+            where the truth is. Input of :func:`simharness.scoring.pck.pck`.
+        variant_scores: scores of every frame, for summaries.
     """
 
     scores: Scores
@@ -62,32 +61,32 @@ class Assessment:
 
 
 def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
-    """Score one variant.
+    """Score one variant on a recording.
 
     Args:
-        recording: what it was given, and the truth.
-        estimates: its answers, one for each frame.
+        recording: the input of the variant, and the truth.
+        estimates: estimates of the variant, one for each frame.
 
     Raises:
-        ValueError: not one answer a frame, or answers that do not fit the frame's detections.
+        ValueError: another number of estimates than frames, or labels that do not fit the frame's detections.
     """
     if len(estimates) != len(recording):
         raise ValueError(f"a recording of {len(recording)} frames needs as many estimates, got {len(estimates)}")
     variant = score_variant(recording, estimates)
     summary = variant.summary()
-    groups = _group(recording, estimates)
+    groups = _groups(recording, estimates)
     truth = np.stack([true.joints for true in recording.truth])
-    placed = _placed(truth.shape, variant.frames, estimates)
+    placed = _paired_joints(truth.shape, variant.frames, estimates)
     errors = joint_errors(truth, placed)
     scores = (
-        _of_people(summary)
-        | _of_joints(errors)
-        | _precisions(truth, estimates)
-        | _pck(errors)
-        | _of_shape(truth, placed)
-        | _in_pictures(recording, placed)
-        | _of_matching(summary, groups)
-        | _times(summary)
+        _people_scores(summary)
+        | _joint_scores(errors)
+        | _precision_scores(truth, estimates)
+        | _pck_scores(errors)
+        | _bone_and_jitter_scores(truth, placed)
+        | _picture_scores(recording, placed)
+        | _matching_scores(summary, groups)
+        | _time_scores(summary)
     )
     return Assessment(
         scores,
@@ -99,7 +98,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
 
 
 def score_variant(recording: Recording, estimates: Sequence[Estimate]) -> VariantScores:
-    """The scores of every frame, as ``summary.json`` has them together."""
+    """Score every frame; ``summary.json`` is made from the result."""
     frames = [
         score_frame(true.joints, estimate.joints, matching=pairs)
         for true, estimate, pairs in zip(recording.truth, estimates, _pairs(recording, estimates), strict=True)
@@ -108,7 +107,7 @@ def score_variant(recording: Recording, estimates: Sequence[Estimate]) -> Varian
 
 
 def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels] | None:
-    """Labels of every frame; None of a method that leaves out who is who in one or all."""
+    """Return the labels of every frame; None if the method gives no labels for the detections of some frame."""
     counts = list(map(len, recording.detections))
     matchings = [estimate.matching for estimate in estimates]
     if not all(matching.covers(count) for matching, count in zip(matchings, counts, strict=True)):
@@ -117,16 +116,16 @@ def _labels(recording: Recording, estimates: Sequence[Estimate]) -> list[Labels]
 
 
 def _pairs(recording: Recording, estimates: Sequence[Estimate]) -> list[PairCounts | None]:
-    """Pairs of every frame; None where nobody knows them."""
+    """Count the pairs of detections of every frame; None for every frame if there are no labels."""
     labels = _labels(recording, estimates)
     if labels is None:
         return [None] * len(recording)
-    seen = zip(recording.detections, labels, recording.truth, strict=True)
-    return [count_pairs(detected.view, said, true.person) for detected, said, true in seen]
+    frames = zip(recording.detections, labels, recording.truth, strict=True)
+    return [count_pairs(detections.view, label, truth.person) for detections, label, truth in frames]
 
 
-def _group(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[GroupCounts], list[int]] | None:
-    """Groups and violations of every frame; None where nobody knows them."""
+def _groups(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[GroupCounts], list[int]] | None:
+    """Count the groups and the violations of every frame; None if there are no labels."""
     labels = _labels(recording, estimates)
     if labels is None:
         return None
@@ -135,16 +134,16 @@ def _group(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[Gr
     return list(map(count_groups, views, labels, people)), list(map(count_violations, views, labels))
 
 
-def _placed(shape: tuple[int, ...], frames: Sequence[FrameScore], estimates: Sequence[Estimate]) -> Floats:
-    """The estimate that is each true person's own, (T, P, J, 3), metres; NaN where missed."""
+def _paired_joints(shape: tuple[int, ...], frames: Sequence[FrameScore], estimates: Sequence[Estimate]) -> Floats:
+    """Return the joints of the estimate paired with each true person, (T, P, J, 3), metres; NaN where missed."""
     placed = np.full(shape, np.nan)
     for row, frame, estimate in zip(placed, frames, estimates, strict=True):
-        own = frame.pairing.estimate
-        row[own >= 0] = estimate.joints[own[own >= 0]]
+        partner = frame.pairing.estimate
+        row[partner >= 0] = estimate.joints[partner[partner >= 0]]
     return placed
 
 
-def _of_people(summary: Mapping[str, Any]) -> Scores:
+def _people_scores(summary: Mapping[str, Any]) -> Scores:
     return {
         "pcp": summary["pcp"],
         **{f"pcp_{group}": value for group, value in summary["pcp_parts"].items()},
@@ -157,14 +156,14 @@ def _of_people(summary: Mapping[str, Any]) -> Scores:
     }
 
 
-def _of_joints(errors: Floats) -> Scores:
+def _joint_scores(errors: Floats) -> Scores:
     return {
         f"mpjpe_{joint}_mm": _statistic(np.mean, 1000.0 * errors[..., index])
         for index, joint in enumerate(COCO17.joints)
     }
 
 
-def _precisions(truth: Floats, estimates: Sequence[Estimate]) -> Scores:
+def _precision_scores(truth: Floats, estimates: Sequence[Estimate]) -> Scores:
     frame = np.repeat(np.arange(len(estimates)), [len(estimate) for estimate in estimates])
     joints = np.concatenate([estimate.joints for estimate in estimates])
     score = np.concatenate([estimate.scores.mean(axis=1) for estimate in estimates])
@@ -177,26 +176,26 @@ def _precisions(truth: Floats, estimates: Sequence[Estimate]) -> Scores:
     return {**found, "map": _statistic(np.mean, np.array(list(found.values()), float))}
 
 
-def _pck(errors: Floats) -> Scores:
+def _pck_scores(errors: Floats) -> Scores:
     curve = pck(errors, np.array(PCK_MM) / 1000.0)
-    shares = {f"pck{limit}": _known(share) for limit, share in zip(PCK_MM, curve, strict=True)}
-    return {**shares, "pck_auc": _known(pck_area(errors, PCK_MM[-1] / 1000.0))}
+    shares = {f"pck{limit}": _finite(share) for limit, share in zip(PCK_MM, curve, strict=True)}
+    return {**shares, "pck_auc": _finite(pck_area(errors, PCK_MM[-1] / 1000.0))}
 
 
-def _of_shape(truth: Floats, placed: Floats) -> Scores:
+def _bone_and_jitter_scores(truth: Floats, placed: Floats) -> Scores:
     return {
         "bone_mm": _statistic(np.mean, 1000.0 * np.abs(bone_errors(truth, placed))),
         "jitter_mm": _statistic(np.mean, 1000.0 * jitter(truth, placed)),
     }
 
 
-def _in_pictures(recording: Recording, placed: Floats) -> Scores:
-    # Medians: what a single joint just before a lens does to a mean says nothing of all others.
+def _picture_scores(recording: Recording, placed: Floats) -> Scores:
+    # Medians, because a single joint close to a lens has an error that dominates the mean.
     estimate, detection = reprojection_errors(recording, placed)
     return {"reprojection_px": _statistic(np.median, estimate), "detection_px": _statistic(np.median, detection)}
 
 
-def _of_matching(summary: Mapping[str, Any], counted: tuple[list[GroupCounts], list[int]] | None) -> Scores:
+def _matching_scores(summary: Mapping[str, Any], counted: tuple[list[GroupCounts], list[int]] | None) -> Scores:
     pairs = {f"match_{key}": _percent(share) for key, share in summary["matching"].items()}
     if counted is None:
         return pairs | dict.fromkeys(("violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"))
@@ -212,7 +211,7 @@ def _of_matching(summary: Mapping[str, Any], counted: tuple[list[GroupCounts], l
     }
 
 
-def _times(summary: Mapping[str, Any]) -> Scores:
+def _time_scores(summary: Mapping[str, Any]) -> Scores:
     timings = summary["timings_ms"]
     medians = {_time_column(stage): timings[stage]["median"] for stage in STAGES}
     return {**medians, "time_p99_ms": timings["total"]["p99"]}
@@ -229,7 +228,7 @@ def _frame_table(
     groups, violations = counted or ([], [])
     for index, (frame, timing) in enumerate(zip(variant.frames, variant.timings, strict=True)):
         row = frame.row()
-        del row["errors_mm"], row["parts"]  # which are in the table of people
+        del row["errors_mm"], row["parts"]  # they are in the table of people
         group = groups[index] if counted else None
         rows.append(
             {"frame": index, "time": float(recording.time[index]), **row}
@@ -238,7 +237,7 @@ def _frame_table(
             | {_time_column(stage): 1000.0 * timing[stage] if stage in timing else None for stage in STAGES}
         )
     types: dict[str, Any] = dict.fromkeys(("pcp", "mpjpe_mm", *map(_time_column, STAGES)), pl.Float64)
-    types |= dict.fromkeys((*_PAIRS, "violations", "merged", "split", "phantoms", "admitted"), pl.Int64)
+    types |= dict.fromkeys((*_PAIR_COLUMNS, "violations", "merged", "split", "phantoms", "admitted"), pl.Int64)
     return pl.DataFrame(rows, schema_overrides=types, infer_schema_length=None)
 
 
@@ -247,20 +246,21 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
     frame, person = np.nonzero(np.stack([pairing.present for pairing in pairings]))
     parts = np.stack([each.parts for each in variant.frames])[frame, person]
     counted = (parts != Part.UNDEFINED).sum(axis=1)
-    own = errors[frame, person]
-    placed = np.where(np.isfinite(own), own, -1.0)
-    worst = placed.argmax(axis=1)
-    known = placed.max(axis=1) >= 0
-    in_sight = np.isin(np.stack([true.visibility for true in recording.truth]), _IN_SIGHT).mean(axis=-1) >= 0.5
+    error = errors[frame, person]
+    finite = np.where(np.isfinite(error), error, -1.0)
+    worst = finite.argmax(axis=1)
+    known = finite.max(axis=1) >= 0
+    visibility = np.stack([truth.visibility for truth in recording.truth])
+    half_visible = np.isin(visibility, _SEEN_OR_SELF_OCCLUDED).mean(axis=-1) >= 0.5
     columns: dict[str, Any] = {
         "frame": frame,
         "person": person,
-        "found": _of_pairings(pairings, "estimate")[frame, person] >= 0,
-        "error_mm": 1000.0 * _of_pairings(pairings, "error")[frame, person],
+        "found": _stacked(pairings, "estimate")[frame, person] >= 0,
+        "error_mm": 1000.0 * _stacked(pairings, "error")[frame, person],
         "pcp": np.where(counted > 0, 100.0 * (parts == Part.CORRECT).sum(axis=1) / np.maximum(counted, 1), np.nan),
         "worst_joint": np.where(known, worst, -1),
-        "worst_mm": np.where(known, 1000.0 * placed.max(axis=1), np.nan),
-        "visible_views": in_sight.sum(axis=1)[frame, person],
+        "worst_mm": np.where(known, 1000.0 * finite.max(axis=1), np.nan),
+        "visible_views": half_visible.sum(axis=1)[frame, person],
     }
     names: Mapping[int, str] = dict(enumerate(COCO17.joints))
     return pl.DataFrame(columns).with_columns(
@@ -269,7 +269,7 @@ def _people_table(recording: Recording, variant: VariantScores, errors: Floats) 
     )
 
 
-def _of_pairings(pairings: Sequence[Pairing], key: str) -> NDArray[Any]:
+def _stacked(pairings: Sequence[Pairing], key: str) -> NDArray[Any]:
     return np.stack([getattr(pairing, key) for pairing in pairings])
 
 
@@ -277,11 +277,11 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _known(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
 def _statistic(function: Callable[[Floats], np.floating], values: Floats) -> float | None:
-    """Of the finite values; None without any."""
+    """Return a statistic of the finite values; None without any."""
     values = values[np.isfinite(values)]
     return float(function(values)) if len(values) else None

@@ -1,4 +1,4 @@
-"""Every score of one frame in one place: what simulated runs and real data both produce and tabulate."""
+"""Scores of one frame, for simulated runs and for recorded data."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from simharness.scoring.pcp import percent, score_parts
 
 @dataclass(frozen=True)
 class FrameScore:
-    """The scores of one frame.
+    """Scores of one frame.
 
     Attributes:
-        parts: what became of every part of every true person, (P, 10), :class:`simharness.scoring.pcp.Part`.
-        pairing: the one-to-one pairs.
-        matching: detection pairs, or None where the true person of a detection is not known (real data).
+        parts: state of every part of every true person, (P, 10), :class:`simharness.scoring.pcp.Part`.
+        pairing: one-to-one pairs of true and estimated people.
+        matching: counts of pairs of detections; None where the true person of a detection is unknown (real data).
     """
 
     parts: NDArray[np.int8]
@@ -31,10 +31,10 @@ class FrameScore:
     matching: PairCounts | None = None
 
     def row(self) -> dict[str, Any]:
-        """The scores as one flat row of a table, free of NaN.
+        """Return the scores as one flat row of a table, without NaN.
 
-        ``pcp`` is over the parts of this frame, ``mpjpe_mm`` the mean over its pairs (None without any).
-        ``parts`` holds ten values and ``errors_mm`` one (None for no pair) for each true person in turn.
+        ``pcp`` is over the parts of this frame, ``mpjpe_mm`` the mean over its pairs (None without pairs).
+        ``parts`` holds ten values and ``errors_mm`` one value (None without a pair) for each true person in turn.
         """
         errors = [None if np.isnan(error) else 1000.0 * float(error) for error in self.pairing.error]
         known = [error for error in errors if error is not None]
@@ -65,13 +65,13 @@ def score_frame(
     """Score the people of one frame.
 
     Args:
-        truth: metres, (P, 17, 3) on COCO17 or (P, 14, 3) on SHELF14; NaN where undefined.
-        estimate: metres, (n, J, 3) on the truth's skeleton, or on COCO17 where the truth is on SHELF14; NaN
-            where missing.
-        head: how COCO-17 becomes the head of SHELF14. PCP is always judged on SHELF14; one-to-one pairs and
-            their errors on the truth's skeleton.
-        matching: :func:`simharness.scoring.matching.count_pairs` of the frame, where the true person of every
-            detection is known.
+        truth: true joints, metres, (P, 17, 3) on COCO17 or (P, 14, 3) on SHELF14; NaN where undefined.
+        estimate: estimated joints, metres, (n, J, 3) on the truth's skeleton, or on COCO17 where the truth is on
+            SHELF14; NaN where missing.
+        head: mapping of COCO-17 to the head of SHELF14. PCP is always computed on SHELF14; one-to-one pairs and their
+            errors on the truth's skeleton.
+        matching: :func:`simharness.scoring.matching.count_pairs` of the frame, if the true person of every detection
+            is known.
 
     Raises:
         ValueError: a wrong shape.

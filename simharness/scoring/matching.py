@@ -1,8 +1,8 @@
 """Scores of the matching alone: pairs of detections in different views, and groups of detections.
 
-A pair is positive where both detections show one true person; the method says so where both carry one label.
-Phantoms (person -1) and unmatched detections (label -1) are in no positive pair. A detector may find a person twice in
-one view; a matching takes one of the two, so what is lost is counted by people and views, not by detections.
+A pair is positive if both detections show the same true person, and matched if both have the same label. Phantoms
+(person -1) are in no positive pair, unmatched detections (label -1) in no matched one. A detector may detect a person
+twice in one view, and a matching takes one of the two, so lost pairs are counted by person and view, not by detection.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mvpose.checks import as_array
 
 @dataclass(frozen=True)
 class PairCounts:
-    """Pairs of detections in different views; frames add up.
+    """Counts of pairs of detections in different views; the counts of frames can be added.
 
     Attributes:
-        correct: pairs of one person that were matched.
-        wrong: pairs that were matched and are not one person.
-        lost: pairs of views in which one person is found, with no pair of detections there matched.
+        correct: matched pairs that show the same person.
+        wrong: matched pairs that do not show the same person.
+        lost: pairs of views in which a person is detected in both, but no pair of the person's detections is matched.
     """
 
     correct: int
@@ -34,17 +34,17 @@ class PairCounts:
 
     @property
     def precision(self) -> float | None:
-        """Share of the matched pairs that are one person; None where nothing was matched."""
+        """Share of the matched pairs that show the same person; None without matched pairs."""
         return _share(self.correct, self.correct + self.wrong)
 
     @property
     def recall(self) -> float | None:
-        """Share of the pairs of one person that were matched; None where there is no such pair."""
+        """Share of the pairs of the same person that are matched; None without such pairs."""
         return _share(self.correct, self.correct + self.lost)
 
     @property
     def f1(self) -> float | None:
-        """Harmonic mean of precision and recall; None where there is no pair of either kind."""
+        """Harmonic mean of precision and recall; None without pairs of either kind."""
         return _share(2 * self.correct, 2 * self.correct + self.wrong + self.lost)
 
 
@@ -53,32 +53,32 @@ def count_pairs(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> PairCo
 
     Args:
         view: camera of each detection, (m,).
-        labels: what the method says, ``Matching.labels``, (m,); -1 for unmatched.
+        labels: label of each detection, ``Matching.labels``, (m,); -1 for unmatched.
         person: true person of each detection, (m,); -1 for a phantom.
 
     Raises:
-        ValueError: lengths that differ.
+        ValueError: different lengths.
     """
     table = _tabulate(view, labels, person)
     known = table[1:, 1:]
-    correct = _across(known)
-    found = (table[:, 1:].sum(axis=0) > 0).astype(np.int64)  # (P, V)
-    in_one = (known > 0).astype(np.int64).transpose(1, 2, 0)  # (P, V, L)
-    joined = in_one @ in_one.transpose(0, 2, 1) > 0  # (P, V, V)
-    lost = _across(found) - int(np.triu(joined, k=1).sum())
-    return PairCounts(correct, _across(table[1:].sum(axis=1)) - correct, lost)
+    correct = _pairs_across_views(known)
+    detected = (table[:, 1:].sum(axis=0) > 0).astype(np.int64)  # (P, V)
+    labelled = (known > 0).astype(np.int64).transpose(1, 2, 0)  # (P, V, L)
+    joined = labelled @ labelled.transpose(0, 2, 1) > 0  # (P, V, V)
+    lost = _pairs_across_views(detected) - int(np.triu(joined, k=1).sum())
+    return PairCounts(correct, _pairs_across_views(table[1:].sum(axis=1)) - correct, lost)
 
 
 @dataclass(frozen=True)
 class GroupCounts:
-    """How the detections of a frame were grouped into people.
+    """Counts of how the detections of a frame are grouped into people.
 
     Attributes:
-        merged: groups with detections of two true people or more.
-        split: true people whose matched detections are in several groups, none of which holds one from every view that
-            has any. So a second detection of a person in one view makes no split.
-        phantoms: detections of nobody.
-        admitted: detections of nobody that are in a group.
+        merged: groups with detections of two or more true people.
+        split: true people with matched detections in several groups, if no single group covers all views in which the
+            person has matched detections. So a second detection of a person in one view is no split.
+        phantoms: detections that show no person.
+        admitted: phantoms that are in a group.
     """
 
     merged: int
@@ -88,7 +88,7 @@ class GroupCounts:
 
 
 def count_groups(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> GroupCounts:
-    """Count what went wrong with whole groups and people; the arguments are those of :func:`count_pairs`."""
+    """Count merged groups, split people and phantoms of one frame; the arguments are those of :func:`count_pairs`."""
     table = _tabulate(view, labels, person)
     known = table[1:, 1:] > 0  # (L, P, V)
     merged = known.any(axis=2).sum(axis=1) >= 2
@@ -98,14 +98,14 @@ def count_groups(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> Group
 
 
 def count_violations(view: ArrayLike, labels: ArrayLike) -> int:
-    """Count the detections that share a person with another one of their own view: what a matching must never have.
+    """Count the detections that share a label with another detection of their view; a valid matching has none.
 
     Args:
         view: camera of each detection, (m,).
-        labels: ``Matching.labels``, (m,); -1 for unmatched.
+        labels: label of each detection, ``Matching.labels``, (m,); -1 for unmatched.
 
     Raises:
-        ValueError: lengths that differ.
+        ValueError: different lengths.
     """
     view = as_array(view, ("m",), "view", np.int64)
     groups = _tabulate(view, labels, np.full(len(view), -1))[1:]
@@ -113,17 +113,17 @@ def count_violations(view: ArrayLike, labels: ArrayLike) -> int:
 
 
 def _tabulate(view: ArrayLike, labels: ArrayLike, person: ArrayLike) -> NDArray[np.int64]:
-    """Count the detections by label, person and view, (L + 1, P + 1, V); the first of both is for -1."""
+    """Count the detections by label, person and view, (L + 1, P + 1, V); the first label and person are -1."""
     view = as_array(view, ("m",), "view", np.int64)
     labels = as_array(labels, view.shape, "labels", np.int64)
     person = as_array(person, view.shape, "person", np.int64)
-    shape = tuple(int(index.max(initial=-1)) + extra for index, extra in ((labels, 2), (person, 2), (view, 1)))
-    places = ((labels + 1) * shape[1] + person + 1) * shape[2] + view
-    return np.bincount(places, minlength=shape[0] * shape[1] * shape[2]).reshape(shape)
+    shape = tuple(int(values.max(initial=-1)) + extra for values, extra in ((labels, 2), (person, 2), (view, 1)))
+    index = ((labels + 1) * shape[1] + person + 1) * shape[2] + view
+    return np.bincount(index, minlength=shape[0] * shape[1] * shape[2]).reshape(shape)
 
 
-def _across(counts: NDArray[np.int64]) -> int:
-    """Pairs of detections in different views, of counts (..., V); those in different rows are no pair."""
+def _pairs_across_views(counts: NDArray[np.int64]) -> int:
+    """Count the pairs of detections in different views within each row of counts (..., V)."""
     return int((counts.sum(axis=-1) ** 2 - (counts**2).sum(axis=-1)).sum()) // 2
 
 

@@ -1,9 +1,9 @@
 """Percentage of correct parts (PCP), as Shelf and Campus are scored.
 
-Ten parts of the 14 joints. A part is correct when the mean of the errors of its two ends is at most half its
-true length (Belagiannis et al., CVPR 2014; as Dong et al., CVPR 2019, use it). Every true person takes the
-nearest estimate; an estimate may serve two people, and one that nobody takes costs nothing. So PCP never sees
-a ghost: read it beside :mod:`simharness.pairing.pairing`.
+SHELF14 has ten parts. A part is correct if the mean of the errors of its two ends is at most half its true length
+(Belagiannis et al., CVPR 2014; as used by Dong et al., CVPR 2019). Every true person is compared with the nearest
+estimate; one estimate may be used for two people, and an unused estimate costs nothing. So PCP ignores ghosts: read it
+together with the scores of :mod:`simharness.pairing.pairing`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.pairing.distance import mean_distances
+from simharness.pairing.pairing import mean_distances
 
 ALPHA = 0.5
+"""Largest mean error of the two ends of a correct part, as a share of the part's true length."""
 
 PARTS = (
     "right_lower_leg",
@@ -41,28 +42,27 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "upper_legs": (1, 2),
     "lower_legs": (0, 3),
 }
-"""The parts that tables report together, by index into :data:`PARTS`."""
+"""Groups of parts that tables report together, by index into :data:`PARTS`."""
 
 _ENDS = np.array([[0, 1], [1, 2], [3, 4], [4, 5], [6, 7], [7, 8], [9, 10], [10, 11], [12, 13]])
 _HIPS, _HEAD_BOTTOM = (2, 3), 12
 
 
 class Part(IntEnum):
-    """What became of one part of one true person."""
+    """State of one part of one true person."""
 
-    UNDEFINED = -1  # the truth does not say where it is: not counted
+    UNDEFINED = -1  # an end is missing in the truth: not counted
     WRONG = 0
     CORRECT = 1
 
 
 def score_parts(truth: ArrayLike, estimate: ArrayLike, *, alpha: float = ALPHA) -> NDArray[np.int8]:
-    """Judge every part of every true person of one frame.
+    """Score every part of every true person of one frame.
 
     Args:
         truth: joints on SHELF14, (P, 14, 3), metres; NaN where undefined.
-        estimate: joints on SHELF14, (n, 14, 3), metres; NaN where missing: a part with a missing end is
-            wrong.
-        alpha: the largest error of a correct part, as a share of its true length.
+        estimate: joints on SHELF14, (n, 14, 3), metres; NaN where missing. A part with a missing end is wrong.
+        alpha: largest error of a correct part, as a share of its true length.
 
     Returns:
         :class:`Part` values, (P, 10).
@@ -74,16 +74,16 @@ def score_parts(truth: ArrayLike, estimate: ArrayLike, *, alpha: float = ALPHA) 
     estimate = as_array(estimate, ("n", 14, 3), "estimate")
     true_ends = part_ends(truth)
     length = np.linalg.norm(true_ends[:, :, 1] - true_ends[:, :, 0], axis=-1)
-    taken = nearest(truth, estimate)
-    guess = np.full_like(truth, np.nan)
-    guess[taken >= 0] = estimate[taken[taken >= 0]]
-    error = np.linalg.norm(part_ends(guess) - true_ends, axis=-1).mean(axis=-1)
+    partner = nearest(truth, estimate)
+    compared = np.full_like(truth, np.nan)
+    compared[partner >= 0] = estimate[partner[partner >= 0]]
+    error = np.linalg.norm(part_ends(compared) - true_ends, axis=-1).mean(axis=-1)
     correct = error <= alpha * length  # False where an end is missing
     return np.where(np.isnan(length), Part.UNDEFINED, correct).astype(np.int8)
 
 
 def nearest(truth: ArrayLike, estimate: ArrayLike) -> NDArray[np.int64]:
-    """The estimate that every true person takes, (P,): least mean joint distance, -1 where there is none."""
+    """Return the estimate at the least mean joint distance from each true person, (P,); -1 where there is none."""
     distance = mean_distances(np.asarray(truth, float), np.asarray(estimate, float))
     if distance.shape[1] == 0:
         return np.full(len(distance), -1)
@@ -91,13 +91,13 @@ def nearest(truth: ArrayLike, estimate: ArrayLike) -> NDArray[np.int64]:
 
 
 def part_ends(joints: Floats) -> Floats:
-    """The two ends of every part, (..., 10, 2, 3), of joints on SHELF14, (..., 14, 3)."""
+    """Return the two ends of every part, (..., 10, 2, 3), from joints on SHELF14, (..., 14, 3)."""
     torso = np.stack([joints[..., _HIPS, :].mean(axis=-2), joints[..., _HEAD_BOTTOM, :]], axis=-2)
     return np.concatenate([joints[..., _ENDS, :], torso[..., None, :, :]], axis=-3)
 
 
 def percent(parts: ArrayLike) -> float | None:
-    """PCP, 0 to 100, of any array of :class:`Part` values; None where none is defined."""
+    """Return PCP, 0 to 100, of any array of :class:`Part` values; None if no part is defined."""
     parts = np.asarray(parts)
     counted = int((parts != Part.UNDEFINED).sum())
     return 100.0 * int((parts == Part.CORRECT).sum()) / counted if counted else None

@@ -1,11 +1,11 @@
-"""How far off in the pictures: estimates drawn into them, against the detections.
+"""Errors in the pictures, pixels: reprojected estimates compared with detections.
 
-The paper says that estimates projected back into the views are much more accurate than the detections (Dong et al.,
-CVPR 2019, section 4.4). Both are compared with the true pixel at the same joints: every detected keypoint of a person
-with an estimate, where the joint is visible. A person who was detected twice in a view has both compared.
+Dong et al. (CVPR 2019, section 4.4) report that estimates projected back into the views are much more accurate than the
+detections. Both are compared with the true pixel at the same joints: every detected keypoint of a person with an
+estimate, where the joint is visible. If a person is detected twice in a view, both detections are compared.
 
-True pixels are those of the cameras as they truly stand, and estimates are projected with the rig as believed: a wrong
-calibration is part of their error, as it is of an overlay that somebody looks at.
+True pixels are projected with the true rig, and estimates with the believed rig: a wrong calibration is part of their
+error, as it is in an overlay on the pictures.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from simharness.types.views import Visibility
 
 
 def reprojection_errors(recording: Recording, placed: Floats) -> tuple[Floats, Floats]:
-    """Distances from the true pixels.
+    """Return the distances of reprojected estimates and of detections from the true pixels.
 
     Args:
         recording: the truth, the detections and the believed rig.
-        placed: the estimate of every true person, (T, P, J, 3), metres; NaN where missing.
+        placed: joints of the estimate paired with every true person, (T, P, J, 3), metres; NaN where missing.
 
     Returns:
-        Of the reprojected estimates and of the detections, both (k,), pixels: entry by entry of the same joint in the
-        same view. A joint that the believed camera has behind it has no pixel, and is left out.
+        Errors of the reprojected estimates and errors of the detections, both (k,), pixels; entry i of both is the same
+        joint in the same view. Joints behind the believed camera have no pixel and are left out.
     """
     counts = [len(detections) for detections in recording.detections]
     frame = np.repeat(np.arange(len(recording)), counts)
@@ -41,8 +41,8 @@ def reprojection_errors(recording: Recording, placed: Floats) -> tuple[Floats, F
     joints = placed[frame, person]
     reprojected = np.full_like(keypoints, np.nan)
     for index, camera in enumerate(recording.rig):
-        seen = view == index
-        reprojected[seen] = camera.project(joints[seen])
-    estimate, detection = (np.linalg.norm(found - pixels, axis=-1) for found in (reprojected, keypoints))
+        in_view = view == index
+        reprojected[in_view] = camera.project(joints[in_view])
+    estimate, detection = (np.linalg.norm(points - pixels, axis=-1) for points in (reprojected, keypoints))
     compared = visible & np.isfinite(estimate) & np.isfinite(detection)
     return estimate[compared], detection[compared]

@@ -1,4 +1,4 @@
-"""From frames to the summary that programs read: ``summary.json`` of a run and ``--json`` of ``evaluate``."""
+"""Summary of the scores of all frames: the content of ``summary.json`` of a run and of ``--json`` of ``evaluate``."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ STAGES = ("affinity", "matching", "reconstruction", "total")
 
 @dataclass(frozen=True)
 class VariantScores:
-    """What one variant of the method scored.
+    """Scores of one variant in all frames.
 
     Attributes:
-        frames: the scored frames; every one with the same P people in the same order.
-        timings: ``Estimate.timings`` of every frame that was timed, seconds by stage.
+        frames: scores of the frames, all with the same P people in the same order.
+        timings: ``Estimate.timings`` of every timed frame, seconds by stage.
+
+    Raises:
+        ValueError: frames with different numbers of people.
     """
 
     frames: tuple[FrameScore, ...]
@@ -38,16 +41,16 @@ class VariantScores:
             raise ValueError(f"all frames must count the same people, got frames of {counts[0]} and of {counts[-1]}")
 
     def summary(self, *, actors: Sequence[int] | None = None) -> dict[str, Any]:
-        """The summary of this variant.
+        """Return the summary of this variant.
 
         Args:
-            actors: the people whose PCP counts, by index; all when not given.
+            actors: indices of the people whose PCP is averaged; None: all.
 
         Returns:
-            ``pcp`` and ``pcp_parts`` (percent; means over the actors, so that everyone counts the same
-            however often seen), ``pcp_actors``, ``precision`` and ``recall`` of people, ``ghosts_per_frame``,
-            ``missed_per_frame``, ``mpjpe_mm`` over all one-to-one pairs, ``matching`` over all pairs of
-            detections, ``timings_ms`` by stage. None where a score does not apply; never NaN.
+            ``pcp`` and ``pcp_parts`` (percent; means over the actors, so that all actors have equal weight in however
+            many frames they are present), ``pcp_actors``, ``precision`` and ``recall`` of people, ``ghosts_per_frame``,
+            ``missed_per_frame``, ``mpjpe_mm`` over all one-to-one pairs, ``matching`` over all pairs of detections,
+            ``timings_ms`` by stage. None where a score does not apply; never NaN.
         """
         pairings = [frame.pairing for frame in self.frames]
         found, people = sum(p.found for p in pairings), sum(p.people for p in pairings)
@@ -69,7 +72,7 @@ class VariantScores:
         }
 
     def pcp_table(self, *, actors: Sequence[int] | None = None) -> list[dict[str, float | None]]:
-        """PCP of every actor by group of parts and of ``"all"`` ten, percent; None where undefined."""
+        """Return PCP of every actor by group of parts and of all ten (``"all"``), percent; None where undefined."""
         if not self.frames:
             return []
         parts = np.stack([frame.parts for frame in self.frames])
@@ -102,17 +105,17 @@ def summarize(
     actors: Sequence[int] | None = None,
     **more: Any,
 ) -> dict[str, Any]:
-    """The summary of a whole run, in the one shape that ``run`` and ``evaluate`` share; JSON-ready.
+    """Return the summary of a whole run, ready for JSON, with the keys that ``run`` and ``evaluate`` share.
 
     Args:
-        name: of the scenario or data set.
+        name: name of the scenario or data set.
         variants: scores by variant.
-        frames: how many frames the method saw.
-        seeds: how many seeds, 0 for recorded data.
-        actors: the people whose PCP counts, by index; all when not given.
-        more: further keys that stand beside the shared ones.
+        frames: number of frames that the method was given.
+        seeds: number of seeds, 0 for recorded data.
+        actors: indices of the people whose PCP is averaged; None: all.
+        more: further keys beside the shared ones.
     """
-    from simharness.runtime.version import code_version  # not part of what makes scores
+    from simharness.runtime.version import code_version  # imported here: scores do not depend on it
 
     return dict(
         name=name,

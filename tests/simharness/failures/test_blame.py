@@ -1,4 +1,4 @@
-"""Stages of failures: scenes whose culprit is known by construction, and what substitutions put in."""
+"""Stages to blame for failures: frames with a known cause, and the substitutes for stages."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from moments import crowd, moment, recorded, ring, said
+from moments import crowd, estimate_of, moment, recorded, ring
 from trials import simulated
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
@@ -29,7 +29,7 @@ VARIANTS = ("full", "fast", "no-matching")
 
 
 def with_keypoints(where, keypoints, *, moment=MOMENT):
-    """A moment with other keypoints in some of its detections."""
+    """Return a frame with changed keypoints in some of its detections."""
     detections, truth = moment
     changed = detections.keypoints.copy()
     changed[where] = keypoints
@@ -37,15 +37,15 @@ def with_keypoints(where, keypoints, *, moment=MOMENT):
 
 
 def only(keep, *, moment=MOMENT):
-    """A moment with some of its detections."""
+    """Return a frame with only some of its detections."""
     detections, truth = moment
     fields = ("view", "keypoints", "scores", "boxes", "box_scores")
-    left = Detections(*(getattr(detections, key)[keep] for key in fields))
-    return left, replace(truth, person=truth.person[keep], error=truth.error[keep])
+    kept = Detections(*(getattr(detections, key)[keep] for key in fields))
+    return kept, replace(truth, person=truth.person[keep], error=truth.error[keep])
 
 
 def joined(one, other, *, person):
-    """A moment with other detections besides, of ``person``."""
+    """Return a frame with the detections of another one added, as detections of ``person``."""
     (a, truth), (b, _) = one, other
     fields = ("view", "keypoints", "scores", "boxes", "box_scores")
     both = Detections(*(np.concatenate([getattr(a, key), getattr(b, key)]) for key in fields))
@@ -54,7 +54,7 @@ def joined(one, other, *, person):
 
 
 def blamed(estimator, *moments, rig=RIG):
-    """(person, kind, stage, matching alone) of each failure."""
+    """Return (person, kind, stage, matching alone) of each failure."""
     recording = recorded(rig, *moments)
     estimates = [estimator.estimate(rig, detections) for detections in recording.detections]
     result = blame(recording, estimator, estimates, find_failures(recording, estimates))
@@ -62,37 +62,37 @@ def blamed(estimator, *moments, rig=RIG):
 
 
 def exchanging(affinity, view):
-    """A matching that takes the first two people for each other in half of the views."""
+    """Match with the labels of the first two people exchanged in half of the views."""
     labels = Matcher(method="clustering")(affinity, view).labels.copy()
-    there = (view < 2) & (labels >= 0) & (labels < 2)
-    labels[there] = 1 - labels[there]
+    exchanged = (view < 2) & (labels >= 0) & (labels < 2)
+    labels[exchanged] = 1 - labels[exchanged]
     return Matching(labels)
 
 
-class TestCulprits:
+class TestStages:
     @pytest.mark.parametrize("variant", VARIANTS)
-    def test_nothing_is_wrong_with_exact_detections(self, variant):
+    def test_exact_detections_have_no_failures(self, variant):
         assert blamed(Pipeline.preset(variant), MOMENT) == []
 
     @pytest.mark.parametrize("variant", VARIANTS)
-    def test_a_figment_in_all_views_is_the_detectors_and_true_labels_leave_it_out(self, variant):
+    def test_a_phantom_in_all_views_is_blamed_on_detection_and_removed_by_true_labels(self, variant):
         phantom = moment(RIG, crowd(1, seed=9) + [0.0, 1.4, 0.0])
         assert blamed(Pipeline.preset(variant), joined(MOMENT, phantom, person=-1)) == [
             (-1, "ghost", "detection", True)
         ]
 
     @pytest.mark.parametrize("variant", VARIANTS)
-    def test_somebody_never_detected_is_the_detectors_and_no_label_helps(self, variant):
+    def test_a_person_without_detections_is_blamed_on_detection_and_not_removed_by_true_labels(self, variant):
         assert blamed(Pipeline.preset(variant), only(MOMENT[1].person != 1)) == [(1, "missed", "detection", False)]
 
-    def test_left_and_right_exchanged_in_most_views_is_the_detectors(self):
+    def test_left_and_right_exchanged_in_most_views_is_blamed_on_detection(self):
         legs = np.array([COCO17.index(f"{side}_{part}") for part in ("knee", "ankle") for side in ("left", "right")])
         where = np.flatnonzero((MOMENT[1].person == 2) & (MOMENT[0].view < 3))
         exchanged = MOMENT[0].keypoints[where][:, np.array(COCO17.mirror)[legs]]
-        there = with_keypoints((where[:, None], legs), exchanged)
-        assert blamed(FAST, there) == [(2, "swapped_limb", "detection", False)]
+        frame = with_keypoints((where[:, None], legs), exchanged)
+        assert blamed(FAST, frame) == [(2, "swapped_limb", "detection", False)]
 
-    def test_people_exchanged_in_half_of_the_views_are_the_matchings(self):
+    def test_people_exchanged_in_half_of_the_views_are_blamed_on_matching(self):
         result = blamed(replace(FAST, matching=exchanging), MOMENT)
         assert len(result) > 1
         assert {person for person, *_ in result} & {0, 1, 2}
@@ -100,7 +100,7 @@ class TestCulprits:
         assert {alone for *_, alone in result} == {True}
         assert "merged" in {kind for _, kind, *_ in result}
 
-    def test_a_wrong_calibration_is_left_to_reconstruction(self):
+    def test_a_wrong_calibration_is_blamed_on_reconstruction(self):
         rig = ring(3)
         turn = np.deg2rad(15)
         turned = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
@@ -111,33 +111,33 @@ class TestCulprits:
         assert {0, 1, 2} <= {person for person, *_ in result}
         assert {(stage, alone) for _, _, stage, alone in result} == {("reconstruction", False)}
 
-    def test_a_perfect_detector_does_not_see_outside_the_picture(self):
-        there = moment(RIG, np.concatenate([PEOPLE, PEOPLE[:1] + [0.0, 0.0, 9.0]]))
-        assert blamed(FAST, there) == [(3, "missed", "reconstruction", False)]
+    def test_a_person_outside_all_pictures_is_blamed_on_reconstruction(self):
+        frame = moment(RIG, np.concatenate([PEOPLE, PEOPLE[:1] + [0.0, 0.0, 9.0]]))
+        assert blamed(FAST, frame) == [(3, "missed", "reconstruction", False)]
 
-    def test_of_several_failures_each_has_its_own_stage(self):
+    def test_several_failures_have_separate_stages(self):
         recording = [MOMENT, only(MOMENT[1].person != 0), MOMENT]
         result = blamed(replace(FAST, matching=exchanging), *recording)
         assert {stage for _, _, stage, _ in result} == {"detection", "matching"}
 
 
 class Fixed:
-    """A method of which only the answers are known: ``exact`` to detections that are, else ``rough``."""
+    """User-defined estimator that returns ``exact`` for perfect detections, else ``rough``."""
 
     def __init__(self, rough, exact):
         self._rough, self._exact = rough, exact
 
     def estimate(self, rig, detections):
         joints = self._exact if (detections.box_scores == 1).all() else self._rough
-        return said(joints, np.full(len(detections), -1))
+        return estimate_of(joints, np.full(len(detections), -1))
 
 
-class TestMending:
-    def test_a_method_from_elsewhere_cannot_be_told_labels(self):
+class TestRemoval:
+    def test_a_user_defined_estimator_takes_no_labels(self):
         assert blamed(Fixed(PEOPLE[1:], PEOPLE), MOMENT) == [(0, "missed", "detection", None)]
         assert blamed(Fixed(PEOPLE[1:], PEOPLE[1:]), MOMENT) == [(0, "missed", "method", None)]
 
-    def test_its_other_stages_are_not_known(self):
+    def test_the_stages_of_a_user_defined_estimator_are_unknown(self):
         recording = recorded(RIG, MOMENT, MOMENT)
         for exact, stages in ((PEOPLE, (100, 0, 0, 0)), (PEOPLE[1:], (0, None, None, 100))):
             method = Fixed(PEOPLE[1:], exact)
@@ -146,18 +146,18 @@ class TestMending:
             scores = failure_scores(table, 2)
             assert tuple(scores[f"blame_{stage}"] for stage in Stage) == stages
 
-    def test_as_many_ghosts_are_mended_as_there_are_fewer(self):
+    def test_as_many_ghosts_are_removed_as_there_are_fewer(self):
         near, far = PEOPLE[:1] + [9.0, 0, 0], PEOPLE[:1] + [-9.0, 0, 0]
         two = np.concatenate([PEOPLE, far, near])
-        one = np.concatenate([PEOPLE, PEOPLE[:1] + [7.0, 0, 0]])  # not where any was, but nearer to one
-        detection, left = (-1, "ghost", "detection", None), (-1, "ghost", "method", None)
-        assert blamed(Fixed(two, one), MOMENT) == [detection, left]
+        one = np.concatenate([PEOPLE, PEOPLE[:1] + [7.0, 0, 0]])  # at the place of neither, but nearer to one
+        detection, remaining = (-1, "ghost", "detection", None), (-1, "ghost", "method", None)
+        assert blamed(Fixed(two, one), MOMENT) == [detection, remaining]
         assert blamed(Fixed(two, PEOPLE), MOMENT) == [detection, detection]
-        assert blamed(Fixed(one, two), MOMENT) == [left]
+        assert blamed(Fixed(one, two), MOMENT) == [remaining]
         nowhere = np.full((1, 17, 3), np.nan)
         assert blamed(Fixed(two, np.concatenate([PEOPLE, nowhere])), MOMENT).count(detection) == 1
 
-    def test_who_is_found_is_mended_though_a_joint_is_wrong_and_a_joint_is_not(self):
+    def test_a_found_person_with_a_wrong_joint_is_removed_and_a_second_wrong_joint_is_not(self):
         bent, stray = PEOPLE.copy(), PEOPLE.copy()
         bent[0, COCO17.index("nose")] += 0.3
         stray[0, COCO17.index("left_knee")] += 0.3
@@ -189,9 +189,9 @@ class TestSubstitution:
         _, real = simulated(scenario)
         _, perfect = simulated(scenario.model_copy(update={"detector": Detector()}))
         hidden = 0
-        for seen, exact in zip(real, perfect, strict=True):
-            detections, truth = perfect_detections(seen.detections, seen.truth)
-            order = np.lexsort((exact.truth.person, exact.detections.view))  # the profile's: the best seen first
+        for noisy, exact in zip(real, perfect, strict=True):
+            detections, truth = perfect_detections(noisy.detections, noisy.truth)
+            order = np.lexsort((exact.truth.person, exact.detections.view))  # the profile sorts by visibility
             np.testing.assert_array_equal(truth.person, exact.truth.person[order])
             np.testing.assert_array_equal(truth.error, exact.truth.error[order])
             for key in ("view", "keypoints", "scores", "boxes"):
@@ -199,16 +199,16 @@ class TestSubstitution:
                     getattr(detections, key), getattr(exact.detections, key)[order], err_msg=key
                 )
             assert (detections.box_scores == 1).all()
-            assert len(seen.detections)
+            assert len(noisy.detections)
             hidden += ((truth.visibility > 1) & (truth.visibility < 4)).sum()
         assert hidden
 
-    def test_descriptors_stay_with_their_person_and_view(self):
+    def test_descriptors_are_those_of_the_same_person_and_view(self):
         detections, truth = joined(only(MOMENT[1].person != 1), only(MOMENT[1].person == 0), person=0)
-        own = 10.0 * detections.view + truth.person
+        code = 10.0 * detections.view + truth.person
         sure = np.where(np.arange(len(detections)) < 8, 0.5, 0.8)  # the second time
         again = np.where(sure > 0.5, 100.0, 0.0)
-        described = replace(detections, descriptors=np.column_stack([own, own + again]), box_scores=sure)
+        described = replace(detections, descriptors=np.column_stack([code, code + again]), box_scores=sure)
         perfect, true = perfect_detections(described, truth)
         for view, person, descriptor in zip(perfect.view, true.person, perfect.descriptors, strict=True):
             place = 10.0 * view + person
@@ -217,7 +217,7 @@ class TestSubstitution:
         assert perfect_detections(detections, truth)[0].descriptors is None
 
     @given(st.integers(0, 2**32 - 1))
-    def test_true_labels_group_the_surest_of_everybody_found_twice(self, seed):
+    def test_true_labels_are_of_the_highest_scored_detections_of_people_in_two_views(self, seed):
         rng = np.random.default_rng(seed)
         m = rng.integers(0, 15)
         view, person = rng.integers(0, 4, m), rng.integers(-1, 3, m)
@@ -234,21 +234,21 @@ class TestSubstitution:
             }
             assert set(np.flatnonzero(labels == number)) == best
 
-    def test_who_is_told_the_labels_keeps_the_rest_of_the_method(self):
+    def test_a_pipeline_with_given_labels_keeps_its_other_stages(self):
         labels = np.arange(4)
-        told = with_labels(Pipeline.preset("fast"), labels)
-        assert told.reconstruction == Triangulation()
-        np.testing.assert_array_equal(told.matching(None, None).labels, labels)
+        labelled = with_labels(Pipeline.preset("fast"), labels)
+        assert labelled.reconstruction == Triangulation()
+        np.testing.assert_array_equal(labelled.matching(None, None).labels, labels)
         assert isinstance(with_labels(Pipeline.preset("no-matching"), labels).reconstruction, PictorialStructure)
         assert with_labels(Fixed(PEOPLE, PEOPLE), labels) is None
 
-    def test_told_people_stand_so_near_that_they_would_be_duplicates(self):
-        # Two people in one place in every picture: what suppresses duplicates must not overrule the truth.
-        there = moment(RIG, np.concatenate([PEOPLE[:1], PEOPLE[:1] + 0.001]))
-        told = with_labels(FAST, true_labels(*there))
-        assert len(FAST.estimate(RIG, there[0])) == 1
-        assert np.isfinite(told.estimate(RIG, there[0]).joints).all()
-        assert len(told.estimate(RIG, there[0])) == 2
+    def test_people_with_true_labels_are_not_suppressed_as_duplicates(self):
+        # Two people at one place in every picture: the suppression of duplicates must not overrule true labels.
+        frame = moment(RIG, np.concatenate([PEOPLE[:1], PEOPLE[:1] + 0.001]))
+        labelled = with_labels(FAST, true_labels(*frame))
+        assert len(FAST.estimate(RIG, frame[0])) == 1
+        assert np.isfinite(labelled.estimate(RIG, frame[0]).joints).all()
+        assert len(labelled.estimate(RIG, frame[0])) == 2
 
 
 class TestTable:
@@ -281,10 +281,10 @@ class TestTable:
         with pytest.raises(ValueError, match="one frame or more, got 0"):
             failure_scores(table, 0)
 
-    def test_failures_that_were_not_looked_into_have_no_stage(self):
-        there = only(MOMENT[1].person != 1)
-        recording = recorded(RIG, there)
-        table = failure_table(find_failures(recording, [FAST.estimate(RIG, there[0])]))
+    def test_failures_without_blame_have_no_stage(self):
+        frame = only(MOMENT[1].person != 1)
+        recording = recorded(RIG, frame)
+        table = failure_table(find_failures(recording, [FAST.estimate(RIG, frame[0])]))
         assert table.select("person", "stage", "matching_alone").rows() == [(1, None, None)]
         scores = failure_scores(table, 1)
         assert scores["failures_missed"] == 1

@@ -1,4 +1,4 @@
-"""A small recording made by hand: people who walk apart from each other in a ring of cameras, and answers to it."""
+"""Small synthetic recording: people who walk apart from each other in a ring of cameras; and estimates of them."""
 
 from dataclasses import replace
 
@@ -18,11 +18,11 @@ PERSON = np.array([
 # fmt: on
 
 RATE = 25.0
-NOBODY = Estimate(np.zeros((0, 17, 3)), np.zeros((0, 17)), Matching(np.zeros(0, np.int64)))
+NO_PEOPLE = Estimate(np.zeros((0, 17, 3)), np.zeros((0, 17)), Matching(np.zeros(0, np.int64)))
 
 
 def ring(views):
-    """Cameras 8 m from the middle, at a height of 2 m, that look at it."""
+    """Return a rig of cameras 8 m from the centre, at a height of 2 m, that look at the centre."""
     cameras = []
     for angle in 2 * np.pi * np.arange(views) / views:
         center = np.array([8 * np.cos(angle), 8 * np.sin(angle), 2.0])
@@ -37,7 +37,7 @@ def ring(views):
 
 
 def walk(frames, people):
-    """Joints, (T, P, 17, 3): everyone turns and walks on, at least 1.5 m from all others."""
+    """Return joints, (T, P, 17, 3), of people who turn and walk, at least 1.5 m from each other."""
     time = np.arange(frames)[:, None] / RATE
     angle = np.linspace(0, 3, people) + 0.8 * time
     turn = np.zeros((frames, people, 3, 3))
@@ -50,24 +50,24 @@ def walk(frames, people):
 
 
 def record(frames=5, people=2, views=3, *, noise=0.0, phantoms=0, seed=0):
-    """A recording in which everyone is detected in every view, ``noise`` pixels off; phantoms come after them."""
+    """Return a recording with every person detected in every view, with ``noise`` pixels; phantoms come last."""
     rng = np.random.default_rng(seed)
     rig, joints = ring(views), walk(frames, people)
     detections, truth = [], []
-    for here in joints:
-        pixels = rig.project(here)
+    for people_joints in joints:
+        pixels = rig.project(people_joints)
         person = np.concatenate([np.tile(np.arange(people), views), np.full(phantoms, -1)])
         view = np.concatenate([np.repeat(np.arange(views), people), rng.integers(0, views, phantoms)])
         keypoints = np.concatenate([pixels.reshape(-1, 17, 2), rng.uniform(0, 700, (phantoms, 17, 2))])
         keypoints = keypoints + noise * rng.standard_normal(keypoints.shape)
         detections.append(Detections.from_keypoints(view, keypoints, np.full(keypoints.shape[:2], 0.9)))
         visibility, boxes = np.zeros(pixels.shape[:3], np.int8), np.zeros((*pixels.shape[:2], 4))
-        truth.append(Truth(here, pixels, visibility, boxes, person, np.zeros(keypoints.shape[:2], np.int8)))
+        truth.append(Truth(people_joints, pixels, visibility, boxes, person, np.zeros(keypoints.shape[:2], np.int8)))
     return Recording(np.arange(frames) / RATE, rig, tuple(detections), tuple(truth))
 
 
-def answer(recording, *, noise=0.0, seed=0):
-    """Estimates of everyone, ``noise`` metres off along each axis, from their own detections; no phantom is used."""
+def perfect_estimates(recording, *, noise=0.0, seed=0):
+    """Return estimates of all people, with ``noise`` metres along each axis and true labels; phantoms are unmatched."""
     rng = np.random.default_rng(seed)
     return [
         Estimate(
@@ -81,7 +81,7 @@ def answer(recording, *, noise=0.0, seed=0):
 
 
 def with_ghost(estimate, *, score=0.1):
-    """A frame's answer with one more person, far from everyone."""
+    """Return an estimate with one more person, far from all others."""
     joints = np.concatenate([estimate.joints, PERSON[None] + [0, 0, 30.0]])
     scores = np.concatenate([estimate.scores, np.full((1, len(COCO17)), score)])
     return replace(estimate, joints=joints, scores=scores)

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import NOBODY, PERSON, answer, record, with_ghost
+from recordings import NO_PEOPLE, PERSON, perfect_estimates, record, with_ghost
 
 from mvpose import COCO17, Estimate, Matching
 from simharness.scoring.assessment import assess, score_variant
@@ -22,9 +22,9 @@ WRONG = [key for key in ASSESSED if SCORES[key].better == "lower" and not key.st
 
 
 def permuted(recording, estimates, rng):
-    """The same with people, estimates and detections in another order."""
-    people, detections, truth, answers = rng.permutation(recording.people), [], [], []
-    number = np.append(np.argsort(people), -1)  # new index of each person, and of nobody
+    """Return the same recording and estimates with people, estimates and detections in another order."""
+    people, detections, truth, reordered = rng.permutation(recording.people), [], [], []
+    number = np.append(np.argsort(people), -1)  # new index of each person; -1 stays
     for detected, true, estimate in zip(recording.detections, recording.truth, estimates, strict=True):
         order, order_3d = rng.permutation(len(detected)), rng.permutation(len(estimate))
         label = np.append(np.argsort(order_3d), -1)
@@ -34,20 +34,20 @@ def permuted(recording, estimates, rng):
         truth.append(Truth(true.joints[people], *views, number[true.person][order], true.error[order]))
         labels = label[estimate.matching.labels][order]
         joints, scores = estimate.joints[order_3d], estimate.scores[order_3d]
-        answers.append(replace(estimate, joints=joints, scores=scores, matching=Matching(labels)))
-    return Recording(recording.time, recording.rig, tuple(detections), tuple(truth)), answers
+        reordered.append(replace(estimate, joints=joints, scores=scores, matching=Matching(labels)))
+    return Recording(recording.time, recording.rig, tuple(detections), tuple(truth)), reordered
 
 
 def test_the_scores_are_those_of_the_catalogue():
     recording = record()
-    assert list(assess(recording, answer(recording)).scores) == ASSESSED
+    assert list(assess(recording, perfect_estimates(recording)).scores) == ASSESSED
 
 
 @given(st.integers(1, 5), st.integers(1, 3), st.integers(2, 4), st.integers(0, 2), st.integers(0, 99))
 @settings(max_examples=15, deadline=None)
 def test_the_truth_itself_is_perfect(frames, people, views, phantoms, seed):
     recording = record(frames, people, views, phantoms=phantoms, seed=seed)
-    scores = assess(recording, answer(recording, seed=seed)).scores
+    scores = assess(recording, perfect_estimates(recording, seed=seed)).scores
     for key in ASSESSED:
         if key.startswith("phantoms"):
             assert scores[key] == (None if not phantoms else 100.0 if key == "phantoms_pruned" else 0.0), key
@@ -64,7 +64,7 @@ def test_the_truth_itself_is_perfect(frames, people, views, phantoms, seed):
 def test_the_order_of_people_estimates_and_detections_does_not_matter(seed, noise):
     rng = np.random.default_rng(seed)
     recording = record(4, 3, noise=3.0, phantoms=2, seed=seed)
-    estimates = [with_ghost(each, score=0.7) for each in answer(recording, noise=noise, seed=seed)]
+    estimates = [with_ghost(each, score=0.7) for each in perfect_estimates(recording, noise=noise, seed=seed)]
     for index, estimate in enumerate(estimates):
         labels = rng.integers(-1, 4, len(estimate.matching.labels))
         estimates[index] = replace(estimate, matching=Matching(labels))
@@ -78,9 +78,9 @@ def test_the_order_of_people_estimates_and_detections_does_not_matter(seed, nois
 
 @given(st.integers(0, 999), st.floats(0.0, 0.3), st.floats(0.0, 1.0))
 @settings(max_examples=20, deadline=None)
-def test_a_ghost_never_helps_and_pcp_never_sees_it(seed, noise, score):
+def test_a_ghost_never_raises_a_score_and_pcp_ignores_it(seed, noise, score):
     recording = record(3, 2, seed=seed)
-    estimates = answer(recording, noise=noise, seed=seed)
+    estimates = perfect_estimates(recording, noise=noise, seed=seed)
     before = assess(recording, estimates).scores
     estimates[1] = with_ghost(estimates[1], score=score)
     after = assess(recording, estimates).scores
@@ -93,11 +93,11 @@ def test_a_ghost_never_helps_and_pcp_never_sees_it(seed, noise, score):
             assert after[key] == before[key], key
 
 
-def test_a_ghost_less_sure_than_everyone_costs_no_average_precision():
+def test_a_ghost_with_the_lowest_score_costs_no_average_precision():
     recording = record()
-    after = assess(recording, [with_ghost(each, score=0.1) for each in answer(recording)]).scores
+    after = assess(recording, [with_ghost(each, score=0.1) for each in perfect_estimates(recording)]).scores
     assert after["ap25"] == after["map"] == 100.0
-    before = assess(recording, [with_ghost(each, score=1.0) for each in answer(recording)]).scores
+    before = assess(recording, [with_ghost(each, score=1.0) for each in perfect_estimates(recording)]).scores
     assert before["map"] == pytest.approx(100 * 2 / 3)  # five ghosts, then ten people
 
 
@@ -105,7 +105,7 @@ def test_a_ghost_less_sure_than_everyone_costs_no_average_precision():
 @settings(max_examples=20, deadline=None)
 def test_moving_an_estimate_away_never_raises_a_share(seed, noise, frame, person):
     recording = record(4, 3, seed=seed)
-    estimates = answer(recording, noise=noise, seed=seed)
+    estimates = perfect_estimates(recording, noise=noise, seed=seed)
     before = assess(recording, estimates).scores
     joints = estimates[frame].joints.copy()
     joints[person] += [0.0, 0.0, 20.0]
@@ -116,9 +116,9 @@ def test_moving_an_estimate_away_never_raises_a_share(seed, noise, frame, person
     assert after["recall"] < before["recall"] or before["recall"] < 100.0
 
 
-def test_a_shift_is_every_error_and_no_jitter():
+def test_a_shift_is_the_error_of_all_joints_and_no_jitter():
     recording = record(6, 3)
-    shifted = [replace(each, joints=each.joints + [0.0, 0.06, 0.08]) for each in answer(recording)]
+    shifted = [replace(each, joints=each.joints + [0.0, 0.06, 0.08]) for each in perfect_estimates(recording)]
     assessed = assess(recording, shifted)
     scores = assessed.scores
     for key in ("mpjpe_mm", "mpjpe_median_mm", *(f"mpjpe_{joint}_mm" for joint in COCO17.joints)):
@@ -133,23 +133,27 @@ def test_a_shift_is_every_error_and_no_jitter():
     np.testing.assert_allclose(pck(assessed.errors, [0.0999, 0.1001]), [0.0, 100.0])
 
 
-def test_joints_are_told_apart():
+def test_joints_are_scored_separately():
     recording = record()
     moved = np.zeros((17, 3))
     moved[COCO17.index("left_wrist"), 2] = 0.2
-    scores = assess(recording, [replace(each, joints=each.joints + moved) for each in answer(recording)]).scores
+    scores = assess(
+        recording, [replace(each, joints=each.joints + moved) for each in perfect_estimates(recording)]
+    ).scores
     assert scores["mpjpe_left_wrist_mm"] == pytest.approx(200.0)
     assert scores["mpjpe_right_wrist_mm"] == scores["mpjpe_left_elbow_mm"] == 0.0
     assert scores["pck150"] == pytest.approx(100 * 16 / 17)
-    # Half of the lower arm is 125 mm, and its ends are 100 mm off on average; but a wrist 300 mm off is too far.
+    # The limit of the lower arm is 125 mm: a wrist 200 mm off makes a mean error of 100 mm, one 300 mm off 150 mm.
     assert scores["pcp_lower_arms"] == 100.0
-    scores = assess(recording, [replace(each, joints=each.joints + 1.5 * moved) for each in answer(recording)]).scores
+    scores = assess(
+        recording, [replace(each, joints=each.joints + 1.5 * moved) for each in perfect_estimates(recording)]
+    ).scores
     assert (scores["pcp_lower_arms"], scores["pcp_upper_arms"]) == (50.0, 100.0)
 
 
-def test_who_is_missed_has_wrong_joints_and_no_error():
+def test_a_missed_person_has_wrong_joints_and_no_error():
     recording = record(4, 2)
-    estimates = [replace(each, joints=each.joints[:1], scores=each.scores[:1]) for each in answer(recording)]
+    estimates = [replace(each, joints=each.joints[:1], scores=each.scores[:1]) for each in perfect_estimates(recording)]
     assessed = assess(recording, estimates)
     assert assessed.scores["recall"] == assessed.scores["pck150"] == assessed.scores["ap150"] == 50.0
     assert (assessed.scores["mpjpe_mm"], assessed.scores["missed"]) == (0.0, 1.0)
@@ -160,31 +164,31 @@ def test_who_is_missed_has_wrong_joints_and_no_error():
     assert assessed.people.filter(pl.col("person") == 0)["error_mm"].to_list() == [0.0] * 4
 
 
-def test_nothing_estimated_and_nobody_there():
-    empty = [NOBODY] * 5
+def test_frames_without_estimates_and_without_people():
+    empty = [NO_PEOPLE] * 5
     unmatched = [replace(each, matching=Matching(np.full(6, -1))) for each in empty]
     nothing = assess(record(), unmatched).scores
     assert (nothing["recall"], nothing["precision"], nothing["map"], nothing["pck_auc"]) == (0.0, None, 0.0, 0.0)
     assert nothing["mpjpe_mm"] is nothing["jitter_mm"] is nothing["reprojection_px"] is nothing["time_ms"] is None
-    deserted = record(people=0)
-    nobody = assess(deserted, empty)
-    known = {key: value for key, value in nobody.scores.items() if value is not None}
+    empty_room = record(people=0)
+    no_people = assess(empty_room, empty)
+    known = {key: value for key, value in no_people.scores.items() if value is not None}
     assert known == dict.fromkeys(["ghosts", "missed", "violations", "merged", "split"], 0.0)
-    assert nobody.people.is_empty()
-    assert nobody.people.schema == assess(record(), answer(record())).people.schema
-    assert nobody.frames.schema == assess(record(), answer(record())).frames.schema
-    ghosts = assess(deserted, [replace(each, matching=NOBODY.matching) for each in map(with_ghost, empty)]).scores
+    assert no_people.people.is_empty()
+    assert no_people.people.schema == assess(record(), perfect_estimates(record())).people.schema
+    assert no_people.frames.schema == assess(record(), perfect_estimates(record())).frames.schema
+    ghosts = assess(empty_room, [replace(each, matching=NO_PEOPLE.matching) for each in map(with_ghost, empty)]).scores
     assert (ghosts["precision"], ghosts["map"], ghosts["ghosts"]) == (0.0, None, 1.0)
 
 
-def test_the_worst_joint_and_the_views_of_a_person():
+def test_the_worst_joint_and_the_visible_views_of_a_person():
     recording = record(1, 2, 3)
     visibility = recording.truth[0].visibility.copy()
     visibility[0, 0, :9] = Visibility.OCCLUDED_BY_CLUTTER  # more than half of person 0 in view 0
     visibility[1, 0, :8] = Visibility.OUTSIDE  # less than half
     visibility[2, 0] = Visibility.SELF_OCCLUDED
     recording = replace(recording, truth=(replace(recording.truth[0], visibility=visibility),))
-    (estimate,) = answer(recording)
+    (estimate,) = perfect_estimates(recording)
     joints = estimate.joints.copy()
     joints[0, 9] += [0.0, 0.3, 0.0]
     joints[0, 3] = np.nan
@@ -195,10 +199,10 @@ def test_the_worst_joint_and_the_views_of_a_person():
     assert people["visible_views"].to_list() == [2, 3]
 
 
-def test_matching_is_counted_a_frame():
+def test_matching_errors_are_counted_per_frame():
     recording = record(2, 2, 3, phantoms=2)
-    right, wrong = answer(recording)
-    labels = np.array([0, 1, 0, 1, 1, 1, 0, -1])  # person 0 of view 2 and a phantom are taken for somebody else
+    right, wrong = perfect_estimates(recording)
+    labels = np.array([0, 1, 0, 1, 1, 1, 0, -1])  # person 0 in view 2 and a phantom have the label of person 1 or 0
     scores = assess(recording, [right, replace(wrong, matching=Matching(labels))])
     assert (scores.scores["merged"], scores.scores["split"], scores.scores["violations"]) == (0.5, 0.5, 1.0)
     assert (scores.scores["phantoms_admitted"], scores.scores["phantoms_pruned"]) == (25.0, 75.0)
@@ -207,35 +211,35 @@ def test_matching_is_counted_a_frame():
     assert scores.frames["admitted"].to_list() == [0, 1]
 
 
-@pytest.mark.parametrize("silent", [(0, 1, 2), (1,)])
-def test_a_method_that_does_not_say_who_is_who_has_no_scores_of_matching(silent):
+@pytest.mark.parametrize("unlabelled", [(0, 1, 2), (1,)])
+def test_a_method_without_labels_has_no_matching_scores(unlabelled):
     recording = record(3, phantoms=1, noise=2.0)
-    told = answer(recording, noise=0.05)
-    untold = [replace(each, matching=Matching([])) if k in silent else each for k, each in enumerate(told)]
-    mute, loud = assess(recording, untold), assess(recording, told)
-    unknown = {key for key in ASSESSED if loud.scores[key] is not None and mute.scores[key] is None}
-    of_matching = {"violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"}
-    assert unknown == of_matching | {f"match_{key}" for key in ("precision", "recall", "f1")}
-    assert all(mute.scores[key] == loud.scores[key] for key in ASSESSED if key not in unknown)
-    assert mute.frames.schema == loud.frames.schema
-    empty = {key for key in mute.frames.columns if mute.frames[key].is_null().all()}
-    full = {"pairs_correct", "pairs_wrong", "pairs_lost", "violations", "merged", "split", "phantoms", "admitted"}
-    assert empty - {key for key in empty if key.startswith("time_")} == full
+    labelled = perfect_estimates(recording, noise=0.05)
+    partly = [replace(each, matching=Matching([])) if k in unlabelled else each for k, each in enumerate(labelled)]
+    without, full = assess(recording, partly), assess(recording, labelled)
+    unknown = {key for key in ASSESSED if full.scores[key] is not None and without.scores[key] is None}
+    matching_scores = {"violations", "merged", "split", "phantoms_admitted", "phantoms_pruned"}
+    assert unknown == matching_scores | {f"match_{key}" for key in ("precision", "recall", "f1")}
+    assert all(without.scores[key] == full.scores[key] for key in ASSESSED if key not in unknown)
+    assert without.frames.schema == full.frames.schema
+    empty = {key for key in without.frames.columns if without.frames[key].is_null().all()}
+    columns = {"pairs_correct", "pairs_wrong", "pairs_lost", "violations", "merged", "split", "phantoms", "admitted"}
+    assert empty - {key for key in empty if key.startswith("time_")} == columns
 
 
-def test_two_people_made_one_are_merged_and_not_split():
+def test_two_people_with_one_label_are_merged_and_not_split():
     recording = record(2)
-    right, wrong = answer(recording)
-    labels = np.array([0, 0, 0, -1, 0, -1])  # everyone of view 0, and person 0 of the others
+    right, wrong = perfect_estimates(recording)
+    labels = np.array([0, 0, 0, -1, 0, -1])  # both people in view 0, and person 0 in the others
     assessed = assess(recording, [right, replace(wrong, matching=Matching(labels))])
     assert (assessed.scores["merged"], assessed.scores["split"], assessed.scores["violations"]) == (0.5, 0.0, 0.5)
     assert assessed.frames.select("merged", "split", "violations").rows() == [(0, 0, 0), (1, 0, 1)]
 
 
-def test_bones_too_long_do_not_make_up_for_bones_too_short():
+def test_too_long_and_too_short_bones_do_not_cancel():
     recording = record(3)
     scaled = []
-    for estimate in answer(recording):
+    for estimate in perfect_estimates(recording):
         middle = estimate.joints.mean(axis=1, keepdims=True)
         scale = np.array([0.9, 1.1])[:, None, None]
         scaled.append(replace(estimate, joints=middle + scale * (estimate.joints - middle)))
@@ -243,11 +247,11 @@ def test_bones_too_long_do_not_make_up_for_bones_too_short():
     assert assess(recording, scaled).scores["bone_mm"] == pytest.approx(100.0 * np.mean(lengths))
 
 
-def test_times_are_those_of_the_frames():
+def test_times_are_statistics_of_the_frames():
     recording = record(5)
     timed = [
         replace(each, timings={"affinity": k, "matching": 2 * k, "reconstruction": 3 * k, "total": 6 * k})
-        for each, k in zip(answer(recording), [0.001, 0.002, 0.003, 0.004, 0.1], strict=True)
+        for each, k in zip(perfect_estimates(recording), [0.001, 0.002, 0.003, 0.004, 0.1], strict=True)
     ]
     assessed = assess(recording, timed)
     times = [assessed.scores[f"time_{stage}ms"] for stage in ("affinity_", "matching_", "reconstruction_", "")]
@@ -258,7 +262,7 @@ def test_times_are_those_of_the_frames():
 
 def test_tables_and_scores_agree():
     recording = record(6, 3, noise=2.0, phantoms=1)
-    estimates = [with_ghost(each) if k % 2 else each for k, each in enumerate(answer(recording, noise=0.1))]
+    estimates = [with_ghost(each) if k % 2 else each for k, each in enumerate(perfect_estimates(recording, noise=0.1))]
     assessed = assess(recording, estimates)
     frames, people, scores = assessed.frames, assessed.people, assessed.scores
     assert frames["frame"].to_list() == list(range(6))
@@ -273,20 +277,20 @@ def test_tables_and_scores_agree():
     json.dumps([scores, frames.to_dicts(), people.to_dicts()], allow_nan=False)
 
 
-def test_the_answers_must_fit_the_recording():
+def test_estimates_must_fit_the_recording():
     recording = record(3)
     with pytest.raises(ValueError, match="3 frames needs as many estimates, got 2"):
-        assess(recording, answer(recording)[:2])
+        assess(recording, perfect_estimates(recording)[:2])
     short = Estimate(np.zeros((0, 17, 3)), np.zeros((0, 17)), Matching([0, 0]))
     with pytest.raises(ValueError, match=r"labels must be \(6\), got \(2\)|labels must be \(6,\), got \(2,\)"):
         assess(recording, [short] * 3)
 
 
-def test_a_recording_must_hold_together():
+def test_the_fields_of_a_recording_must_agree():
     recording = record(3)
     with pytest.raises(ValueError, match="3 of time, 2 of detections, 3 of truth"):
         replace(recording, detections=recording.detections[:2])
-    with pytest.raises(ValueError, match="one or more frames"):
+    with pytest.raises(ValueError, match="at least one frame"):
         Recording([], recording.rig, (), ())
     with pytest.raises(ValueError, match=r"frame 1 has \(3, 17\)"):
         replace(recording, truth=(recording.truth[0], *record(2, 3).truth))

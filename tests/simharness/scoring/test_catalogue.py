@@ -2,7 +2,7 @@ from simharness.failures.classification import FailureKind
 from simharness.scoring.catalogue import AP_MM, HEADLINE, PCK_MM, SCORES
 
 
-def test_every_score_says_what_it_is():
+def test_every_score_is_described():
     for key, info in SCORES.items():
         assert info.key == key
         assert info.title
@@ -13,14 +13,14 @@ def test_every_score_says_what_it_is():
     assert len(set(titles)) == len(titles)
 
 
-def test_names_tell_the_unit():
+def test_keys_end_in_the_unit():
     for key, info in SCORES.items():
         assert key.endswith("_mm") == (info.unit == "mm"), key
         assert key.endswith("_ms") == (info.unit == "ms"), key
         assert key.endswith("_px") == (info.unit == "px"), key
 
 
-def test_only_shares_of_what_is_right_should_be_high():
+def test_higher_is_better_for_percentages_alone():
     low_shares = {"phantoms_admitted", "blame_detection", "blame_matching", "blame_reconstruction", "blame_method"}
     for key, info in SCORES.items():
         assert (info.better == "higher") == (info.unit == "%" and key not in low_shares), key
@@ -30,11 +30,11 @@ def test_the_headline_is_among_the_scores():
     assert set(HEADLINE) < set(SCORES)
 
 
-def test_failures_are_those_that_there_are():
+def test_every_class_of_failures_has_a_score():
     kinds = [key.removeprefix("failures_") for key in SCORES if key.startswith("failures_")]
     assert kinds == [kind.value for kind in FailureKind]
 
 
-def test_limits_have_a_score_each():
+def test_every_limit_has_a_score():
     assert [key for key in SCORES if key.startswith("ap")] == [f"ap{limit}" for limit in AP_MM]
     assert {f"pck{limit}" for limit in PCK_MM} < set(SCORES)

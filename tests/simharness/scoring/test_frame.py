@@ -20,14 +20,14 @@ PERSON = np.array([
 PEOPLE = np.stack([PERSON, PERSON + np.array([1.0, 0, 0])])
 
 
-def test_a_shift_is_the_error_and_loses_the_short_parts():
+def test_a_shift_is_the_error_and_makes_short_parts_wrong():
     score = score_frame(PEOPLE, PEOPLE + np.array([0, 0, 0.13]), matching=PairCounts(3, 1, 2))
     row = score.row()
     assert row["errors_mm"] == pytest.approx([130, 130])
     assert row["mpjpe_mm"] == pytest.approx(130)
     assert (row["people"], row["estimates"], row["found"], row["missed"], row["ghosts"]) == (2, 2, 2, 0, 0)
     assert (row["pairs_correct"], row["pairs_wrong"], row["pairs_lost"]) == (3, 1, 2)
-    # Lower arms are 0.25 m: half of that is less than 0.13. The upper arms (0.304 m) and legs bear it.
+    # Lower arms are 0.25 m: half of that is less than 0.13. Upper arms (0.304 m) and legs stay correct.
     parts = np.array(row["parts"]).reshape(2, 10)
     assert (parts[:, list(GROUPS["lower_arms"])] == Part.WRONG).all()
     for group in ("upper_arms", "upper_legs", "lower_legs", "torso"):
@@ -35,7 +35,7 @@ def test_a_shift_is_the_error_and_loses_the_short_parts():
     assert row["pcp"] == 100.0 * (parts == Part.CORRECT).mean()
 
 
-def test_pcp_knows_no_ghosts_and_the_pairs_do():
+def test_pcp_ignores_ghosts_and_pairs_count_them():
     score = score_frame(PEOPLE, np.concatenate([PEOPLE[:1], PEOPLE[:1] + 0.01, PEOPLE[:1] + 5.0]))
     row = score.row()
     assert (row["found"], row["missed"], row["ghosts"]) == (1, 1, 2)
@@ -52,7 +52,7 @@ def test_coco_estimates_are_mapped_onto_a_shelf_truth(head):
     assert (other.pairing.error > 0.001).all()  # the head is one of the 14 joints: the mapping matters
 
 
-def test_a_missing_ear_costs_the_head_but_no_distance():
+def test_a_missing_ear_makes_the_head_wrong_and_adds_no_error():
     estimate = PEOPLE.copy()
     estimate[:, 3] = np.nan
     score = score_frame(PEOPLE, estimate)
@@ -61,7 +61,7 @@ def test_a_missing_ear_costs_the_head_but_no_distance():
     np.testing.assert_array_equal(score.pairing.error, 0)
 
 
-def test_rows_are_free_of_nan_and_make_a_table():
+def test_rows_have_no_nan_and_make_a_table():
     truth = coco17_to_shelf14(PEOPLE)
     truth[1] = np.nan
     rows = [
@@ -77,6 +77,6 @@ def test_rows_are_free_of_nan_and_make_a_table():
     assert table["pairs_lost"].to_list() == [None, None, 3]
 
 
-def test_a_strange_skeleton_is_refused():
+def test_an_unknown_skeleton_is_refused():
     with pytest.raises(ValueError, match="17 joints of COCO17 or the 14 of SHELF14, got 15"):
         score_frame(np.zeros((1, 15, 3)), np.zeros((1, 15, 3)))

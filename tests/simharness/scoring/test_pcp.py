@@ -20,7 +20,7 @@ LENGTHS = dict(zip(PARTS, (0.5, 0.5, 0.5, 0.5, 0.25, 0.375, 0.375, 0.25, 0.25, 0
 
 
 def wrong_parts(truth, estimate):
-    """Names of the parts of a single true person that are wrong; fails if one is undefined."""
+    """Return the names of the wrong parts of a single true person; fail if a part is undefined."""
     parts = score_parts(truth[None], np.asarray(estimate).reshape(-1, 14, 3))[0]
     assert (parts != Part.UNDEFINED).all()
     return {name for name, part in zip(PARTS, parts, strict=True) if part == Part.WRONG}
@@ -32,7 +32,7 @@ def moved(joint, by):
     return estimate
 
 
-def test_a_perfect_estimate_has_every_part():
+def test_a_perfect_estimate_has_all_parts_correct():
     assert wrong_parts(PERSON, PERSON) == set()
     assert percent(score_parts(PERSON[None], PERSON[None])) == 100.0
 
@@ -88,12 +88,12 @@ def test_a_missing_joint_does_not_count_in_the_distance():
     assert nearest(PERSON[None], nothing[None]).tolist() == [-1]
 
 
-def test_ghosts_cost_nothing():
+def test_pcp_ignores_ghosts():
     ghosts = [PERSON + np.array([1, 0, 0]), PERSON - np.array([0, 2, 0])]
     assert wrong_parts(PERSON, [*ghosts, PERSON]) == set()
 
 
-def test_one_estimate_serves_two_people():
+def test_one_estimate_is_used_for_two_people():
     truth = np.stack([PERSON, PERSON + np.array([0.0625, 0, 0])])
     assert (score_parts(truth, PERSON[None]) == Part.CORRECT).all()
 

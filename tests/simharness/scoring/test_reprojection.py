@@ -10,7 +10,7 @@ from simharness.types.recording import Recording
 from simharness.types.views import Visibility
 
 
-def test_the_truth_is_at_its_pixels_and_the_noise_of_detections_is_found():
+def test_the_truth_has_no_error_and_detections_have_their_noise():
     recording = record(frames=40, noise=3.0, phantoms=2)
     estimate, detection = reprojection_errors(recording, walk(40, 2))
     assert len(estimate) == 40 * 2 * 3 * 17
@@ -18,7 +18,7 @@ def test_the_truth_is_at_its_pixels_and_the_noise_of_detections_is_found():
     assert np.median(detection) == pytest.approx(3.0 * np.sqrt(2 * np.log(2)), rel=0.03)  # Rayleigh
 
 
-def test_a_believed_rig_that_is_off_shows_in_the_estimates_alone():
+def test_a_wrong_believed_rig_changes_the_error_of_estimates_only():
     recording = record()
     shifted = [
         Camera(K=camera.K + [[0, 0, 4.0], [0, 0, 3.0], [0, 0, 0]], R=camera.R, t=camera.t, size=camera.size)
@@ -30,14 +30,14 @@ def test_a_believed_rig_that_is_off_shows_in_the_estimates_alone():
     np.testing.assert_allclose(detection, 0, atol=1e-9)
 
 
-def test_both_are_over_the_same_visible_detected_joints_of_people_found():
+def test_both_errors_are_over_the_visible_detected_joints_of_people_found():
     recording, placed = record(people=3), walk(5, 3)
     hidden = recording.truth[0].visibility.copy()
     hidden[1, 0, :4] = Visibility.SELF_OCCLUDED  # frame 0, view 1, person 0: four joints
     missing = recording.detections[1].scores.copy()
     missing[0, :5] = 0.0  # frame 1, the detection of person 0 in view 0: five keypoints
     missed = recording.truth[2].person.copy()
-    missed[missed == 1] = -1  # frame 2: nobody detected person 1, in three views
+    missed[missed == 1] = -1  # frame 2: person 1 is not detected, in three views
     recording = Recording(
         recording.time,
         recording.rig,
@@ -50,7 +50,7 @@ def test_both_are_over_the_same_visible_detected_joints_of_people_found():
         ),
     )
     placed[3, 2] = np.nan  # frame 3: person 2 was missed, in three views
-    placed[4, 1, 7] = np.nan  # frame 4: an elbow was not placed, in three views
+    placed[4, 1, 7] = np.nan  # frame 4: an elbow is missing, in three views
     placed[4, 0] += 0.1  # and person 0 is off
     estimate, detection = reprojection_errors(recording, placed)
     assert len(estimate) == len(detection) == 5 * 3 * 3 * 17 - 4 - 5 - 3 * 17 - 3 * 17 - 3
@@ -64,11 +64,11 @@ def test_a_second_detection_in_a_view_is_compared_too():
     twice = replace(recording.detections[0], view=[0, 0, 1])
     estimate, detection = reprojection_errors(Recording(recording.time, recording.rig, (twice,), (truth,)), walk(1, 1))
     assert len(estimate) == len(detection) == 3 * 17
-    assert (detection[17:34] > 1.0).all()  # what view 1 saw is not where view 0 has it
+    assert (detection[17:34] > 1.0).all()  # the pixels of view 1 are wrong in view 0
     np.testing.assert_allclose(estimate, 0, atol=1e-9)
 
 
-def test_nobody_detected():
+def test_no_detections():
     recording = record(people=0)
     estimate, detection = reprojection_errors(recording, walk(5, 0))
     assert len(estimate) == len(detection) == 0

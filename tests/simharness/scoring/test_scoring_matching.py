@@ -21,7 +21,7 @@ def test_one_view_of_three_matched_to_the_wrong_person():
     assert counts.precision == counts.recall == counts.f1 == pytest.approx(1 / 3)
 
 
-def test_phantoms_and_unmatched_detections_are_no_person():
+def test_phantoms_and_unmatched_detections_are_in_no_correct_pair():
     assert count_pairs([0, 1], [-1, -1], [-1, -1]) == PairCounts(0, 0, 0)
     assert count_pairs([0, 1], [0, 0], [-1, -1]) == PairCounts(0, 1, 0)
     assert count_pairs([0, 1], [-1, -1], [4, 4]) == PairCounts(0, 0, 1)
@@ -40,17 +40,17 @@ def test_shares_that_do_not_apply_are_none():
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(-1, 2), st.integers(-1, 2)), max_size=12), st.randoms())
 def test_agrees_with_counting_by_hand_in_any_order(detections, random):
-    correct, wrong, seen, joined = 0, 0, set(), set()
+    correct, wrong, detected, joined = 0, 0, set(), set()
     for (view, label, person), (other_view, other_label, other_person) in combinations(detections, 2):
-        said, true = label == other_label != -1, person == other_person != -1
+        matched, true = label == other_label != -1, person == other_person != -1
         if view != other_view:
-            correct, wrong = correct + (said and true), wrong + (said and not true)
+            correct, wrong = correct + (matched and true), wrong + (matched and not true)
             place = (person, frozenset([view, other_view]))
-            seen |= {place} if true else set()
-            joined |= {place} if said and true else set()
+            detected |= {place} if true else set()
+            joined |= {place} if matched and true else set()
     random.shuffle(detections)
     counts = count_pairs(*np.array(detections, int).reshape(-1, 3).T)
-    assert counts == PairCounts(correct, wrong, len(seen - joined))
+    assert counts == PairCounts(correct, wrong, len(detected - joined))
 
 
 def test_one_of_two_detections_of_a_person_in_a_view_is_enough():
@@ -73,14 +73,14 @@ def test_a_group_of_two_people_is_merged_and_one_with_a_phantom_is_not():
     assert count_groups([0, 1, 2], [0, 0, 0], [4, 4, -1]) == GroupCounts(0, 0, 1, 1)
 
 
-def test_a_person_in_two_groups_is_split_and_one_half_matched_is_not():
+def test_a_person_in_two_groups_is_split_and_a_half_matched_one_is_not():
     assert count_groups([0, 1, 2, 3], [0, 0, 1, 1], [4, 4, 4, 4]).split == 1
     assert count_groups([0, 1, 2, 3], [0, 0, -1, -1], [4, 4, 4, 4]).split == 0
 
 
 def test_a_second_detection_in_a_view_makes_no_split():
     assert count_groups([0, 1, 2, 2], [0, 0, 0, 1], [4, 4, 4, 4]).split == 0
-    assert count_groups([0, 1, 2, 2, 3], [0, 0, 0, 1, 1], [4, 4, 4, 4, 4]).split == 1  # view 3 is with the other one
+    assert count_groups([0, 1, 2, 2, 3], [0, 0, 0, 1, 1], [4, 4, 4, 4, 4]).split == 1  # view 3 is in the other group
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(-1, 2), st.integers(-1, 2)), max_size=12), st.randoms())
@@ -88,8 +88,8 @@ def test_groups_agree_with_counting_by_hand_in_any_order(detections, random):
     groups = {label: [each for each in detections if each[1] == label] for label in range(3)}
     merged = sum(len({person for _, _, person in group if person >= 0}) >= 2 for group in groups.values())
     split = 0
-    for someone in range(3):
-        views = [{view for view, _, person in group if person == someone} for group in groups.values()]
+    for subject in range(3):
+        views = [{view for view, _, person in group if person == subject} for group in groups.values()]
         split += set.union(*views) not in views
     phantoms = [label for _, label, person in detections if person < 0]
     doubled = sum(len(group) - len({view for view, _, _ in group}) for group in groups.values())

@@ -24,7 +24,7 @@ KEYS = {
 
 
 def frame(parts, errors, *, estimates, matching=None):
-    """A frame whose people are all there; a NaN error is a missed person."""
+    """Return a frame with all people present; a NaN error is a missed person."""
     errors = np.array(errors, float)
     found = np.isfinite(errors)
     pairing = Pairing(np.where(found, np.cumsum(found) - 1, -1), errors, np.ones(len(errors), bool), estimates)
@@ -35,7 +35,7 @@ RIGHT, WRONG, ABSENT = [1] * 10, [0] * 10, [-1] * 10
 HEAD_WRONG = [1] * 8 + [0, 1]
 
 
-def test_every_person_counts_the_same_however_often_seen():
+def test_all_people_have_equal_weight_in_however_many_frames():
     frames = (
         frame([RIGHT, ABSENT], [0.01, np.nan], estimates=1),
         frame([RIGHT, ABSENT], [0.01, np.nan], estimates=1),
@@ -77,7 +77,7 @@ def test_timings_are_in_milliseconds_by_stage():
     assert timed["matching"] == {"median": None, "p99": None}
 
 
-def test_what_does_not_apply_is_null_and_never_nan():
+def test_scores_that_do_not_apply_are_null_and_never_nan():
     nobody = frame([], [], estimates=0)
     for variant in (VariantScores(()), VariantScores((nobody,))):
         summary = summarize("empty", {"full": variant}, frames=len(variant.frames), seeds=1)
@@ -90,13 +90,13 @@ def test_what_does_not_apply_is_null_and_never_nan():
     assert VariantScores((nobody,)).summary()["ghosts_per_frame"] == 0.0
 
 
-def test_the_whole_has_the_shared_shape_and_room_beside_it():
+def test_summaries_have_the_shared_keys_and_further_ones():
     summary = summarize("x", {"a": VariantScores(())}, frames=3, seeds=2, head="2019")
     assert set(summary) == {"name", "frames", "seeds", "code", "variants", "head"}
     assert (summary["name"], summary["frames"], summary["seeds"], summary["head"]) == ("x", 3, 2, "2019")
     assert summary["code"]
 
 
-def test_frames_must_count_the_same_people():
+def test_frames_must_have_the_same_people():
     with pytest.raises(ValueError, match="frames of 1 and of 2"):
         VariantScores((frame([RIGHT], [0.1], estimates=1), frame([RIGHT, RIGHT], [0.1, 0.1], estimates=1)))

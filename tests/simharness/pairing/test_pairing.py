@@ -26,7 +26,7 @@ def test_an_estimate_serves_one_person_only():
     assert pairing.missed == 1
 
 
-def test_as_many_pairs_as_possible_even_where_greed_would_take_fewer():
+def test_the_number_of_pairs_is_the_largest_even_where_greedy_pairing_finds_fewer():
     # The best single pair is (1, 0) at 0.1; taking it leaves person 0 with an estimate 0.8 away.
     assert pair(points(0, 0.5), points(0.4, 0.8)).estimate.tolist() == [0, 1]
 
@@ -36,7 +36,7 @@ def test_the_limit_is_half_a_metre():
     assert pair(points(0), points(0.501)).found == 0
 
 
-def test_an_undefined_person_is_not_there():
+def test_an_undefined_person_is_absent():
     truth = np.stack([np.full((2, 3), np.nan), np.zeros((2, 3)), np.zeros((2, 3))])
     truth[2] += 3
     pairing = pair(truth, truth[[1]])
@@ -44,7 +44,7 @@ def test_an_undefined_person_is_not_there():
     assert (pairing.people, pairing.found, pairing.missed, pairing.ghosts) == (2, 1, 1, 0)
 
 
-def test_a_person_with_one_defined_joint_is_there():
+def test_a_person_with_one_defined_joint_is_present():
     truth = np.full((1, 2, 3), np.nan)
     truth[0, 1] = 0.0
     assert pair(truth, np.zeros((0, 2, 3))).missed == 1
@@ -58,7 +58,7 @@ def test_the_error_is_over_the_joints_that_both_have():
     assert pair(truth, estimate).error.tolist() == [0.3]
 
 
-def test_nobody_and_nothing():
+def test_frames_without_people_or_estimates():
     assert pair(points(), points()).ghosts == 0
     assert pair(points(), points(1, 2)).ghosts == 2
     assert pair(points(1, 2), points()).missed == 2
@@ -67,7 +67,7 @@ def test_nobody_and_nothing():
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 4))
-def test_agrees_with_trying_every_assignment(seed, people, estimates):
+def test_agrees_with_exhaustive_search(seed, people, estimates):
     rng = np.random.default_rng(seed)
     truth, estimate = rng.uniform(0, 1, (people, 2, 3)), rng.uniform(0, 1, (estimates, 2, 3))
     distance = np.linalg.norm(truth[:, None] - estimate[None], axis=-1).mean(axis=-1)
