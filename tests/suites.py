@@ -1,6 +1,6 @@
-"""A small suite for tests of the gate, whose scenes are made once in a session.
+"""Small suite for tests of the gate; its scenes are simulated once in a session.
 
-It allows for more slowness than a study does by default: what else the machine does while tests run is no regression.
+Its allowed slow-down is larger than the default, because other processes may use the machine while tests run.
 """
 
 from __future__ import annotations

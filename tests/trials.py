@@ -1,4 +1,4 @@
-"""Trials of tests: simulated as far as a test needs."""
+"""Trials for tests, run up to the stage that a test needs."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def _table(check: GateResult, variant: str) -> Table:
 
     table = Table(title=variant, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
     table.add_column("score", no_wrap=True)
-    for column in ("now", "baseline", "difference (95 %)", "allowed"):
+    for column in ("now", "baseline", "difference\n(95 % interval)", "allowed"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("")
     for change in check.comparison.changes_of(variant):
@@ -166,7 +166,7 @@ def _table(check: GateResult, variant: str) -> Table:
             title(change.score),
             number(change.score, change.after),
             number(change.score, change.before),
-            difference(change),
+            difference(change).replace(" (", "\n("),  # in one line the table is wider than 80 columns
             allowed(change, check.gate),
             _VERDICTS[change.verdict],
         )

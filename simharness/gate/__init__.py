@@ -1,1 +1,1 @@
-"""The gate before a merge: a suite of scenarios beside its committed baseline."""
+"""Regression gate: comparison of a suite with its committed baseline."""

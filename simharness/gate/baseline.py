@@ -1,4 +1,4 @@
-"""What a suite scored, and the file that a team commits of it: a line for each trial and variant, in order."""
+"""Scores of a suite, and its baseline file: a line for each trial and variant, sorted for readable diffs."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from simharness.runtime.atomic_files import write_atomic
 from simharness.scoring.catalogue import HEADLINE
 
 TIME = "time_ratio"
-"""Beside the headline scores: time of a frame by that of the reference kernel."""
+"""Score beside the headline scores: time of a frame divided by the time of the reference kernel."""
 
 KEPT = (*HEADLINE, TIME)
 
-_DIGITS = 4  # after the point: finer than any tolerance, short enough to read in a diff
-_WHAT = ("suite", "fingerprint", "code")
+_DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff
+_HEAD = ("suite", "fingerprint", "code")
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a suite scored.
+    """Scores of a suite.
 
     Attributes:
-        suite: its name.
-        fingerprint: of its settings, seeds and variants.
-        code: the version of the code that was measured.
-        scores: of each trial; all of ``KEPT``, rounded, None where a score does not apply.
+        suite: name of the suite.
+        fingerprint: digest of its settings, seeds and variants, :func:`simharness.gate.suite.fingerprint`.
+        code: version of the code that was measured.
+        scores: scores of each trial: all of ``KEPT``, rounded to four decimals, None where a score does not apply.
     """
 
     suite: str
@@ -47,32 +47,37 @@ class Measurement:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Names of its cases, in order."""
+        """Names of the cases, in order."""
         return tuple(dict.fromkeys(trial.case for trial in self.scores))
 
     @property
     def variants(self) -> tuple[str, ...]:
-        """Names of its variants, in order."""
+        """Names of the variants, sorted."""
         return tuple(sorted({trial.variant for trial in self.scores}))
 
 
 def write_baseline(measurement: Measurement, path: Path) -> None:
-    """Write a baseline, by rename: a file that is there is whole.
+    """Write a baseline. The file appears only when it is complete.
 
     Raises:
-        ValueError: it cannot be written there.
+        ValueError: the file cannot be written.
     """
-    head = [f"  {json.dumps(key)}: {json.dumps(getattr(measurement, key))}," for key in _WHAT]
+    head = [f"  {json.dumps(key)}: {json.dumps(getattr(measurement, key))}," for key in _HEAD]
     rows = [f"    {json.dumps(trial._asdict() | dict(scores))}" for trial, scores in measurement.scores.items()]
     text = "\n".join(["{", *head, '  "trials": [', ",\n".join(rows), "  ]", "}"])
     write_text(text + "\n", path, option="--baseline")
 
 
 def write_text(text: str, path: Path, *, option: str) -> None:
-    """Write a text file by rename, its folder too; ``option`` is who named it.
+    """Write a text file, and its folder where it is missing. The file appears only when it is complete.
+
+    Args:
+        text: the text.
+        path: the file.
+        option: command line option that names the file, for the message.
 
     Raises:
-        ValueError: it cannot be written there.
+        ValueError: the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -82,10 +87,10 @@ def write_text(text: str, path: Path, *, option: str) -> None:
 
 
 def check_place(path: Path, *, option: str) -> None:
-    """Refuse, before the work, a place where :func:`write_text` could not write; makes its folder.
+    """Check before a run that :func:`write_text` can write a file; create its folder.
 
     Raises:
-        ValueError: as :func:`write_text`.
+        ValueError: the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -99,7 +104,7 @@ def read_baseline(path: Path) -> Measurement:
     """Read a baseline.
 
     Raises:
-        ValueError: there is none, or it is not a whole one.
+        ValueError: the file is missing, incomplete or no baseline.
     """
     mend = "write one with --update-baseline"
     try:
@@ -110,27 +115,31 @@ def read_baseline(path: Path) -> Measurement:
         raise ValueError(f"--baseline {path}: cannot be read: {error}; {mend}") from None
     try:
         data = json.loads(text)
-        head = {key: _text(data, key) for key in _WHAT}
+        head = {key: _text(data, key) for key in _HEAD}
         return Measurement(**head, scores=dict(map(_row, data["trials"])))
     except json.JSONDecodeError as error:
         raise ValueError(
             f"--baseline {path}, line {error.lineno}: not valid JSON: {error.msg}; restore it, or {mend}"
         ) from None
     except (KeyError, TypeError, ValueError) as error:
-        what = f"it has no {error}" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"--baseline {path}: not a baseline: {what}; restore it, or {mend}") from None
+        problem = f"the key {error} is missing" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"--baseline {path}: not a baseline: {problem}; restore it, or {mend}") from None
 
 
 def _text(data: Any, key: str) -> str:
     if not isinstance(data, dict):
-        raise TypeError(f"expected an object with {', '.join(_WHAT)} and trials, got {type(data).__name__}")
+        raise TypeError(f"expected an object with {', '.join(_HEAD)} and trials, got {type(data).__name__}")
     if not isinstance(data[key], str):
         raise TypeError(f"{key}: expected text, got {json.dumps(data[key])}")
     return str(data[key])
 
 
 def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
-    """One line, checked."""
+    """Return trial and scores of one row.
+
+    Raises:
+        TypeError, KeyError: the row is not valid.
+    """
     if not isinstance(row, dict):
         raise TypeError(f"trials: expected objects, got {json.dumps(row)}")
     trial = TrialKey(row["case"], row["seed"], row["variant"])

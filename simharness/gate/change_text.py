@@ -1,4 +1,4 @@
-"""Changes in words, the same in a terminal, a summary and a test report."""
+"""Changes of scores as text, the same in the terminal, the Markdown summary and the JUnit report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from simharness.scoring.catalogue import SCORES
 
 
 def title(score: str) -> str:
-    """What a score is called, with its unit."""
+    """Return the title of a score with its unit."""
     if score == TIME:
         return "Time, × reference"
     info = SCORES[score]
@@ -20,34 +20,34 @@ def title(score: str) -> str:
 
 
 def number(score: str, value: float) -> str:
-    """A value of a score."""
+    """Return a value of a score as text."""
     return fixed(value, _digits(score))
 
 
 def difference(change: Change) -> str:
-    """A change with its interval; of time, its ratio."""
+    """Return a change with its interval as text; a ratio for time."""
     if change.score != TIME and change.difference == change.low == change.high == 0:
         return "none"
-    ends = ""
+    interval = ""
     if math.isfinite(change.low):
-        ends = f" ({_difference(change.score, change.low)} to {_difference(change.score, change.high)})"
-    return _difference(change.score, change.difference) + ends
+        interval = f" ({_difference(change.score, change.low)} to {_difference(change.score, change.high)})"
+    return _difference(change.score, change.difference) + interval
 
 
 def allowed(change: Change, gate: Gate) -> str:
-    """How much worse the score may get."""
+    """Return the tolerance of a score as text; the largest allowed ratio for time."""
     if change.score == TIME:
         return _difference(TIME, gate.slowdown)
     return f"{getattr(gate.tolerance, change.score):g}"
 
 
 def place(change: Change) -> str:
-    """Where a change is."""
+    """Return the case of a change, or "whole suite"."""
     return change.case or "whole suite"
 
 
 def sentence(change: Change, gate: Gate) -> str:
-    """A change in one line."""
+    """Return a change as one line of text."""
     before, after = (number(change.score, value) for value in (change.before, change.after))
     return (
         f"{change.variant}, {place(change)}: {title(change.score)}: {before} before, {after} now: "

@@ -1,26 +1,27 @@
-"""Is it worse? Two measurements of one suite, compared seed by seed.
+"""Comparison of two measurements of one suite, seed by seed.
 
-Every headline score of every variant, and its time, is compared over the whole suite, and then over each case alone,
-which sees what the whole dilutes: a step that became quadratic in people, say. A change counts where it is larger in
-the mean than its tolerance *and* significant: a paired, one-sided sign-flip test, Holm's correction over all tests that
-are made.
+Every headline score of every variant, and its time, is compared over the whole suite and over each case alone. A
+single case shows changes that the mean over the suite dilutes, for example a step that became quadratic in the number
+of people. A change counts if its mean is larger than the tolerance *and* it is significant: a paired, one-sided
+sign-flip test with Holm's correction over all tests that are made.
 
-The cases are conditions of the same scenes: a change that helps at a seed in one case tends to help there in the
-others, so trials of one seed are no independent evidence. The whole suite is therefore compared by seed: before and
-after, each the mean over the cases that have the score on both sides at that seed.
+The cases are conditions of the same scenes: a change that helps at a seed in one case tends to help at that seed in the
+other cases, so trials of one seed are not independent. The whole suite is therefore compared by seed: before and after
+are means over the cases that have the score in both measurements at that seed.
 
-Which tests are made: those of which the mean size of the differences, whatever their signs, exceeds the tolerance. No
-other could be a change that counts; and as the test is of the signs alone, given the sizes, choosing by size takes
-nothing from its level. A change to one case makes a handful of tests, for trials that did not change differ by nothing.
+A test is made where the mean absolute difference exceeds the tolerance; no other change could count. Given the absolute
+differences, the test depends on their signs alone, so this selection does not change its level. A change of one case
+makes few tests, because unchanged trials have the difference zero.
 
-How small a suite may be: n seeds that all fall have p = 2^-n, times the number of tests. One test alone needs 5 seeds
-at level 0.05; a suite with fewer is refused, for it could never find anything. Of v variants and c cases at most
-7 v (1 + c) tests are made, 7 v where there are no cases, and a bug that changes everything makes them all: it is
-found from 8 seeds without cases, from 9 with two cases, and from 12 with eleven cases and two variants (168 tests,
-168 / 4096 = 0.041). A loss beyond its tolerance that so few seeds could not have shown to be one is ``undecided``.
+Number of seeds: n seeds that all get worse have p = 2^-n, times the number of tests. One test alone needs 5 seeds at
+level 0.05; a suite with fewer is refused, because it could not find any regression. With v variants and c cases at most
+7 v (1 + c) tests are made, 7 v where there are no cases. A bug that changes everything makes all of them: it is found
+from 8 seeds without cases, from 9 with two cases, and from 12 with eleven cases and two variants (168 tests,
+168 / 4096 = 0.041). A loss beyond its tolerance that the number of seeds could not have shown to be significant is
+``undecided``.
 
-Time is compared by the ratio of each trial's time in units of the reference kernel, now to before, in logarithms. Of
-a seed's ratios the middle half counts, for a trial during which the machine was held up says nothing, and then the
+Time is compared by the logarithm of the ratio of each trial's time after and before, both in units of the reference
+kernel. The middle half of a seed's ratios is used, because the machine may have been busy during a trial, and then the
 middle half of the seeds: their geometric mean must exceed the allowed slow-down, and the seeds must be significant by
 the same test.
 """
@@ -49,21 +50,21 @@ Verdict = Literal["worse", "better", "same"]
 
 @dataclass(frozen=True)
 class Change:
-    """How one score of one variant changed.
+    """Change of one score of one variant.
 
     Attributes:
-        score: its key in the catalogue, or ``TIME``.
-        variant: of the method.
-        case: None for the whole suite.
-        before, after: means over the seeds; of ``TIME``, geometric means of the middle half.
-        difference: after - before with its 95 % interval; of ``TIME``, after / before.
-        low, high: the interval's ends.
-        n: how many seeds.
-        p: of a change in the direction that it went, after Holm's correction; 1 where no test was made.
-        loss: how much worse, in tolerances; negative where better.
-        verdict: what it comes to.
-        undecided: larger than its tolerance, but not even if all seeds agreed could it be significant.
-        worst: the trial that lost most.
+        score: key of the score in the catalogue, or ``TIME``.
+        variant: variant of the method.
+        case: case; None for the whole suite.
+        before, after: means over the seeds; for ``TIME``, geometric means of the middle half.
+        difference: after - before; for ``TIME``, after / before.
+        low, high: ends of the 95 % interval of the difference.
+        n: number of seeds.
+        p: p-value of a change in the observed direction after Holm's correction; 1 where no test was made.
+        loss: size of the loss in tolerances; negative for a gain.
+        verdict: worse, better or same.
+        undecided: larger than its tolerance, but could not be significant even if all seeds agreed.
+        worst: trial with the largest loss.
     """
 
     score: str
@@ -84,52 +85,53 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All changes of a suite: scores of the whole, then case by case; then time, likewise.
+    """Changes of a suite: scores of the whole suite, then of each case; then time in the same order.
 
     Attributes:
-        changes: of each score and of time, by variant, over the whole suite and, where there are several, each case.
-        cases: the names of the cases, where there are several.
+        changes: change of each score and of time, by variant, over the whole suite and, if there are several cases,
+            over each case.
+        cases: names of the cases; empty if there is only one.
     """
 
     changes: tuple[Change, ...]
     cases: tuple[str, ...]
 
     def with_verdict(self, verdict: Verdict) -> tuple[Change, ...]:
-        """Changes of a verdict: of the whole suite first, those that lost most first."""
-        found = (change for change in self.changes if change.verdict == verdict)
-        return tuple(sorted(found, key=lambda change: (change.case is not None, -abs(change.loss))))
+        """Return the changes with a verdict: those of the whole suite first, the largest first."""
+        changes = (change for change in self.changes if change.verdict == verdict)
+        return tuple(sorted(changes, key=lambda change: (change.case is not None, -abs(change.loss))))
 
     @property
     def undecided(self) -> tuple[Change, ...]:
-        """Losses beyond their tolerances of which so few seeds cannot tell whether they are by chance."""
+        """Losses beyond their tolerances that may be chance: the seeds are too few to decide."""
         return tuple(change for change in self.changes if change.undecided and change.loss > 0)
 
     def changes_of(self, variant: str, case: str | None = None) -> tuple[Change, ...]:
-        """Changes of a variant over the whole suite or one case."""
+        """Return the changes of a variant over the whole suite or one case."""
         return tuple(change for change in self.changes if (change.variant, change.case) == (variant, case))
 
 
 @dataclass(frozen=True)
 class _Tested:
-    """A change before its verdict: its p is that of its own side, uncorrected."""
+    """Change without a verdict; its p-value is one-sided in the direction of the change, and not corrected."""
 
     change: Change
-    made: bool  # whether the test counts
+    made: bool  # whether the test is made, and so counts in Holm's correction
 
 
 def compare(before: Measurement, after: Measurement, gate: Gate) -> Comparison:
     """Compare two measurements of one suite.
 
-    Trials that only one of them has (they failed) are left out: who asks must look after those.
+    Trials that only one of them has, because they failed in the other, are left out; the caller reports them.
 
     Args:
         before: the baseline.
-        after: what was measured now.
+        after: the new measurement.
         gate: tolerances and level.
     """
     cases = before.cases if len(before.cases) > 1 else ()
     tested = list(_all_tests(before, after, gate, cases))
-    worse, better = _corrected(tested, 1), _corrected(tested, -1)
+    worse, better = _corrected_p(tested, 1), _corrected_p(tested, -1)
     made = sum(each.made for each in tested)
     changes = []
     for each, p_worse, p_better in zip(tested, worse, better, strict=True):
@@ -158,7 +160,7 @@ def _all_tests(before: Measurement, after: Measurement, gate: Gate, cases: tuple
 
 @dataclass(frozen=True)
 class _Pairs:
-    """A score of a variant in the trials that have it in both measurements: (n,) each."""
+    """One score of a variant in the trials that have it in both measurements, (n,) each."""
 
     variant: str
     trials: tuple[TrialKey, ...]
@@ -167,30 +169,30 @@ class _Pairs:
 
     @property
     def seeds(self) -> tuple[NDArray[np.intp], ...]:
-        """Which trials are of each seed: the pairs that are independent of each other."""
+        """Indices of the trials of each seed. Trials of different seeds are independent."""
         seeds = np.array([trial.seed for trial in self.trials])
         return tuple(np.flatnonzero(seeds == seed) for seed in np.unique(seeds))
 
 
 def _pairs(score: str, variant: str, case: str | None, before: Measurement, after: Measurement) -> _Pairs:
-    found = {
+    values_by_trial = {
         trial: (old[score], new)
         for trial, old in before.scores.items()
         if trial.variant == variant and case in (None, trial.case)
         if old[score] is not None and (new := after.scores.get(trial, {}).get(score)) is not None
     }
-    values = np.array(list(found.values()), float).reshape(-1, 2)
-    return _Pairs(variant, tuple(found), values[:, 0], values[:, 1])
+    values = np.array(list(values_by_trial.values()), float).reshape(-1, 2)
+    return _Pairs(variant, tuple(values_by_trial), values[:, 0], values[:, 1])
 
 
 def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tested | None:
-    """Compare means of a score; None where no trial has it."""
+    """Compare the means of a score; return None where no trial has it."""
     if not pairs.trials:
         return None
     bad = -1 if SCORES[score].better == "higher" else 1
     before, after = (np.array([each[at].mean() for at in pairs.seeds]) for each in (pairs.before, pairs.after))
     change = after - before
-    test = paired(before, after, alternative=_side(change.sum()))
+    test = paired(before, after, alternative=_alternative(change.sum()))
     loss = bad * test.difference
     result = Change(
         score=score,
@@ -212,17 +214,17 @@ def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tes
 
 
 def _test_time(pairs: _Pairs, case: str | None, tolerance: float) -> _Tested | None:
-    """Compare times; ``tolerance`` is of the logarithm of their ratio."""
+    """Compare times; ``tolerance`` is the largest allowed logarithm of their ratio."""
     if not pairs.trials:
         return None
     ratios = np.log(pairs.after / pairs.before)
-    # The middle half of a seed is the same trials with before and after exchanged: the test asks for no more.
+    # Exchanging before and after leaves the middle half of a seed the same trials, as the sign-flip test requires.
     counted = [at[_middle(np.argsort(ratios[at], kind="stable"))] for at in pairs.seeds]
     before, after = (np.array([np.log(each[at]).mean() for at in counted]) for each in (pairs.before, pairs.after))
     change = after - before
     middle = _middle(np.argsort(change, kind="stable"))
     ratio = float(change[middle].mean())
-    test = paired(before, after, alternative=_side(ratio))
+    test = paired(before, after, alternative=_alternative(ratio))
     low, high = _middle_ends(change)
     result = Change(
         score=TIME,
@@ -244,13 +246,13 @@ def _test_time(pairs: _Pairs, case: str | None, tolerance: float) -> _Tested | N
 
 
 def _middle(values: NDArray[Any]) -> NDArray[Any]:
-    """The middle half of sorted values (..., n)."""
+    """Return the middle half of sorted values (..., n)."""
     cut = values.shape[-1] // 4
     return values[..., cut : values.shape[-1] - cut]
 
 
 def _middle_ends(change: Floats) -> tuple[float, float]:
-    """The 95 % interval of the mean of the middle half, over seeds."""
+    """Return the 95 % interval over seeds of the mean of the middle half; NaN for fewer than two seeds."""
     if len(change) < 2:
         return math.nan, math.nan
     weights = block_weights(np.arange(len(change))).astype(int)
@@ -259,15 +261,15 @@ def _middle_ends(change: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _side(change: float) -> Alternative:
-    """Of a test in the direction in which scores went."""
+def _alternative(change: float) -> Alternative:
+    """Return the one-sided alternative in the direction of a change."""
     return "greater" if change > 0 else "less"
 
 
-def _corrected(tested: Sequence[_Tested], side: int) -> list[float]:
-    """Holm's correction over the tests that were made, of a loss (side 1) or a gain (-1); 1 for all others.
+def _corrected_p(tested: Sequence[_Tested], side: int) -> list[float]:
+    """Return p-values of losses (side 1) or gains (side -1) after Holm's correction; 1 where no test was made.
 
-    Every test that was made counts, and those that went the other way have nothing to say.
+    Every test that was made counts in the correction; changes in the other direction count with p = 1.
     """
     made = [index for index, each in enumerate(tested) if each.made]
     p = [tested[index].change.p if side * tested[index].change.loss > 0 else 1.0 for index in made]

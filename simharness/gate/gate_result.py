@@ -1,4 +1,4 @@
-"""What a check came to."""
+"""Result of a gate check."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from simharness.scenario.sections.gate import Gate
 
 @dataclass(frozen=True)
 class FailedCase:
-    """A trial that could not be run.
+    """Case at a seed that could not be run.
 
     Attributes:
-        case: its case.
-        seed: its seed.
-        error: what went wrong.
+        case: name of the setting, :func:`simharness.gate.trial_command.setting_name`.
+        seed: seed.
+        error: message of the error.
     """
 
     case: str
@@ -26,18 +26,19 @@ class FailedCase:
 
 @dataclass(frozen=True)
 class GateResult:
-    """A suite that was run and compared with its baseline.
+    """Result of a gate check: comparison of a suite with its baseline.
 
     Attributes:
-        suite: its name.
-        variants: of the method.
+        suite: name of the suite.
+        variants: variants of the method.
         gate: tolerances and level.
-        comparison: of all scores with the baseline's.
+        comparison: changes of all scores from the baseline.
         failed: trials that could not be run.
-        trials: how many there are, a setting at a seed each.
-        worst: the trial to look at: one that could not be run, else one that lost most, else that of the lowest PCP.
-        command: runs that trial.
-        seconds: how long the suite took.
+        trials: number of trials; a trial is a setting at a seed.
+        worst: trial to inspect first: one that could not be run, else the one with the largest loss, else the one with
+            the lowest PCP.
+        command: command line that runs this trial.
+        seconds: duration of the run.
     """
 
     suite: str
@@ -52,18 +53,18 @@ class GateResult:
 
     @property
     def passed(self) -> bool:
-        """Nothing got worse, and every trial ran."""
+        """Whether no score got worse and every trial ran."""
         return not self.failed and not self.comparison.with_verdict("worse")
 
     @property
     def verdict(self) -> str:
-        """What it comes to, in a few words."""
+        """Summary in a few words."""
         worse = len(self.comparison.with_verdict("worse"))
-        said = [
+        parts = [
             f"{worse} regression{'s' * (worse > 1)}" if worse else "",
             f"{len(self.failed)} of {self.trials} trials could not be run" if self.failed else "",
         ]
-        verdict = ", ".join(filter(None, said)) or "no regression"
+        verdict = ", ".join(filter(None, parts)) or "no regression"
         if undecided := self.comparison.undecided:
             seeds = max(change.n for change in undecided)
             losses = f"{len(undecided)} loss{'es' * (len(undecided) > 1)} beyond tolerance"
@@ -72,6 +73,6 @@ class GateResult:
 
     @property
     def worst_description(self) -> str:
-        """What the command is of."""
+        """Description of the worst trial, which the command runs."""
         why = "lost most" if self.comparison.with_verdict("worse") else "has the lowest PCP"
         return f"the trial that {'could not be run' if self.failed else why}: {self.worst}"

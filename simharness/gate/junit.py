@@ -1,4 +1,4 @@
-"""The check as a JUnit report, which every CI shows: a test case for each case of the suite, the whole, and time."""
+"""JUnit report of a gate check: a test case for each case of the suite, the whole suite, and time."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def junit(check: GateResult) -> str:
-    """The report, XML.
+    """Return the report as XML.
 
-    A regression is a failure of its case, with all that got worse; a trial that could not be run is an error of its
-    case. What was lost of which too few seeds cannot tell whether it is by chance fails nothing, and is said.
+    A regression is a failure of its case and lists all scores that got worse. A trial that could not be run is an error
+    of its case. An undecided loss fails nothing; it is printed as output of its case.
     """
     suite = ElementTree.Element("testsuite", name=check.suite, time=f"{check.seconds:.1f}")
     _add(suite, check, WHOLE, _of(None))
@@ -37,25 +37,25 @@ def junit(check: GateResult) -> str:
 
 
 def _of(case: str | None) -> Callable[[Change], bool]:
-    """Whether a change is of a score, not of time, in a case; None: over the whole suite."""
+    """Return a predicate: whether a change is a change of a score, not of time, in a case (None: whole suite)."""
     return lambda change: change.case == case and change.score != TIME
 
 
 def _add(suite: ElementTree.Element, check: GateResult, name: str, belongs: Callable[[Change], bool]) -> None:
-    """Add a test case, of the changes that belong there."""
+    """Add a test case with the changes that belong to it."""
     worse = list(filter(belongs, check.comparison.with_verdict("worse")))
     undecided = list(filter(belongs, check.comparison.undecided))
     case = ElementTree.SubElement(suite, "testcase", classname=f"simharness.{_clean(check.suite)}", name=_clean(name))
-    # Without cases of its own the suite is one case, and what failed in it belongs there.
+    # A suite without cases is one test case, which gets all failed trials.
     failed = [each for each in check.failed if each.case == name or (name == WHOLE and not check.comparison.cases)]
     if failed:
-        said = "\n".join(f"seed {each.seed}: {each.error}" for each in failed)
-        _problem(case, "error", f"{len(failed)} trials could not be run", said)
+        text = "\n".join(f"seed {each.seed}: {each.error}" for each in failed)
+        _problem(case, "error", f"{len(failed)} trials could not be run", text)
     elif worse:
         _problem(case, "failure", sentence(worse[0], check.gate), _sentences(worse, check))
     if undecided:
-        said = f"worse, but too few seeds to judge\n{_sentences(undecided, check)}"
-        ElementTree.SubElement(case, "system-out").text = _clean(said)
+        text = f"worse, but too few seeds to judge\n{_sentences(undecided, check)}"
+        ElementTree.SubElement(case, "system-out").text = _clean(text)
 
 
 def _sentences(changes: Sequence[Change], check: GateResult) -> str:
@@ -67,5 +67,5 @@ def _problem(case: ElementTree.Element, kind: str, message: str, text: str) -> N
 
 
 def _clean(text: str) -> str:
-    """Without the characters that XML cannot hold."""
+    """Replace the characters that XML 1.0 forbids."""
     return _FORBIDDEN.sub("?", text)

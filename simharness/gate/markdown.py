@@ -1,4 +1,4 @@
-"""The check as Markdown, which GitHub shows on the page of a workflow's run."""
+"""Markdown summary of a gate check, for the page of a workflow run on GitHub."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from simharness.gate.change_text import allowed, difference, number, sentence, t
 from simharness.gate.compare import Change
 from simharness.gate.gate_result import GateResult
 
-_LISTED = 20  # of each kind: a bug that breaks everything breaks a hundred scores
+_LISTED = 20  # changes of each kind: a bug that breaks everything breaks a hundred scores
 
 
 def markdown(check: GateResult) -> str:
-    """The summary: the verdict, what got worse, what got better, the headline scores, how to run the worst trial."""
+    """Return the summary: verdict, regressions, gains, headline scores, and the command that runs the worst trial."""
     return "\n".join(_lines(check)) + "\n"
 
 
@@ -65,5 +65,5 @@ def _cells(change: Change, check: GateResult) -> tuple[str, ...]:
 
 
 def _escaped(text: str) -> str:
-    """On one line, and without what Markdown would read as a cell or as HTML."""
+    """Return text on one line, with the characters escaped that start a table cell or HTML in Markdown."""
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")

@@ -1,7 +1,8 @@
-"""A kernel of fixed work, timed beside the method: how fast this machine is at this moment.
+"""Reference kernel: a fixed amount of work that is timed beside the method.
 
-Times of the method are given as ratios to it, so that they mean the same on a fast machine, a slow one and a busy one.
-It is made of what the method is made of: products of small matrices, likelihoods of points in views, small solves.
+Times of the method are given as ratios to the time of the kernel, so that they can be compared between fast, slow and
+busy machines. The kernel does the same kinds of work as the method: products of small matrices, likelihoods of points
+in views, small linear systems.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ import numpy as np
 
 from mvpose.arrays import Floats
 
-CALLS = 9  # a call is about as long as a frame, so that a busy machine interrupts both alike
-_SIZE, _PRODUCTS = 40, 24  # of the matrices of a matching; how many of its steps
-_POINTS, _VIEWS = 4000, 5  # places that a joint might be at, and who looks
+CALLS = 9  # a call takes as long as a frame, so that a busy machine interrupts both equally
+_SIZE, _PRODUCTS = 40, 24  # size of the matrices, and number of products, as in a matching
+_POINTS, _VIEWS = 4000, 5  # candidate positions of a joint, and views
 
 
 def time_reference(calls: int = CALLS) -> Floats:
-    """Milliseconds of each of ``calls`` calls of the kernel, after one that is not timed."""
+    """Return the duration in milliseconds of each of ``calls`` calls of the kernel, after one call that is not timed."""
     rng = np.random.default_rng(0)
     matrix = rng.random((_SIZE, _SIZE)) / _SIZE
     points, rays = rng.random((_POINTS, 3)), rng.random((_VIEWS, 6))
@@ -34,7 +35,7 @@ def time_reference(calls: int = CALLS) -> Floats:
 
 @numba.njit(cache=True)
 def _work(matrix: Floats, points: Floats, rays: Floats) -> float:
-    """Some number that needs all of the work."""
+    """Do the work of one call; return a number that depends on all of it, so that no part is optimised away."""
     size = len(matrix)
     power, product = matrix.copy(), np.empty_like(matrix)
     for _ in range(_PRODUCTS):

@@ -1,4 +1,4 @@
-"""How many seeds a suite needs for anything in it to be significant."""
+"""Minimum number of seeds with which a suite can find a regression."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from simharness.statistics.paired_tests import DRAWS
 
 
 def least_p(seeds: int) -> float:
-    """The least p that the one-sided sign-flip test can give: that of seeds which all went the same way."""
+    """Return the smallest p-value of the one-sided sign-flip test: that of seeds which all change in one direction."""
     return max(2.0**-seeds, 1 / (1 + DRAWS))
 
 
 def least_seeds(level: float) -> int | None:
-    """The fewest seeds of which a single test can be significant; None where the level is too low for any number."""
+    """Return the smallest number of seeds with which a single test can be significant; None if no number is enough."""
     return next((seeds for seeds in range(1, DRAWS.bit_length() + 1) if least_p(seeds) <= level), None)
 
 
 def require_seeds(study: Study) -> None:
-    """Refuse a suite that would pass whatever happened to the method.
+    """Check that a suite has enough seeds to find a regression.
 
     Raises:
-        ValueError: it has so few seeds, or so low a level, that no change could be significant.
+        ValueError: the seeds are so few, or the level so low, that no change could be significant.
     """
     level, seeds = study.gate.level, len(study.seeds)
     if least_p(seeds) <= level:
@@ -28,6 +28,6 @@ def require_seeds(study: Study) -> None:
     least = least_seeds(level)
     mend = "a higher level" if least is None else f"at least {least} seeds, or a higher level"
     raise ValueError(
-        f"{study.path}: no regression could ever be found: {seeds} seed{'s' * (seeds > 1)} that all get worse have "
+        f"{study.path}: no regression can be found: {seeds} seed{'s' * (seeds > 1)} that all get worse have "
         f"p = {least_p(seeds):.2g}, and gate.level is {level:g}; give it {mend}"
     )

@@ -1,4 +1,4 @@
-"""The check itself: run the suite, compare it with its baseline."""
+"""Gate check: run a suite and compare it with its baseline."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ def baseline_of(study: Study, path: Path) -> Measurement:
     """Read the baseline of a suite.
 
     Raises:
-        ValueError: there is none, it is damaged, or it is of another suite; or the suite has so few seeds that nothing
-            could differ from a baseline significantly.
+        ValueError: the file is missing, damaged, or the baseline of another suite; or the suite has so few seeds that
+            no change could be significant.
     """
     require_seeds(study)
     baseline = read_baseline(path)
     now = fingerprint(study)
     if baseline.fingerprint != now:
         raise ValueError(
-            f"--baseline {path}: is of the suite {baseline.suite} ({baseline.fingerprint}), and {study.path} is "
-            f"{study.name} ({now}): {_what_differs(baseline, study)}; measure this suite with --update-baseline"
+            f"--baseline {path}: this is the baseline of suite {baseline.suite} ({baseline.fingerprint}), but "
+            f"{study.path} is suite {study.name} ({now}): {_describe_differences(baseline, study)}; write a baseline "
+            "of this suite with --update-baseline"
         )
     return baseline
 
@@ -40,7 +41,7 @@ def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Re
         study: the suite.
         baseline: from :func:`baseline_of`.
         workers: processes that share the trials.
-        reporter: receiver of progress, a step a trial.
+        reporter: receiver of progress, one step for each trial.
     """
     start = time.perf_counter()
     done = run_suite(study, workers=workers, reporter=reporter)
@@ -60,7 +61,7 @@ def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Re
 
 
 def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> TrialKey:
-    """The trial to look at: one that could not be run, one that lost most, or else that of the lowest PCP."""
+    """Return the trial to inspect first: one that could not be run, else the largest loss, else the lowest PCP."""
     if done.failed:
         return TrialKey(done.failed[0].case, done.failed[0].seed, variant)
     if worse := comparison.with_verdict("worse"):
@@ -69,17 +70,17 @@ def _worst_trial(done: SuiteRun, comparison: Comparison, variant: str) -> TrialK
     return min(scores, key=lambda trial: (scores[trial] is None, scores[trial] or 0.0))
 
 
-def _what_differs(baseline: Measurement, study: Study) -> str:
-    """In a few words."""
+def _describe_differences(baseline: Measurement, study: Study) -> str:
+    """Return in a few words how the trials of a suite and a baseline differ."""
     now = {
         TrialKey(setting_name(setting, study), seed, name)
         for setting, seed in settings_at_seeds(study)
         for name in study.variants
     }
     gone, new = sorted(baseline.scores.keys() - now), sorted(now - baseline.scores.keys())
-    said = [
+    parts = [
         f"{len(trials)} trials {what}, the first {trials[0]}"
         for trials, what in ((gone, "are only in the baseline"), (new, "are not in it"))
         if trials
     ]
-    return " and ".join(said) or "the trials have the same names, but other settings"
+    return " and ".join(parts) or "the trials have the same names, but different settings"

@@ -1,4 +1,4 @@
-"""A suite run once: every trial measured, beside the reference kernel."""
+"""Run of a suite: every trial is measured beside the reference kernel."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ Scores = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class SuiteRun:
-    """What became of the trials of a suite.
+    """Scores and failed trials of a suite.
 
     Attributes:
-        scores: of each trial: all of the catalogue, and ``TIME``.
-        failed: the trials that could not be run.
+        scores: scores of each trial: all of the catalogue, and ``TIME``.
+        failed: trials that could not be run.
     """
 
     scores: Mapping[TrialKey, Scores]
     failed: tuple[FailedCase, ...]
 
     def measurement(self, study: Study) -> Measurement:
-        """What a baseline keeps of it."""
+        """Return the scores that a baseline keeps."""
         return Measurement(study.name, fingerprint(study), code_version(), self.scores)
 
 
 def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = None) -> SuiteRun:
-    """Run all trials of a study. Nothing is stored: times of another day would say nothing.
+    """Run all trials of a study. Nothing is stored, because times of an earlier run cannot be compared.
 
     Args:
         study: the suite.
         workers: processes that share the trials.
-        reporter: receiver of progress, a step a trial.
+        reporter: receiver of progress, one step for each trial.
 
     Raises:
-        ValueError: fewer than one worker, or a method of one's own that cannot be loaded.
+        ValueError: fewer than one worker, or a user-defined estimator that cannot be loaded.
     """
-    estimators_of(study.base.method)  # better now than at every trial
+    estimators_of(study.base.method)  # report errors now rather than at every trial
     units: dict[str, Unit] = {}
-    places: dict[str, list[tuple[str, int]]] = {}  # two settings may come to the same scenario
+    places: dict[str, list[tuple[str, int]]] = {}  # several settings may resolve to the same scenario
     for setting, seed in settings_at_seeds(study):
         scenario = study.at(setting, seed)
         unit = Unit(trial_identity(scenario), scenario, study.variants)
@@ -76,16 +76,16 @@ def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = Non
 def measure_beside_reference(
     scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None
 ) -> TrialOutput:
-    """Measure a trial, and time the reference kernel before and after: its scores get ``TIME``.
+    """Measure a trial and time the reference kernel before and after it; add the score ``TIME``.
 
-    That is the time of the quickest frame divided by that of the quickest call. On a busy machine medians measure the
-    other processes: under four times its load the ratio of medians of one trial differed by a factor of 1.9, typically,
-    between two runs, and that of the quickest by a factor of 1.15.
+    ``TIME`` is the time of the quickest frame divided by the time of the quickest call. On a busy machine medians
+    measure the other processes: at four times the load the ratio of medians of one trial typically differed by a factor
+    of 1.9 between two runs, and the ratio of the quickest by a factor of 1.15.
 
     Args:
         scenario: resolved, with its seed.
         variants: variants of the method.
-        stored: not used: times of another day mean nothing.
+        stored: not used, because stored times cannot be compared.
 
     Raises:
         ValueError: the scenario cannot be built.
@@ -103,11 +103,11 @@ def measure_beside_reference(
 
 
 def fingerprint(study: Study) -> str:
-    """Ten hexadecimal digits that change with what a study runs: its settings, their files, its seeds and variants.
+    """Return ten hexadecimal digits that change with the settings of a study, their files, its seeds and variants.
 
-    Not with names, nor with keys that a later version adds: only what differs from a default counts.
+    Names do not count, nor do keys with default values, so that keys added by a later version change nothing.
     """
-    said = {
+    values = {
         "settings": {
             setting_name(setting, study): setting.scenario.model_dump(
                 mode="json", exclude_defaults=True, exclude={"name", "description", "seed", "method"}
@@ -117,10 +117,10 @@ def fingerprint(study: Study) -> str:
         "seeds": study.seeds,
         "variants": study.variants,
     }
-    text = json.dumps(said, sort_keys=True)
+    text = json.dumps(values, sort_keys=True)
     digest = hashlib.blake2b(digest_size=5)
     for file in sorted({file for setting in study.settings for file in setting.scenario.files}):
-        text = text.replace(json.dumps(str(file)), json.dumps(file.name))  # wherever the repository lies
+        text = text.replace(json.dumps(str(file)), json.dumps(file.name))  # independent of the folder
         digest.update(file.read_bytes() if file.is_file() else b"")
     digest.update(text.encode())
     return digest.hexdigest()

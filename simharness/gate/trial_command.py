@@ -1,4 +1,4 @@
-"""The trials of a suite: what they are called, and the command that runs one by itself, with report and pictures."""
+"""Names of the trials of a suite, and the command that runs one trial alone, with report and pictures."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from simharness.scenario.study_definition import Setting, Study
 from simharness.scenario.toml_files import toml
 
 _WORD = re.compile(r"[a-z][a-z0-9_-]*")
-_VALUES = ("true", "false", "inf", "nan")  # words that TOML takes for something else
-_ALONE = {"cases": "{}", "sweep": "{}", "seeds": "1"}  # what makes one scenario of a study
+_VALUES = ("true", "false", "inf", "nan")  # words with a meaning in TOML
+_ALONE = {"cases": "{}", "sweep": "{}", "seeds": "1"}  # overrides that turn a study into one scenario
 
 
 class TrialKey(NamedTuple):
-    """One variant at one setting and seed.
+    """Key of one variant at one setting and seed.
 
     Attributes:
-        case: the name of the setting, from :func:`setting_name`.
-        seed: its seed.
-        variant: of the method.
+        case: name of the setting, from :func:`setting_name`.
+        seed: seed.
+        variant: name of the variant.
     """
 
     case: str
@@ -36,20 +36,20 @@ class TrialKey(NamedTuple):
 
 
 def settings_at_seeds(study: Study) -> Iterator[tuple[Setting, int]]:
-    """Every setting at every seed."""
+    """Yield every setting at every seed, seed by seed."""
     for seed in study.seeds:
         for setting in study.settings:
             yield setting, seed
 
 
 def setting_name(setting: Setting, study: Study) -> str:
-    """What a setting is called among its like: its case and its factors; the study's name where it has neither."""
+    """Return the name of a setting: its case and its factors; the name of the study where it has neither."""
     factors = ", ".join(f"{key} = {json.dumps(value)}" for key, value in setting.factors.items())
     return ", ".join(filter(None, (setting.case, factors))) or study.name
 
 
 def command_of(study: Study, trial: TrialKey) -> str:
-    """``simharness run FILE --set KEY=VALUE ... --seed N``, for a shell: runs a trial by itself, with all variants.
+    """Return the shell command that runs one trial alone: ``simharness run FILE --set KEY=VALUE ... --seed N``.
 
     Raises:
         ValueError: the study has no such trial.
@@ -62,27 +62,27 @@ def command_of(study: Study, trial: TrialKey) -> str:
 
 
 def overrides(study: Study, setting: Setting) -> list[str]:
-    """What to ``--set`` over a study's file to get one of its settings, and that alone."""
-    said = read_document(study.path).data
-    alone = {key: value for key, value in _ALONE.items() if key in said}
-    changes = dict(_values(said["cases"][setting.case])) if setting.case else {}
-    factors = {key: value for key, value in setting.factors.items() if value is not None}  # None: it has no one value
-    written = {key: _written(value) for key, value in {**changes, **factors}.items()}
-    return [f"{key}={value}" for key, value in {**alone, **written}.items()]
+    """Return the ``--set`` overrides of a study's file that give one of its settings alone."""
+    data = read_document(study.path).data
+    alone = {key: value for key, value in _ALONE.items() if key in data}
+    changes = dict(_values(data["cases"][setting.case])) if setting.case else {}
+    factors = {key: value for key, value in setting.factors.items() if value is not None}  # None: no single value
+    texts = {key: _toml_text(value) for key, value in {**changes, **factors}.items()}
+    return [f"{key}={value}" for key, value in {**alone, **texts}.items()]
 
 
 def _values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Values by dotted key."""
+    """Yield values by dotted key."""
     for key in leaves(data):
         value: Any = data
         for part in key:
             value = value[part]
-        if not isinstance(value, Mapping):  # an empty section says nothing
+        if not isinstance(value, Mapping):  # an empty section sets nothing
             yield ".".join(key), value
 
 
-def _written(value: Any) -> str:
-    """A TOML value; words without the quotes that a shell would need quotes around."""
+def _toml_text(value: Any) -> str:
+    """Return a value as TOML; a plain word without quotes, which a shell would need quotes around."""
     if isinstance(value, str) and _WORD.fullmatch(value) and value not in _VALUES:
         return value
     return toml(value)

@@ -1,4 +1,4 @@
-"""``simharness check``: planted bugs are found, nothing else is."""
+"""``simharness check`` finds planted bugs and nothing else."""
 
 import json
 import shlex
@@ -59,7 +59,7 @@ def baseline(tmp_path, measured):
 
 
 def no_cycle_constraint(monkeypatch):
-    """Whoever is alike is one person, through others, too, and however many of a view."""
+    """Cluster by connected components, with any number of detections of a view."""
 
     def cluster(affinity, view, *, alpha):
         return connected_components(affinity > alpha)[1].astype(np.int64)
@@ -78,13 +78,13 @@ def swapped_wrists(monkeypatch):
 
 
 def wrong_sigma(monkeypatch):
-    """Keypoints are taken to be five times as exact as they are."""
+    """Assume keypoints five times as exact as they are."""
     sigmas = Noise.sigmas
     monkeypatch.setattr(Noise, "sigmas", lambda self, skeleton: 0.2 * sigmas(self, skeleton))
 
 
 def wrong_scale(monkeypatch):
-    """Rays are taken to agree three times as far apart as they do."""
+    """Accept rays at three times the distance."""
     compare = GeometricAffinity.__call__
 
     def scaled(self, *seen):
@@ -108,7 +108,7 @@ def ten_times_as_slow(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("bug", "said"),
+    ("bug", "score"),
     [
         (no_cycle_constraint, "Match F1"),
         (swapped_wrists, "PCP"),
@@ -117,24 +117,24 @@ def ten_times_as_slow(monkeypatch):
         (ten_times_as_slow, "Time"),
     ],
 )
-def test_a_planted_bug_is_found(check, baseline, measured, monkeypatch, bug, said):
+def test_a_planted_bug_is_found(check, baseline, measured, monkeypatch, bug, score):
     bug(monkeypatch)
     result = check("--junit", "out.xml", "--summary", "out.md")
     assert result.exit_code == 1
     first = result.stdout.splitlines()
     assert first[0].startswith("small: ")
     assert "regression" in first[0]
-    assert any(line.startswith("worse") and said in line for line in first)
+    assert any(line.startswith("worse") and score in line for line in first)
     report = ElementTree.parse("out.xml").getroot()
     assert int(report[0].get("failures")) >= 1
     text = Path("out.md").read_text(encoding="utf-8")
     assert text.startswith("## small: ")
     assert "**worse**" in text
-    assert baseline.read_text() == measured  # a bug does not become the norm
+    assert baseline.read_text() == measured  # the check does not change the baseline
 
 
 @pytest.mark.slow
-def test_ten_times_unchanged_it_never_fails(check, baseline):
+def test_the_unchanged_method_passes_ten_times(check, baseline):
     for _ in range(10):
         result = check()
         assert result.exit_code == 0, result.stdout
@@ -143,7 +143,7 @@ def test_ten_times_unchanged_it_never_fails(check, baseline):
 
 
 @pytest.mark.slow
-def test_improvements_are_said(check, baseline, monkeypatch):
+def test_improvements_are_reported(check, baseline, monkeypatch):
     with monkeypatch.context() as planted:
         swapped_wrists(planted)
         assert check("--update-baseline", baseline="worse.json").exit_code == 0
@@ -154,7 +154,7 @@ def test_improvements_are_said(check, baseline, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_command_that_it_prints_runs_the_worst_trial(check, baseline, tmp_path):
+def test_the_printed_command_runs_the_worst_trial(check, baseline, tmp_path):
     result = check()
     *_, description, command = result.stdout.splitlines()
     case, seed = description.removeprefix("the trial that has the lowest PCP: ").split(", ")[:2]
@@ -171,7 +171,7 @@ def test_the_command_that_it_prints_runs_the_worst_trial(check, baseline, tmp_pa
 
 
 @pytest.mark.slow
-def test_two_workers_say_what_one_says(check, tmp_path):
+def test_two_workers_give_the_result_of_one(check, tmp_path):
     two = SMALL.replace("seeds = 12", "seeds = 2").replace("duration = 0.8", "duration = 0.4")
     (tmp_path / "two.toml").write_text(two.replace("[gate]\n", "[gate]\nlevel = 0.5\n"))
     assert check("--update-baseline", file="two.toml", baseline="new/two.json").exit_code == 0
@@ -180,24 +180,24 @@ def test_two_workers_say_what_one_says(check, tmp_path):
     assert result.stdout.count("none") == 6
 
 
-def test_help_is_there():
+def test_help_lists_the_options():
     result = CliRunner(env={"COLUMNS": "120"}).invoke(app, ["check", "--help"])
     assert result.exit_code == 0
     for option in ("--baseline", "--junit", "--summary", "--update-baseline", "--workers", "section [gate]"):
         assert option in result.stdout
 
 
-def refused(result, *said):
+def refused(result, *messages):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr.startswith("error: ")
     assert "Traceback" not in result.stderr
-    for text in said:
+    for text in messages:
         assert text in result.stderr
 
 
 class TestBadInput:
-    """Found before anything is run."""
+    """Errors that are found before anything is run."""
 
     @pytest.fixture(autouse=True)
     def nothing_is_run(self, monkeypatch):
@@ -208,8 +208,8 @@ class TestBadInput:
         monkeypatch.setattr("simharness.gate.suite.run_suite", run)
 
     @pytest.fixture
-    def there(self, tmp_path):
-        """A baseline as a file, of a suite that need not be run for it."""
+    def written(self, tmp_path):
+        """Write a baseline with made-up scores, without running the suite."""
         from simharness.gate.baseline import KEPT, Measurement, write_baseline
         from simharness.gate.suite import fingerprint
         from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
@@ -227,40 +227,40 @@ class TestBadInput:
     def test_no_baseline(self, check):
         refused(check(), "small.json: no such file", "--update-baseline")
 
-    def test_a_baseline_that_was_cut_off(self, check, there):
-        there.write_text(there.read_text()[:200])
+    def test_a_baseline_that_was_cut_off(self, check, written):
+        written.write_text(written.read_text()[:200])
         refused(check(), "small.json, line", "not valid JSON", "--update-baseline")
 
-    def test_a_baseline_of_another_suite(self, check, there, tmp_path):
+    def test_a_baseline_of_another_suite(self, check, written, tmp_path):
         other = SMALL.replace('"small"', '"other"').replace("[cases.crowd]", "[cases.masses]")
         (tmp_path / "other.toml").write_text(other)
         refused(
             check(file="other.toml"),
-            "is of the suite small",
-            "other.toml is other",
+            "the baseline of suite small",
+            "other.toml is suite other",
             "12 trials are only in the baseline, the first crowd, seed 0, fast and 12 trials are not in it",
             "--update-baseline",
         )
 
-    def test_a_baseline_of_other_settings_under_the_same_names(self, check, there, tmp_path):
+    def test_a_baseline_of_other_settings_under_the_same_names(self, check, written, tmp_path):
         (tmp_path / "small.toml").write_text(SMALL.replace("count = 5", "count = 4"))
-        refused(check(), "the same names, but other settings")
+        refused(check(), "the same names, but different settings")
 
-    def test_a_suite_of_so_few_seeds_that_it_could_find_nothing(self, check, there, tmp_path):
+    def test_a_suite_with_too_few_seeds(self, check, written, tmp_path):
         (tmp_path / "few.toml").write_text(SMALL.replace("seeds = 12", "seeds = 4"))
-        said = ("few.toml: no regression could ever be found: 4 seeds", "at least 5 seeds")
-        refused(check(file="few.toml"), *said)
-        refused(check("--update-baseline", file="few.toml"), *said)
+        messages = ("few.toml: no regression can be found: 4 seeds", "at least 5 seeds")
+        refused(check(file="few.toml"), *messages)
+        refused(check("--update-baseline", file="few.toml"), *messages)
 
     @pytest.mark.parametrize("option", ["--junit", "--summary"])
-    def test_a_report_that_cannot_be_written(self, check, there, option):
+    def test_a_report_that_cannot_be_written(self, check, written, option):
         refused(check(option, "small.toml/out"), f"{option} small.toml/out: cannot be written")
 
-    def test_a_baseline_that_cannot_be_written(self, check, there):
+    def test_a_baseline_that_cannot_be_written(self, check, written):
         refused(check("--update-baseline", baseline="small.toml/b.json"), "--baseline small.toml/b.json: cannot be")
 
     @pytest.mark.parametrize("option", ["--junit", "--summary"])
-    def test_a_report_of_a_comparison_that_is_not_made(self, check, there, option):
+    def test_a_report_of_a_comparison_that_is_not_made(self, check, written, option):
         refused(check("--update-baseline", option, "out"), f"{option}: cannot be combined with --update-baseline")
 
     def test_no_suite(self, check):
@@ -270,17 +270,17 @@ class TestBadInput:
 class TestFailedTrials:
     @pytest.fixture(autouse=True)
     def a_fault(self, monkeypatch):
-        measure = suite.measure
+        run_trial = suite.run_trial
 
-        def sometimes(scenario, variants, *, blame):
+        def sometimes(scenario, **options):
             if scenario.seed == 3 and scenario.people.count == 5:
                 raise RunError("the ceiling came down")
-            return measure(scenario, variants, blame=blame)
+            return run_trial(scenario, **options)
 
-        monkeypatch.setattr(suite, "measure", sometimes)
+        monkeypatch.setattr(suite, "run_trial", sometimes)
 
     @pytest.mark.slow
-    def test_they_fail_the_check_and_are_named(self, check, baseline):
+    def test_failed_trials_fail_the_check_and_are_listed(self, check, baseline):
         result = check("--junit", "out.xml")
         assert result.exit_code == 1
         assert "1 of 24 trials could not be run" in result.stdout
@@ -289,7 +289,7 @@ class TestFailedTrials:
         assert ElementTree.parse("out.xml").getroot()[0].get("errors") == "1"
 
     @pytest.mark.slow
-    def test_no_baseline_is_written_without_them(self, check, tmp_path):
+    def test_no_baseline_is_written_if_a_trial_failed(self, check, tmp_path):
         result = check("--update-baseline")
         assert result.exit_code == 1
         assert "the ceiling came down" in result.stderr

@@ -1,3 +1,5 @@
+"""Baseline files: written, read back, and refused when damaged."""
+
 import json
 import os
 
@@ -39,7 +41,7 @@ def test_a_trial_is_a_line_and_one_that_changes_changes_one_line(tmp_path):
     assert [old == new for old, new in zip(before, after, strict=True)].count(False) == 1
 
 
-def test_lines_are_in_order_whatever_the_order_of_the_trials(tmp_path):
+def test_lines_are_sorted_independently_of_the_order_of_the_trials(tmp_path):
     path, other = tmp_path / "one.json", tmp_path / "other.json"
     write_baseline(measurement(), path)
     turned = Measurement("ci", "0123456789", "1.0", dict(reversed(measurement().scores.items())))
@@ -47,7 +49,7 @@ def test_lines_are_in_order_whatever_the_order_of_the_trials(tmp_path):
     assert path.read_bytes() == other.read_bytes()
 
 
-def test_what_is_no_number_is_none_and_digits_beyond_all_tolerances_go():
+def test_nan_becomes_none_and_scores_are_rounded():
     scores = measurement(pcp=float("nan"), recall=97.123456).scores[TrialKey("a", 10, "full")]
     assert (scores["pcp"], scores["recall"]) == (None, 97.1235)
 
@@ -60,48 +62,48 @@ def spoilt(path, change):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
-        (lambda data: data.pop("fingerprint"), "no 'fingerprint'"),
+        (lambda data: data.pop("fingerprint"), "the key 'fingerprint' is missing"),
         (lambda data: data.update(suite=3), "suite: expected text, got 3"),
         (lambda data: data.update(trials={"a": 1}), "trials: expected objects"),
         (lambda data: data.update(trials=None), "not a baseline"),
-        (lambda data: data["trials"][0].pop("pcp"), "no 'pcp'"),
+        (lambda data: data["trials"][0].pop("pcp"), "the key 'pcp' is missing"),
         (lambda data: data["trials"][0].update(pcp="97"), 'a, seed 10, full: pcp: expected a number or null, got "97"'),
         (lambda data: data["trials"][0].update(pcp=True), "expected a number or null, got true"),
         (lambda data: data["trials"][0].update(seed="x"), "expected case, seed and variant"),
     ],
 )
-def test_what_is_no_baseline_is_refused(tmp_path, change, said):
+def test_an_invalid_baseline_is_refused(tmp_path, change, message):
     path = tmp_path / "ci.json"
     spoilt(path, change)
     with pytest.raises(ValueError, match="--update-baseline") as error:
         read_baseline(path)
     assert str(path) in str(error.value)
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize("content", [b"", b'{"suite": "ci",\n "trials": [', b"[1, 2]", b"\xff\xfe\x00"])
-def test_what_is_cut_off_or_something_else_is_refused(tmp_path, content):
+def test_an_incomplete_or_foreign_file_is_refused(tmp_path, content):
     path = tmp_path / "ci.json"
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"ci\.json.*--update-baseline"):
         read_baseline(path)
 
 
-def test_none_is_there(tmp_path):
+def test_a_missing_baseline_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"ci\.json: no such file; write one with --update-baseline"):
         read_baseline(tmp_path / "ci.json")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_to(tmp_path):
+def test_an_unwritable_folder_is_refused(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(ValueError, match="cannot be written: Permission denied"):
         write_baseline(measurement(), tmp_path / "ci.json")
 
 
-def test_a_file_in_the_way_of_a_folder(tmp_path):
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ValueError, match="cannot be written"):
         write_baseline(measurement(), tmp_path / "file" / "ci.json")

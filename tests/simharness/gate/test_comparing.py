@@ -1,3 +1,5 @@
+"""Comparison of two measurements: tolerances, significance, cases and time."""
+
 import itertools
 import math
 
@@ -16,18 +18,18 @@ CASES = tuple(f"case{index:02}" for index in range(11))
 
 
 def measured(change=lambda trial: {}, *, cases=CASES, seeds=12, variants=("fast", "full")):
-    """A suite with scores of its own in every trial, and what ``change`` adds to them; to the logarithm, of time."""
+    """Return a suite with different scores in every trial, plus ``change``; of time the change is of the logarithm."""
     scores = {}
     for case in cases:
         for seed in range(seeds):
             for variant in variants:
                 trial = TrialKey(case, seed, variant)
-                own = np.random.default_rng([len(case), cases.index(case), seed, len(variant)]).normal(0, 1)
+                noise = np.random.default_rng([len(case), cases.index(case), seed, len(variant)]).normal(0, 1)
                 added = change(trial)
                 scores[trial] = {
-                    key: usual * math.exp(0.2 * own + added.get(key, 0))
+                    key: usual * math.exp(0.2 * noise + added.get(key, 0))
                     if key == TIME
-                    else usual + (own if usual > 1 else 0.01 * own) + added.get(key, 0)
+                    else usual + (noise if usual > 1 else 0.01 * noise) + added.get(key, 0)
                     for key, usual in USUAL.items()
                 }
     return Measurement("suite", "0123456789", "1.0", scores)
@@ -64,7 +66,7 @@ def test_every_score_is_guarded_in_its_own_direction(score, variant):
     assert not better.with_verdict("worse")
 
 
-def test_within_its_tolerance_nothing_is_a_regression_however_certain():
+def test_a_certain_loss_within_its_tolerance_is_no_regression():
     assert not regressions(lambda trial: {"pcp": -0.9, "mpjpe_mm": 1.9, "ghosts": 0.045})
     assert regressions(lambda trial: {"pcp": -1.1})
     assert not regressions(lambda trial: {"pcp": -1.1}, Gate.model_validate({"tolerance": {"pcp": 1.5}}))
@@ -76,7 +78,7 @@ def test_a_small_mean_of_large_changes_is_within_its_tolerance():
 
     comparison = compare(measured(), measured(change), GATE)
     assert not comparison.with_verdict("worse")
-    assert comparison.changes_of("full")[0].p < GATE.level  # which it is in spite of, over the whole suite
+    assert comparison.changes_of("full")[0].p < GATE.level  # significant, but within the tolerance
 
 
 def test_a_large_change_of_few_trials_is_not_significant():
@@ -85,7 +87,7 @@ def test_a_large_change_of_few_trials_is_not_significant():
 
 
 def test_one_case_alone_is_seen():
-    """Eleven others drown it: the whole suite loses less than its tolerance."""
+    """Eleven unchanged cases dilute the loss: over the whole suite it is within the tolerance."""
     worse = regressions(lambda trial: {"pcp": -6.0 - 0.1 * trial.seed} if trial[::2] == ("case07", "full") else {})
     assert named(worse) == {("pcp", "full", "case07")}
     assert worse[0].worst == TrialKey("case07", 11, "full")
@@ -94,7 +96,7 @@ def test_one_case_alone_is_seen():
 
 
 def test_trials_that_did_not_change_make_no_tests():
-    """One seed of twelve gained a little: p = 2 / 4096, which is too much for 146 tests, and little for one."""
+    """One seed of twelve gained a little: p = 2 / 4096 is significant as one test, not as one of 146."""
 
     def change(trial):
         return {"pcp": 0.01 if trial.seed == 4 else -3.0} if trial[::2] == ("case07", "full") else {}
@@ -103,7 +105,7 @@ def test_trials_that_did_not_change_make_no_tests():
 
 
 def test_one_case_alone_is_seen_where_all_others_changed_at_random():
-    """The most tests that are ever made, 146: one in 4096 is still below the level."""
+    """All 146 tests are made; p = 1 / 4096 is significant among them."""
 
     def change(trial):
         if trial[::2] == ("case07", "full"):
@@ -114,8 +116,8 @@ def test_one_case_alone_is_seen_where_all_others_changed_at_random():
     assert named(regressions(change)) == {("pcp", "full", "case07")}
 
 
-def test_what_changes_at_random_is_called_a_regression_no_more_often_than_the_level():
-    """Small suites whose every score moves by ten tolerances, up or down: one in twenty may fail."""
+def test_random_changes_are_called_regressions_no_more_often_than_the_level():
+    """Small suites with random changes of ten tolerances in every score: one in twenty may fail."""
 
     def fails(run):
         def change(trial):
@@ -129,9 +131,9 @@ def test_what_changes_at_random_is_called_a_regression_no_more_often_than_the_le
 
 
 def flipped(signs, size):
-    """A suite of one variant and three cases, and what becomes of it: at each seed all cases move in one direction.
+    """Return a suite of one variant and three cases before and after: at each seed all cases change in one direction.
 
-    All that could be said of a neutral change: its signs are a matter of chance, and by seed, not by trial.
+    This is a neutral change: its signs are random, by seed and not by trial.
     """
 
     def measurement(change):
@@ -146,8 +148,8 @@ def flipped(signs, size):
 
 
 @pytest.mark.parametrize("score", ["pcp", TIME])
-def test_what_moves_whole_seeds_at_random_is_called_a_regression_no_more_often_than_the_level(score):
-    """Every way in which six seeds can go up and down: the level is the share that may fail."""
+def test_random_changes_of_whole_seeds_are_called_regressions_no_more_often_than_the_level(score):
+    """All sign patterns of six seeds: the share that fails is at most the level."""
     gate = Gate(level=0.07)
 
     def size(case, seed, sign):
@@ -161,7 +163,7 @@ def test_what_moves_whole_seeds_at_random_is_called_a_regression_no_more_often_t
     assert 0 < np.mean(fail) <= gate.level
 
 
-def test_over_the_whole_suite_a_seed_is_a_pair_and_its_cases_weigh_alike():
+def test_over_the_whole_suite_a_seed_is_a_pair_and_its_cases_have_equal_weight():
     before, after = measured(), measured(lambda trial: {"pcp": -1.0 * trial.seed * CASES.index(trial.case)})
     whole = compare(before, after, GATE).changes_of("full")[0]
     assert (whole.score, whole.n) == ("pcp", 12)
@@ -170,8 +172,8 @@ def test_over_the_whole_suite_a_seed_is_a_pair_and_its_cases_weigh_alike():
     assert whole.worst == TrialKey(CASES[10], 11, "full")
 
 
-def test_a_score_that_one_side_lacks_in_a_case_is_not_made_up_by_the_others():
-    """Case by case nothing changed: that the case with the low score has none any more is no gain."""
+def test_a_score_that_is_missing_in_one_measurement_is_left_out_of_both():
+    """No case changed: a low score that is missing afterwards is no gain."""
     before = measured(lambda trial: {"pcp": -60.0 if trial.case == "case03" else 0.0})
     scores = {
         trial: {**each, "pcp": None} if trial.case == "case03" and trial.seed % 2 else each
@@ -181,7 +183,7 @@ def test_a_score_that_one_side_lacks_in_a_case_is_not_made_up_by_the_others():
     assert {change.difference for change in comparison.changes if change.score != TIME} == {0.0}
 
 
-def test_a_loss_that_so_few_seeds_cannot_show_is_undecided():
+def test_a_loss_with_too_few_seeds_is_undecided():
     """All scores of both variants fall at all of six seeds: 1 / 64, and 26 tests or more."""
 
     def fall(trial):
@@ -198,7 +200,7 @@ def test_a_loss_that_so_few_seeds_cannot_show_is_undecided():
     assert not gain.undecided
     mixed = compare(measured(), measured(lambda t: {"pcp": -9.0 if t.seed % 2 else 4.0}), GATE)
     assert not mixed.with_verdict("worse")
-    assert not mixed.undecided  # twelve seeds could have shown it, and did not
+    assert not mixed.undecided  # twelve seeds are enough to show a loss, and did not
 
 
 def test_a_study_of_one_case_is_not_compared_twice():
@@ -207,7 +209,7 @@ def test_a_study_of_one_case_is_not_compared_twice():
     assert {change.case for change in comparison.changes} == {None}
 
 
-def test_time_is_compared_by_the_middle_of_its_ratios():
+def test_time_is_compared_by_the_middle_half_of_its_ratios():
     slower = regressions(lambda trial: {TIME: math.log(2.0)} if trial.variant == "full" else {})
     assert named(slower) == {(TIME, "full", case) for case in (None, *CASES)}
     assert slower[0].difference == pytest.approx(2.0, rel=1e-3)
@@ -219,12 +221,12 @@ def test_time_is_compared_by_the_middle_of_its_ratios():
     assert not regressions(lambda trial: {TIME: math.log(2.0)}, Gate(slowdown=2.5))
 
 
-def test_what_is_slow_in_one_case_alone_is_found_there():
+def test_a_slowdown_in_one_case_is_found_in_that_case():
     slower = regressions(lambda trial: {TIME: math.log(3.0) if trial.case == CASES[4] else 0.0})
     assert named(slower) == {(TIME, variant, CASES[4]) for variant in ("fast", "full")}
 
 
-def test_the_interval_of_time_holds_the_ratio():
+def test_the_interval_of_time_contains_the_ratio():
     def holds(run):
         def change(trial):
             return {TIME: math.log(1.2) + np.random.default_rng([trial.seed, run]).normal(0, 0.3)}
@@ -237,7 +239,7 @@ def test_the_interval_of_time_holds_the_ratio():
     assert np.mean([holds(run) for run in range(50)]) > 0.84  # 0.95 expected, less three deviations
 
 
-def test_trials_and_scores_that_only_one_side_has_are_left_out():
+def test_trials_and_scores_of_only_one_measurement_are_left_out():
     before = measured(cases=("a", "b"))
     after = measured(lambda trial: {"pcp": -3.0}, cases=("a", "b"))
     scores = {trial: {**each, "mpjpe_mm": None} for trial, each in after.scores.items() if trial.seed != 5}
@@ -254,7 +256,7 @@ def test_regressions_come_whole_suite_first_and_worst_first():
     assert worse[0].loss > worse[-1].loss > 1
 
 
-def test_a_tolerance_of_nothing_is_one():
+def test_a_tolerance_of_zero_is_valid():
     strict = Gate.model_validate({"tolerance": {"pcp": 0.0}})
     assert not regressions(lambda trial: {}, strict)
     assert named(regressions(lambda trial: {"pcp": -0.01}, strict)) >= {("pcp", "full", None)}

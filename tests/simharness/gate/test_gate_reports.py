@@ -1,11 +1,14 @@
-"""What a check says: JUnit, Markdown."""
+"""Reports of a gate check: terminal, JUnit, Markdown."""
 
+import io
 import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
+from rich.console import Console
 
+from simharness.cli.check import _print
 from simharness.gate.baseline import TIME, Measurement
 from simharness.gate.change_text import difference
 from simharness.gate.compare import compare
@@ -20,7 +23,7 @@ COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"
 
 
 def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd"), seeds=12):
-    """A check of three cases whose scores changed by what ``change`` says."""
+    """Return the result of a check of three cases whose scores changed by ``change``."""
     usual = {
         "pcp": 90.0,
         "recall": 95.0,
@@ -57,12 +60,33 @@ def cases_of(check):
 
 
 def test_a_difference_that_rounds_to_zero_has_no_sign():
-    """MPJPE has differences of both signs below the last digit that is printed."""
+    """The differences of MPJPE have both signs and are smaller than the last printed digit."""
     jitter = {seed: 0.003 * (-1) ** seed - 0.001 for seed in range(12)}
     check = made(lambda trial: {"mpjpe_mm": jitter[trial.seed]})
     (change,) = (each for each in check.comparison.changes_of("full") if each.score == "mpjpe_mm")
     assert change.low < change.difference < 0 < change.high
     assert difference(change) == "0.0 (0.0 to 0.0)"
+
+
+class TestTerminal:
+    @pytest.mark.parametrize("more", [{}, {"mpjpe_mm": 412.34, TIME: 123.4}, {"pcp": -89.0, "ghosts": 12.3}])
+    def test_tables_are_complete_at_80_columns(self, more):
+        """Large changes with wide intervals, in a terminal of 80 columns."""
+        check = made(lambda trial: {key: value * (1 + 0.3 * (trial.seed % 3)) for key, value in more.items()})
+        file = io.StringIO()
+        _print(check, Console(file=file, width=80))
+        _, *tables, _ = file.getvalue().split("\n\n")  # verdict and changes, a table for each variant, command
+        assert len(tables) == 2
+        tables = "\n".join(tables).splitlines()
+        assert "…" not in "".join(tables)
+        assert max(map(len, tables)) <= 80
+        for key in HEADLINE:
+            assert sum(SCORES[key].title in line for line in tables) == 2
+        for change in check.comparison.changes_of("full"):
+            for cell in difference(change).split(" (", 1):
+                assert any(cell in line for line in tables)
+        if more:
+            assert sum("worse" in line for line in tables) >= 2
 
 
 class TestJUnit:
@@ -90,7 +114,7 @@ class TestJUnit:
         assert [name for name, case in cases.items() if len(case)] == [SPEED]
         assert "×2.00" in cases[SPEED].find("failure").get("message")
 
-    def test_what_could_not_be_run_is_an_error(self):
+    def test_a_failed_trial_is_an_error(self):
         failed = [FailedCase("crowd", 3, "no \x00 room & <more>\nin two lines")]
         suite, cases = cases_of(made(failed=failed))
         assert suite.get("errors") == "1"
@@ -101,21 +125,21 @@ class TestJUnit:
         assert list(cases) == [WHOLE, SPEED]
         assert cases[WHOLE].find("error") is not None
 
-    def test_what_cannot_be_judged_fails_nothing_and_is_said(self):
+    def test_an_undecided_loss_fails_nothing_and_is_printed(self):
         suite, cases = cases_of(made(crowded, seeds=5))
         assert (suite.get("failures"), suite.get("errors")) == ("0", "0")
         assert [name for name, case in cases.items() if len(case)] == [WHOLE, "crowd"]
-        said = cases["crowd"].find("system-out").text
-        assert "too few seeds" in said
-        assert "PCP" in said
+        text = cases["crowd"].find("system-out").text
+        assert "too few seeds" in text
+        assert "PCP" in text
 
-    def test_what_improved_fails_nothing(self):
+    def test_a_gain_fails_nothing(self):
         suite, _ = cases_of(made(better))
         assert suite.get("failures") == "0"
 
 
 class TestMarkdown:
-    def test_tables_are_whole(self):
+    def test_tables_are_complete(self):
         text = markdown(made(crowded))
         rows = [line for line in text.splitlines() if line.startswith("|")]
         assert len(rows) == 2 * (2 + 6 + 1)
@@ -123,21 +147,21 @@ class TestMarkdown:
         for key in HEADLINE:
             assert sum(row.startswith(f"| {SCORES[key].title}") for row in rows) == 2
 
-    def test_the_verdict_comes_first_then_what_got_worse_then_what_got_better(self):
+    def test_the_order_is_verdict_losses_gains(self):
         text = markdown(made(lambda trial: crowded(trial) | better(trial)))
         assert text.startswith("## ci: 4 regressions\n")
         places = [text.index(each) for each in ("### Worse", "### Better", "### full", "### fast", COMMAND)]
         assert places == sorted(places)
         assert markdown(made()).startswith("## ci: no regression\n")
 
-    def test_what_cannot_be_judged_is_listed(self):
+    def test_undecided_losses_are_listed(self):
         assert "### Worse, but too few seeds to judge\n\n- full, " in markdown(made(crowded, seeds=5))
         assert "too few" not in markdown(made(crowded)) + markdown(made(seeds=5))
 
     def test_the_command_can_be_copied(self):
         assert f"\n```sh\n{COMMAND}\n```\n" in markdown(made())
 
-    def test_names_cannot_break_it(self):
+    def test_special_characters_in_names_are_escaped(self):
         text = markdown(made(lambda trial: {"pcp": -5} if trial.case == "a<b|c" else {}))
         assert "a&lt;b\\|c" in text
         assert "a<b|c" not in text
@@ -167,7 +191,7 @@ def test_the_verdict(check, passed, verdict):
     assert (check.passed, check.verdict) == (passed, verdict)
 
 
-def test_what_the_command_is_of():
+def test_the_worst_trial_is_described():
     assert made().worst_description == "the trial that has the lowest PCP: base, seed 0, full"
     assert made(crowded).worst_description.startswith("the trial that lost most")
     assert replace(made(), failed=(FailedCase("base", 0, "no"),)).worst_description.startswith(

@@ -1,4 +1,4 @@
-"""How small a suite may be."""
+"""Minimum number of seeds of a suite."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from simharness.statistics.paired_tests import paired
 
 
 @pytest.mark.parametrize("seeds", [1, 2, 5, 12, 13, 20])
-def test_no_test_comes_below_the_least_p(seeds):
+def test_no_p_value_is_below_the_smallest(seeds):
     p = paired(np.zeros(seeds), -np.arange(1.0, seeds + 1), alternative="less").p
     assert least_p(seeds) <= p < 4 * least_p(seeds)
     assert p == least_p(seeds) or seeds > 12
@@ -25,13 +25,13 @@ def test_the_least_seeds_are_enough_and_one_fewer_are_not(level):
     assert least_p(seeds) <= level < least_p(seeds - 1)
 
 
-def test_some_levels_no_number_of_seeds_reaches():
+def test_some_levels_are_too_low_for_any_number_of_seeds():
     assert least_seeds(1e-6) is None
 
 
 @pytest.fixture
 def read(tmp_path):
-    """Read the baseline of a suite of so many seeds, judged at a level."""
+    """Write and read the baseline of a suite with a number of seeds and a level."""
 
     def baseline(seeds, level=0.05):
         path = tmp_path / "few.toml"
@@ -49,8 +49,8 @@ def read(tmp_path):
     return baseline
 
 
-def test_a_suite_that_could_find_nothing_is_refused(read):
-    with pytest.raises(ValueError, match=r"few\.toml: no regression could ever be found: 4 seeds .* at least 5 seeds"):
+def test_a_suite_that_cannot_find_a_regression_is_refused(read):
+    with pytest.raises(ValueError, match=r"few\.toml: no regression can be found: 4 seeds .* at least 5 seeds"):
         read(4)
     with pytest.raises(ValueError, match=r"1 seed that .* at least 5 seeds, or a higher level"):
         read(1)
@@ -58,6 +58,6 @@ def test_a_suite_that_could_find_nothing_is_refused(read):
         read(20, level=1e-6)
 
 
-def test_a_suite_that_can_find_something_is_not(read):
+def test_a_suite_with_enough_seeds_is_accepted(read):
     assert len(read(5).scores) == len(read(5, level=0.04).scores)
     assert read(1, level=0.5).suite == "few"

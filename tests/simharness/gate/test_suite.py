@@ -1,3 +1,5 @@
+"""Runs of a suite and their fingerprints."""
+
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -22,9 +24,9 @@ def study(tmp_path):
     return load_study(path, seeds=2)
 
 
-def test_the_suite_that_is_committed_is_well_within_its_limits():
+def test_the_shipped_suite_is_small_and_has_enough_seeds():
     ci = load_study(Path(__file__).parents[3] / "scenarios" / "ci.toml")
-    assert len(ci.seeds) >= 12  # fewer, and no case alone could be significant
+    assert len(ci.seeds) >= 12  # with fewer no single case could be significant
     assert ci.trials * len(ci.variants) <= 300
     assert max(setting.scenario.frames for setting in ci.settings) <= 15
     assert {setting.scenario.rendering.renderer for setting in ci.settings} == {"rays"}
@@ -32,24 +34,24 @@ def test_the_suite_that_is_committed_is_well_within_its_limits():
     assert tests / 2 ** len(ci.seeds) < ci.gate.level
 
 
-def test_the_reference_is_timed_as_often_as_asked():
+def test_the_reference_is_timed_the_requested_number_of_times():
     times = time_reference(15)
     assert len(times) == 15
     assert times.min() > 0
 
 
 class TestFingerprint:
-    def test_is_of_what_is_run(self, study):
+    def test_changes_with_settings_seeds_and_variants(self, study):
         path, one = study.path, fingerprint(study)
         assert fingerprint(load_study(path, seeds=2)) == one
         for line in ("people.area = 1.9", "[cases.more]", 'detector.profile = "poor"', 'appearance.source = "drawn"'):
-            path.write_text(f"{SMALL}\n{line}\n")  # of the last case, or one more
+            path.write_text(f"{SMALL}\n{line}\n")  # a key of the last case, or another case
             assert fingerprint(load_study(path, seeds=2)) != one, line
         path.write_text(SMALL)
         assert fingerprint(load_study(path, seeds=3)) != one
         assert fingerprint(replace(study, variants=("full",))) != one
 
-    def test_is_not_of_names_folders_and_tolerances(self, study, tmp_path):
+    def test_does_not_change_with_names_folders_and_tolerances(self, study, tmp_path):
         other = tmp_path / "elsewhere" / "other.toml"
         other.parent.mkdir()
         text = SMALL.replace('name = "small"', 'name = "other"\ndescription = "the same"')
@@ -57,7 +59,7 @@ class TestFingerprint:
         assert load_study(other).gate != study.gate
         assert fingerprint(load_study(other, seeds=2)) == fingerprint(study)
 
-    def test_is_of_the_content_of_files_and_not_of_where_they_lie(self, study, tmp_path):
+    def test_changes_with_the_content_of_files_and_not_with_their_folder(self, study, tmp_path):
         prints = []
         for folder, content in (("a", b"one"), ("b", b"one"), ("c", b"two")):
             file = tmp_path / folder / "net.onnx"
@@ -90,24 +92,24 @@ def test_every_trial_is_measured_once_beside_the_reference(study, monkeypatch):
     json.dumps([dict(scores) for scores in kept.scores.values()], allow_nan=False)
 
 
-def test_a_trial_that_cannot_be_run_is_said_and_the_others_go_on(study, monkeypatch):
+def test_a_failing_trial_is_reported_and_the_others_run(study, monkeypatch):
     def sometimes(scenario, *, variants, until):
         if scenario.seed == 1:
             raise RunError("the ceiling came down")
-        raise ValueError("nobody fits") if scenario.people.count == 5 else RunError("and again")
+        raise ValueError("no room") if scenario.people.count == 5 else RunError("and again")
 
     monkeypatch.setattr(suite, "run_trial", sometimes)
     done = run_suite(study)
     assert done.scores == {}
     assert {(each.case, each.seed, each.error) for each in done.failed} == {
         ("phantoms", 0, "and again"),
-        ("crowd", 0, "nobody fits"),
+        ("crowd", 0, "no room"),
         ("phantoms", 1, "the ceiling came down"),
         ("crowd", 1, "the ceiling came down"),
     }
 
 
-def test_two_settings_of_one_scenario_both_have_its_scores(study, monkeypatch):
+def test_two_settings_of_one_scenario_share_its_result(study, monkeypatch):
     def measure(scenario, *, variants, until):
         measured.append(scenario.seed)
         raise RunError("enough")

@@ -1,3 +1,5 @@
+"""Names and commands of the trials of a suite."""
+
 import shlex
 from pathlib import Path
 
