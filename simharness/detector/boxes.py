@@ -20,7 +20,7 @@ from mvpose.camera import Rig
 from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import Boxes
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
@@ -39,7 +39,7 @@ _INWARD = 0.45  # most that a side may move, as a share of the box's size, so th
 _JOINTS = np.arange(len(COCO17))
 
 
-@step("people", stage=Stage.PEOPLE, sections=("boxes",))
+@step("people", stage=StepStage.PEOPLE, sections=("boxes",))
 def detect_people(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Detect people in boxes, with the errors of boxes."""
     return apply_box_errors(block, context.views, context.rig, context.config.boxes, context.draws)

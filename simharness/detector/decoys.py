@@ -16,14 +16,14 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import DecoyHits
 from simharness.types.views import Views
 
 _SCATTER = 0.2  # deviation of keypoints at the decoy's true joints, in units of OKS sigma x sqrt(area)
 
 
-@step("decoys", stage=Stage.FALSE_POSITIVES, sections=("decoys",))
+@step("decoys", stage=StepStage.FALSE_POSITIVES, sections=("decoys",))
 def add_decoy_hits(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Append the decoys that are taken for people."""
     hits = draw_decoy_hits(context.views, context.rig, context.config.decoys, context.draws)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.detector.detection_block import DetectionBlock
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 
 
-@step("delivery", stage=Stage.DELIVERY)
+@step("delivery", stage=StepStage.DELIVERY)
 def deliver_pictures(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Arrange the detections as the pictures arrive."""
     return rearrange_by_source(block, context.views.source)

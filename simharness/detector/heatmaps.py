@@ -18,7 +18,7 @@ from mvpose.arrays import Bools, Floats
 from mvpose.checks import seal
 from mvpose.heatmaps import Heatmaps
 from simharness.detector.detection_block import DetectionBlock
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import HeatmapHead
 from simharness.types.truth import KeypointError
 
@@ -82,7 +82,7 @@ class Peaks:
         return Heatmaps(values, origin, stride)
 
 
-@step("crops", stage=Stage.DETECTIONS, sections=("heatmaps",))
+@step("crops", stage=StepStage.DETECTIONS, sections=("heatmaps",))
 def limit_to_crops(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Drop keypoints outside the crops where keypoints are read from heat maps."""
     return block if context.config.heatmaps.size == "none" else drop_outside_crops(block)

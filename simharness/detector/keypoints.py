@@ -25,7 +25,7 @@ from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VIS
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.error_classes import MIRROR, PAIRED
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.detector.view_geometry import image_axes
 from simharness.scenario.sections.detector import Bias, Correlation, Keypoints
 from simharness.types.sequence import Sequence
@@ -58,7 +58,7 @@ class Keypoints2D:
     rivals: Floats
 
 
-@step("keypoints", stage=Stage.KEYPOINTS, sections=("keypoints", "bias", "correlation"))
+@step("keypoints", stage=StepStage.KEYPOINTS, sections=("keypoints", "bias", "correlation"))
 def set_keypoints(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Move every person's keypoints to where the detector finds them."""
     config, rig = context.config, context.rig

@@ -18,7 +18,7 @@ from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.false_positives import MIN_JOINTS, bounding_box, false_positive_block, keypoint_scores
 from simharness.detector.phantom_poses import NORMALS, postures, project_upright, rotate_about_z
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import Phantoms
 from simharness.types.views import Views, Visibility
 
@@ -32,7 +32,7 @@ _TRIES = 6  # places tried for a figure until at least two views contain it, eac
 _LOWER = np.arange(11, 17)  # hips and legs
 
 
-@step("phantoms", stage=Stage.FALSE_POSITIVES, sections=("phantoms",))
+@step("phantoms", stage=StepStage.FALSE_POSITIVES, sections=("phantoms",))
 def add_phantoms(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Append the phantoms."""
     drawn = draw_phantoms(context.views, context.rig, context.config.phantoms, context.draws)

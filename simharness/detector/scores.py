@@ -15,7 +15,7 @@ from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws, logistic
-from simharness.detector.steps import Context, Stage, step
+from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import Correlation, Scores
 from simharness.types.truth import KeypointError
 
@@ -23,7 +23,7 @@ MIN_SCORE = 0.02
 """Lowest score of a joint that is reported."""
 
 
-@step("scores", stage=Stage.SCORES, sections=("scores", "correlation"))
+@step("scores", stage=StepStage.SCORES, sections=("scores", "correlation"))
 def set_scores(block: DetectionBlock, context: Context) -> DetectionBlock:
     """Give every keypoint its score; a person without a scored keypoint is not detected."""
     scores = score_keypoints(

@@ -2,7 +2,7 @@
 
 :func:`simharness.detector.detect.detect` begins with the perfect detections of all people
 (:meth:`~simharness.detector.detection_block.DetectionBlock.of_people`) and runs every registered step on them, ordered
-by :class:`Stage` and within a stage by :data:`MODULES`.
+by :class:`StepStage` and within a stage by :data:`MODULES`.
 
 How to add an error, for example keypoints that are rounded to whole pixels:
 
@@ -18,7 +18,7 @@ How to add an error, for example keypoints that are rounded to whole pixels:
 
 2. The step: one new file, ``simharness/detector/quantisation.py``::
 
-       @step("quantisation", stage=Stage.DETECTIONS, sections=("quantisation",))
+       @step("quantisation", stage=StepStage.DETECTIONS, sections=("quantisation",))
        def quantise(block: DetectionBlock, context: Context) -> DetectionBlock:
            grid = context.config.quantisation.pixels
            if grid == 0:
@@ -70,8 +70,8 @@ MODULES = (
 """Modules of ``simharness.detector`` that register steps, in the order in which steps of one stage run."""
 
 
-class Stage(IntEnum):
-    """Stage of detection in which a step runs; what the block holds before it."""
+class StepStage(IntEnum):
+    """StepStage of detection in which a step runs; what the block holds before it."""
 
     KEYPOINTS = 1
     """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1."""
@@ -126,7 +126,7 @@ class Step:
     """
 
     name: str
-    stage: Stage
+    stage: StepStage
     sections: tuple[str, ...]
     apply: StepFunction
 
@@ -135,7 +135,7 @@ REGISTRY: dict[str, Step] = {}
 """Registered steps by name; complete after :func:`registered_steps`."""
 
 
-def step(name: str, *, stage: Stage, sections: tuple[str, ...] = ()) -> Callable[[StepFunction], StepFunction]:
+def step(name: str, *, stage: StepStage, sections: tuple[str, ...] = ()) -> Callable[[StepFunction], StepFunction]:
     """Register the decorated function as a step of the detector.
 
     Args:

@@ -19,7 +19,7 @@ from simharness.study.result_folder import Results, read_study, write_study
 from simharness.study.scheduler import Measure, TrialFailure, TrialSuccess, Unit, error_text, run_units
 from simharness.study.study_file import document
 from simharness.study.tables import tables
-from simharness.study.trial_store import Entry, State, Store, StoreError
+from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code
 from simharness.trial.provenance import provenance
@@ -212,7 +212,7 @@ def _different(planned: Sequence[PlannedTrial]) -> Iterator[PlannedTrial]:
 def _unit(store: Store, planned: PlannedTrial) -> Unit:
     """Return the work that is left of a trial: no variants where nothing is."""
     entries = {variant: store.read(identity) for variant, identity in planned.entries.items()}
-    left = tuple(name for name, entry in entries.items() if entry is None or entry.state is not State.CURRENT)
+    left = tuple(name for name, entry in entries.items() if entry is None or entry.state is not EntryState.CURRENT)
     stored = StoredTrial()
     if left and (detected := store.read_detections(planned.trial)):
         known = {name: entry for name, entry in entries.items() if name in left and entry and entry.estimates}

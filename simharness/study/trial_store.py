@@ -9,7 +9,7 @@ A store is a folder::
     7c/7c51...e0.failed.json    the error of an entry that could not be made; a later run tries it again
 
 An entry says with which code it was scored. If that code has changed, the entry is scored again from its estimates and
-the detections of its trial, without simulation; see :class:`State`.
+the detections of its trial, without simulation; see :class:`EntryState`.
 
 Files get their names by renaming, and one name always stands for the same estimates, so any number of processes may use
 a store at once: the worst that happens is that two do the same work.
@@ -48,8 +48,8 @@ class StoreError(RunError):
     """A store that cannot be written to any more: no room, no permission. Its content stays."""
 
 
-class State(Enum):
-    """State of an entry in a store."""
+class EntryState(Enum):
+    """EntryState of an entry in a store."""
 
     MISSING = "missing"  # or damaged
     OUTDATED = "outdated"  # its scores or failures were made by other code; the estimates are good
@@ -79,10 +79,10 @@ class Entry:
     failures_code: str = field(default_factory=lambda: code().failures)
 
     @property
-    def state(self) -> State:
+    def state(self) -> EntryState:
         """Whether scores and failures were made by the code of this process."""
         current = self.scores_code == code().scores and self.failures_code == code().failures
-        return State.CURRENT if current else State.OUTDATED
+        return EntryState.CURRENT if current else EntryState.OUTDATED
 
 
 class Store:
@@ -117,10 +117,10 @@ class Store:
         """Return whether an entry exists and can be read in whole."""
         return self._sound(identity) is not None
 
-    def state(self, identity: str) -> State:
+    def state(self, identity: str) -> EntryState:
         """Return whether an entry can be used as it is, scored again, or has to be made."""
         entry = self.read(identity)
-        return State.MISSING if entry is None else entry.state
+        return EntryState.MISSING if entry is None else entry.state
 
     def read(self, identity: str) -> Entry | None:
         """Return an entry; None where there is none that can be read."""

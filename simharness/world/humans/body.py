@@ -29,7 +29,7 @@ PHENOTYPES = ("gender", "age", "muscle", "weight", "height", "proportions")
 DENSITY = 985.0  # kg / m3 of the whole body; Dempster 1955 and others: 960 (lungs full) to 1050
 
 
-class Part(IntEnum):
+class FacePart(IntEnum):
     """Body part that a face of the mesh shows.
 
     Torso, arms, legs, shoes and soles are faces of a suit, which also have a level (see :class:`Body`).
@@ -212,7 +212,7 @@ class Body:
         shape: shape parameters of the body.
         vertices: mesh in the rest pose, with clothes if dressed, (n, 3) float32 metres.
         faces: vertex indices, counter-clockwise seen from outside, (k, 3) int32.
-        part: :class:`Part` of every face, (k,).
+        part: :class:`FacePart` of every face, (k,).
         level: position of every face along its body part, (k,). On arms and legs: 0 at shoulder or hip, 1 at elbow or
             knee, 2 at wrist or ankle. On the torso: 0 at the hips, 1 at the root of the neck. On a skirt: as on legs.
         heads: start points of the bones, (B, 3) metres.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.body import Body, Part
+from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.wardrobe import Color, Look
 
 WIDTH, BAND, WHITE = 256, 160, 16  # pixels
@@ -76,14 +76,14 @@ def texture_coordinates(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[n
     rows = 2 * BAND + WHITE
     around, down = np.full(corners.shape[:2], 0.5), np.zeros(corners.shape[:2])
     worn = top | bottom
-    trunk = worn & np.isin(body.part, [Part.TORSO, Part.SKIRT])
+    trunk = worn & np.isin(body.part, [FacePart.TORSO, FacePart.SKIRT])
     neck = body.heads[body.index("Neck")]
     middle = 0.5 * (body.heads[0, 0] + neck[0])
     around[trunk] = np.arctan2(corners[trunk, :, 1], corners[trunk, :, 0] - middle) / (2 * np.pi)
     down[trunk] = neck[2] + _ROOT - corners[trunk, :, 2]
     for part, share, start, bones in (
-        (Part.ARM, _ARM, _ARM_START, ("Arm", "ForeArm", "Hand")),
-        (Part.LEG, _LEG, neck[2] - body.heads[body.index("LeftUpLeg"), 2], ("UpLeg", "Leg", "Foot")),
+        (FacePart.ARM, _ARM, _ARM_START, ("Arm", "ForeArm", "Hand")),
+        (FacePart.LEG, _LEG, neck[2] - body.heads[body.index("LeftUpLeg"), 2], ("UpLeg", "Leg", "Foot")),
     ):
         left = corners[:, :, 1].mean(1) > 0
         for side, on_side in (("Left", left), ("Right", ~left)):
@@ -92,7 +92,7 @@ def texture_coordinates(body: Body, *, top: NDArray[np.bool_], bottom: NDArray[n
             angle, along = _limb_coordinates(corners[limb], joints, mirrored=side == "Right")
             around[limb], down[limb] = 0.5 + share * angle / (2 * np.pi), start + _ROOT + along
     step = around - around[:, :1]
-    period = np.select([body.part == Part.ARM, body.part == Part.LEG], [_ARM, _LEG], 1.0)[:, None]
+    period = np.select([body.part == FacePart.ARM, body.part == FacePart.LEG], [_ARM, _LEG], 1.0)[:, None]
     around -= period * np.rint(step / period)  # the corners of a face are never a whole turn apart
     down = np.clip(down, _MARGIN, LENGTH - _MARGIN) / LENGTH * BAND / rows
     down[bottom] += BAND / rows

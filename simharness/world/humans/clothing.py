@@ -11,7 +11,7 @@ from scipy import sparse
 
 from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
-from simharness.world.humans.body import Body, Part
+from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.skirts_and_hair import AddedMesh, bun, long_hair, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
 
@@ -64,10 +64,10 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
     """Return the albedo of every face without patterns, (k, 3) float32."""
     palette = np.array([look.skin, look.hair, look.top, look.trousers, look.shoes, _SOLE], np.float32)
     colors = palette[garments(body, look)]
-    colors[body.part == Part.BROW] = mix(look.hair, look.skin, 0.3)
-    colors[body.part == Part.LIPS] = look.lips
-    colors[body.part == Part.SCLERA] = _SCLERA
-    colors[body.part == Part.IRIS] = look.eyes
+    colors[body.part == FacePart.BROW] = mix(look.hair, look.skin, 0.3)
+    colors[body.part == FacePart.LIPS] = look.lips
+    colors[body.part == FacePart.SCLERA] = _SCLERA
+    colors[body.part == FacePart.IRIS] = look.eyes
     return colors
 
 
@@ -75,16 +75,16 @@ def garments(body: Body, look: Look) -> NDArray[np.int64]:
     """Return the :class:`Garment` of every face of a body, (k,)."""
     part, level = body.part, body.level
     result = np.full(len(part), int(Garment.NONE))
-    result[part == Part.SCALP] = Garment.HAIR
+    result[part == FacePart.SCALP] = Garment.HAIR
     hem = -np.inf if look.lower_garment in ("dress", "coat") else HEMS[look.hem]
-    trunk = part == Part.TORSO
-    result[(trunk & (level >= hem)) | ((part == Part.ARM) & (level < SLEEVES[look.sleeves]))] = Garment.TOP
+    trunk = part == FacePart.TORSO
+    result[(trunk & (level >= hem)) | ((part == FacePart.ARM) & (level < SLEEVES[look.sleeves]))] = Garment.TOP
     result[trunk & (level < hem)] = Garment.TROUSERS
     if look.lower_garment in ("trousers", "coat"):
-        result[(part == Part.LEG) & (level < LEGS[look.legs])] = Garment.TROUSERS
-    result[part == Part.SKIRT] = Garment.TROUSERS if look.lower_garment == "skirt" else Garment.TOP
-    result[part == Part.SHOE] = Garment.SHOE
-    result[part == Part.SOLE] = Garment.SOLE
+        result[(part == FacePart.LEG) & (level < LEGS[look.legs])] = Garment.TROUSERS
+    result[part == FacePart.SKIRT] = Garment.TROUSERS if look.lower_garment == "skirt" else Garment.TOP
+    result[part == FacePart.SHOE] = Garment.SHOE
+    result[part == FacePart.SOLE] = Garment.SOLE
     return result
 
 
@@ -102,7 +102,7 @@ def dress(body: Body, look: Look) -> Body:
     faces = faces.reshape(-1, 3).astype(np.int32)
     source, worn = pairs // len(Garment), pairs % len(Garment)
 
-    arm = body.part == Part.ARM
+    arm = body.part == FacePart.ARM
     adjacent = np.stack([np.bincount(faces[rows].ravel(), minlength=len(pairs)) for rows in (~arm, arm)])
     level, along_arm = (
         np.bincount(faces[rows].ravel(), np.repeat(body.level[rows], 3), len(pairs)) / np.maximum(count, 1)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.world.humans.body import Body, Part
+from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.skinning import Skirt
 
 _THIGH = ("UpLeg", "Leg")
@@ -33,7 +33,7 @@ class AddedMesh:
 
     vertices: Floats
     faces: NDArray[np.int32]
-    part: Part
+    part: FacePart
     level: Floats
     weight_bones: NDArray[np.uint8]
     weights: NDArray[np.float32]
@@ -98,14 +98,14 @@ def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> t
     weights[:, :3] = np.column_stack([hang.pelvis_share, on_legs * left, on_legs * (1 - left)])
     level = np.repeat(depth, _COLUMNS)[faces].mean(1)
     bones = np.tile(np.array([*hang.bones, 0], np.uint8), (len(vertices), 1))
-    return AddedMesh(vertices.astype(float), faces, Part.SKIRT, level, bones, weights), hang
+    return AddedMesh(vertices.astype(float), faces, FacePart.SKIRT, level, bones, weights), hang
 
 
 def _body_points(body: Body) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return the vertices of the trunk, and those of the left and the right leg with that half of the trunk."""
     trunk, both = (
         body.vertices[np.unique(body.faces[np.isin(body.part, parts)])].astype(float)
-        for parts in ([Part.TORSO], [Part.TORSO, Part.LEG])
+        for parts in ([FacePart.TORSO], [FacePart.TORSO, FacePart.LEG])
     )
     return trunk, (both[both[:, 1] > 0], both[both[:, 1] < 0])
 
@@ -161,7 +161,7 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
     weights = np.zeros((len(vertices), 4), np.float32)
     weights[:, :3] = np.column_stack([1 - 0.45 * below, 0.2 * below, 0.25 * below])
     bones = np.array([body.index("Head"), body.index("Neck"), body.index("Spine1"), 0], np.uint8)
-    return AddedMesh(vertices, faces, Part.SCALP, np.ones(len(faces)), np.tile(bones, (len(vertices), 1)), weights)
+    return AddedMesh(vertices, faces, FacePart.SCALP, np.ones(len(faces)), np.tile(bones, (len(vertices), 1)), weights)
 
 
 def bun(body: Body, *, volume: float) -> AddedMesh:
@@ -177,14 +177,14 @@ def bun(body: Body, *, volume: float) -> AddedMesh:
     faces = _grid(9, 16, closed=True)
     weights = np.tile(np.array([1, 0, 0, 0], np.float32), (len(vertices), 1))
     bones = np.full((len(vertices), 4), body.index("Head"), np.uint8)
-    return AddedMesh(vertices, faces, Part.SCALP, np.ones(len(faces)), bones, weights)
+    return AddedMesh(vertices, faces, FacePart.SCALP, np.ones(len(faces)), bones, weights)
 
 
 def _head_points(body: Body) -> tuple[Floats, Floats]:
     """Return the vertices of head, neck and trunk, and those of the scalp."""
     points = body.vertices.astype(float)
-    scalp = np.unique(body.faces[body.part == Part.SCALP])
-    upper_body = np.unique(body.faces[np.isin(body.part, [Part.SCALP, Part.SKIN, Part.TORSO])])
+    scalp = np.unique(body.faces[body.part == FacePart.SCALP])
+    upper_body = np.unique(body.faces[np.isin(body.part, [FacePart.SCALP, FacePart.SKIN, FacePart.TORSO])])
     return points[upper_body], points[scalp]
 
 

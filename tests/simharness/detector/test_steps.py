@@ -10,7 +10,7 @@ from simharness.detector import steps
 from simharness.detector.detect import detect
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.error_classes import MIRROR
-from simharness.detector.steps import Context, Stage, registered_steps, step
+from simharness.detector.steps import Context, StepStage, registered_steps, step
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.section import Section
 from simharness.types.truth import KeypointError
@@ -54,7 +54,7 @@ def test_every_section_of_the_detector_is_read_by_a_step():
 
 
 def test_a_registered_step_acts_on_all_detections(registry):
-    @step("quantisation", stage=Stage.DETECTIONS)
+    @step("quantisation", stage=StepStage.DETECTIONS)
     def quantise(block: DetectionBlock, context: Context) -> DetectionBlock:
         return replace(block, keypoints=np.round(block.keypoints))
 
@@ -69,7 +69,7 @@ def test_a_registered_step_acts_on_all_detections(registry):
 def test_a_step_that_draws_leaves_the_draws_of_all_others_alone(registry):
     """Every third person, about, is reported with left and right exchanged."""
 
-    @step("mirrored people", stage=Stage.KEYPOINTS)
+    @step("mirrored people", stage=StepStage.KEYPOINTS)
     def mirror(block: DetectionBlock, context: Context) -> DetectionBlock:
         people = block.present.shape[2]
         flipped = context.draws.uniform("mirrored people", shape=(len(context.rig), people)) < 1 / 3
@@ -140,10 +140,10 @@ def test_steps_do_not_change_the_block_they_get():
 
 def test_a_name_can_be_registered_once(registry):
     with pytest.raises(ValueError, match="detector step 'keypoints' is registered twice; choose another name"):
-        step("keypoints", stage=Stage.KEYPOINTS)
+        step("keypoints", stage=StepStage.KEYPOINTS)
 
 
 def test_an_unknown_section_is_refused_with_the_nearest_name():
     with pytest.raises(ValueError, match=r"'new': expected sections of \[detector\].*got 'phantom'; did you mean 'ph"):
-        step("new", stage=Stage.DETECTIONS, sections=("phantom",))
+        step("new", stage=StepStage.DETECTIONS, sections=("phantom",))
     assert "new" not in steps.REGISTRY

@@ -17,7 +17,7 @@ from simharness.scoring import assessment
 from simharness.study.measure import StoredTrial, measure
 from simharness.study.plan import plan
 from simharness.study.runner import run_study
-from simharness.study.trial_store import State, Store
+from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
 from simharness.trial.detected_sequence import DetectedSequence
@@ -150,10 +150,10 @@ def test_an_entry_knows_its_state(run, code, tmp_path):
     study = load_study(QUICKSTART, overrides=CHEAP, seeds=1, variants=["full"])
     store, (planned,) = Store(tmp_path / "store"), plan(study)
     own = planned.entries["full"]
-    assert store.state(own) is State.CURRENT
-    assert store.state(own[::-1]) is State.MISSING
+    assert store.state(own) is EntryState.CURRENT
+    assert store.state(own[::-1]) is EntryState.MISSING
     code(failures="another")
-    assert store.state(own) is State.OUTDATED
+    assert store.state(own) is EntryState.OUTDATED
 
 
 @pytest.mark.parametrize(

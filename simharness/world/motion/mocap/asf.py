@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
-from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
+from simharness.world.motion.mocap.skeleton import END, RecordedMotion, MocapSkeleton
 
 RATE = 120.0  # Hz: AMC files do not state the rate; this is the rate of CMU recordings
 _TURNS, _SHIFTS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
@@ -45,7 +45,7 @@ class Acclaim:
         degrees: whether angles are in degrees.
     """
 
-    skeleton: Skeleton
+    skeleton: MocapSkeleton
     frames: dict[str, Rotation]
     dofs: dict[str, tuple[str, ...]]
     origin: Floats
@@ -94,7 +94,7 @@ def read_asf(path: Path) -> Acclaim:
     )
 
 
-def read_amc(path: Path, acclaim: Acclaim) -> Recording:
+def read_amc(path: Path, acclaim: Acclaim) -> RecordedMotion:
     """Read the motion of an AMC file for a skeleton; its rate is taken to be ``RATE``.
 
     Raises:
@@ -142,7 +142,7 @@ def _frame(reader: Reader, moving: dict[str, tuple[str, ...]], values: dict[str,
 
 def _recording(
     file: str, acclaim: Acclaim, values: dict[str, list[list[float]]], frames: int, *, degrees: bool
-) -> Recording:
+) -> RecordedMotion:
     skeleton = acclaim.skeleton
     turns = np.zeros((frames, len(skeleton), 4))
     turns[..., 0] = 1.0
@@ -160,10 +160,10 @@ def _recording(
             frame = acclaim.frames[name]
             turn = frame * rotation * frame.inv()
             turns[:, skeleton.names.index(name)] = turn.as_quat(scalar_first=True)
-    return Recording(file=file, skeleton=skeleton, rate=RATE, root=root, turns=turns)
+    return RecordedMotion(file=file, skeleton=skeleton, rate=RATE, root=root, turns=turns)
 
 
-def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
+def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> MocapSkeleton:
     names, above, offsets = [_ROOT], [-1], [np.zeros(3)]
     for place, name in enumerate(names):  # grows during the iteration: children follow their parents
         tip = bones[name].offset if name in bones else np.zeros(3)
@@ -178,7 +178,7 @@ def _skeleton(bones: dict[str, _Bone], parents: dict[str, str]) -> Skeleton:
         raise unconnected[0].line.error(
             f"bone {quoted(unconnected[0].line.words[1])} is not connected to the root in :hierarchy"
         )
-    return Skeleton(tuple(names), np.array(above), np.array(offsets))
+    return MocapSkeleton(tuple(names), np.array(above), np.array(offsets))
 
 
 def _body(reader: Reader) -> list[Line]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
-from simharness.world.motion.mocap.skeleton import END, Recording, Skeleton
+from simharness.world.motion.mocap.skeleton import END, RecordedMotion, MocapSkeleton
 
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 _MOST_JOINTS = 2000
@@ -30,7 +30,7 @@ class _Joint:
     first: int = 0  # column of its first channel
 
 
-def read_bvh(path: Path) -> Recording:
+def read_bvh(path: Path) -> RecordedMotion:
     """Read the skeleton and the motion of a BVH file.
 
     Raises:
@@ -38,7 +38,7 @@ def read_bvh(path: Path) -> Recording:
     """
     reader = Reader(path)
     joints = _hierarchy(reader)
-    skeleton = Skeleton(
+    skeleton = MocapSkeleton(
         tuple(joint.name for joint in joints),
         np.array([joint.parent for joint in joints]),
         np.array([joint.offset if joint.parent >= 0 else [0.0, 0.0, 0.0] for joint in joints]),
@@ -65,7 +65,7 @@ def read_bvh(path: Path) -> Recording:
             for k, axis in enumerate("xyz"):
                 if f"{axis}position" in columns:
                     root[:, k] = table[:, columns[f"{axis}position"]]
-    return Recording(file=path.name, skeleton=skeleton, rate=rate, root=root, turns=turns)
+    return RecordedMotion(file=path.name, skeleton=skeleton, rate=rate, root=root, turns=turns)
 
 
 def _hierarchy(reader: Reader) -> list[_Joint]:

@@ -19,7 +19,7 @@ from simharness.scenario.sections.people import Mocap
 from simharness.world.motion.mocap.asf import read_amc, read_asf
 from simharness.world.motion.mocap.bvh import read_bvh
 from simharness.world.motion.mocap.retarget import SourceMotion, pelvis_path, retarget, source_motion
-from simharness.world.motion.mocap.skeleton import Recording
+from simharness.world.motion.mocap.skeleton import RecordedMotion
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import RATE, interpolate_poses
@@ -40,7 +40,7 @@ class Clip:
             not that of a person.
     """
 
-    recording: Recording
+    recording: RecordedMotion
     start: float = 0.0
 
     def __post_init__(self) -> None:

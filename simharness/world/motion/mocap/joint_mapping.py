@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.mocap.skeleton import Recording, Skeleton, lowest_common_ancestor
+from simharness.world.motion.mocap.skeleton import RecordedMotion, MocapSkeleton, lowest_common_ancestor
 
 # Joint names by role, without the side, best first: of CMU, MotionBuilder, Biovision, Poser, 3ds Max and Blender. Two
 # roles of a limb may share a name ("shoulder" is the clavicle in one skeleton and the upper arm in another), so the
@@ -52,7 +52,7 @@ class JointMap:
     axes: Floats
 
 
-def map_joints(recording: Recording) -> JointMap:
+def map_joints(recording: RecordedMotion) -> JointMap:
     """Map the skeleton of a recording to the joints of a person.
 
     Raises:
@@ -91,7 +91,7 @@ def map_joints(recording: Recording) -> JointMap:
     return JointMap(pelvis, chest, heads[0] if heads else -1, limbs, _axes(recording, limbs))
 
 
-def _above(skeleton: Skeleton, joint: int) -> int:
+def _above(skeleton: MocapSkeleton, joint: int) -> int:
     return int(skeleton.parents[joint])
 
 
@@ -111,7 +111,7 @@ def _side_and_word(name: str) -> tuple[str | None, str]:
     return None, joined
 
 
-def _check_limb(recording: Recording, side: str, limb: tuple[str, ...], joints: dict[str, int]) -> None:
+def _check_limb(recording: RecordedMotion, side: str, limb: tuple[str, ...], joints: dict[str, int]) -> None:
     """Raise ValueError unless the joints of a limb form a chain in their order."""
     chain = [role for role in limb if joints[role] >= 0]
     names = recording.skeleton.names
@@ -124,7 +124,7 @@ def _check_limb(recording: Recording, side: str, limb: tuple[str, ...], joints: 
             )
 
 
-def _axes(recording: Recording, limbs: dict[str, dict[str, int]]) -> Floats:
+def _axes(recording: RecordedMotion, limbs: dict[str, dict[str, int]]) -> Floats:
     """Return the axes of the person in the coordinates of the file, from the zero pose of the skeleton."""
     zero = recording.skeleton.zero
     thigh, shank, foot, arm = (

@@ -19,7 +19,7 @@ from simharness.world.humans.anatomy import DOFS, SIDES
 from simharness.world.motion.mocap.foot_contact import FootPath, detect_stances, make_sole, plant_foot
 from simharness.world.motion.mocap.joint_mapping import JointMap, map_joints
 from simharness.world.motion.mocap.limb_angles import ARM, arm_angles, thigh_and_shank
-from simharness.world.motion.mocap.skeleton import Recording
+from simharness.world.motion.mocap.skeleton import RecordedMotion
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.inverse_kinematics import pelvis_height
 from simharness.world.motion.poses.kinematics import Kinematics
@@ -59,7 +59,7 @@ class SourceMotion:
     leg: float
 
 
-def source_motion(recording: Recording, *, rate: float) -> SourceMotion:
+def source_motion(recording: RecordedMotion, *, rate: float) -> SourceMotion:
     """Map the skeleton of a recording to a person and resample it to ``rate`` frames per second, or keep a lower rate.
 
     Raises:
@@ -128,7 +128,7 @@ def smooth_envelope(excess: Floats, frames: int) -> Floats:
     return gaussian_filter1d(most, frames / 3, mode="nearest", radius=frames) if frames else most
 
 
-def _tip(recording: Recording, roles: JointMap, side: str, role: str) -> int:
+def _tip(recording: RecordedMotion, roles: JointMap, side: str, role: str) -> int:
     """Return the joint at the far end of a limb's last segment: the toes or, if missing, its first child."""
     limb = roles.limbs[side]
     if role == "foot" and limb["toes"] >= 0:
@@ -138,7 +138,7 @@ def _tip(recording: Recording, roles: JointMap, side: str, role: str) -> int:
     return children[0] if children else joint
 
 
-def _resampled(recording: Recording, rate: float) -> Recording:
+def _resampled(recording: RecordedMotion, rate: float) -> RecordedMotion:
     """Return the recording without marker noise and reduced to every n-th frame, with at least ``rate`` per second."""
     step = max(int(recording.rate / rate + 0.01), 1)
     turns = recording.turns

@@ -1,4 +1,4 @@
-"""Skeleton and joint rotations of a motion file."""
+"""MocapSkeleton and joint rotations of a motion file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ END = " end"  # suffix of a joint name: tip of its bone, a joint without rotatio
 
 
 @dataclass(frozen=True)
-class Skeleton:
-    """Skeleton of J joints, the root first and parents before children. The zero pose has no rotations.
+class MocapSkeleton:
+    """MocapSkeleton of J joints, the root first and parents before children. The zero pose has no rotations.
 
     Attributes:
         names: unique names of the joints.
@@ -50,7 +50,7 @@ class Skeleton:
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedMotion:
     """Recorded motion of a skeleton in N frames.
 
     Attributes:
@@ -62,7 +62,7 @@ class Recording:
     """
 
     file: str
-    skeleton: Skeleton
+    skeleton: MocapSkeleton
     rate: float
     root: Floats
     turns: Floats
@@ -88,7 +88,7 @@ class Recording:
         return places, turns
 
 
-def lowest_common_ancestor(skeleton: Skeleton, first: int, second: int) -> int:
+def lowest_common_ancestor(skeleton: MocapSkeleton, first: int, second: int) -> int:
     """Return the nearest joint that is an ancestor of both."""
     above = set(skeleton.ancestors(first))
     return next(joint for joint in skeleton.ancestors(second) if joint in above)

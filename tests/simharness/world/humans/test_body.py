@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mvpose.skeleton import COCO17
-from simharness.world.humans.body import PHENOTYPES, BodyModel, Part, body_model, make_body, volume
+from simharness.world.humans.body import PHENOTYPES, BodyModel, FacePart, body_model, make_body, volume
 from simharness.world.humans.shape import Shape
 
 
@@ -103,7 +103,7 @@ def test_weights_sum_to_one_and_keypoints_are_affine(body):
 
 def test_faces_point_outwards(body):
     """The volume inside the clothed surface is positive and near that of the body; inside out it would be negative."""
-    cloth = np.isin(body.part, [Part.TORSO, Part.ARM, Part.LEG, Part.SHOE, Part.SOLE])
+    cloth = np.isin(body.part, [FacePart.TORSO, FacePart.ARM, FacePart.LEG, FacePart.SHOE, FacePart.SOLE])
     inside = 1000 * volume(body.vertices - body.vertices.mean(0), body.faces[cloth])
     assert 0.8 * body.mass < inside < 1.05 * body.mass  # litres; head and hands are left out
 
@@ -120,7 +120,7 @@ def test_volume_of_a_tetrahedron():
 
 def test_every_part_is_shown_on_both_sides(body):
     middle = body.vertices[body.faces].mean(1)
-    for part in set(Part) - {Part.SKIRT}:
+    for part in set(FacePart) - {FacePart.SKIRT}:
         centers = middle[body.part == part]
         assert (centers[:, 1] > 0).sum() == pytest.approx((centers[:, 1] < 0).sum(), rel=0.1), part
         assert len(centers) > 10, part
@@ -128,14 +128,14 @@ def test_every_part_is_shown_on_both_sides(body):
 
 def test_parts_are_where_they_belong(body):
     top, middle = body.stature, body.vertices[body.faces].mean(1)
-    height = {part: middle[body.part == part, 2] for part in Part}
-    assert height[Part.SOLE].max() < 0.03
-    assert height[Part.SHOE].max() < 0.15
-    assert height[Part.SCALP].mean() > 0.93 * top
-    assert 0.4 * top < height[Part.TORSO].min() < 0.55 * top
-    face = middle[np.isin(body.part, [Part.LIPS, Part.BROW, Part.IRIS])]
+    height = {part: middle[body.part == part, 2] for part in FacePart}
+    assert height[FacePart.SOLE].max() < 0.03
+    assert height[FacePart.SHOE].max() < 0.15
+    assert height[FacePart.SCALP].mean() > 0.93 * top
+    assert 0.4 * top < height[FacePart.TORSO].min() < 0.55 * top
+    face = middle[np.isin(body.part, [FacePart.LIPS, FacePart.BROW, FacePart.IRIS])]
     assert face[:, 0].min() > body.heads[body.index("Head"), 0] + 0.03
-    assert height[Part.LIPS].max() < height[Part.IRIS].min() < height[Part.BROW].max()
+    assert height[FacePart.LIPS].max() < height[FacePart.IRIS].min() < height[FacePart.BROW].max()
 
 
 def test_joint_depths_are_plausible_limb_radii(body):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.body import Part, make_body
+from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.cloth_texture import BAND, LENGTH, WHITE, WIDTH, texture_image
 from simharness.world.humans.clothing import Garment, dress, garments, paint
 from simharness.world.humans.shape import Shape
@@ -51,7 +51,7 @@ def test_stripes_are_horizontal_and_have_the_width_of_their_repeats(body):
     """On the front the colour depends on height alone, with two stripes per repeat."""
     look = look_with(top_pattern="stripes", repeats=18)
     surface, height = paint(body, look), body.vertices[body.faces].mean(1)
-    front = (body.part == Part.TORSO) & (height[:, 0] > 0.02) & (garments(body, look) == Garment.TOP)
+    front = (body.part == FacePart.TORSO) & (height[:, 0] > 0.02) & (garments(body, look) == Garment.TOP)
     dark = np.abs(sample(surface) - look.accent).max(1) < 0.05
     bands = (height[front, 2] / (1.05 / 18)) % 1
     phase = np.angle(np.exp(2j * np.pi * bands[dark[front]]).mean())
@@ -92,7 +92,7 @@ def test_the_vertical_axis_of_the_texture_is_in_metres(body):
     """On the trunk a metre of height is a metre of the texture."""
     look = look_with(top_pattern="stripes")
     uv = paint(body, look).uv
-    trunk = (body.part == Part.TORSO) & (garments(body, look) == Garment.TOP)
+    trunk = (body.part == FacePart.TORSO) & (garments(body, look) == Garment.TOP)
     corners = body.vertices[body.faces[trunk]][..., 2]
     down = uv[trunk][..., 1] * (2 * BAND + WHITE) / BAND * LENGTH
     np.testing.assert_allclose(corners + down, (corners + down).mean(), atol=1e-4)
@@ -107,6 +107,6 @@ def test_a_coat_has_a_dark_line_in_front(body):
     assert 2 <= dark.sum() <= 6
     assert dark[0]
     assert dark[-1]
-    arms = (dressed.part == Part.ARM) & (garments(dressed, look) == Garment.TOP)
+    arms = (dressed.part == FacePart.ARM) & (garments(dressed, look) == Garment.TOP)
     assert np.abs(surface.uv[arms][..., 0] - 0.5).max() < 0.3  # no such line on the sleeves
     assert texture_image(look_with()) is None

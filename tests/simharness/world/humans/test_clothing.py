@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.body import Part, make_body
+from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import Garment, dress, face_colors, garments, paint
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, draw_look
@@ -35,7 +35,7 @@ def test_garments_end_at_a_clean_line(body, look, sleeves, legs, hem):
     """The mesh has edges along every hem, so the border of a garment lies on a line of constant level."""
     look = replace(look, sleeves=sleeves, legs=legs, hem=hem)
     worn = garments(body, look)
-    arm, leg = body.part == Part.ARM, body.part == Part.LEG
+    arm, leg = body.part == FacePart.ARM, body.part == FacePart.LEG
     for limb, garment, end, chain in (
         (arm, Garment.TOP, SLEEVES[sleeves], ("Arm", "ForeArm", "Hand")),
         (leg, Garment.TROUSERS, LEGS[legs], ("UpLeg", "Leg", "Foot")),
@@ -59,9 +59,9 @@ def test_faces_have_the_colour_of_their_garment_or_skin(body, look):
     look = replace(look, sleeves="long", legs="shorts")
     colors = face_colors(body, look)
     np.testing.assert_allclose(
-        np.unique(colors[(body.part == Part.ARM) & (body.level < 1.5)], axis=0), [look.top], atol=1e-6
+        np.unique(colors[(body.part == FacePart.ARM) & (body.level < 1.5)], axis=0), [look.top], atol=1e-6
     )
-    for bare in ((body.part == Part.LEG) & (body.level > 1.2), body.part == Part.HAND):
+    for bare in ((body.part == FacePart.LEG) & (body.level > 1.2), body.part == FacePart.HAND):
         np.testing.assert_allclose(np.unique(colors[bare], axis=0), [look.skin], atol=1e-6)
 
 
@@ -121,8 +121,8 @@ def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, lower_garment, 
     np.testing.assert_array_equal(dressed.landmarks(pose), body.landmarks(pose))
     np.testing.assert_array_equal(dressed.part[: len(body.part)], body.part)
     added = dressed.part[len(body.part) :]
-    assert (Part.SKIRT in added) == (lower_garment != "trousers")
-    assert (Part.SCALP in added) == (hair_style != "short")
+    assert (FacePart.SKIRT in added) == (lower_garment != "trousers")
+    assert (FacePart.SCALP in added) == (hair_style != "short")
     assert dressed.vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
     np.testing.assert_allclose(dressed.skin(pose), dressed.vertices, atol=1e-5)
 
@@ -131,7 +131,7 @@ def test_dresses_and_coats_have_the_colour_of_the_top_and_skirts_that_of_trouser
     for lower_garment, color in (("skirt", "trousers"), ("dress", "top"), ("coat", "top")):
         changed = replace(look, lower_garment=lower_garment)
         dressed = dress(body, changed)
-        shown = face_colors(dressed, changed)[dressed.part == Part.SKIRT]
+        shown = face_colors(dressed, changed)[dressed.part == FacePart.SKIRT]
         np.testing.assert_allclose(np.unique(shown, axis=0), [getattr(changed, color)], atol=1e-6)
 
 

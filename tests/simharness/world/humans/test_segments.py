@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simharness.world.humans.body import Part, make_body
+from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import dress
 from simharness.world.humans.segments import Segment, of_bones, of_faces
 from simharness.world.humans.shape import Shape
@@ -40,11 +40,11 @@ def test_left_and_right_segments_have_similar_numbers_of_faces(body):
 
 def test_face_hands_and_soles_belong_to_head_hands_and_feet(body):
     for parts, segments in (
-        ([Part.SCALP, Part.LIPS, Part.IRIS, Part.BROW], {Segment.HEAD}),
-        ([Part.SOLE], {Segment.LEFT_FOOT, Segment.RIGHT_FOOT}),
+        ([FacePart.SCALP, FacePart.LIPS, FacePart.IRIS, FacePart.BROW], {Segment.HEAD}),
+        ([FacePart.SOLE], {Segment.LEFT_FOOT, Segment.RIGHT_FOOT}),
     ):
         assert set(body.segments[np.isin(body.part, parts)].tolist()) == segments
-    hand = body.part == Part.HAND
+    hand = body.part == FacePart.HAND
     left = body.vertices[body.faces[hand]].mean(1)[:, 1] > 0
     for side, segment in ((left, Segment.LEFT_HAND), (~left, Segment.RIGHT_HAND)):
         assert (body.segments[hand][side] == segment).mean() > 0.97
@@ -57,7 +57,7 @@ def test_faces_of_clothes_and_hair_have_segments(body):
         assert dressed.segments.dtype == np.int8
         same = dressed.segments[: len(body.faces)] == body.segments
         assert same.all()
-        assert np.isin(dressed.segments[dressed.part == Part.SCALP], [Segment.HEAD]).all()
+        assert np.isin(dressed.segments[dressed.part == FacePart.SCALP], [Segment.HEAD]).all()
 
 
 def test_a_face_belongs_to_the_segment_with_the_larger_weight():

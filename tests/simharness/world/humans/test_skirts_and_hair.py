@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simharness.types.random_streams import stream
-from simharness.world.humans.body import Part, make_body
+from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import dress
 from simharness.world.humans.mujoco_model import bone_transforms, person_spec
 from simharness.world.humans.population import draw_shape
@@ -54,7 +54,7 @@ class Walker:
 
     def thighs(self):
         """Return the vertices of the legs that are well above the hem."""
-        faces = (self.body.part == Part.LEG) & (self.body.level < self.length - 0.08)
+        faces = (self.body.part == FacePart.LEG) & (self.body.level < self.length - 0.08)
         return np.unique(self.body.faces[faces])
 
 
@@ -103,7 +103,7 @@ def test_no_thigh_comes_through_a_skirt_in_a_stride(seed, wear, pose):
 def test_a_skirt_is_a_closed_tube_with_faces_pointing_outwards():
     """Every edge has two faces, except those of the waist and the hem; the faces point outwards."""
     body = walker_of(0).body
-    faces = body.faces[body.part == Part.SKIRT]
+    faces = body.faces[body.part == FacePart.SKIRT]
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     count = np.unique(edges, axis=0, return_counts=True)[1]
     assert set(count.tolist()) == {1, 2}
@@ -156,7 +156,7 @@ def test_a_skirt_moves_continuously_with_the_legs():
 
 def test_long_hair_hangs_behind_the_face_and_turns_with_the_head():
     body = walker_of(0).body
-    hair = np.unique(body.faces[(body.part == Part.SCALP) & (body.faces.min(1) >= body.skinned_count)])
+    hair = np.unique(body.faces[(body.part == FacePart.SCALP) & (body.faces.min(1) >= body.skinned_count)])
     head = body.heads[body.index("Head")]
     added = body.vertices[hair]
     assert added[:, 2].min() < body.heads[body.index("Neck"), 2]
