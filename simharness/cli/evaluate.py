@@ -55,7 +55,8 @@ def shelf(
     with exit_on_error():
         start = perf_counter()
         from mvpose.pipeline import NEED_DESCRIPTORS
-        from simharness.reality.evaluation import evaluate, print_evaluation
+        from simharness.cli.evaluation_tables import print_evaluation
+        from simharness.reality.evaluation import evaluate
         from simharness.reality.shelf import read_shelf
         from simharness.runtime.progress import reporter
 
@@ -90,8 +91,9 @@ def twin(
     """Shelf and its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
     with exit_on_error():
         start = perf_counter()
+        from simharness.cli.evaluation_tables import print_twin_comparison
         from simharness.reality.shelf import read_shelf
-        from simharness.reality.twin import compare, print_comparison
+        from simharness.reality.twin import compare
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 
@@ -100,7 +102,7 @@ def twin(
             comparison = compare(recorded, loaded, count=twins, reporter=bars)
         if json_file is not None:
             _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
-    print_comparison(comparison, Console())
+    print_twin_comparison(comparison, Console())
 
 
 @app.command("seeds")
@@ -113,27 +115,27 @@ def evaluate_seeds(
     """A scenario at many seeds: PCP of its variants, of all people and of each person, with intervals."""
     with exit_on_error():
         start = perf_counter()
-        from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at
-        from simharness.reality.seed_evaluation import print_seeds
+        from simharness.cli.evaluation_tables import print_seed_evaluation
+        from simharness.reality.seed_evaluation import evaluate_seeds as evaluate_at_seeds
         from simharness.runtime.progress import reporter
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or ())
         with reporter() as bars:
-            result = evaluate_at(loaded, seeds, reporter=bars)
+            result = evaluate_at_seeds(loaded, seeds, reporter=bars)
         if json_file is not None:
             _write(result.summary(), json_file, seeds=result.seeds, variants=loaded.method.variants, start=start)
-    print_seeds(result, Console())
+    print_seed_evaluation(result, Console())
 
 
 def _estimator(name: str) -> Estimator:
-    """Return a preset, or a user-defined estimator by its place."""
+    """Return a preset, or a user-defined estimator given as FILE.py:NAME."""
     from mvpose import Pipeline
     from simharness.trial.stages.estimators import OwnEstimator, load_estimator
 
     if ":" not in name:
         return Pipeline.preset(name)
-    load_estimator(name)  # better now than at the first frame
+    load_estimator(name)  # so that errors appear before the first frame
     return OwnEstimator("--method", name)
 
 

@@ -1,9 +1,9 @@
-"""What papers print for Campus and Shelf: tables 1 and 2 of Dong et al., CVPR 2019.
+"""Published scores on Campus and Shelf: tables 1 and 2 of Dong et al., CVPR 2019.
 
     Dong, Jiang, Huang, Bao, Zhou: Fast and Robust Multi-Person 3D Pose Estimation from Multiple Views, CVPR 2019.
 
-All numbers are percentages of correct parts (PCP), their own method's with its detections and the head mapping "2019".
-The rows of other methods are as that paper quotes them.
+All numbers are percentages of correct parts (PCP). Those of Dong et al. were made with their detections and the head
+mapping "2019"; the rows of other methods are as that paper quotes them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class PublishedPcp(NamedTuple):
-    """A row of a table: PCP in percent, as printed, to one digit."""
+    """Row of a table: PCP in percent, as printed, with one digit after the decimal point."""
 
     actor_1: float
     actor_2: float
@@ -36,7 +36,7 @@ ABLATION: dict[str, dict[str, PublishedPcp]] = {
         "no-matching": PublishedPcp(98.1, 91.1, 92.8, 94.0),
     },
 }
-"""Table 2, by data set and by the preset of :class:`mvpose.Pipeline` that is the same variant."""
+"""Table 2, by data set and by the equivalent preset of :class:`mvpose.Pipeline`."""
 
 COMPARISON: dict[str, dict[str, PublishedPcp]] = {
     "campus": {
@@ -58,5 +58,5 @@ COMPARISON: dict[str, dict[str, PublishedPcp]] = {
 }
 """Table 1, by data set and method.
 
-The average of Belagiannis et al., CVPR 2014, on Campus is printed 75.8 and is 76.0 by its own row.
+The average of Belagiannis et al., CVPR 2014, on Campus is printed as 75.8; the mean of its row is 76.0.
 """

@@ -1,13 +1,12 @@
-"""Shelf: four people assemble a shelf before five calibrated cameras (Belagiannis et al., CVPR 2014).
+"""Reader of the Shelf data set: four people assemble a shelf in front of five cameras (Belagiannis et al., CVPR 2014).
 
-The folder holds ``calibration_shelf.json`` (VoxelPose's), ``actorsGT.mat`` (the published truth: 14 joints in
-metres, each actor annotated in some frames only) and ``openpose/<camera>/<camera>_<k>_keypoints.json``
-(OpenPose's detections; file k, written with 12 digits, belongs to frame 300 + k).
+The folder holds ``calibration_shelf.json`` (from VoxelPose), ``actorsGT.mat`` (the published truth: 14 joints in
+metres, each actor annotated in some frames only) and ``openpose/<camera>/<camera>_<k>_keypoints.json`` (detections of
+OpenPose; file k, written with 12 digits, belongs to frame 300 + k).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,58 +14,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from mvpose import Detections, Rig
-from mvpose.checks import as_array
 from simharness.formats.calibration.voxelpose import read_calibration
 from simharness.formats.openpose import read_frame
 from simharness.formats.read_errors import read_bytes
+from simharness.reality.annotated_recording import AnnotatedRecording
 
 SIZE = (1032, 776)
-FRAMES = range(300, 600)  # the published test frames that have truth
+"""Width and height of the pictures, pixels."""
+
+FRAMES = range(300, 600)
+"""Published test frames with truth."""
+
 ACTORS = 4
+"""Number of actors."""
+
 _FIRST_DETECTED = 300
 _TRUTH = "Shelf's truth: a MATLAB 5 file with actor3D, 4 actors x 3200 frames of 14 x 3 metres"
 
 
-@dataclass(frozen=True)
-class Shelf:
-    """Frames of the Shelf data set, or of another recording in its form.
-
-    Attributes:
-        rig: the cameras, five of them.
-        truth: joints on SHELF14, (F, A, 14, 3), metres; NaN where the actor is not annotated.
-        detections: what the 2D detector found in each of the F frames.
-        frames: their indices in the published sequence, from 0, (F,).
-        people: A, how many actors there are.
-    """
-
-    rig: Rig
-    truth: NDArray[np.float64]
-    detections: tuple[Detections, ...]
-    frames: NDArray[np.int64]
-    people: int = ACTORS
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", as_array(self.frames, ("F",), "frames", np.int64))
-        object.__setattr__(self, "truth", as_array(self.truth, (len(self.frames), self.people, 14, 3), "truth"))
-        object.__setattr__(self, "detections", tuple(self.detections))
-        if len(self.detections) != len(self.frames):
-            raise ValueError(f"expected detections of {len(self.frames)} frames, got {len(self.detections)}")
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-
-def read_shelf(folder: str | Path, *, frames: range = FRAMES) -> Shelf:
-    """Read Shelf from its published files, as they are.
+def read_shelf(folder: str | Path, *, frames: range = FRAMES) -> AnnotatedRecording:
+    """Read Shelf from its published files.
 
     Args:
-        folder: where they lie.
-        frames: which frames, 0-based indices into the published sequence; detections exist for 300 to 600.
+        folder: folder of the files.
+        frames: frames to read, 0-based indices into the published sequence; detections exist for 300 to 600.
 
     Raises:
-        ValueError: a file that is missing, cut off or not what it should be; the message names it and says
-            how to mend it.
+        ValueError: a file that is missing, truncated or of another format; the message names the file and the remedy.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -85,20 +59,20 @@ def read_shelf(folder: str | Path, *, frames: range = FRAMES) -> Shelf:
         )
         for frame in frames
     ]
-    return Shelf(rig, truth, tuple(detections), np.array(frames))
+    return AnnotatedRecording(rig, truth, tuple(detections), np.array(frames))
 
 
 def read_truth(path: str | Path, *, frames: range = FRAMES) -> NDArray[np.float64]:
     """Read the published joints of some frames, (F, 4, 14, 3), metres; NaN where not annotated.
 
     Raises:
-        ValueError: the file is missing, cut off, no MATLAB 5 file, or of another layout.
+        ValueError: the file is missing, truncated, no MATLAB 5 file, or of another layout.
     """
     path = Path(path)
     size = len(read_bytes(path, what=_TRUTH))
     try:
-        cells = loadmat(path).get("actor3D")  # all variables, so that a cut behind actor3D shows too
-    except Exception as error:  # a file that is cut off raises a dozen kinds, zlib.error among them
+        cells = loadmat(path).get("actor3D")  # reads all variables, so that truncation after actor3D is detected too
+    except Exception as error:  # a truncated file raises many types of errors, for example zlib.error
         raise ValueError(
             f"{path}: cannot be read as a MATLAB file ({error}; it has {size} bytes); expected {_TRUTH}. "
             "It was probably cut off: copy or download it again"
@@ -125,7 +99,7 @@ def read_truth(path: str | Path, *, frames: range = FRAMES) -> NDArray[np.float6
 
 
 def _unwrap(cell: Any) -> np.ndarray:
-    """Take off MATLAB cells that hold nothing but one other array."""
+    """Unwrap MATLAB cells that contain only one other array."""
     cell = np.asarray(cell)
     while cell.dtype == object and cell.size == 1:
         cell = np.asarray(cell.item())

@@ -10,7 +10,7 @@ import numpy as np
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
-from simharness.reality.shelf import Shelf
+from simharness.reality.annotated_recording import AnnotatedRecording
 
 LIMB_JOINTS = np.arange(5, 17)
 """Joints of COCO-17 that data sets have in common, (12,): shoulders to ankles, without the face."""
@@ -74,7 +74,7 @@ class Sample:
         return float(self.time[-1] - self.time[0]) / max(1, len(self.time) - 1)
 
 
-def of_shelf(shelf: Shelf) -> Sample:
+def of_shelf(shelf: AnnotatedRecording) -> Sample:
     """Return the sample of Shelf and its published detections; its truth has limb joints, no face."""
     reference = np.full((*shelf.truth.shape[:2], len(COCO17), 3), np.nan)
     reference[:, :, LIMB_JOINTS] = shelf.truth[:, :, _OF_SHELF]

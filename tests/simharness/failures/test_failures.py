@@ -164,7 +164,8 @@ def random_estimate(seed):
     rng = np.random.default_rng(seed)
     chosen = rng.integers(0, 3, rng.integers(0, 6))
     joints = PEOPLE[chosen] + rng.choice([0.0, 0.1, 0.4, 3.0], len(chosen))[:, None, None]
-    joints += rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(joints.shape)
+    # Never zero, because identical estimates are ties, which the order of estimates decides.
+    joints += rng.choice([1e-6, 0.02, 0.3]) * rng.standard_normal(joints.shape)
     joints[rng.random(joints.shape[:2]) < rng.choice([0.0, 0.1])] = np.nan
     person = np.where(rng.random(len(DETECTIONS)) < 0.1, -1, TRUTH.person)
     visibility = np.where(rng.random(TRUTH.visibility.shape) < 0.3, TRUTH.visibility, Visibility.OCCLUDED_BY_PERSON)

@@ -1,4 +1,4 @@
-"""The paper's tables: right by their own averages, and as the paper has them."""
+"""Published tables: consistent averages, and the numbers of the paper's source."""
 
 import re
 
@@ -10,17 +10,17 @@ from simharness.reality.published_scores import ABLATION, COMPARISON
 ROWS = [
     (data, name, row) for table in (ABLATION, COMPARISON) for data, rows in table.items() for name, row in rows.items()
 ]
-WRONG = ("campus", "Belagiannis et al., CVPR 2014")  # in the paper itself: 76.03 by its row, printed 75.8
+INCONSISTENT = ("campus", "Belagiannis et al., CVPR 2014")  # in the paper: the mean of the row is 76.03, printed 75.8
 
 
 def within_rounding(row):
-    """All four are rounded to a digit: the mean of three and their average are up to 0.1 apart."""
+    """Return whether the average agrees with the mean of the three actors; rounding explains up to 0.1."""
     return abs(sum(row[:3]) / 3 - row.average) <= 0.1 + 1e-9
 
 
 @pytest.mark.parametrize(("data", "name", "row"), ROWS)
-def test_an_average_is_that_of_its_actors(data, name, row):
-    assert within_rounding(row) is ((data, name) != WRONG)
+def test_averages_are_the_means_of_the_actors(data, name, row):
+    assert within_rounding(row) is ((data, name) != INCONSISTENT)
 
 
 def test_both_data_sets_have_all_rows():

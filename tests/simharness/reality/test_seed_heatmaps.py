@@ -31,7 +31,7 @@ def test_seeds_are_scored_on_the_estimates_of_a_trial():
     scenario = load("quickstart", overrides=[*CHEAP, "detector.heatmaps.size=64x48", 'method.variants=["full"]'])
     result = run_trial(scenario, until="estimate")
     evaluation = seed_evaluation.evaluate_seeds(scenario, 1)
-    scores = evaluation.of_variant("full")[0]
-    expected = seed_evaluation.score_estimates(seed_evaluation.annotated_recording(result), result.estimates)
+    scores = evaluation.variant_scores("full")[0]
+    expected = seed_evaluation.score_estimates(seed_evaluation.annotate(result), result.estimates)
     for one, other in zip(scores.frames, expected.variants["full"].frames, strict=True):
         assert np.array_equal(one.parts, other.parts)

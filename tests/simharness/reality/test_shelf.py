@@ -6,9 +6,10 @@ from scipy.io import savemat
 from scipy.optimize import linear_sum_assignment
 
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.reality.shelf import FRAMES, Shelf, read_shelf, read_truth
+from simharness.pairing.pairing import pair
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.shelf import FRAMES, read_shelf, read_truth
 from simharness.scoring.pcp import percent, score_parts
-from simharness.scoring.pose import pair
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +19,7 @@ def shelf(shared_data):
 
 @pytest.fixture
 def copied(shared_data, tmp_path):
-    """A copy of the files of two frames, to be damaged."""
+    """Copy the files of two frames, so that tests can damage them."""
     source, folder = shared_data / "shelf", tmp_path / "shelf"
     for view in range(5):
         (folder / "openpose" / str(view)).mkdir(parents=True)
@@ -34,14 +35,14 @@ def test_the_published_frames(shelf):
     assert shelf.frames.tolist() == list(range(300, 600))
     assert len(shelf.rig) == 5
     assert all(camera.size == (1032, 776) for camera in shelf.rig)
-    # Actors are annotated as a whole or not at all; how often was counted in the file.
+    # Actors are annotated completely or not at all; the numbers were counted in the file.
     defined = np.isfinite(shelf.truth).all(axis=(2, 3))
     assert (defined == np.isfinite(shelf.truth).any(axis=(2, 3))).all()
     assert defined.sum(axis=0).tolist() == [279, 37, 161, 33]
     assert all(set(detections.view) == set(range(5)) for detections in shelf.detections[:10])
 
 
-def test_detections_lie_on_the_truth_of_the_same_frame(shelf):
+def test_detections_and_truth_belong_to_the_same_frames(shelf):
     """Published: limb joints to OpenPose, median 16.1 / 8.6 / 8.8 / 11.1 / 12.3 px for views 0 to 4."""
     nearest: list[list[float]] = [[] for _ in shelf.rig]
     for truth, detections in zip(shelf.truth, shelf.detections, strict=True):
@@ -60,11 +61,11 @@ def test_detections_lie_on_the_truth_of_the_same_frame(shelf):
     ("head", "actors", "average"),
     [("voxelpose", (99.5, 93.5, 98.5), 97.2), ("2019", (98.5, 91.9, 98.6), 96.3)],
 )
-def test_an_oracle_scores_what_was_published(shelf, head, actors, average):
-    """Detections given to their true person by projection, then score-weighted DLT: the whole protocol."""
+def test_true_correspondences_reach_the_published_scores(shelf, head, actors, average):
+    """The whole protocol: detections assigned to true people by projection, then score-weighted DLT."""
     parts, errors = [], []
     for truth, detections in zip(shelf.truth, shelf.detections, strict=True):
-        estimate = coco17_to_shelf14(_oracle(shelf, truth, detections), head=head)
+        estimate = coco17_to_shelf14(_triangulate_true_people(shelf, truth, detections), head=head)
         parts.append(score_parts(truth, estimate))
         errors.extend(pair(truth, estimate).error)
     scores = [percent(np.stack(parts)[:, actor]) for actor in range(3)]
@@ -78,24 +79,24 @@ _LIMBS = [16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9]  # COCO-17 joints of SHELF1
 _REACH = 60.0  # pixels between a detection and its person
 
 
-def _oracle(shelf, truth, detections):
+def _triangulate_true_people(shelf, truth, detections):
     people = np.flatnonzero(np.isfinite(truth).all(axis=(1, 2)))
-    owner = np.full(len(detections), -1)
+    true_person = np.full(len(detections), -1)
     for view, camera in enumerate(shelf.rig):
-        mine = np.flatnonzero(detections.view == view)
-        keypoints = detections.keypoints[mine][:, _LIMBS]
+        rows_of_view = np.flatnonzero(detections.view == view)
+        keypoints = detections.keypoints[rows_of_view][:, _LIMBS]
         distance = np.linalg.norm(camera.project(truth[people, None, :12]) - keypoints, axis=-1)
         count = np.isfinite(distance).sum(axis=-1)
         mean = np.where(count > 0, np.nansum(distance, axis=-1) / np.maximum(count, 1), np.inf)
         for row, column in zip(*linear_sum_assignment(np.minimum(mean, 2 * _REACH)), strict=True):
             if mean[row, column] < _REACH:
-                owner[mine[column]] = people[row]
+                true_person[rows_of_view[column]] = people[row]
     result = []
     for person in people:
         joints = np.full((17, 3), np.nan)
         for joint in range(17):
             rows = []
-            for index in np.flatnonzero((owner == person) & (detections.scores[:, joint] > 0)):
+            for index in np.flatnonzero((true_person == person) & (detections.scores[:, joint] > 0)):
                 P = shelf.rig.P[detections.view[index]]
                 x, y = detections.keypoints[index, joint]
                 rows += [
@@ -109,7 +110,7 @@ def _oracle(shelf, truth, detections):
     return np.array(result).reshape(-1, 17, 3)
 
 
-def test_two_frames_of_a_copy_read_the_same(copied, shelf):
+def test_a_copy_of_two_frames_reads_the_same(copied, shelf):
     part = read_shelf(copied, frames=range(300, 302))
     np.testing.assert_array_equal(part.truth, shelf.truth[:2])
     np.testing.assert_array_equal(part.detections[1].keypoints, shelf.detections[1].keypoints)
@@ -180,7 +181,7 @@ def test_another_layout_is_refused(tmp_path):
 
 
 def test_the_fields_must_fit(shelf):
-    with pytest.raises(ValueError, match=r"truth must be \(300, 4, 14, 3\), got \(299, 4, 14, 3\)"):
-        Shelf(shelf.rig, shelf.truth[1:], shelf.detections, shelf.frames)
+    with pytest.raises(ValueError, match=r"truth must be \(300, A, 14, 3\), got \(299, 4, 14, 3\)"):
+        AnnotatedRecording(shelf.rig, shelf.truth[1:], shelf.detections, shelf.frames)
     with pytest.raises(ValueError, match="expected detections of 300 frames, got 2"):
-        Shelf(shelf.rig, shelf.truth, shelf.detections[:2], shelf.frames)
+        AnnotatedRecording(shelf.rig, shelf.truth, shelf.detections[:2], shelf.frames)

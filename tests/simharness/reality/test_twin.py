@@ -1,13 +1,14 @@
-"""A recording beside its simulated twin."""
+"""Comparison of a recording with its simulated twin, and evaluation at many seeds."""
 
 import numpy as np
 import pytest
 
-from simharness.reality.seed_evaluation import Score, evaluate_seeds, record, score
-from simharness.reality.twin import Comparison, compare
+from simharness.reality.seed_evaluation import PcpInterval, annotate, evaluate_seeds, pcp_interval
+from simharness.reality.twin import TwinComparison, compare
 from simharness.scenario.load import load
 from simharness.scoring.frame import score_frame
 from simharness.scoring.summary import VariantScores
+from simharness.trial.run_trial import run_trial
 
 SHORT = ["duration=0.4", 'method.variants=["fast", "no-3dps"]']
 
@@ -19,10 +20,10 @@ def scenario():
 
 @pytest.fixture(scope="module")
 def recorded(scenario):
-    return record(scenario)[0]
+    return annotate(run_trial(scenario, until="detect"))
 
 
-def test_a_twin_annotates_whom_most_cameras_see_whole(recorded):
+def test_people_inside_most_pictures_are_annotated(recorded):
     known = np.isfinite(recorded.truth).all(axis=(2, 3))
     assert known.any()
     assert (known == np.isfinite(recorded.truth).any(axis=(2, 3))).all()
@@ -31,7 +32,7 @@ def test_a_twin_annotates_whom_most_cameras_see_whole(recorded):
         assert sum(camera.inside(camera.project(limbs)).all() for camera in recorded.rig) >= len(recorded.rig) - 1
 
 
-def test_a_twin_of_a_twin_scores_alike(recorded, scenario):
+def test_a_twin_of_a_simulated_recording_has_similar_scores(recorded, scenario):
     comparison = compare(recorded, scenario, count=2)
     assert len(comparison.seeds) == 2
     assert comparison.seeds[0] == scenario.seed
@@ -45,40 +46,40 @@ def test_a_twin_of_a_twin_scores_alike(recorded, scenario):
     )
 
 
-def test_order_counts_where_reality_is_clear():
+def test_the_order_counts_only_for_clear_differences_in_reality():
     def comparison(real, simulated):
-        scores = [{name: Score(pcp, pcp, pcp) for name, pcp in each.items()} for each in (real, simulated)]
-        return Comparison("x", "y", (1, 1), (0, 1), "voxelpose", *scores, {})
+        scores = [{name: PcpInterval(pcp, pcp, pcp) for name, pcp in each.items()} for each in (real, simulated)]
+        return TwinComparison("x", "y", (1, 1), (0, 1), "voxelpose", *scores, {})
 
     assert comparison({"a": 90.0, "b": 80.0}, {"a": 70.0, "b": 60.0}).same_order
     assert not comparison({"a": 90.0, "b": 80.0}, {"a": 60.0, "b": 70.0}).same_order
     assert comparison({"a": 80.05, "b": 80.0}, {"a": 60.0, "b": 70.0}).same_order
-    assert comparison({"a": 90.0, "b": 80.0}, {"a": 93.0, "b": 81.0}).apart == 3.0
+    assert comparison({"a": 90.0, "b": 80.0}, {"a": 93.0, "b": 81.0}).largest_difference == 3.0
 
 
-def test_scores_are_means_over_people_and_intervals_widen_with_doubt():
+def test_pcp_is_a_mean_over_people_and_intervals_widen_with_variance():
     rng = np.random.default_rng(0)
     truth = rng.uniform(-1, 1, (2, 14, 3))
 
-    def recording(right):
-        """Frames in which person 0 is right always and person 1 as often as said."""
+    def recording(correct):
+        """Return frames in which person 0 is always correct and person 1 with probability ``correct``."""
         frames = []
-        for good in rng.random(100) < right:
+        for good in rng.random(100) < correct:
             estimate = truth.copy()
             estimate[1] += 0.0 if good else 50.0
             frames.append(score_frame(truth, estimate))
         return VariantScores(tuple(frames))
 
-    half = score([recording(0.5)], (0, 1), rate=10.0)
+    half = pcp_interval([recording(0.5)], (0, 1), rate=10.0)
     assert half.pcp == pytest.approx(75, abs=8)
     assert half.low < half.pcp < half.high
-    certain = score([recording(1.0)], (0, 1), rate=10.0)
+    certain = pcp_interval([recording(1.0)], (0, 1), rate=10.0)
     assert (certain.low, certain.pcp, certain.high) == (100.0, 100.0, 100.0)
-    many = score([recording(0.5) for _ in range(8)], (0, 1), rate=10.0)
+    many = pcp_interval([recording(0.5) for _ in range(8)], (0, 1), rate=10.0)
     assert many.high - many.low < half.high - half.low
 
 
-def test_people_who_never_fit_are_an_error(recorded, scenario):
+def test_people_who_fit_at_no_seed_are_an_error(recorded, scenario):
     crowded = scenario.model_copy(update={"people": scenario.people.model_copy(update={"area": 0.72})})
     with pytest.raises(ValueError, match="do not fit"):
         compare(recorded, crowded, count=2)
@@ -87,9 +88,9 @@ def test_people_who_never_fit_are_an_error(recorded, scenario):
 def test_seeds_are_paired_between_variants(scenario):
     result = evaluate_seeds(scenario, 3)
     assert len(result.seeds) == 3
-    ahead = result.ahead("no-3dps", "fast")
-    assert ahead.pcp == pytest.approx(result.score("no-3dps").pcp - result.score("fast").pcp)
-    same = result.ahead("fast", "fast")
+    difference = result.difference("no-3dps", "fast")
+    assert difference.pcp == pytest.approx(result.pcp("no-3dps").pcp - result.pcp("fast").pcp)
+    same = result.difference("fast", "fast")
     assert (same.low, same.pcp, same.high) == (0.0, 0.0, 0.0)
     summary = result.summary()
     assert summary["seeds"] == list(result.seeds)

@@ -1,0 +1,183 @@
+"""Terminal tables of evaluations: recorded data, a recording and its twin, many seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from rich.box import SIMPLE_HEAD, Box
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from simharness.reality.evaluation import ACTORS, Evaluation
+from simharness.reality.published_scores import ABLATION
+from simharness.reality.twin import TOLERANCE
+from simharness.scoring.pcp import GROUPS
+from simharness.scoring.summary import STAGES, VariantScores
+
+if TYPE_CHECKING:
+    from simharness.reality.seed_evaluation import SeedEvaluation
+    from simharness.reality.twin import TwinComparison
+
+_PAPER = ABLATION["shelf"]
+
+
+def print_evaluation(evaluation: Evaluation, console: Console) -> None:
+    """Print PCP by actor and part beside that of the paper, errors that PCP ignores, and the time per stage."""
+    summaries = evaluation.summary()["variants"]
+    headline = Text.assemble(
+        ("Shelf", "bold"),
+        f"  {evaluation.frames} frames, {evaluation.annotated} of them annotated; head mapping ",
+        (evaluation.head, "bold"),
+    )
+    tables = [_pcp_table(name, scores) for name, scores in evaluation.variants.items()]
+    notes = Text(
+        "PCP: part correct within 0.5 of its length; average of actors 1 to 3; ignores ghosts. "
+        "Paper: Dong et al. 2019, with their detections and the 2019 head.\n"
+        "One-to-one: pairs under 500 mm. Shelf does not annotate all people in every frame: "
+        "an estimate of a person without annotation counts as a ghost. "
+        "Same view: detections that share an estimate with another detection of their view.",
+        style="dim",
+    )
+    blocks: list[RenderableType] = [
+        headline,
+        *tables,
+        *([_variants_table(evaluation)] if len(tables) > 1 else []),
+        _people_table(summaries),
+        _time_table(summaries),
+        notes,
+    ]
+    console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
+
+
+def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
+    """Print the PCP of every variant in reality and in simulation side by side."""
+    table = Table(
+        title=f"{comparison.name}: PCP in reality and in simulation, with 95 % intervals; median MPJPE",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
+    table.add_column("variant", no_wrap=True)
+    for column in ("real", "simulated", "difference", "mm, real", "mm, sim."):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, real in comparison.real.items():
+        simulated = comparison.simulated[name]
+        errors = [comparison.summaries[which][name]["mpjpe_mm"]["median"] for which in ("real", "simulated")]
+        table.add_row(
+            name,
+            str(real),
+            str(simulated),
+            f"{simulated.pcp - real.pcp:+.1f}",
+            *("–" if error is None else f"{error:.1f}" for error in errors),
+        )
+    console.print(table)
+    order = "same" if comparison.same_order else "different"
+    console.print(
+        f"Detector {comparison.detector}, {len(comparison.seeds)} twins of {comparison.frames[1]} frames. Largest "
+        f"difference {comparison.largest_difference:.1f} points (limit: {TOLERANCE:g}), {order} order.",
+        style="dim",
+        highlight=False,
+    )
+
+
+def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
+    """Print PCP by variant, of all people and of each person."""
+    first, *others = result.scenario.method.variants
+    table = Table(
+        title=f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
+        f"{first} on the same detections, and of each person",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
+    table.add_column("variant", no_wrap=True)
+    people = range(result.scenario.people.count)
+    for column in ("all", f"minus {first}", *map(str, people)):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name in (first, *others):
+        difference = "" if name == first else result.difference(name, first)
+        scores = [result.pcp(name, [person]) for person in people]
+        table.add_row(name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores))
+    console.print(table)
+
+
+def _pcp_table(name: str, scores: VariantScores) -> Table:
+    table = _table(f"PCP, {name}", "actor")
+    for group in GROUPS:
+        table.add_column(group.replace("_", " "), justify="right")
+    table.add_column("all", justify="right", style="bold")
+    published = _PAPER.get(name)
+    if published:
+        table.add_column("paper", justify="right", style="cyan")
+    rows = scores.pcp_table(actors=ACTORS)
+    summary = scores.summary(actors=ACTORS)
+    rows.append({**summary["pcp_parts"], "all": summary["pcp"]})
+    labels = [*(str(actor + 1) for actor in ACTORS), "average"]
+    for index, (label, row) in enumerate(zip(labels, rows, strict=True)):
+        last = index == len(rows) - 1
+        cells = [_number(value, 1) for value in row.values()]
+        cells += [_number(published[index], 1)] if published else []
+        table.add_row(label, *cells, style="bold" if last else "", end_section=index == len(rows) - 2)
+    return table
+
+
+def _variants_table(evaluation: Evaluation) -> Table:
+    """Return the PCP of all actors with a row for each variant, followed by the row of the paper if it has one."""
+    table = _table("PCP of the variants", "variant")
+    for actor in ACTORS:
+        table.add_column(f"actor {actor + 1}", justify="right")
+    table.add_column("average", justify="right", style="bold")
+    for name, scores in evaluation.summary()["variants"].items():
+        table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
+        if name in _PAPER:
+            table.add_row("  paper", *(_number(value, 1) for value in _PAPER[name]), style="cyan not bold")
+    return table
+
+
+def _people_table(summaries: Mapping[str, Any]) -> Table:
+    table = _table("People, one-to-one: %, people per frame, and MPJPE in mm", "variant")
+    columns = ("precision", "recall", "ghosts", "missed", "mean", "median", "same view")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for name, scores in summaries.items():
+        table.add_row(
+            name,
+            _number(scores["precision"], 1, scale=100),
+            _number(scores["recall"], 1, scale=100),
+            _number(scores["ghosts_per_frame"], 2),
+            _number(scores["missed_per_frame"], 2),
+            _number(scores["mpjpe_mm"]["mean"], 1),
+            _number(scores["mpjpe_mm"]["median"], 1),
+            str(scores["same_view_violations"]),
+        )
+    return table
+
+
+def _time_table(summaries: Mapping[str, Any]) -> Table:
+    table = _table("Time per frame, ms: median (99th percentile)", "variant")
+    for stage in STAGES:
+        table.add_column(stage, justify="right", style="bold" if stage == "total" else "")
+    for name, scores in summaries.items():
+        times = (scores["timings_ms"][stage] for stage in STAGES)
+        table.add_row(name, *(f"{_number(time['median'], 2)} ({_number(time['p99'], 2)})" for time in times))
+    return table
+
+
+_RULES = Box("    \n    \n ── \n    \n ── \n ── \n    \n    \n")  # a rule under the header and between sections
+
+
+def _table(title: str, first: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=_RULES, show_edge=False, pad_edge=False)
+    table.add_column(first, min_width=8, no_wrap=True)
+    return table
+
+
+def _number(value: float | None, digits: int, *, scale: float = 1.0) -> str:
+    return "–" if value is None else f"{scale * value:.{digits}f}"

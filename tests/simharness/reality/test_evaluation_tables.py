@@ -1,0 +1,58 @@
+"""Terminal tables of evaluations."""
+
+import io
+
+from rich.console import Console
+from small_recording import PERSON, Fixed, small_recording
+
+from simharness.cli.evaluation_tables import print_evaluation, print_twin_comparison
+from simharness.reality.evaluation import evaluate
+from simharness.reality.seed_evaluation import PcpInterval
+from simharness.reality.twin import TwinComparison
+
+
+def printed(evaluation):
+    """Return the printed tables of an evaluation as text."""
+    stream = io.StringIO()
+    print_evaluation(evaluation, Console(file=stream, width=100))
+    return stream.getvalue()
+
+
+def test_the_tables_name_the_head_mapping_and_the_paper_and_fit_100_columns():
+    text = printed(evaluate(small_recording("2019"), {"full": Fixed(PERSON), "custom": Fixed([])}, head="2019"))
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert "head mapping 2019" in lines[0]
+    rows = [line.split() for line in lines]
+    assert ["1", *["100.0"] * 7, "98.8"] in rows
+    assert ["2", *["0.0"] * 7, "94.1"] in rows
+    assert ["3", *["–"] * 7, "97.8"] in rows
+    assert ["average", *["50.0"] * 7, "96.9"] in rows
+    assert ["average", *["0.0"] * 7] in rows  # no published number for a method of another name
+    assert ["full", "100.0", "66.7", "0.00", "0.50", "0.0", "0.0", "0"] in rows
+    assert ["custom", "–", "0.0", "0.00", "1.50", "–", "–", "0"] in rows
+    assert ["full", "1.00", "(1.00)", "2.00", "(2.00)", "3.00", "(3.00)", "6.00", "(6.00)"] in rows
+
+
+def test_several_variants_have_a_common_table_with_rows_of_the_paper():
+    text = printed(evaluate(small_recording("2019"), {"no-matching": Fixed(PERSON), "custom": Fixed([])}, head="2019"))
+    rows = [line.split() for line in text.splitlines()]
+    first = rows.index(["no-matching", "100.0", "0.0", "–", "50.0"])
+    assert rows[first + 1 : first + 3] == [
+        ["paper", "98.1", "91.1", "92.8", "94.0"],
+        ["custom", "0.0", "0.0", "–", "0.0"],
+    ]
+
+
+def test_a_twin_comparison_fits_100_columns_and_names_the_limit():
+    real, simulated = {"full": PcpInterval(97.0, 96.0, 98.0)}, {"full": PcpInterval(95.5, 95.0, 96.0)}
+    errors = {"full": {"mpjpe_mm": {"median": 41.25}}}
+    summaries = {"real": errors, "simulated": {"full": {"mpjpe_mm": {"median": None}}}}
+    comparison = TwinComparison("shelf", "openpose", (300, 250), (3, 4), "voxelpose", real, simulated, summaries)
+    stream = io.StringIO()
+    print_twin_comparison(comparison, Console(file=stream, width=100))
+    text = stream.getvalue()
+    assert max(map(len, text.splitlines())) <= 100
+    row = next(line.split() for line in text.splitlines() if line.split()[:1] == ["full"])
+    assert row == ["full", "97.0", "(96.0–98.0)", "95.5", "(95.0–96.0)", "-1.5", "41.2", "–"]
+    assert "Largest difference 1.5 points (limit: 2), same order." in " ".join(text.split())
