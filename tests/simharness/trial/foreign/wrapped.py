@@ -1,4 +1,4 @@
-"""A method in another program, made an estimator: simharness asks it by ``foreign = "wrapped.py:Foreign"``."""
+"""A method in another program as a user-defined estimator: ``foreign = "wrapped.py:Foreign"``."""
 
 import json
 import subprocess
@@ -13,18 +13,18 @@ PROGRAM = [sys.executable, str(Path(__file__).with_name("program.py"))]
 
 
 class Foreign:
-    """Starts the program for every frame. It keeps nothing: frames come in any order, in several processes."""
+    """Estimator that starts the program for every frame. No state: frames come in any order, in several processes."""
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        # One detection a row, all cameras together; pixels as a camera without a lens would see them.
-        pixels = [rig[k].undistort(seen) for k, seen in zip(detections.view, detections.keypoints, strict=True)]
-        question = {
+        # One row for each detection, all cameras together; pixels without lens distortion.
+        pixels = [rig[k].undistort(points) for k, points in zip(detections.view, detections.keypoints, strict=True)]
+        request = {
             "P": rig.P.tolist(),  # (V, 3, 4), metres
             "view": detections.view.tolist(),  # (m,)
             "keypoints": np.nan_to_num(pixels).tolist(),  # (m, 17, 2)
             "scores": detections.scores.tolist(),  # (m, 17), 0 where a keypoint was not detected
         }
-        done = subprocess.run(PROGRAM, input=json.dumps(question), capture_output=True, text=True, check=False)
+        done = subprocess.run(PROGRAM, input=json.dumps(request), capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"the program failed: {done.stderr.strip()}")
         answer = json.loads(done.stdout)
