@@ -36,12 +36,11 @@ def export(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
-        from simharness.export.export import Export
-        from simharness.export.export import export as export_scenario
+        from simharness.export.panoptic_sequence import ExportPlan, export_sequence
 
-        plan = Export(folder / loaded.name, every=every, pictures=pictures)
+        plan = ExportPlan(folder / loaded.name, every=every, pictures=pictures)
         with reporter() as bars:
-            made = export_scenario(loaded, plan, reporter=bars, command=command_line())
+            made = export_sequence(loaded, plan, reporter=bars, command=command_line())
     files = [file for file in made.rglob("*") if file.is_file()]
     megabytes = sum(file.stat().st_size for file in files) / 1e6
     typer.echo(f"{len(files)} files, {megabytes:.1f} MB, in {made}")

@@ -88,13 +88,13 @@ def render(
         from simharness.scenario.load import load
 
         loaded = load(scenario, overrides=overrides or (), seed=seed)
-        from simharness.export.films import Footage
-        from simharness.export.films import render as render_scenario
+        from simharness.export.render import RenderPlan
+        from simharness.export.render import render as render_scenario
 
         layers, channels = (frozenset(filter(None, map(str.strip, given.split(",")))) for given in (overlay, also))
-        footage = Footage(video=video, overlay=layers, channels=channels, every=every)
+        plan = RenderPlan(video=video, overlay=layers, channels=channels, every=every)
         with reporter() as bars:
-            folder = render_scenario(loaded, footage, out=out, reporter=bars)
+            folder = render_scenario(loaded, plan, out=out, reporter=bars)
     typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
 
 

@@ -1,1 +1,1 @@
-"""Synthetic benchmarks on disk, in the layout of the CMU Panoptic toolbox, which other people's loaders read."""
+"""Files of simulated data: sequences in the layout of Panoptic, rendered pictures and films."""

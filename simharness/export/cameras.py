@@ -1,4 +1,4 @@
-"""The cameras of an exported sequence, by names that loaders of Panoptic know."""
+"""Cameras of an exported sequence, with names that loaders of Panoptic know."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _HD = re.compile(r"00_\d\d")
 
 
 def hd_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of HD cameras, 00_00 and on, in the order of the rig; those that already have such names keep them.
+    """Return names of HD cameras (00_00, 00_01, ...) in the order of the rig; existing names of this form are kept.
 
-    So the sets of Panoptic cameras that loaders list (0 3, 0 6, ...) are found in a twin of theirs.
+    So loaders that list Panoptic cameras by number (0 3, 0 6, ...) find them in a twin of a Panoptic sequence.
     """
     if all(map(_HD.fullmatch, names)):
         return tuple(names)
@@ -25,17 +25,17 @@ def hd_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def renamed(rig: Rig, names: Sequence[str]) -> Rig:
-    """The same cameras by other names."""
+    """Return the same cameras with other names."""
     return Rig([replace(camera, name=name) for camera, name in zip(rig, names, strict=True)])
 
 
 def write_cameras(path: Path, rig: Rig, *, source: str) -> None:
-    """Write a Panoptic calibration with all that loaders look for: they choose cameras by ``panel`` and ``node``.
+    """Write a Panoptic calibration with ``panel`` and ``node``, by which loaders select cameras.
 
     Args:
-        path: the JSON file.
-        rig: cameras by names of HD cameras.
-        source: what ``calibDataSource`` says.
+        path: path of the JSON file.
+        rig: cameras with names of HD cameras.
+        source: value of ``calibDataSource``.
     """
     write_calibration(path, rig)
     entries = json.loads(path.read_text(encoding="utf-8"))["cameras"]

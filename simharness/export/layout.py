@@ -1,4 +1,4 @@
-"""Where everything of an exported sequence is: the folders and file names of the CMU Panoptic toolbox.
+"""Folders and file names of an exported sequence: the layout of the CMU Panoptic toolbox.
 
     calibration_NAME.json, calibration_believed_NAME.json
     hdImgs/00_00/00_00_00000000.jpg
@@ -6,8 +6,8 @@
     openpose/00_00/00_00_00000000_keypoints.json
     manifest.json, scenario.toml
 
-The believed calibration, ``openpose``, the manifest and the scenario are ours; the rest is as the toolbox has it
-(https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolbox).
+The believed calibration, ``openpose``, the manifest and the scenario are additions of simharness; the rest is the
+toolbox's layout (https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolbox).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FORMAT = "simharness export"
-"""What a manifest says by which an export is known."""
+"""Value of ``format`` in the manifest of an export."""
 
 PICTURES = "hdImgs/{camera}/{camera}_{frame:08d}.jpg"
 BODIES = "hdPose3d_stage1_coco19/body3DScene_{frame:08d}.json"
@@ -28,11 +28,11 @@ PEOPLE = "openpose/{camera}/{camera}_{frame:08d}_keypoints.json"
 
 @dataclass(frozen=True)
 class Layout:
-    """The paths of a sequence.
+    """Paths of a sequence.
 
     Attributes:
-        folder: the sequence's own.
-        name: of the sequence, by which its calibrations are called, whatever the folder is.
+        folder: folder of the sequence.
+        name: name of the sequence, used in the names of calibration files; the folder may have another name.
     """
 
     folder: Path
@@ -40,38 +40,38 @@ class Layout:
 
     @property
     def calibration(self) -> Path:
-        """The cameras that take the pictures."""
+        """Calibration of the true rig."""
         return self.folder / f"calibration_{self.name}.json"
 
     @property
     def believed(self) -> Path:
-        """The cameras that a method is told of, where they differ from those."""
+        """Calibration of the believed rig; written only where it differs from the true rig."""
         return self.folder / f"calibration_believed_{self.name}.json"
 
     @property
     def manifest(self) -> Path:
-        """What the sequence is."""
+        """Description of the sequence."""
         return self.folder / "manifest.json"
 
     @property
     def scenario(self) -> Path:
-        """What it was made from."""
+        """Resolved scenario of the sequence."""
         return self.folder / "scenario.toml"
 
     def picture(self, camera: str, frame: int) -> Path:
-        """What a camera delivers in a frame."""
+        """Return the path of the picture of a camera in a frame."""
         return self.folder / PICTURES.format(camera=camera, frame=frame)
 
     def bodies(self, frame: int) -> Path:
-        """Where everybody is in a frame."""
+        """Return the path of the true poses of a frame."""
         return self.folder / BODIES.format(frame=frame)
 
     def people(self, camera: str, frame: int) -> Path:
-        """What is detected in a picture."""
+        """Return the path of the detections in the picture of a camera."""
         return self.folder / PEOPLE.format(camera=camera, frame=frame)
 
     def make_folders(self, cameras: Iterable[str], *, pictures: bool) -> None:
-        """Make the folders that its files go into."""
+        """Create the folders of the files."""
         self.bodies(0).parent.mkdir(parents=True)
         for camera in cameras:
             self.people(camera, 0).parent.mkdir(parents=True)
@@ -80,24 +80,24 @@ class Layout:
 
 
 def check_place(folder: Path) -> None:
-    """Check that an export can take the place of ``folder``.
+    """Check that an export can be written to ``folder``.
 
     Raises:
-        ValueError: something else is there, or it cannot be made.
+        ValueError: the folder exists and is no export, or cannot be created.
     """
     if folder.exists() and not _is_export(folder):
         raise ValueError(
-            f"{folder}: is there and is no export of simharness, which would replace it; expected a free place or an "
-            "earlier export: name another FOLDER, or move it away"
+            f"{folder}: already exists and is no export of simharness; expected a new folder, or an earlier export to "
+            "replace. Choose another FOLDER, or move this one away"
         )
     first = next(parent for parent in folder.absolute().parents if parent.exists())
     if not first.is_dir() or not os.access(first, os.W_OK):
-        raise ValueError(f"{folder}: cannot make this folder: {first} is no folder that can be written to")
+        raise ValueError(f"{folder}: this folder cannot be created, because {first} is no writable folder")
 
 
 def _is_export(folder: Path) -> bool:
     try:
-        said = json.loads((folder / "manifest.json").read_bytes())
+        content = json.loads((folder / "manifest.json").read_bytes())
     except (OSError, ValueError):
         return False
-    return isinstance(said, dict) and said.get("format") == FORMAT
+    return isinstance(content, dict) and content.get("format") == FORMAT

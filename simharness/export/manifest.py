@@ -1,4 +1,4 @@
-"""What an exported sequence says of itself: what is in it, in which units and axes, who is who, where it comes from."""
+"""Manifest of an exported sequence: files, units, axes, cameras, people and provenance."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ def manifest(
     command: str | None,
     seconds: float,
 ) -> dict[str, Any]:
-    """What is to be known of a sequence, JSON-ready.
+    """Return the manifest of a sequence, ready for JSON.
 
     Args:
-        trial: what was exported.
-        frames: which of its frames.
-        names: of the cameras in the files, in the order of the rig.
+        trial: exported trial.
+        frames: exported frames.
+        names: names of the cameras in the files, in the order of the rig.
         pictures: whether pictures were written.
-        believed: whether a believed calibration was.
-        command: how the user asked for this.
-        seconds: that it took.
+        believed: whether a believed calibration was written.
+        command: command of the user.
+        seconds: duration of the export, seconds.
     """
     scenario = trial.scenario
     return {
@@ -98,7 +98,7 @@ def manifest(
 
 
 def _camera(exposures: ExposureSchedule, time: np.ndarray, frames: range, view: int, name: str) -> dict[str, Any]:
-    """One view: whose pictures it has, when they were taken, which are missing."""
+    """Describe one view: the camera that takes its pictures, its clock, and its missing and repeated pictures."""
     numbers = np.array(frames)
     source, taker = exposures.source[numbers, view], int(exposures.camera_of_view[view])
     taken = source >= 0

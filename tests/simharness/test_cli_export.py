@@ -52,8 +52,8 @@ def test_pictures_may_be_left_out(call, tmp_path):
         ((QUICKSTART, "bench", "--every", "0"), "--every must be 1 or more, got 0"),
         ((QUICKSTART, "bench", "--set", "people.cuont=2"), "did you mean people.count?"),
         ((QUICKSTART, "bench", *TINY, "--set", "cameras.radius=4.5"), "cameras.radius"),
-        ((QUICKSTART, "file"), "file/quickstart: cannot make this folder"),
-        ((QUICKSTART, "mine"), "mine/quickstart: is there and is no export"),
+        ((QUICKSTART, "file"), "file/quickstart: this folder cannot be created"),
+        ((QUICKSTART, "mine"), "mine/quickstart: already exists and is no export"),
         (("nothing.toml", "bench"), "nothing.toml: no such file"),
     ],
 )
@@ -72,7 +72,7 @@ def test_an_error_of_ours_shows_its_traceback(call, tmp_path, monkeypatch):
     def broken(*_args, **_options):
         raise ValueError("wrong turn")
 
-    monkeypatch.setattr("simharness.export.export.body_scene", broken)
+    monkeypatch.setattr("simharness.export.panoptic_sequence.body_scene", broken)
     result = call(QUICKSTART, "bench", *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr

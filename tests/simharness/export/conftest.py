@@ -1,10 +1,10 @@
-"""One small trial with a lens that bends and a calibration that is wrong, and its export."""
+"""Small trial with lens distortion and a wrong believed calibration, and its export."""
 
 from __future__ import annotations
 
 import pytest
 
-from simharness.export.export import Export, export
+from simharness.export.panoptic_sequence import ExportPlan, export_sequence
 from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Rendering, Scenario
 from simharness.trial.stages.build_trial import build_trial
 
@@ -27,10 +27,11 @@ def trial():
 
 @pytest.fixture(scope="session")
 def folder(trial, tmp_path_factory):
-    return export(trial, Export(tmp_path_factory.mktemp("export") / "tiny"), command="simharness export tiny.toml out")
+    plan = ExportPlan(tmp_path_factory.mktemp("export") / "tiny")
+    return export_sequence(trial.scenario, plan, command="simharness export tiny.toml out")
 
 
 @pytest.fixture(scope="session")
 def scenario():
-    """Makes scenarios like that of ``trial``, with other sections."""
+    """Function that returns the scenario of ``trial`` with other sections."""
     return tiny

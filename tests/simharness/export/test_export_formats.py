@@ -1,4 +1,4 @@
-"""The two file formats by themselves: closed forms."""
+"""Formats of exported files: closed forms."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ NECK, RIGHT_SHOULDER, LEFT_SHOULDER, MID_HIP, LEFT_HIP = 1, 2, 5, 8, 12
 
 
 def confidence_of(joint: str, *visible: tuple[int, str]) -> float:
-    """Of one of two people whom four views see, the first of whom shows some joints in some views."""
+    """Return the confidence of a joint of the first of two people, who shows some joints in some of four views."""
     visibility = np.array(HIDDEN)[:, None, None] * np.ones((4, 2, 17), int)
     for view, shown in visible:
         visibility[view, 0, COCO17.index(shown)] = Visibility.VISIBLE
     result = confidences(visibility)
-    assert not result[1].any()  # nobody sees the other one
+    assert not result[1].any()  # no view shows the second person
     return float(result[0, PANOPTIC19.index(joint)])
 
 
@@ -39,14 +39,14 @@ def test_confidence_counts_the_pictures_that_show_a_joint():
     assert confidence_of("left_knee") == 0.0
 
 
-def test_the_neck_is_seen_with_a_shoulder_and_the_middle_of_the_hips_with_a_hip():
+def test_the_neck_is_visible_with_a_shoulder_and_mid_hip_with_a_hip():
     assert confidence_of("neck", (0, "left_shoulder"), (1, "right_shoulder")) == 1.0
     assert confidence_of("neck", (0, "left_shoulder"), (0, "right_shoulder")) == 0.5
     assert confidence_of("mid_hip", (0, "left_shoulder"), (1, "right_hip")) == 0.5
 
 
-def test_loaders_keep_whose_hips_a_table_hides_and_drop_whom_nobody_sees():
-    """VoxelPose and others: a joint is there above 0.1, a person where his BodyCenter is."""
+def test_loaders_keep_people_with_hidden_hips_and_drop_invisible_people():
+    """VoxelPose and others: a joint is valid above 0.1, and a person if BodyCenter is."""
     assert confidence_of("mid_hip", (0, "nose")) > 0.1
     assert not confidence_of("mid_hip") > 0.1
 
@@ -73,7 +73,7 @@ def people(draw):
 
 
 @given(people())
-def test_keypoints_come_back_to_the_last_digit(tmp_path_factory, given_people):
+def test_keypoints_are_read_back_exactly(tmp_path_factory, given_people):
     keypoints, scores = given_people
     path = tmp_path_factory.mktemp("people") / "0_keypoints.json"
     path.write_text(json.dumps(people_file(keypoints, scores), allow_nan=False))
@@ -83,14 +83,14 @@ def test_keypoints_come_back_to_the_last_digit(tmp_path_factory, given_people):
     np.testing.assert_array_equal(back_scores, scores[found])
 
 
-def test_who_has_no_keypoint_is_left_out():
+def test_people_without_keypoints_are_left_out():
     keypoints, scores = np.full((3, 17, 2), np.nan), np.zeros((3, 17))
     keypoints[1, 4], scores[1, 4] = (7.0, 8.0), 0.5
     (person,) = people_file(keypoints, scores)["people"]
     assert np.count_nonzero(person["pose_keypoints_2d"]) == 3
 
 
-def test_neck_and_middle_of_the_hips_lie_halfway_where_both_ends_are_there():
+def test_neck_and_mid_hip_are_midpoints_where_both_ends_are_detected():
     keypoints, scores = np.full((2, 17, 2), np.nan), np.zeros((2, 17))
     for person, joints in enumerate([("left_shoulder", "right_shoulder", "left_hip"), ("left_hip", "right_hip")]):
         for k, joint in enumerate(joints):

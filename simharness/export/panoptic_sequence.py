@@ -1,4 +1,4 @@
-"""A scenario as a sequence on disk: pictures, true poses, detections and calibration, written frame by frame."""
+"""Export of a scenario as a sequence on disk: pictures, true poses, detections and calibration, frame by frame."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
 
-_QUALITY = 95  # of JPEG
-_FINER = 2  # samples a pixel each way, for smooth outlines
+_JPEG_QUALITY = 95
+_FINER = 2  # samples per pixel along each axis, against aliasing
 
 
 @dataclass(frozen=True)
-class Export:
-    """What is to be written, and where.
+class ExportPlan:
+    """Content and place of an exported sequence.
 
     Attributes:
-        folder: of the sequence; an earlier export there is replaced.
-        every: frames from one that is written to the next; files are numbered by frame.
+        folder: folder of the sequence; an earlier export there is replaced.
+        every: step between written frames; files are numbered by frame.
         pictures: whether pictures are written.
 
     Raises:
-        ValueError: a folder that is there and is no export, or that cannot be made; ``every`` below 1.
+        ValueError: the folder exists and is no export, or cannot be created; ``every`` below 1.
     """
 
     folder: Path
@@ -56,17 +56,19 @@ class Export:
         check_place(self.folder)
 
 
-def export(scenario: Scenario, plan: Export, *, reporter: Reporter | None = None, command: str | None = None) -> Path:
+def export_sequence(
+    scenario: Scenario, plan: ExportPlan, *, reporter: Reporter | None = None, command: str | None = None
+) -> Path:
     """Write a scenario as a sequence in the layout of the CMU Panoptic toolbox (:mod:`simharness.export.layout`).
 
-    The folder appears when it is whole. What the cameras see is known of all frames before the first is written, for
-    a detector's errors last; pictures are drawn and written one by one.
+    The folder appears when it is complete. All frames are detected before the first is written, because detector errors
+    depend on earlier frames; pictures are rendered and written one by one.
 
     Args:
-        scenario: a resolved scenario with its seed; its method is not run.
-        plan: how much of it, and where.
+        scenario: resolved scenario with its seed; its method is not run.
+        plan: content and place of the sequence.
         reporter: receiver of progress.
-        command: the user's command, for the manifest.
+        command: command of the user, for the manifest.
 
     Returns:
         The folder of the sequence.
@@ -81,7 +83,7 @@ def export(scenario: Scenario, plan: Export, *, reporter: Reporter | None = None
     trial, sequence = result.simulation.trial, result.simulation.sequence
     exposures, detected = trial.exposures, result.detected.frames
     names = hd_names([camera.name for camera in exposures.believed_rig])
-    taking, told = renamed(exposures.true_rig, names), renamed(exposures.believed_rig, names)
+    true_rig, believed_rig = renamed(exposures.true_rig, names), renamed(exposures.believed_rig, names)
     joints = sequence.of_skeleton(PANOPTIC19)
     picture_source = picture_source_of(scenario, Playback(trial.scene)) if plan.pictures else None
     frames = range(0, scenario.frames, plan.every)
@@ -89,40 +91,40 @@ def export(scenario: Scenario, plan: Export, *, reporter: Reporter | None = None
         layout = Layout(partial, scenario.name)
         layout.make_folders(names, pictures=plan.pictures)
         layout.scenario.write_text(dumps(scenario), encoding="utf-8")
-        write_cameras(layout.calibration, taking, source=scenario.name)
-        if mistaken := not _same(taking, told):
-            write_cameras(layout.believed, told, source=f"{scenario.name}, as believed")
+        write_cameras(layout.calibration, true_rig, source=scenario.name)
+        if faulty := not _same_cameras(true_rig, believed_rig):
+            write_cameras(layout.believed, believed_rig, source=f"{scenario.name}, as believed")
         for frame in frames:
-            seen = detected[frame]
+            current = detected[frame]
             bodies = body_scene(
                 joints[frame],
-                confidences(seen.truth.visibility),
+                confidences(current.truth.visibility),
                 ids=sequence.ids.tolist(),
                 time=float(sequence.time[frame]),
                 rate=scenario.rate,
             )
             _write_json(layout.bodies(frame), bodies)
-            _write_people(layout, names, frame, seen.detections)
+            _write_people(layout, names, frame, current.detections)
             if picture_source is not None:
                 for view, name in enumerate(names):
                     _write_picture(
                         layout.picture(name, frame), picture_source.picture(exposures, frame, view, finer=_FINER)
                     )
             advance(1)
-        about = manifest(
+        description = manifest(
             trial,
             frames=frames,
             names=names,
             pictures=plan.pictures,
-            believed=mistaken,
+            believed=faulty,
             command=command,
             seconds=round(time.perf_counter() - start, 3),
         )
-        layout.manifest.write_text(json.dumps(about, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        layout.manifest.write_text(json.dumps(description, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     return plan.folder
 
 
-def _same(one: Rig, other: Rig) -> bool:
+def _same_cameras(one: Rig, other: Rig) -> bool:
     return all(
         np.array_equal(getattr(a, key), getattr(b, key))
         for a, b in zip(one, other, strict=True)
@@ -132,8 +134,8 @@ def _same(one: Rig, other: Rig) -> bool:
 
 def _write_people(layout: Layout, names: Sequence[str], frame: int, detections: Detections) -> None:
     for view, name in enumerate(names):
-        mine = detections.view == view
-        _write_json(layout.people(name, frame), people_file(detections.keypoints[mine], detections.scores[mine]))
+        of_view = detections.view == view
+        _write_json(layout.people(name, frame), people_file(detections.keypoints[of_view], detections.scores[of_view]))
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:
@@ -141,7 +143,7 @@ def _write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def _write_picture(path: Path, rgb: NDArray[np.uint8]) -> None:
-    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    if not done:
-        raise RuntimeError(f"OpenCV cannot make a JPEG of a picture of {rgb.shape}")
+    encoded, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    if not encoded:
+        raise RuntimeError(f"OpenCV cannot encode a picture of shape {rgb.shape} as JPEG")
     path.write_bytes(data.tobytes())

@@ -1,10 +1,10 @@
-"""What `simharness render` writes."""
+"""Files of ``simharness render``."""
 
 import cv2
 import numpy as np
 import pytest
 
-from simharness.export.films import Footage, render
+from simharness.export.render import RenderPlan, render
 from simharness.scenario.sections.scenario import Cameras, Clutter, Faults, People, Scenario
 
 
@@ -19,7 +19,7 @@ def tiny(**sections) -> Scenario:
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    return render(tiny(), Footage(), out=tmp_path_factory.mktemp("plain"))
+    return render(tiny(), RenderPlan(), out=tmp_path_factory.mktemp("plain"))
 
 
 def test_a_picture_for_every_camera_and_frame_and_a_mosaic(plain):
@@ -35,7 +35,7 @@ def test_a_picture_for_every_camera_and_frame_and_a_mosaic(plain):
 
 @pytest.mark.parametrize("layer", ["truth", "detections", "estimates"])
 def test_each_layer_changes_the_picture(plain, tmp_path, layer):
-    folder = render(tiny(), Footage(overlay=frozenset({layer}), every=2), out=tmp_path)
+    folder = render(tiny(), RenderPlan(overlay=frozenset({layer}), every=2), out=tmp_path)
     assert sorted(path.name for path in (folder / "cam0").iterdir()) == ["0000.png", "0002.png"]
     drawn, bare = (cv2.imread(str(each / "cam0" / "0000.png")).astype(int) for each in (folder, plain))
     changed = (np.abs(drawn - bare).max(axis=2) > 20).mean()
@@ -43,7 +43,7 @@ def test_each_layer_changes_the_picture(plain, tmp_path, layer):
 
 
 def test_a_film_holds_every_frame(plain, tmp_path):
-    folder = render(tiny(), Footage(video=True), out=tmp_path)
+    folder = render(tiny(), RenderPlan(video=True), out=tmp_path)
     assert sorted(path.name for path in folder.iterdir()) == ["cam0.mp4", "cam1.mp4", "mosaic.mp4"]
     film = cv2.VideoCapture(str(folder / "cam0.mp4"))
     assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
@@ -59,13 +59,13 @@ def test_a_film_holds_every_frame(plain, tmp_path):
 
 
 def test_a_dead_camera_is_black(tmp_path):
-    folder = render(tiny(faults=Faults(dead=(1,))), Footage(every=3, overlay=frozenset({"truth"})), out=tmp_path)
+    folder = render(tiny(faults=Faults(dead=(1,))), RenderPlan(every=3, overlay=frozenset({"truth"})), out=tmp_path)
     assert not cv2.imread(str(folder / "cam1" / "0000.png")).any()
     assert cv2.imread(str(folder / "cam0" / "0000.png")).any()
 
 
 def test_channels_are_written_beside_the_pictures(tmp_path):
-    folder = render(tiny(), Footage(channels=frozenset({"depth", "ids", "parts"}), every=3), out=tmp_path)
+    folder = render(tiny(), RenderPlan(channels=frozenset({"depth", "ids", "parts"}), every=3), out=tmp_path)
     depth, ids, parts = (
         cv2.imread(str(folder / "cam0" / f"0000.{name}.png"), cv2.IMREAD_UNCHANGED)
         for name in ("depth", "ids", "parts")
@@ -81,9 +81,9 @@ def test_channels_are_written_beside_the_pictures(tmp_path):
 
 
 def test_bad_requests_are_refused():
-    with pytest.raises(ValueError, match="--overlay: ghosts is not known; there are truth, detections, estimates"):
-        Footage(overlay=frozenset({"ghosts", "truth"}))
-    with pytest.raises(ValueError, match="--also goes with pictures, not with --video"):
-        Footage(video=True, channels=frozenset({"depth"}))
+    with pytest.raises(ValueError, match="--overlay: unknown ghosts; expected any of truth, detections, estimates"):
+        RenderPlan(overlay=frozenset({"ghosts", "truth"}))
+    with pytest.raises(ValueError, match="--also needs pictures, not --video"):
+        RenderPlan(video=True, channels=frozenset({"depth"}))
     with pytest.raises(ValueError, match="--every must be 1 or more, got 0"):
-        Footage(every=0)
+        RenderPlan(every=0)
