@@ -110,7 +110,7 @@ def merge(
         from simharness.study.merge import merge as merge_stores
 
         merged = merge_stores(stores, into)
-        _write(f"{merged.copied} entries copied into {into}, {merged.there} were already there")
+        _write(f"{merged.copied} entries copied into {into}, {merged.present} were already there")
         if merged.damaged:
             _write(f"{len(merged.damaged)} are damaged and were skipped:", err=True)
             for damaged in merged.damaged[:_LISTED]:

@@ -14,13 +14,13 @@ import numpy as np
 
 from mvpose.arrays import Floats
 
-CALLS = 9  # a call takes as long as a frame, so that a busy machine interrupts both equally
+CALLS = 9  # a call takes as long as a frame, so a busy machine interrupts both equally
 _SIZE, _PRODUCTS = 40, 24  # size of the matrices, and number of products, as in a matching
 _POINTS, _VIEWS = 4000, 5  # candidate positions of a joint, and views
 
 
 def time_reference(calls: int = CALLS) -> Floats:
-    """Return the duration in milliseconds of each of ``calls`` calls of the kernel, after one call that is not timed."""
+    """Return the duration in milliseconds of each of ``calls`` calls of the kernel, after one untimed call."""
     rng = np.random.default_rng(0)
     matrix = rng.random((_SIZE, _SIZE)) / _SIZE
     points, rays = rng.random((_POINTS, 3)), rng.random((_VIEWS, 6))

@@ -1,1 +1,1 @@
-"""Many runs in one: sweeps over factors and seeds, trials that are kept, tables of them all."""
+"""Studies: sweeps over factors and seeds, a store of finished trials, and tables of their results."""

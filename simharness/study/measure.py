@@ -15,11 +15,11 @@ from simharness.trial.variant_result import VariantResult
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """What a store has of a trial.
+    """Stored parts of a trial.
 
     Attributes:
         archive: detections, and estimates by variant.
-        failures: tables of failures by variant, as far as the code that makes them has not changed.
+        failures: tables of failures by variant, where the code that makes them has not changed.
     """
 
     archive: TrialArchive = field(default_factory=TrialArchive)
@@ -28,11 +28,11 @@ class StoredTrial:
 
 @dataclass(frozen=True)
 class TrialOutput:
-    """What is to be stored of a trial.
+    """Parts of a trial to be stored.
 
     Attributes:
         results: results by variant.
-        archive: detections, where they were simulated now, and the estimates of these variants.
+        archive: detections if they were simulated in this run, and the estimates of these variants.
     """
 
     results: Mapping[str, VariantResult]
@@ -45,11 +45,11 @@ def measure(scenario: Scenario, variants: Sequence[str], stored: StoredTrial | N
     Args:
         scenario: resolved, with its seed.
         variants: variants of the method.
-        stored: what the store has of the trial. Without detections in it everything is simulated.
+        stored: stored parts of the trial. Without detections everything is simulated.
 
     Raises:
         ValueError: the scenario cannot be built at this seed.
-        RunError: any error after that, which is its cause.
+        RunError: any error after that; the error is its cause.
     """
     stored = stored or StoredTrial()
     known = Known()

@@ -1,4 +1,4 @@
-"""Stores that were filled apart, in one: what the shards of a study leave behind."""
+"""Merge of stores, for example of the shards of a study."""
 
 from __future__ import annotations
 
@@ -11,43 +11,43 @@ from simharness.study.trial_store import Store, is_store
 
 @dataclass(frozen=True)
 class MergeResult:
-    """What was merged.
+    """Result of a merge.
 
     Attributes:
-        copied: how many entries.
-        there: how many were in the target before.
-        damaged: the files that were left out.
+        copied: number of copied entries.
+        present: number of entries that were in the target before.
+        damaged: damaged files, which were not copied.
     """
 
     copied: int
-    there: int
+    present: int
     damaged: tuple[Path, ...]
 
 
 def merge(sources: Sequence[Path], into: Path) -> MergeResult:
-    """Copy the whole entries of stores into another.
+    """Copy the undamaged entries of stores into another store.
 
     Args:
         sources: stores.
-        into: a store; it is begun if it is not there.
+        into: the target store; it is created if it does not exist.
 
     Raises:
-        ValueError: a source is no store, or is of another format; so is the target.
-        StoreError: the target cannot be written to. What was copied stays.
+        ValueError: a source is no store, or a source or the target has another format.
+        StoreError: the target cannot be written. Entries copied so far stay.
     """
     for folder in sources:
         if not is_store(folder):
-            raise ValueError(f"{folder}: no store of trials: it has no store.json")
-    opened = [Store(folder) for folder in sources]  # all are looked at before anything is copied
+            raise ValueError(f"{folder}: not a store of trials: the file store.json is missing")
+    opened = [Store(folder) for folder in sources]  # all formats are checked before anything is copied
     target = Store(into)
-    copied = there = 0
+    copied = present = 0
     damaged: list[Path] = []
     for source in opened:
         for identity in source:
             if target.has(identity):
-                there += 1
+                present += 1
             elif target.copy_from(source, identity):
                 copied += 1
             else:
                 damaged.append(source.file_of(identity))
-    return MergeResult(copied, there, tuple(damaged))
+    return MergeResult(copied, present, tuple(damaged))

@@ -1,4 +1,4 @@
-"""Which trials a study is made of, and where a store keeps them."""
+"""Plan of a study: its trials, and the identities under which a store keeps them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class PlannedTrial:
     """A trial of a study.
 
     Attributes:
-        setting: of the study.
-        seed: that the setting is run at.
-        scenario: resolved, at that seed.
-        trial: its identity. Two settings may amount to the same trial.
-        entries: the identity of each variant's entry.
+        setting: setting of the study.
+        seed: seed of the trial.
+        scenario: resolved scenario at that seed.
+        trial: identity of the trial. Several settings may resolve to the same trial.
+        entries: identity of the entry of each variant.
     """
 
     setting: Setting
@@ -30,14 +30,14 @@ class PlannedTrial:
 
 
 def plan(study: Study) -> list[PlannedTrial]:
-    """All trials of a study: every setting at the first seed, then at the second, for half a study is of use then."""
+    """Return all trials of a study, seed by seed, so that an interrupted study has all settings at its first seeds."""
     places = study.base.method.estimators.places
-    own = {variant: estimator_code(places[variant]) if variant in places else "" for variant in study.variants}
-    return [_planned(study, setting, seed, own) for seed in study.seeds for setting in study.settings]
+    codes = {variant: estimator_code(places[variant]) if variant in places else "" for variant in study.variants}
+    return [_planned(study, setting, seed, codes) for seed in study.seeds for setting in study.settings]
 
 
-def _planned(study: Study, setting: Setting, seed: int, own: Mapping[str, str]) -> PlannedTrial:
+def _planned(study: Study, setting: Setting, seed: int, codes: Mapping[str, str]) -> PlannedTrial:
     scenario = study.at(setting, seed)
     trial = trial_identity(scenario)
-    entries = {variant: entry_identity(trial, variant, code) for variant, code in own.items()}
+    entries = {variant: entry_identity(trial, variant, code) for variant, code in codes.items()}
     return PlannedTrial(setting, seed, scenario, trial, entries)

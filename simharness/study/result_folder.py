@@ -1,13 +1,14 @@
-"""A study on disk: the folder that its results are in, and how it is read back.
+"""Result folder of a study: its files, written and read.
 
 `study.json`
-    what was run and how: ``name``, ``description``, ``seeds``, ``variants``, ``factors`` (dotted keys),
-    ``one_at_a_time``, ``settings`` and ``trials`` (how many), ``kept`` (trials that were finished before), ``run``,
-    ``failed`` (a list of ``trial``, ``case``, ``factors``, ``seed``, ``variants``, ``error``: empty where all is
-    there), ``damaged`` (entries of the store that were run again), ``seconds`` (of this run), ``command``,
-    ``machine``, ``code`` (version), ``digests`` (of the code: simulation, method), ``versions`` (of packages).
+    description of the study and of the run: ``name``, ``description``, ``seeds``, ``variants``, ``factors`` (dotted
+    keys), ``one_at_a_time``, ``settings`` and ``trials`` (numbers), ``kept`` (number of trials that were finished
+    before), ``run`` (number of trials that were run), ``failed`` (a list of ``trial``, ``case``, ``factors``, ``seed``,
+    ``variants``, ``error``; empty if no trial failed), ``damaged`` (entries of the store that were run again),
+    ``seconds`` (duration of this run), ``command``, ``machine``, ``code`` (version), ``digests`` (of the code:
+    simulation, method, scores, failures), ``versions`` (of packages).
 `study.toml`
-    the study as it was run.
+    the study as it was run, with the keys of its bases.
 `trials.parquet`
     a row for each trial and variant: ``trial`` (identity, the same for all variants), ``case``, ``varied``, ``seed``,
     ``variant``, a column for each factor, named by its key, one for each of
@@ -16,7 +17,7 @@
     ``trial``, ``variant``, and the columns of :class:`simharness.trial.variant_result.VariantResult`. Settings that
     make the same trial share its rows.
 `report.html`
-    for people.
+    the report.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ TABLES = ("trials", "frames", "people", "failures")
 
 @dataclass(frozen=True)
 class Tables:
-    """The tables of a study, as above."""
+    """Tables of a study; their columns are listed in the docstring of this module."""
 
     trials: pl.DataFrame
     frames: pl.DataFrame
@@ -47,15 +48,15 @@ class Tables:
 
 @dataclass(frozen=True)
 class Results:
-    """A study that was run.
+    """Results of a study.
 
     Attributes:
-        info: what ``study.json`` says.
+        info: content of ``study.json``.
         trials: a row for each trial and variant.
-        frames: a row for each of those and frame.
-        people: a row for each of those, frame and true person.
+        frames: a row for each trial, variant and frame.
+        people: a row for each trial, variant, frame and true person.
         failures: a row for each failure.
-        folder: where it lies.
+        folder: the result folder.
     """
 
     info: Mapping[str, Any]
@@ -66,25 +67,25 @@ class Results:
     folder: Path
 
     def scenario_of(self, trial: str) -> Scenario:
-        """The resolved scenario of a trial, its seed included.
+        """Return the resolved scenario of a trial, with its seed.
 
         Raises:
             ValueError: the study has no such trial.
         """
-        found = self.trials.filter(pl.col("trial") == trial)
-        if found.is_empty():
+        rows = self.trials.filter(pl.col("trial") == trial)
+        if rows.is_empty():
             raise ValueError(f"{self.folder}: this study has no trial {trial}")
-        return Scenario.model_validate_json(found["scenario"][0])
+        return Scenario.model_validate_json(rows["scenario"][0])
 
 
 def write_study(folder: Path, info: Mapping[str, Any], tables: Tables, document: str) -> None:
     """Write the files of a study, all but the report, into an existing folder.
 
     Args:
-        folder: that exists.
-        info: for ``study.json``.
-        tables: the rest.
-        document: for ``study.toml``.
+        folder: an existing folder.
+        info: content of ``study.json``.
+        tables: the tables.
+        document: content of ``study.toml``.
     """
     (folder / "study.json").write_text(
         json.dumps(info, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
@@ -98,19 +99,20 @@ def read_study(folder: Path | str) -> Results:
     """Read the folder of a study.
 
     Raises:
-        ValueError: it is none, a file of it is missing, or one cannot be read.
+        ValueError: a file is missing or cannot be read.
     """
     folder = Path(folder)
     files = [folder / "study.json", *(folder / f"{name}.parquet" for name in TABLES)]
     if missing := [file.name for file in files if not file.is_file()]:
         raise ValueError(
-            f"{folder}: not the folder of a study: it has no {', '.join(missing)}; simharness study makes one"
+            f"{folder}: not the result folder of a study: missing {', '.join(missing)}; give a folder that simharness "
+            "study wrote"
         )
     try:
         info = json.loads(files[0].read_text(encoding="utf-8"))
         tables = dict(zip(TABLES, map(_read_table, files[1:]), strict=True))
     except ValueError as error:
-        raise ValueError(f"{folder}: cannot be read: {error}; run the study again to make it anew") from None
+        raise ValueError(f"{folder}: cannot be read: {error}; run the study again to write the folder again") from None
     return Results(info, folder=folder, **tables)
 
 

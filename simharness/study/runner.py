@@ -1,4 +1,4 @@
-"""A study from its settings to its folder of results."""
+"""Run of a study: finished trials are read from the store, missing ones are run, and the result folder is written."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from simharness.trial.stages.estimators import estimators_of
 
 @dataclass(frozen=True)
 class FailedTrial:
-    """A trial of which at least one variant could not be measured.
+    """Trial in which at least one variant could not be measured.
 
     Attributes:
-        trial: its identity.
-        case: of its setting.
-        factors: of its setting.
-        seed: its own.
-        variants: that are missing.
-        error: why; with the names of the variants where it is not that of all.
+        trial: identity of the trial.
+        case: case of its setting.
+        factors: factors of its setting.
+        seed: seed of the trial.
+        variants: missing variants.
+        error: message of the error, with the names of the variants unless all variants have the same error.
     """
 
     trial: str
@@ -49,15 +49,15 @@ class FailedTrial:
 
 @dataclass(frozen=True)
 class StudyOutcome:
-    """What became of the trials of a study.
+    """Numbers of kept, run and failed trials of a study.
 
     Attributes:
-        trials: how many there are; those that two settings share count once.
-        kept: how many were finished before.
-        run: how many were finished now.
-        failed: the others. Of some of them there are variants that were measured, and kept.
-        damaged: entries of the store that were found damaged and run again.
-        seconds: that it took.
+        trials: number of trials; a trial that several settings share counts once.
+        kept: number of trials that were finished before.
+        run: number of trials that were finished in this run.
+        failed: the failed trials. Their variants that were measured are stored.
+        damaged: damaged entries of the store, which were run again.
+        seconds: duration of the run.
     """
 
     trials: int
@@ -69,10 +69,10 @@ class StudyOutcome:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, and what is kept of the study."""
+    """Interruption of a study by Ctrl-C, with the number of finished trials."""
 
     def __init__(self, finished: int, trials: int) -> None:
-        super().__init__(f"interrupted: {finished} of {trials} trials are kept; the same command goes on")
+        super().__init__(f"interrupted: {finished} of {trials} trials are stored; the same command continues")
 
 
 def run_study(
@@ -86,31 +86,32 @@ def run_study(
     command: str | None = None,
     measure: Measure = measure_trial,
 ) -> Results:
-    """Run what is not finished of a study, and write its results.
+    """Run the unfinished trials of a study and write its results.
 
     Args:
-        study: what to run.
-        out: where the folder named as the study goes. It appears when it is whole, in the place of an earlier one.
+        study: the study.
+        out: parent of the result folder, which has the name of the study. The folder appears when it is complete and
+            replaces an earlier one.
         store: the folder of finished trials; ``out / "store"`` by default.
         workers: processes; see :func:`simharness.study.scheduler.run_units`.
-        scheduler: address of a Dask scheduler, instead.
-        reporter: receiver of progress, a step a trial.
-        command: how the user asked for this.
-        measure: what is done with a trial.
+        scheduler: address of a Dask scheduler to use instead of processes.
+        reporter: receiver of progress, one step for each trial.
+        command: command line of the user, for ``study.json``.
+        measure: function that measures a trial.
 
     Returns:
         The results, as :func:`simharness.study.result_folder.read_study` reads them;
-        ``info["failed"]`` says what is missing.
+        ``info["failed"]`` lists what is missing.
 
     Raises:
-        ValueError: the folder is no place for a study, the store is no store, the scheduler does not answer, or a
-            method of one's own cannot be loaded.
-        RunError: the disk is full, or the cluster went away. What is finished is kept.
-        Interrupted: Ctrl-C. What is finished is kept.
+        ValueError: the result folder holds something else, the store is no store, the scheduler does not answer, or a
+            user-defined estimator cannot be loaded.
+        RunError: the disk is full, or the connection to the cluster was lost. Finished trials stay in the store.
+        Interrupted: Ctrl-C. Finished trials stay in the store.
     """
     folder, store = out / study.name, out / "store" if store is None else store
     _check_place(folder, store)
-    estimators_of(study.base.method)  # better now than at every trial
+    estimators_of(study.base.method)  # report errors now rather than at every trial
     opened, planned = Store(store), plan(study)
     tally = _run(planned, opened, workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
     order = {id(setting): index for index, setting in enumerate(study.settings)}
@@ -123,8 +124,8 @@ def run_study(
             write_study(partial, info, tables(rows, study.factors), document(study))
     except OSError as error:
         raise StoreError(
-            f"{folder}: cannot be written: {error.strerror}. All trials are kept: make room, and the same command goes "
-            "on"
+            f"{folder}: cannot be written: {error.strerror}. All trials are stored: free some disk space and run the "
+            "same command again"
         ) from error
     return read_study(folder)
 
@@ -139,25 +140,26 @@ def run_shard(
     reporter: Reporter | None = None,
     measure: Measure = measure_trial,
 ) -> StudyOutcome:
-    """Run one of ``n`` parts of a study, into a store alone: ``simharness merge`` puts the stores together.
+    """Run one of ``n`` parts of a study and only store its trials; ``simharness merge`` merges the stores.
 
     Args:
-        study: what to run.
-        shard: which part, from 1 to n; and n.
+        study: the study.
+        shard: index of the part, from 1 to n, and n.
         store: the folder of finished trials.
-        workers: as of :func:`run_study`.
-        scheduler: as of :func:`run_study`.
-        reporter: as of :func:`run_study`.
-        measure: as of :func:`run_study`.
+        workers: see :func:`run_study`.
+        scheduler: see :func:`run_study`.
+        reporter: see :func:`run_study`.
+        measure: see :func:`run_study`.
 
     Raises:
-        ValueError, RunError, Interrupted: as of :func:`run_study`; no such part.
+        ValueError: the part does not exist, or see :func:`run_study`.
+        RunError, Interrupted: see :func:`run_study`.
     """
     part, parts = shard
     if not 1 <= part <= parts:
-        raise ValueError(f"a shard is i/n with i from 1 to n, got {part}/{parts}")
+        raise ValueError(f"shard must be i/n with i from 1 to n, got {part}/{parts}")
     estimators_of(study.base.method)
-    planned = list(_different(plan(study)))[part - 1 :: parts]
+    planned = list(_unique(plan(study)))[part - 1 :: parts]
     return _run(planned, Store(store), workers=workers, scheduler=scheduler, reporter=reporter, measure=measure)
 
 
@@ -170,38 +172,38 @@ def _run(
     reporter: Reporter | None,
     measure: Measure,
 ) -> StudyOutcome:
-    """Measure what the store lacks."""
+    """Measure the trials that are missing or outdated in the store."""
     start = perf_counter()
-    different = {each.trial: each for each in _different(planned)}
-    units = [unit for each in different.values() if (unit := _unit(store, each)).variants]
+    unique = {each.trial: each for each in _unique(planned)}
+    units = [unit for each in unique.values() if (unit := _unit(store, each)).variants]
     damaged = tuple(sorted(store.damaged))
-    kept, run, failed = len(different) - len(units), 0, dict[str, TrialFailure]()
+    kept, run, failed = len(unique) - len(units), 0, dict[str, TrialFailure]()
     try:
         with (
-            (reporter or Silence()).stage("trials", len(different), done=kept) as advance,
+            (reporter or Silence()).stage("trials", len(unique), done=kept) as advance,
             closing(run_units(units, measure, workers=workers, scheduler=scheduler)) as results,
         ):
             for result in results:
-                each = different[result.unit.trial]
+                each = unique[result.unit.trial]
                 for part in result.parts:
                     if isinstance(part, TrialSuccess):
                         _keep(store, each, part)
                     else:
-                        _note(store, each, part)
+                        _store_failure(store, each, part)
                 if isinstance(result, TrialFailure):
                     failed[each.trial] = result
                 else:
                     run += 1
                 advance(1, failed=int(isinstance(result, TrialFailure)))
-    except KeyboardInterrupt:  # which may come between a trial's last entry and its count: the store knows
-        finished = sum(all(map(store.holds, different[unit.trial].entries.values())) for unit in units)
-        raise Interrupted(kept + finished, len(different)) from None
-    losses = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)
-    return StudyOutcome(len(different), kept, run, losses, damaged, perf_counter() - start)
+    except KeyboardInterrupt:  # may come between writing a trial and counting it, so the store is asked
+        finished = sum(all(map(store.holds, unique[unit.trial].entries.values())) for unit in units)
+        raise Interrupted(kept + finished, len(unique)) from None
+    failures = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)
+    return StudyOutcome(len(unique), kept, run, failures, damaged, perf_counter() - start)
 
 
-def _different(planned: Sequence[PlannedTrial]) -> Iterator[PlannedTrial]:
-    """The first of those that are the same trial."""
+def _unique(planned: Sequence[PlannedTrial]) -> Iterator[PlannedTrial]:
+    """Yield each trial once: the first of those with the same identity."""
     seen: set[str] = set()
     for each in planned:
         if each.trial not in seen:
@@ -210,21 +212,21 @@ def _different(planned: Sequence[PlannedTrial]) -> Iterator[PlannedTrial]:
 
 
 def _unit(store: Store, planned: PlannedTrial) -> Unit:
-    """Return the work that is left of a trial: no variants where nothing is."""
+    """Return the remaining work of a trial; a unit without variants if it is finished."""
     entries = {variant: store.read(identity) for variant, identity in planned.entries.items()}
-    left = tuple(name for name, entry in entries.items() if entry is None or entry.state is not EntryState.CURRENT)
+    missing = tuple(name for name, entry in entries.items() if entry is None or entry.state is not EntryState.CURRENT)
     stored = StoredTrial()
-    if left and (detected := store.read_detections(planned.trial)):
-        known = {name: entry for name, entry in entries.items() if name in left and entry and entry.estimates}
+    if missing and (detected := store.read_detections(planned.trial)):
+        known = {name: entry for name, entry in entries.items() if name in missing and entry and entry.estimates}
         stored = StoredTrial(
             TrialArchive(detected, {name: entry.estimates for name, entry in known.items()}),
             {name: entry.result.failures for name, entry in known.items() if entry.failures_code == code().failures},
         )
-    return Unit(planned.trial, planned.scenario, left, stored)
+    return Unit(planned.trial, planned.scenario, missing, stored)
 
 
 def _keep(store: Store, planned: PlannedTrial, success: TrialSuccess) -> None:
-    """Store a finished unit. Detections come first: an entry without them could never be scored again."""
+    """Store a finished unit. Detections are written first, because an entry without them cannot be scored again."""
     output = success.output
     if output.archive.detected:
         store.write_detections(planned.trial, output.archive.detected)
@@ -234,29 +236,31 @@ def _keep(store: Store, planned: PlannedTrial, success: TrialSuccess) -> None:
         store.write(planned.entries[variant], entry)
 
 
-def _note(store: Store, planned: PlannedTrial, failure: TrialFailure) -> None:
+def _store_failure(store: Store, planned: PlannedTrial, failure: TrialFailure) -> None:
     for variant in failure.unit.variants:
-        noted = {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback}
-        store.write_failure(planned.entries[variant], noted)
+        store.write_failure(
+            planned.entries[variant],
+            {"trial": planned.trial, "variant": variant, "error": failure.error, "traceback": failure.traceback},
+        )
 
 
 def _failed(planned: PlannedTrial, failure: TrialFailure) -> FailedTrial:
-    lost = [part for part in failure.parts if isinstance(part, TrialFailure)]
+    failures = [part for part in failure.parts if isinstance(part, TrialFailure)]
     return FailedTrial(
         trial=planned.trial,
         case=planned.setting.case,
         factors=dict(planned.setting.factors),
         seed=planned.seed,
-        variants=tuple(variant for part in lost for variant in part.unit.variants),
-        error=error_text(lost, planned.entries),
+        variants=tuple(variant for part in failures for variant in part.unit.variants),
+        error=error_text(failures, planned.entries),
     )
 
 
 def _entries(store: Store, planned: PlannedTrial, *, failed: bool) -> Iterator[Entry]:
-    """What the store has of a trial; all of it, but of one that failed.
+    """Yield the stored entries of a trial; entries may be missing only if the trial failed.
 
     Raises:
-        StoreError: an entry is not there any more.
+        StoreError: an entry of a finished trial cannot be read any more.
     """
     for identity in planned.entries.values():
         entry = store.read(identity)
@@ -286,12 +290,15 @@ def _info(study: Study, tally: StudyOutcome, command: str | None) -> dict[str, A
 
 
 def _check_place(folder: Path, store: Path) -> None:
-    """Before the work: a place that is no good is better known at once, and nothing may be replaced but a study."""
+    """Check before the run that the result folder can be written and replaces nothing but a study."""
     if folder.resolve() in (store.resolve(), *store.resolve().parents):
-        raise ValueError(f"the results would take the place of the store {store}: name another folder by --store")
+        raise ValueError(f"the results would replace the store {store}: choose another folder with --store")
     if folder.exists() and not (folder / "study.json").is_file() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(f"{folder} is there and holds no study: name another folder by --out, or rename the study")
+        raise ValueError(
+            f"{folder} exists and is not the result folder of a study: choose another folder with --out, or rename the "
+            "study"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ValueError(f"--out {folder.parent}: cannot make this folder: {error.strerror}") from None
+        raise ValueError(f"--out {folder.parent}: cannot create this folder: {error.strerror}") from None

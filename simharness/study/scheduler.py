@@ -1,8 +1,8 @@
-"""Trials shared out: in this process, among processes of this machine, or on a Dask cluster.
+"""Scheduler of trials: in this process, in processes of this machine, or on a Dask cluster.
 
-What fails is tried again, for a worker may die of what it has no fault in, and given up after :data:`ATTEMPTS`; the
-others go on. What the scenario is to blame for is given up at once: it would fail the same way again. Variants that
-failed together are tried once more one by one, so that one that fails costs no other its result.
+A trial that fails is tried again, because a worker may die for reasons outside the trial, and given up after
+:data:`ATTEMPTS` attempts; the other trials go on. An error of the scenario is final at once, because it would happen
+again. Variants that failed together are tried once more one by one, so that the others keep their results.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 ATTEMPTS = 3
-"""How often a trial may fail before it is given up."""
+"""Number of attempts before a trial is given up."""
 
 _PATIENCE = 30.0  # seconds to wait for a scheduler
-_FIRST_WORKER = 30.0  # seconds to wait for the first worker of one that has none
+_FIRST_WORKER = 30.0  # seconds to wait for the first worker of a scheduler without workers
 
 Measure = Callable[[Scenario, Sequence[str], StoredTrial], TrialOutput]
-"""What is done with a trial, in whatever process: :func:`simharness.study.measure.measure`. It must be picklable, and
-say by a ValueError that the scenario is to blame."""
+"""Function that measures a trial in any process, by default :func:`simharness.study.measure.measure`. It must be
+picklable and raise a ValueError for an error of the scenario."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What is shared out: a trial, and the variants of it that are wanted. It is detected once for all of them.
+    """Unit of work: a trial and its requested variants, which share the detections.
 
     Attributes:
-        trial: its identity.
-        scenario: at its seed.
-        variants: of the method.
-        stored: what the store has of the trial.
+        trial: identity of the trial.
+        scenario: resolved scenario at its seed.
+        variants: variants of the method.
+        stored: stored parts of the trial.
     """
 
     trial: str
@@ -56,12 +56,12 @@ class Unit:
 
 @dataclass(frozen=True)
 class TrialSuccess:
-    """A unit that is done.
+    """Result of a finished unit.
 
     Attributes:
-        unit: which.
-        output: results by variant, and what is to be stored beside them.
-        seconds: that it took.
+        unit: the unit.
+        output: results by variant, and archives to be stored.
+        seconds: duration.
     """
 
     unit: Unit
@@ -70,21 +70,22 @@ class TrialSuccess:
 
     @property
     def parts(self) -> tuple[TrialSuccess]:
-        """It is one whole."""
+        """The result itself, as the only part."""
         return (self,)
 
 
 @dataclass(frozen=True)
 class TrialFailure:
-    """A unit that failed.
+    """Failure of a unit.
 
     Attributes:
-        unit: which.
-        error: in a line.
-        traceback: of it; empty where there is none.
-        final: whether it would fail the same way again.
-        deaths: how many workers died over it.
-        alone: what each variant did by itself, in the unit's order, where the unit has several; at least one failed.
+        unit: the unit.
+        error: message of the error, one line.
+        traceback: traceback; empty where there is none.
+        final: whether the unit would fail in the same way again.
+        deaths: number of workers that died while they ran it.
+        alone: results of the variants one by one, in the order of the unit, at least one of them a failure; empty where
+            the variants were not tried one by one.
     """
 
     unit: Unit
@@ -96,30 +97,30 @@ class TrialFailure:
 
     @property
     def parts(self) -> tuple[TrialSuccess | TrialFailure, ...]:
-        """What is known of its variants: each by itself, or that all failed together."""
+        """Results of the variants one by one, or this failure of all variants together."""
         return self.alone or (self,)
 
 
 def run_units(
     units: Collection[Unit], measure: Measure, *, workers: int = 1, scheduler: str | None = None
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
-    """Measure units, each until it is done or has failed for good, and yield them as they come.
+    """Measure units and yield their results in the order in which they finish.
 
-    A unit of several variants that has failed :data:`ATTEMPTS` times is divided: each variant is tried by itself, and
-    given up at once if it fails as all did together. What comes of that is one result, too.
+    A unit of several variants that has failed :data:`ATTEMPTS` times is split: each variant is tried alone, and given
+    up at once if it fails with the same error as before. The results of the variants are joined to one result.
 
-    Closing the iterator, or an error in whoever iterates, ends all work.
+    Closing the iterator, or an error in the loop over it, ends all work.
 
     Args:
-        units: in the order in which they are begun, no two of one trial.
-        measure: what to do with each.
-        workers: processes; 1 works in this one, where a crash cannot be survived. They are spawned, so a script that
-            calls this needs its ``if __name__ == "__main__"``.
-        scheduler: address of a Dask scheduler whose workers do it instead.
+        units: units in the order in which they start; no two of the same trial.
+        measure: function that measures a unit.
+        workers: number of processes. With 1 the work is done in this process, and a crash ends it. Processes are
+            spawned, so a script that calls this needs ``if __name__ == "__main__"``.
+        scheduler: address of a Dask scheduler whose workers are used instead.
 
     Raises:
         ValueError: fewer than one worker; no scheduler at the address, or it has no workers, or they run other code.
-        RunError: the cluster went away.
+        RunError: the connection to the cluster was lost.
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
@@ -131,22 +132,22 @@ def run_units(
 
 
 def attempt(measure: Measure, unit: Unit) -> TrialSuccess | TrialFailure:
-    """Measure a unit once. Errors come back as text, for not every exception can travel."""
+    """Measure a unit once. Errors are returned as text, because not every exception can be pickled."""
     start = perf_counter()
     try:
         output = measure(unit.scenario, unit.variants, unit.stored)
     except Exception as error:
-        said = str(error) if isinstance(error, ValueError | RunError) else f"{type(error).__name__}: {error}"
-        return TrialFailure(unit, said, traceback.format_exc(), final=isinstance(error, ValueError))
+        message = str(error) if isinstance(error, ValueError | RunError) else f"{type(error).__name__}: {error}"
+        return TrialFailure(unit, message, traceback.format_exc(), final=isinstance(error, ValueError))
     return TrialSuccess(unit, output, perf_counter() - start)
 
 
 def error_text(failures: Iterable[TrialFailure], variants: Collection[str]) -> str:
-    """The errors of failures in a line, with whose they are, but where all variants have the same one.
+    """Return the errors of failures in one line, with the names of their variants unless all have the same error.
 
     Args:
-        failures: of variants of one trial.
-        variants: all of the trial.
+        failures: failures of variants of one trial.
+        variants: all variants of the trial.
     """
     whose: dict[str, list[str]] = {}
     for each in failures:
@@ -157,14 +158,14 @@ def error_text(failures: Iterable[TrialFailure], variants: Collection[str]) -> s
 
 
 def _split_by_variant(failure: TrialFailure) -> list[Unit]:
-    """The variants of a unit that has failed for good, each a unit; none where that would tell nothing new."""
+    """Return a unit for each variant of a failed unit; none where it has one variant or the failure is final."""
     if failure.final or len(failure.unit.variants) < 2:
         return []
     return [replace(failure.unit, variants=(variant,)) for variant in failure.unit.variants]
 
 
 def _join_parts(together: TrialFailure, alone: Iterable[TrialSuccess | TrialFailure]) -> TrialSuccess | TrialFailure:
-    """What came of a unit that failed: what its variants did one by one."""
+    """Return the result of a failed unit, joined from the results of its variants one by one."""
     unit = together.unit
     alone = tuple(sorted(alone, key=lambda each: unit.variants.index(each.unit.variants[0])))
     done = [each for each in alone if isinstance(each, TrialSuccess)]
@@ -192,7 +193,13 @@ def _run_in_process(units: Iterable[Unit], measure: Measure) -> Generator[TrialS
 def _attempt_repeatedly(
     unit: Unit, measure: Measure, together: TrialFailure | None = None
 ) -> TrialSuccess | TrialFailure:
-    """Attempt a unit until it is done or has failed for good; ``together``: the failure that it is a part of."""
+    """Attempt a unit until it is finished or given up.
+
+    Args:
+        unit: the unit.
+        measure: function that measures it.
+        together: failure of all variants together, if the unit is one variant of a split unit.
+    """
     for _ in range(ATTEMPTS):
         result = attempt(measure, unit)
         if isinstance(result, TrialSuccess) or result.final or _repeats_error(result, together):
@@ -201,28 +208,28 @@ def _attempt_repeatedly(
 
 
 def _repeats_error(failure: TrialFailure, together: TrialFailure | None) -> bool:
-    """Whether a variant fails by itself as it did, :data:`ATTEMPTS` times, with the others."""
+    """Return whether a variant alone fails with the same error as it did :data:`ATTEMPTS` times with the others."""
     return together is not None and failure.error == together.error
 
 
 def _run_on_cluster(
     units: Iterable[Unit], measure: Measure, client: Client
 ) -> Generator[TrialSuccess | TrialFailure, None, None]:
-    """As many units are on their way as the cluster has threads: more would wait at workers that may die under them.
+    """Run units on a cluster, at most one for each thread, because units that wait at a worker are lost if it dies.
 
-    When a worker dies nobody knows which of the units that were at it has killed it. So those come last, one at a time:
-    then there is no doubt, and one that needs much memory has the machine to itself.
+    If a worker dies, each of its units may be the cause. These units are therefore run last, one at a time: then the
+    cause is certain, and a unit that needs much memory has the machine to itself.
     """
     waiting, suspects, alone = iter(units), deque[Unit](), False
-    parts = deque[Unit]()  # of units that are divided; they come before what waits
-    together: dict[str, TrialFailure] = {}  # by trial, how they failed
-    finished: dict[str, list[TrialSuccess | TrialFailure]] = {}  # by trial, what came of its parts so far
+    parts = deque[Unit]()  # of units that were split; they run before the waiting units
+    together: dict[str, TrialFailure] = {}  # failure of all variants together, by trial
+    finished: dict[str, list[TrialSuccess | TrialFailure]] = {}  # results of the parts so far, by trial
     failed: Counter[tuple[str, tuple[str, ...]]] = Counter()
     running: dict[Future[Any], Unit] = {}
     completed = _completed()
 
     def submit(unit: Unit) -> None:
-        # A name of its own each time: what failed under a name would not be run under it again.
+        # A new key each time, because Dask does not run a failed key again.
         future = client.submit(attempt, measure, unit, key=f"{unit.trial}-{secrets.token_hex(4)}", pure=False)
         running[future] = unit
         completed.add(future)
@@ -241,7 +248,7 @@ def _run_on_cluster(
         future = next(completed)
         unit = running.pop(future)
         result, whole = _result(future, unit), together.get(unit.trial)
-        del future  # what is held would be measured anew, were the worker that has it to die
+        del future  # a held result would be measured again if its worker died
         if isinstance(result, TrialFailure):
             tried = unit.trial, unit.variants
             failed[tried] += max(1, result.deaths) if alone else 1
@@ -270,10 +277,10 @@ def _completed() -> Any:
 
 
 def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
-    """What came back, or that the worker died of it.
+    """Return the result of a finished future; a failure where its worker died.
 
     Raises:
-        RunError: nothing will come back.
+        RunError: the connection was lost, or another client cancelled the future.
     """
     from distributed import KilledWorker
 
@@ -281,7 +288,7 @@ def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
         result: TrialSuccess | TrialFailure = future.result()
         return result
     if future.status != "error":
-        raise RunError(f"the Dask scheduler went away, or somebody else cancelled trial {unit.trial}")
+        raise RunError(f"the connection to the Dask scheduler was lost, or another client cancelled trial {unit.trial}")
     error = future.exception()
     if isinstance(error, KilledWorker):
         return TrialFailure(
@@ -292,7 +299,7 @@ def _result(future: Future[Any], unit: Unit) -> TrialSuccess | TrialFailure:
 
 @contextlib.contextmanager
 def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
-    """A client of a cluster of this machine, or of the one at an address."""
+    """Give a client of a new cluster of this machine, or of the cluster at an address."""
     import dask
     from distributed import Client, LocalCluster
 
@@ -309,13 +316,13 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",  # any free port: the scheduler has one without a dashboard, too
+            dashboard_address="127.0.0.1:0",  # any free port; the scheduler opens one even without a dashboard
             silence_logs=logging.CRITICAL,
-            memory_limit=0,  # Dask would share the memory out evenly, and kill whoever takes more
+            memory_limit=0,  # otherwise Dask divides the memory evenly and kills workers that use more
         ) as cluster,
         Client(cluster) as client,
     ):
-        client.register_plugin(_interrupt_shield())
+        client.register_plugin(_ignore_interrupts())
         yield client
 
 
@@ -331,26 +338,26 @@ def _connected(scheduler: str) -> Iterator[Client]:
         try:
             client.wait_for_workers(1, timeout=_FIRST_WORKER)
         except TimeoutError:
-            raise ValueError(f"--scheduler {scheduler}: it has no workers; start some by: dask worker") from None
-        for address, theirs in client.run(code, on_error="return").items():
-            if isinstance(theirs, Exception):
-                raise ValueError(f"--scheduler {scheduler}: worker {address} cannot import simharness: {theirs}")
-            if theirs != code():
+            raise ValueError(f"--scheduler {scheduler}: it has no workers; start one with: dask worker") from None
+        for address, digests in client.run(code, on_error="return").items():
+            if isinstance(digests, Exception):
+                raise ValueError(f"--scheduler {scheduler}: worker {address} cannot import simharness: {digests}")
+            if digests != code():
                 raise ValueError(
                     f"--scheduler {scheduler}: worker {address} runs another version of simharness or mvpose, and "
-                    "results would be kept under the wrong one: install this version there"
+                    "results would be stored under the wrong version: install this version there"
                 )
         yield client
 
 
-def _interrupt_shield() -> Any:
-    """Ctrl-C reaches all processes of a terminal; only this one is to act on it."""
+def _ignore_interrupts() -> Any:
+    """Return a Dask plugin that makes workers ignore Ctrl-C, which reaches all processes of a terminal."""
     from distributed import WorkerPlugin
 
-    class Deaf(WorkerPlugin):
+    class IgnoreInterrupts(WorkerPlugin):
         def setup(self, worker: Any) -> None:
             import signal
 
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    return Deaf()
+    return IgnoreInterrupts()

@@ -1,4 +1,4 @@
-"""From the entries of a store to the tables of a study."""
+"""Tables of a study, made from the entries of a store."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _FIRST = ("trial", "case", "varied", "seed", "variant")
 
 
 def tables(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) -> Tables:
-    """The tables of a study.
+    """Return the tables of a study.
 
     Args:
-        rows: its trials, each with what a variant did in it, in the order of the table.
-        factors: the swept keys.
+        rows: trials of the study, each with the stored result of one variant, in the order of the table.
+        factors: swept keys.
     """
-    entries = {(entry.trial, entry.variant): entry for _, entry in rows}  # settings may share a trial
+    entries = {(entry.trial, entry.variant): entry for _, entry in rows}  # several settings may share a trial
     return Tables(
         _trials(rows, factors),
         *(_joined(entries.values(), name) for name in ("frames", "people", "failures")),
@@ -58,9 +58,9 @@ def _trials(rows: Sequence[tuple[PlannedTrial, Entry]], factors: Sequence[str]) 
 
 
 def factor_column(values: Sequence[Value]) -> pl.Series:
-    """The values of a factor: booleans, integers, numbers or text; what is none of these, or mixed, is text as in JSON.
+    """Return the values of a factor as a column of booleans, integers, numbers or text.
 
-    A missing value is null.
+    Values of another or of mixed types are written as JSON text. A missing value is null.
     """
     known = [value for value in values if value is not None]
     for kinds, dtype in (((bool,), pl.Boolean), ((int,), pl.Int64), ((int, float), pl.Float64), ((str,), pl.String)):
@@ -71,7 +71,7 @@ def factor_column(values: Sequence[Value]) -> pl.Series:
 
 
 def _joined(entries: Iterable[Entry], name: str) -> pl.DataFrame:
-    """The tables of all entries, each row with its trial and variant."""
+    """Return one table of all entries joined, each row with its trial and variant."""
     parts = [
         getattr(entry.result, name).select(
             pl.lit(entry.trial).alias("trial"), pl.lit(entry.variant).alias("variant"), pl.all()

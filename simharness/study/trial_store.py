@@ -1,4 +1,4 @@
-"""Store of finished trials: files that are there whole or not at all.
+"""Store of finished trials, in files that appear only when they are complete.
 
 A store is a folder::
 
@@ -6,13 +6,13 @@ A store is a folder::
     3f/3f09...b2.detections     detections and truth of a trial: a ZIP of trial.json and detected.npz
     7c/7c51...e0.trial          an entry: a ZIP of trial.json, frames.parquet, people.parquet, failures.parquet and
                                 estimates.npz of one variant in a trial
-    7c/7c51...e0.failed.json    the error of an entry that could not be made; a later run tries it again
+    7c/7c51...e0.failed.json    error of an entry that could not be made; a later run tries it again
 
-An entry says with which code it was scored. If that code has changed, the entry is scored again from its estimates and
-the detections of its trial, without simulation; see :class:`EntryState`.
+An entry holds the digest of the code that scored it. If that code has changed, the entry is scored again from its
+estimates and the detections of its trial, without simulation; see :class:`EntryState`.
 
-Files get their names by renaming, and one name always stands for the same estimates, so any number of processes may use
-a store at once: the worst that happens is that two do the same work.
+Files appear by renaming, and a name always stands for the same estimates, so any number of processes may use a store
+at once: at worst two of them do the same work.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ FORMAT = 2
 _TABLES = ("frames", "people", "failures")
 _ESTIMATES, _DETECTIONS = "estimates.npz", "detected.npz"
 _PARTS = ("trial.json", *(f"{name}.parquet" for name in _TABLES), _ESTIMATES)
-_STALE = 24 * 3600.0  # seconds after which nobody is still writing a temporary file
+_STALE = 24 * 3600.0  # seconds after which a temporary file is regarded as abandoned
 _ENTRY = re.compile(r"[0-9a-f]{16,}")
 
 
 class StoreError(RunError):
-    """A store that cannot be written to any more: no room, no permission. Its content stays."""
+    """Store that cannot be written any more: disk full or no permission. Its content stays."""
 
 
 class EntryState(Enum):
-    """EntryState of an entry in a store."""
+    """State of an entry in a store."""
 
     MISSING = "missing"  # or damaged
     OUTDATED = "outdated"  # its scores or failures were made by other code; the estimates are good
@@ -89,42 +89,42 @@ class Store:
     """A folder of finished trials.
 
     Attributes:
-        folder: where it is.
-        damaged: the entries that were found damaged, which count as not being there. They stay until they are written
-            anew, for somebody may be doing so.
+        folder: folder of the store.
+        damaged: identities of damaged entries. They count as missing, and stay on disk until they are written again,
+            because another process may be writing them.
     """
 
     def __init__(self, folder: Path | str) -> None:
-        """Open a store, or begin one in a folder that is empty or not there.
+        """Open a store, or create one in a folder that is empty or does not exist.
 
         Raises:
-            ValueError: a folder that holds something else, a store of another format, no permission.
+            ValueError: the folder holds something else or a store of another format, or there is no permission.
         """
         self.folder = Path(folder)
         self.damaged: set[str] = set()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._check_format()
-            self._sweep()
+            self._remove_partial_files()
         except OSError as error:
             raise ValueError(f"store {self.folder}: cannot be used: {error.strerror}: {error.filename}") from None
 
     def holds(self, identity: str) -> bool:
-        """Return whether an entry exists that was not found damaged so far. It is not read."""
+        """Return whether an entry exists and is not known to be damaged, without reading it."""
         return identity not in self.damaged and self.file_of(identity).exists()
 
     def has(self, identity: str) -> bool:
-        """Return whether an entry exists and can be read in whole."""
-        return self._sound(identity) is not None
+        """Return whether an entry exists and is undamaged."""
+        return self._valid_content(identity) is not None
 
     def state(self, identity: str) -> EntryState:
-        """Return whether an entry can be used as it is, scored again, or has to be made."""
+        """Return whether an entry is current, has to be scored again, or is missing."""
         entry = self.read(identity)
         return EntryState.MISSING if entry is None else entry.state
 
     def read(self, identity: str) -> Entry | None:
-        """Return an entry; None where there is none that can be read."""
-        content = self._sound(identity)
+        """Return an entry; None where it is missing or damaged."""
+        content = self._valid_content(identity)
         if content is None:
             return None
         try:
@@ -134,19 +134,19 @@ class Store:
             return None
 
     def read_detections(self, trial: str) -> bytes:
-        """Return the archive of a trial's detections; empty where there is none that can be read."""
+        """Return the archive of a trial's detections; empty where it is missing or damaged."""
         try:
             with zipfile.ZipFile(self._detections_path(trial)) as archive:
                 named = json.loads(archive.read("trial.json"))["trial"] == trial
                 return archive.read(_DETECTIONS) if named else b""
-        except Exception:  # missing, or damaged in any way: it is made again
+        except Exception:  # missing, or damaged in any way: detections are simulated again
             return b""
 
     def write_detections(self, trial: str, content: bytes) -> None:
-        """Keep the archive of a trial's detections.
+        """Store the archive of a trial's detections.
 
         Raises:
-            StoreError: as :meth:`write`.
+            StoreError: see :meth:`write`.
         """
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w") as archive:
@@ -155,10 +155,10 @@ class Store:
         self._write(self._detections_path(trial), buffer.getvalue())
 
     def write(self, identity: str, entry: Entry) -> None:
-        """Keep an entry.
+        """Store an entry.
 
         Raises:
-            StoreError: the disk is full, or cannot be written to for another reason. Nothing is left of the entry.
+            StoreError: the disk is full or cannot be written. No part of the entry is left.
         """
         self._write(self.file_of(identity), _packed(identity, entry))
         self.damaged.discard(identity)
@@ -166,28 +166,28 @@ class Store:
             self._failure_path(identity).unlink()
 
     def write_failure(self, identity: str, failure: dict[str, Any]) -> None:
-        """Note why there is no entry.
+        """Store the error of an entry that could not be made.
 
         Raises:
-            StoreError: as :meth:`write`.
+            StoreError: see :meth:`write`.
         """
         self._write(self._failure_path(identity), json.dumps(failure, indent=2).encode())
 
     def failure(self, identity: str) -> dict[str, Any] | None:
-        """What was noted last; None where nothing was, or it cannot be read."""
+        """Return the stored error of an entry; None where there is none or it cannot be read."""
         try:
-            noted = json.loads(self._failure_path(identity).read_bytes())
+            failure = json.loads(self._failure_path(identity).read_bytes())
         except (OSError, ValueError):
             return None
-        return noted if isinstance(noted, dict) else None
+        return failure if isinstance(failure, dict) else None
 
     def copy_from(self, other: Store, identity: str) -> bool:
-        """Take an entry of another store; False where it is damaged there.
+        """Copy an entry of another store; return False where it is damaged.
 
         Raises:
-            StoreError: as :meth:`write`.
+            StoreError: see :meth:`write`.
         """
-        content = other._sound(identity)
+        content = other._valid_content(identity)
         if content is None:
             return False
         trial = _unpacked(content).trial
@@ -197,11 +197,11 @@ class Store:
         return True
 
     def __iter__(self) -> Iterator[str]:
-        """The identities of all entries, damaged ones too, in order."""
+        """Iterate over the identities of all entries, also of damaged ones, sorted."""
         return iter(sorted(path.stem for path in self.folder.glob("??/*.trial") if not path.name.startswith(".")))
 
     def file_of(self, identity: str) -> Path:
-        """Where an entry is, or would be."""
+        """Return the path of an entry, whether it exists or not."""
         assert _ENTRY.fullmatch(identity), identity
         return self.folder / identity[:2] / f"{identity}.trial"
 
@@ -211,8 +211,8 @@ class Store:
     def _failure_path(self, identity: str) -> Path:
         return self.file_of(identity).with_suffix(".failed.json")
 
-    def _sound(self, identity: str) -> bytes | None:
-        """The bytes of an entry if every checksum in them is right and they say that they are this entry."""
+    def _valid_content(self, identity: str) -> bytes | None:
+        """Return the bytes of an entry if all checksums are right and the identity matches; else None."""
         try:
             content = self.file_of(identity).read_bytes()
         except FileNotFoundError:
@@ -224,8 +224,8 @@ class Store:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
                 parts = {name: archive.read(name) for name in _PARTS}
             if json.loads(parts["trial.json"])["entry"] != identity:
-                raise ValueError("this is another entry")
-        except Exception:  # of damaged bytes a parser may raise anything
+                raise ValueError("another entry")
+        except Exception:  # parsers may raise any error on damaged bytes
             self.damaged.add(identity)
             return None
         return content
@@ -236,35 +236,35 @@ class Store:
             write_atomic(path, content)
         except OSError as error:
             raise StoreError(
-                f"store {self.folder}: cannot be written to: {error.strerror}. What is finished is kept: make room, "
-                "and the same command goes on"
+                f"store {self.folder}: cannot be written: {error.strerror}. Finished trials are stored: free some disk "
+                "space and run the same command again to continue"
             ) from error
 
     def _check_format(self) -> None:
         file = self.folder / "store.json"
         try:
-            said = json.loads(file.read_bytes())["format"]
+            version = json.loads(file.read_bytes())["format"]
         except FileNotFoundError:
             if strange := sorted(path.name for path in self.folder.iterdir() if not path.name.startswith(".")):
-                if file.exists():  # another process began the store just now
+                if file.exists():  # another process has just created the store
                     return self._check_format()
                 raise ValueError(
-                    f"store {self.folder}: this folder is not empty and no store of trials (it has {strange[0]} and no "
-                    "store.json): name another folder"
+                    f"store {self.folder}: the folder is not empty and not a store of trials (it has {strange[0]} and "
+                    "no store.json): choose another folder"
                 ) from None
             return write_atomic(file, json.dumps({"what": "simharness trials", "format": FORMAT}).encode())
         except (ValueError, KeyError, TypeError):
-            said = None
-        if said != FORMAT:
-            what = "its store.json cannot be read" if said is None else f"it is of format {said}"
+            version = None
+        if version != FORMAT:
+            problem = "its store.json cannot be read" if version is None else f"it has format {version}"
             raise ValueError(
-                f"store {self.folder}: {what}, and this version of simharness reads format {FORMAT}: name another "
-                "folder by --store, or delete this one to run everything again"
+                f"store {self.folder}: {problem}, but this version of simharness reads format {FORMAT}: choose another "
+                "folder with --store, or delete this one to run everything again"
             )
         return None
 
-    def _sweep(self) -> None:
-        """Remove what killed processes left."""
+    def _remove_partial_files(self) -> None:
+        """Remove temporary files of killed processes."""
         now = time.time()
         for path in (*self.folder.glob(".*.partial"), *self.folder.glob("??/.*.partial")):
             with contextlib.suppress(OSError):
@@ -273,12 +273,12 @@ class Store:
 
 
 def is_store(folder: Path) -> bool:
-    """Whether a folder is a store, of whatever format."""
+    """Return whether a folder is a store, of any format."""
     return (folder / "store.json").is_file()
 
 
 def parquet(table: pl.DataFrame) -> bytes:
-    """A table as the bytes of a Parquet file."""
+    """Return a table as the bytes of a Parquet file."""
     buffer = io.BytesIO()
     table.write_parquet(buffer, compression="zstd")
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""``simharness study`` and ``merge``: what they say and how they exit."""
+"""Output and exit codes of ``simharness study`` and ``merge``."""
 
 import json
 from pathlib import Path
@@ -29,23 +29,23 @@ def simharness(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def reports(monkeypatch):
-    """Reports are tested where they are made: here only who asks for one."""
-    asked = []
+    """Record the results for which a report is requested; reports have separate tests."""
+    requested = []
 
     def write_report(results, **_options):
-        asked.append(results)
+        requested.append(results)
         return results.folder / "report.html"
 
     monkeypatch.setattr("simharness.report.study.page.write_report", write_report)
-    return asked
+    return requested
 
 
-def assert_refused(result, *said: str):
-    """One message and no traceback."""
+def assert_refused(result, *messages: str):
+    """Assert that there is one message and no traceback."""
     assert result.exit_code == 2, result.stderr
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.strip().splitlines()) == 1
-    for text in said:
+    for text in messages:
         assert text in result.stderr
     assert result.stdout == ""
 
@@ -61,14 +61,14 @@ def test_a_threshold_that_is_not_finite_is_refused_before_anything_is_written(si
 
 
 @pytest.mark.parametrize("command", ["study", "merge"])
-def test_help_is_there(simharness, command):
+def test_help_is_printed(simharness, command):
     result = simharness(command, "--help")
     assert result.exit_code == 0
     assert "Usage" in result.stdout
 
 
 @pytest.mark.slow
-def test_a_study_in_parts_and_then_whole(simharness, reports):
+def test_a_study_in_shards_and_then_complete(simharness, reports):
     first = simharness("study", QUICKSTART, *TINY, *SWEEP, "--seeds", "2", "--shard", "1/2", "--store", "one")
     assert first.exit_code == 0, first.stderr
     assert "part 1/2: 2 trials: 0 kept from before, 2 run, 0 failed" in first.stdout
@@ -90,9 +90,9 @@ def test_a_study_in_parts_and_then_whole(simharness, reports):
     assert results.trials["cameras.count"].to_list() == [3, 3, 4, 4]
     lines = [line.split() for line in whole.stdout.splitlines()]
     for count in (3, 4):  # a row for each setting: its mean over the two seeds, and half its interval below
-        mine = results.trials.filter(results.trials["cameras.count"] == count)
+        rows = results.trials.filter(results.trials["cameras.count"] == count)
         (place,) = [place for place, words in enumerate(lines) if words[:2] == [f"{count}", "fast"]]
-        assert lines[place][2] == f"{mine['pcp'].mean():.1f}"
+        assert lines[place][2] == f"{rows['pcp'].mean():.1f}"
         assert len(lines[place + 1]) == 6
         assert all(word.startswith("±") for word in lines[place + 1])
 
@@ -109,7 +109,7 @@ class TestFailures:
         assert failed["factors"] == {"people.area": 0.3}
         assert len(reports) == 1
 
-    def test_a_study_of_nothing_but_failures_has_no_report(self, simharness, reports):
+    def test_a_study_with_failures_only_has_no_report(self, simharness, reports):
         result = simharness("study", QUICKSTART, *TINY, "--set", "cameras.radius=4.5", "--out", "out")
         assert result.exit_code == 3
         assert "1 trial: 0 kept from before, 0 run, 1 failed" in result.stdout
@@ -117,12 +117,12 @@ class TestFailures:
 
 
 class TestBadInput:
-    def test_more_trials_than_anybody_means(self, simharness):
+    def test_a_study_of_too_many_trials(self, simharness):
         many = ("--set", "sweep.people.area={from=1.0,to=2.0,steps=200}", "--seeds", "100")
         assert_refused(simharness("study", QUICKSTART, *many), "20,000 trials", "--yes")
 
     @pytest.mark.parametrize("shard", ["3", "a/b", "1/2/3", "-1/2"])
-    def test_what_is_no_shard(self, simharness, shard):
+    def test_an_invalid_shard(self, simharness, shard):
         assert_refused(simharness("study", QUICKSTART, f"--shard={shard}"), "--shard", "1/8")
 
     def test_a_shard_that_does_not_exist(self, simharness):
@@ -143,11 +143,11 @@ class TestBadInput:
         (tmp_path / "old" / "store.json").write_text('{"format": 0}')
         assert_refused(simharness("study", QUICKSTART, "--store", "old"), "format 0", "--store")
 
-    def test_what_is_no_store_to_merge(self, simharness):
-        assert_refused(simharness("merge", "nowhere", "--into", "all"), "nowhere: no store")
+    def test_merging_a_folder_that_is_no_store(self, simharness):
+        assert_refused(simharness("merge", "nowhere", "--into", "all"), "nowhere: not a store")
 
 
-def test_damaged_entries_are_told_of(simharness):
+def test_damaged_entries_are_reported(simharness):
     arguments = ("study", QUICKSTART, *TINY, "--out", "out")
     assert simharness(*arguments).exit_code == 0
     (entry,) = Path("out/store").glob("??/*.trial")

@@ -258,7 +258,7 @@ class TestCommand:
         assert not list(ran.folder.glob(".*partial"))
 
     def test_a_folder_that_is_no_study(self, tmp_path):
-        assert "not the folder of a study" in self.refused(tmp_path)
+        assert "not the result folder of a study" in self.refused(tmp_path)
 
     def test_a_threshold_that_is_none(self, ran):
         assert "expected SCORE=NUMBER" in self.refused(ran.folder, "--threshold", "pcp")

@@ -1,6 +1,6 @@
-"""Studies that cost nothing: trials that are not measured but made up, and that do harm where a test asks for it.
+"""Studies with made-up trials, which fail or kill their process where a test requests it.
 
-Run as a program by tests that kill it.
+Tests that kill a study run this module as a program.
 """
 
 import json
@@ -24,21 +24,22 @@ from simharness.study.measure import TrialOutput
 from simharness.trial.variant_result import VariantResult
 
 ALWAYS = 99
-PATIENCE = 120.0  # seconds that a call waits for others, or for its end by them
-FOR_EVER = 600.0  # seconds; an end all the same, should whoever has started it be gone
+PATIENCE = 120.0  # seconds that a call waits for other calls, or to be killed by them
+FOR_EVER = 600.0  # seconds; finite, in case the test that started the process is gone
 
 
 @dataclass(frozen=True)
 class Fake:
-    """In the place of ``measure``. Leaves a file for each call, so calls are counted across processes.
+    """Replacement of ``measure`` that writes a file for each call, so that calls are counted across processes.
 
     Attributes:
-        calls: the folder of those files.
-        harm: what happens at a seed, and how often: "raise", "refuse" (the scenario's fault), "kill".
-        seconds: that each call takes.
-        large: the seed from which tables are of a megabyte.
-        stuck: the seed from which calls never end.
-        together: how many calls must have begun before one kills. The first of every other seed waits to be killed.
+        calls: folder of these files.
+        harm: failure at a seed, and how often: "raise", "refuse" (an error of the scenario), "kill".
+        seconds: duration of each call.
+        large: seed from which tables have a megabyte.
+        stuck: seed from which calls never end.
+        together: number of calls that must have begun before one kills its process. The first call of every other seed
+            waits to be killed.
     """
 
     calls: Path
@@ -49,7 +50,7 @@ class Fake:
     together: int = 0
 
     def __call__(self, scenario, variants, stored=None):
-        self._note(f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}")
+        self._record(f"{scenario.seed} {scenario.cameras.count} {'+'.join(variants)}")
         what, times = self.harm.get(scenario.seed, ("", 0))
         begun = sum(each.startswith(f"{scenario.seed} ") for each in called(self.calls))
         if begun <= times:
@@ -58,15 +59,15 @@ class Fake:
                 while len(called(self.calls)) < self.together and time.monotonic() < end:
                     time.sleep(0.02)
                 os.kill(os.getpid(), signal.SIGKILL)
-            raise ValueError("nobody fits") if what == "refuse" else ZeroDivisionError("by zero")
+            raise ValueError("no room") if what == "refuse" else ZeroDivisionError("by zero")
         if scenario.seed >= self.stuck:
             time.sleep(FOR_EVER)
         time.sleep(PATIENCE if self.together and begun == 1 else self.seconds)
         rows = 3 if scenario.seed < self.large else 130_000
         return TrialOutput({variant: made_up(scenario, variant, rows=rows) for variant in variants})
 
-    def _note(self, call):
-        """Leave the file of a call, all at once: others read the folder meanwhile."""
+    def _record(self, call):
+        """Write the file of a call by renaming, because other processes read the folder."""
         self.calls.mkdir(exist_ok=True)
         name = f"{time.time_ns()} {secrets.token_hex(4)}"
         written = self.calls.with_name(f"{self.calls.name}, {name}")
@@ -75,7 +76,7 @@ class Fake:
 
 
 def made_up(scenario, variant, *, rows=3):
-    """A result that is known beforehand: the same for the same trial and variant, another for any other."""
+    """Return a known result, different for every trial and variant."""
     number = 1000.0 * scenario.seed + scenario.cameras.count + len(variant) / 100
     frames = pl.DataFrame({"frame": np.arange(rows), "noise": np.random.default_rng(int(number)).random(rows)})
     people = pl.DataFrame({"frame": [0], "person": [0], "error_mm": [number]})
@@ -84,17 +85,17 @@ def made_up(scenario, variant, *, rows=3):
 
 
 def called(folder: Path) -> list[str]:
-    """The calls so far, "SEED CAMERAS VARIANTS", in their order."""
+    """Return the calls so far, "SEED CAMERAS VARIANTS", in their order."""
     return [file.read_text() for file in sorted(folder.iterdir())] if folder.is_dir() else []
 
 
 def times(folder: Path) -> Counter:
-    """How often each seed was called."""
+    """Return the number of calls of each seed."""
     return Counter(int(call.split()[0]) for call in called(folder))
 
 
 def study_of(folder: Path, *, cameras=(3,), seeds=2, variants=("full", "fast"), name="views", more="") -> Study:
-    """A study of some numbers of cameras."""
+    """Return a study with a sweep of the number of cameras."""
     path = folder / "fake.toml"
     swept = f"[sweep]\ncameras.count = {list(cameras)}\n" if len(cameras) > 1 else ""
     count = f"[cameras]\ncount = {cameras[0]}\n"
@@ -105,18 +106,18 @@ def study_of(folder: Path, *, cameras=(3,), seeds=2, variants=("full", "fast"), 
 
 
 def program(folder: Path, **options) -> list[str]:
-    """The command that runs a study of 2 x 3 trials in a process of its own: options of :func:`main`."""
+    """Return the command that runs a study of 2 x 3 trials in a separate process, with options of :func:`main`."""
     text = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import fakes; fakes.main()"
     return [sys.executable, "-c", text, json.dumps({"folder": str(folder), **options})]
 
 
 def run_program(folder: Path, **options) -> subprocess.CompletedProcess:
-    """Run it to its end."""
+    """Run the program to its end."""
     return subprocess.run(program(folder, **options), capture_output=True, text=True, timeout=300, check=False)
 
 
 def main():
-    """``simharness study`` of a made-up study."""
+    """Run ``simharness study`` with made-up trials."""
     from simharness.cli import study as study_command
     from simharness.study import runner
 

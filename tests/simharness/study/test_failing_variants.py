@@ -1,4 +1,4 @@
-"""Variants that fail where others do not: the others keep their results."""
+"""Variants that fail: the other variants keep their results."""
 
 import os
 import signal
@@ -24,12 +24,12 @@ VARIANTS = ("full", "fast", "no-3dps")
 
 @dataclass(frozen=True)
 class Broken:
-    """In the place of ``measure``: variants that fail at odd seeds, and with them all that are measured together.
+    """Replacement of ``measure`` with variants that fail at odd seeds, together with all that are measured with them.
 
     Attributes:
-        errors: of the variants that fail: what they raise, or "kill".
-        calls: a file that gets a line, "SEED VARIANTS", for each call.
-        least: how many variants must be together for one to fail.
+        errors: error of each failing variant, or "kill".
+        calls: file that gets a line "SEED VARIANTS" for each call.
+        least: smallest number of variants in a call for one to fail.
     """
 
     errors: Mapping[str, Exception | str]
@@ -53,7 +53,7 @@ def units_of(folder, seeds, variants=VARIANTS):
 
 @pytest.fixture
 def run(tmp_path):
-    """Run a made-up study of which variants fail at odd seeds."""
+    """Run a made-up study with variants that fail at odd seeds."""
 
     def run(errors, **options):
         study = study_of(tmp_path, variants=VARIANTS, seeds=options.pop("seeds", 3))
@@ -66,10 +66,10 @@ def run(tmp_path):
 class TestOneByOne:
     @pytest.mark.slow
     @pytest.mark.parametrize("error", [RunError("boom"), "kill"], ids=["raises", "kills its worker"])
-    def test_whoever_fails_among_workers_is_lost_alone(self, tmp_path, error):
+    def test_a_variant_that_fails_in_a_worker_is_lost_alone(self, tmp_path, error):
         self.check(run_units(units_of(tmp_path, 2), Broken({"fast": error}), workers=2))
 
-    def test_whoever_fails_in_this_process_is_lost_alone(self, tmp_path):
+    def test_a_variant_that_fails_in_this_process_is_lost_alone(self, tmp_path):
         self.check(run_units(units_of(tmp_path, 2), Broken({"fast": RunError("boom")})))
 
     @staticmethod
@@ -87,17 +87,17 @@ class TestOneByOne:
                 else:
                     assert part.unit.variants == ("fast",)
                     assert result.error == f"fast: {part.error}"
-            there = {"full", "no-3dps"} if isinstance(result, TrialFailure) else set(VARIANTS)
-            assert set(measured) == there
-            for variant in there:
+            expected = {"full", "no-3dps"} if isinstance(result, TrialFailure) else set(VARIANTS)
+            assert set(measured) == expected
+            for variant in expected:
                 assert measured[variant].scores == made_up(result.unit.scenario, variant).scores
 
-    def test_what_fails_only_together_is_whole_in_the_end(self, tmp_path):
+    def test_variants_that_fail_only_together_all_succeed(self, tmp_path):
         (result,) = run_units(units_of(tmp_path, 2)[1:], Broken({"fast": MemoryError()}, least=2))
         assert isinstance(result, TrialSuccess)
         assert tuple(result.output.results) == VARIANTS
 
-    def test_it_costs_one_attempt_more_for_each_variant(self, tmp_path):
+    def test_a_failing_variant_costs_one_attempt_for_each_variant(self, tmp_path):
         list(run_units(units_of(tmp_path, 2)[1:], Broken({"fast": RunError("boom")}, tmp_path / "calls")))
         together = f"1 {'+'.join(VARIANTS)}"
         assert (tmp_path / "calls").read_text().splitlines() == [
@@ -105,34 +105,32 @@ class TestOneByOne:
             *(f"1 {variant}" for variant in VARIANTS),
         ]
 
-    def test_what_the_scenario_is_to_blame_for_is_tried_once(self, tmp_path):
-        (result,) = run_units(
-            units_of(tmp_path, 2)[1:], Broken({"fast": ValueError("nobody fits")}, tmp_path / "calls")
-        )
-        assert (result.error, result.parts) == ("nobody fits", (result,))
+    def test_an_error_of_the_scenario_is_tried_once(self, tmp_path):
+        (result,) = run_units(units_of(tmp_path, 2)[1:], Broken({"fast": ValueError("no room")}, tmp_path / "calls"))
+        assert (result.error, result.parts) == ("no room", (result,))
         assert len((tmp_path / "calls").read_text().splitlines()) == 1
 
-    def test_a_variant_that_was_alone_is_not_tried_more_often(self, tmp_path):
+    def test_a_single_variant_is_not_tried_again_alone(self, tmp_path):
         unit = units_of(tmp_path, 2, variants=("fast",))[1:]
         (result,) = run_units(unit, Broken({"fast": RunError("boom")}, tmp_path / "calls"))
         assert result.error == "boom"
         assert len((tmp_path / "calls").read_text().splitlines()) == ATTEMPTS
 
     @pytest.mark.parametrize(
-        ("errors", "said"),
+        ("errors", "message"),
         [
             (dict.fromkeys(VARIANTS, RunError("dark")), "dark"),
             (dict.fromkeys(VARIANTS[:2], RunError("dark")), "full, fast: dark"),
             ({"full": RunError("dark"), "no-3dps": RunError("lost")}, "full: dark; no-3dps: lost"),
         ],
     )
-    def test_errors_are_told_with_whose_they_are(self, tmp_path, errors, said):
+    def test_errors_are_listed_with_their_variants(self, tmp_path, errors, message):
         (result,) = run_units(units_of(tmp_path, 2)[1:], Broken(errors))
-        assert result.error == said
+        assert result.error == message
 
 
 class TestStudies:
-    def test_the_others_are_kept_and_the_trial_counts_as_failed_once(self, tmp_path, run):
+    def test_the_other_variants_are_stored_and_the_trial_counts_as_failed_once(self, tmp_path, run):
         recorder = Recorder()
         results = run({"fast": RunError("boom")}, reporter=recorder)
         assert [results.info[key] for key in ("trials", "kept", "run")] == [3, 0, 2]
@@ -140,15 +138,15 @@ class TestStudies:
         assert sorted(recorder.steps) == [(1, 0), (1, 0), (1, 1)]
         (failed,) = results.info["failed"]
         assert (failed["seed"], failed["variants"], failed["error"]) == (1, ["fast"], "fast: boom")
-        there = {(seed, variant) for seed in range(3) for variant in VARIANTS} - {(1, "fast")}
-        assert set(results.trials.select("seed", "variant").iter_rows()) == there
-        assert results.frames.select("trial", "variant").n_unique() == len(there)
+        expected = {(seed, variant) for seed in range(3) for variant in VARIANTS} - {(1, "fast")}
+        assert set(results.trials.select("seed", "variant").iter_rows()) == expected
+        assert results.frames.select("trial", "variant").n_unique() == len(expected)
 
         store = Store(tmp_path / "out" / "store")
-        noted = {variant: store.failure(entry_identity(failed["trial"], variant)) for variant in VARIANTS}
-        assert {variant for variant, note in noted.items() if note} == {"fast"}
-        assert noted["fast"]["error"] == "boom"
-        assert noted["fast"]["traceback"].startswith("Traceback")
+        failures = {variant: store.failure(entry_identity(failed["trial"], variant)) for variant in VARIANTS}
+        assert {variant for variant, failure in failures.items() if failure} == {"fast"}
+        assert failures["fast"]["error"] == "boom"
+        assert failures["fast"]["traceback"].startswith("Traceback")
 
     def test_the_next_run_tries_what_is_missing_and_no_more(self, tmp_path, run):
         run({"fast": RunError("boom")})

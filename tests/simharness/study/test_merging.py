@@ -1,4 +1,4 @@
-"""Stores in one."""
+"""Merge of stores."""
 
 import json
 
@@ -12,7 +12,7 @@ from simharness.study.trial_store import Store
 
 @pytest.fixture
 def shards(tmp_path):
-    """A study, and three stores with a third of its trials each."""
+    """Return a study, and three stores with a third of its trials each."""
     study = study_of(tmp_path, cameras=(3, 4), seeds=3)
     stores = [tmp_path / f"shard{part}" for part in (1, 2, 3)]
     for part, store in enumerate(stores, start=1):
@@ -23,7 +23,7 @@ def shards(tmp_path):
 def test_the_parts_of_a_study_make_the_study(tmp_path, shards):
     study, stores = shards
     merged = merge(stores, tmp_path / "all")
-    assert (merged.copied, merged.there, merged.damaged) == (12, 0, ())
+    assert (merged.copied, merged.present, merged.damaged) == (12, 0, ())
     calls = called(tmp_path / "calls")
     together = run_study(study, out=tmp_path / "out", store=tmp_path / "all", measure=Fake(tmp_path / "calls"))
     assert called(tmp_path / "calls") == calls
@@ -35,15 +35,15 @@ def test_the_parts_of_a_study_make_the_study(tmp_path, shards):
         assert one.equals(other)
 
 
-def test_what_is_there_stays(tmp_path, shards):
+def test_existing_entries_stay(tmp_path, shards):
     _, stores = shards
     merge(stores[:2], tmp_path / "all")
     merged = merge(stores, tmp_path / "all")
-    assert (merged.copied, merged.there) == (4, 8)
+    assert (merged.copied, merged.present) == (4, 8)
     assert len(list(Store(tmp_path / "all"))) == 12
 
 
-def test_damaged_entries_are_left_out_and_whole_ones_mend_them(tmp_path, shards):
+def test_damaged_entries_are_left_out_and_replaced_by_undamaged_ones(tmp_path, shards):
     _, stores = shards
     identity = next(iter(Store(stores[0])))
     file = Store(stores[0]).file_of(identity)
@@ -61,12 +61,12 @@ def test_damaged_entries_are_left_out_and_whole_ones_mend_them(tmp_path, shards)
     assert target.read_bytes() == whole
 
 
-def test_what_is_no_store_is_refused_and_not_made_one(tmp_path, shards):
+def test_a_folder_that_is_no_store_is_refused(tmp_path, shards):
     _, stores = shards
     for name in ("nowhere", "empty"):
         if name == "empty":
             (tmp_path / name).mkdir()
-        with pytest.raises(ValueError, match=f"{name}: no store"):
+        with pytest.raises(ValueError, match=f"{name}: not a store"):
             merge([*stores, tmp_path / name], tmp_path / "all")
         assert not (tmp_path / name / "store.json").exists()
     assert not (tmp_path / "all").exists()

@@ -1,4 +1,4 @@
-"""Stored trials after a change of code: what is computed again, and from what."""
+"""Stored trials after a change of code: the stages that run again."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def stages(monkeypatch):
 @pytest.fixture
 def code(monkeypatch):
     """Change digests of the code: ``code(scores="x")``."""
-    own = identity.code()
+    current = identity.code()
 
     def change(**digests):
-        changed = replace(own, **digests)
+        changed = replace(current, **digests)
         for module in (identity, "simharness.study.trial_store", "simharness.study.runner"):
             target = f"{module}.code" if isinstance(module, str) else "simharness.trial.identity.code"
             monkeypatch.setattr(target, lambda: changed)
@@ -64,7 +64,7 @@ def code(monkeypatch):
 
 @pytest.fixture
 def run(tmp_path):
-    """Run the study of three trials in a store that stays."""
+    """Run a study of three trials; all runs use the same store."""
 
     def again():
         study = load_study(QUICKSTART, overrides=CHEAP, seeds=3, variants=VARIANTS)
@@ -149,11 +149,11 @@ def test_an_entry_knows_its_state(run, code, tmp_path):
     run()
     study = load_study(QUICKSTART, overrides=CHEAP, seeds=1, variants=["full"])
     store, (planned,) = Store(tmp_path / "store"), plan(study)
-    own = planned.entries["full"]
-    assert store.state(own) is EntryState.CURRENT
-    assert store.state(own[::-1]) is EntryState.MISSING
+    entry = planned.entries["full"]
+    assert store.state(entry) is EntryState.CURRENT
+    assert store.state(entry[::-1]) is EntryState.MISSING
     code(failures="another")
-    assert store.state(own) is EntryState.OUTDATED
+    assert store.state(entry) is EntryState.OUTDATED
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_archives_restore_every_bit(more):
 
 
 def identical(one, other, but=frozenset()):
-    """Both are None, or all their fields are the same to the bit."""
+    """Assert that both are None, or that all fields except ``but`` are the same bytes."""
     assert (one is None) == (other is None)
     for key in getattr(one, "__dataclass_fields__", {}).keys() - but:
         first, second = getattr(one, key), getattr(other, key)

@@ -1,4 +1,4 @@
-"""Trials shared out, and those that fail."""
+"""Scheduler of trials: order, retries, dead workers and clusters."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def by_seed(results):
     return {result.unit.scenario.seed: result for result in results}
 
 
-class TestHere:
+class TestInProcess:
     def test_results_come_in_order(self, tmp_path):
         units = units_of(tmp_path, 4)
         results = list(run_units(units, Fake(tmp_path / "calls")))
@@ -29,21 +29,21 @@ class TestHere:
             assert result.output.results["fast"].scores == made_up(result.unit.scenario, "fast").scores
 
     @pytest.mark.parametrize(("times_raised", "calls"), [(1, 2), (2, 3)])
-    def test_what_fails_now_and_then_is_done(self, tmp_path, times_raised, calls):
+    def test_a_trial_that_fails_sometimes_succeeds(self, tmp_path, times_raised, calls):
         fake = Fake(tmp_path / "calls", {1: ("raise", times_raised)})
         assert all(isinstance(result, TrialSuccess) for result in run_units(units_of(tmp_path, 3), fake))
         assert times(fake.calls) == {0: 1, 1: calls, 2: 1}
 
-    def test_what_always_fails_is_given_up(self, tmp_path):
+    def test_a_trial_that_always_fails_is_given_up(self, tmp_path):
         fake = Fake(tmp_path / "calls", {1: ("raise", ALWAYS), 2: ("refuse", ALWAYS)})
         results = by_seed(run_units(units_of(tmp_path, 4), fake))
         assert {seed for seed, result in results.items() if isinstance(result, TrialFailure)} == {1, 2}
         assert results[1].error == "ZeroDivisionError: by zero"
         assert "ZeroDivisionError" in results[1].traceback
-        assert results[2].error == "nobody fits"
+        assert results[2].error == "no room"
         assert times(fake.calls) == {0: 1, 1: 3 + 2, 2: 1, 3: 1}  # three times together, then each variant once
 
-    def test_work_is_begun_when_it_is_asked_for(self, tmp_path):
+    def test_work_begins_with_the_first_iteration(self, tmp_path):
         fake = Fake(tmp_path / "calls")
         results = run_units(units_of(tmp_path, 4), fake)
         assert called(fake.calls) == []
@@ -68,14 +68,14 @@ def test_workers_that_die_cost_a_retry(tmp_path):
     assert "fakes.py" in failed[3].traceback
     calls = times(fake.calls)
     for seed, least in {0: 1, 1: 2, 3: 3, 4: 2, 5: 1}.items():
-        assert least <= calls[seed] <= least + 3  # with a worker may die a result that is on its way
+        assert least <= calls[seed] <= least + 3  # a result that was not yet delivered is lost with its worker
     for seed in set(results) - set(failed):
         assert results[seed].output.results["full"].scores == made_up(results[seed].unit.scenario, "full").scores
 
 
 class TestClusters:
     @pytest.mark.slow
-    def test_whoever_is_killed_along_is_not_to_blame(self, tmp_path):
+    def test_a_trial_that_is_killed_by_another_is_not_blamed(self, tmp_path):
         import dask
         from distributed import LocalCluster
 
@@ -107,12 +107,12 @@ class TestClusters:
         assert times(fake.calls) == {0: 2, 1: 2, 2: 3 + 2, 3: 1, 4: 1}
 
     @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
-    def test_one_that_is_not_there_is_said(self, tmp_path, monkeypatch, address):
+    def test_a_missing_scheduler_is_reported(self, tmp_path, monkeypatch, address):
         monkeypatch.setattr(scheduling, "_PATIENCE", 0.5)
         with pytest.raises(ValueError, match=f"--scheduler {address}: no Dask scheduler"):
             next(run_units(units_of(tmp_path, 1), Fake(tmp_path / "calls"), scheduler=address))
 
-    def test_one_without_workers_or_with_others_is_said(self, tmp_path, monkeypatch):
+    def test_a_scheduler_without_workers_or_with_other_code_is_refused(self, tmp_path, monkeypatch):
         from distributed import LocalCluster
 
         monkeypatch.setattr(scheduling, "_FIRST_WORKER", 0.5)
@@ -122,7 +122,7 @@ class TestClusters:
                 next(run_units(unit, fake, scheduler=cluster.scheduler_address))
             cluster.scale(1)
             monkeypatch.setattr(scheduling, "_FIRST_WORKER", 60)
-            monkeypatch.setattr(scheduling, "code", object)  # of which no two are equal
+            monkeypatch.setattr(scheduling, "code", object)  # no two objects are equal
             with pytest.raises(ValueError, match="another version of simharness"):
                 next(run_units(unit, fake, scheduler=cluster.scheduler_address))
         assert called(fake.calls) == []

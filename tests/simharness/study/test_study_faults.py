@@ -1,4 +1,4 @@
-"""Studies that are killed, interrupted, or run out of disk: nothing finished is lost, and the store is clean."""
+"""Studies that are killed, interrupted, or run out of disk space: no finished trial is lost, the store is clean."""
 
 import contextlib
 import os
@@ -16,27 +16,28 @@ from simharness.study.trial_store import Store
 
 
 def store_is_clean(folder):
-    """Every file of the store is a whole entry with the right numbers; returns of how many trials it has all variants.
+    """Assert that every entry of the store is complete and has the right scores.
 
-    A kill may well come between two variants of a trial: that trial is not finished.
+    Returns:
+        The number of finished trials. A trial that was killed between two variants is not finished.
     """
     store, finished = Store(folder / "out" / "store"), 0
     for each in plan(study_of(folder, cameras=(3, 4), seeds=3)):
-        there = {variant: store.file_of(identity).exists() for variant, identity in each.entries.items()}
-        for variant in (variant for variant, exists in there.items() if exists):
+        present = {variant: store.file_of(identity).exists() for variant, identity in each.entries.items()}
+        for variant in (variant for variant, exists in present.items() if exists):
             assert store.read(each.entries[variant]).result.scores == made_up(each.scenario, variant).scores
-        finished += all(there.values())
+        finished += all(present.values())
     assert not store.damaged
     return finished
 
 
 def entries(folder):
-    """The files of the store so far, two of each trial that is finished."""
+    """Return the entries of the store so far, two for each finished trial."""
     return list(folder.glob("out/store/??/*.trial"))
 
 
 def gone(process):
-    """Whether it has ended; its parent may not have asked yet what became of it."""
+    """Return whether a process has ended, even if its parent has not waited for it."""
     try:
         return process.status() == psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
@@ -52,7 +53,7 @@ def wait_for(condition, seconds=300.0):
 
 @pytest.fixture
 def start(tmp_path):
-    """Start the program in a process group of its own, as a shell does; nothing of the group outlives the test."""
+    """Start the program in a separate process group, as a shell does; kill the group after the test."""
     with contextlib.ExitStack() as stack:
 
         def started(**options):
@@ -76,8 +77,8 @@ def end_group(group):
         os.killpg(group, signal.SIGKILL)
 
 
-def goes_on(folder, finished):
-    """The same study once more runs the rest, and is whole."""
+def check_resuming(folder, finished):
+    """Assert that the same study runs the remaining trials and is complete."""
     fake = Fake(folder / "calls again")
     results = run_study(study_of(folder, cameras=(3, 4), seeds=3), out=folder / "out", measure=fake)
     assert (results.info["kept"], results.info["run"], results.info["failed"]) == (finished, 6 - finished, [])
@@ -87,20 +88,20 @@ def goes_on(folder, finished):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
-def test_an_interrupted_study_keeps_what_is_finished(tmp_path, start, workers):
+def test_an_interrupted_study_keeps_finished_trials(tmp_path, start, workers):
     process = start(seconds=0.1, stuck=2, workers=workers)  # the trials of the last of three seeds never end
     wait_for(lambda: len(entries(tmp_path)) >= 8)
     os.killpg(process.pid, signal.SIGINT)
-    output, said = process.communicate(timeout=120)
+    output, errors = process.communicate(timeout=120)
     assert process.returncode == 130
     finished = store_is_clean(tmp_path)
     assert finished == 4
-    assert said.splitlines()[-1] == "interrupted: 4 of 6 trials are kept; the same command goes on"
-    assert "Traceback" not in said
+    assert errors.splitlines()[-1] == "interrupted: 4 of 6 trials are stored; the same command continues"
+    assert "Traceback" not in errors
     assert output == ""
     assert not (tmp_path / "out" / "views").exists()
     assert list(tmp_path.rglob("*.partial")) == []
-    goes_on(tmp_path, finished)
+    check_resuming(tmp_path, finished)
 
 
 @pytest.mark.slow
@@ -114,18 +115,18 @@ def test_a_killed_parent_leaves_neither_workers_nor_a_broken_store(tmp_path, sta
     wait_for(lambda: all(map(gone, workers)), 120)
     finished = store_is_clean(tmp_path)
     assert not (tmp_path / "out" / "views").exists()
-    goes_on(tmp_path, finished)
+    check_resuming(tmp_path, finished)
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_said_once_and_what_is_finished_is_kept(tmp_path):
-    done = run_program(tmp_path, file_size=200_000, large=1)  # from seed 1 on there is no room
+def test_a_full_disk_is_reported_once_and_finished_trials_are_kept(tmp_path):
+    done = run_program(tmp_path, file_size=200_000, large=1)  # from seed 1 on the disk is full
     assert done.returncode == 3
-    said = done.stderr.splitlines()[-1]
-    assert said.startswith("the study stopped: store ")
-    assert "cannot be written to: File too large" in said
-    assert "the same command goes on" in said
+    message = done.stderr.splitlines()[-1]
+    assert message.startswith("the study stopped: store ")
+    assert "cannot be written: File too large" in message
+    assert "run the same command again" in message
     assert "Traceback" not in done.stderr
     assert store_is_clean(tmp_path) == 2
     assert list(tmp_path.rglob("*.partial")) == []
-    goes_on(tmp_path, 2)
+    check_resuming(tmp_path, 2)

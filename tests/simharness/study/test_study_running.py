@@ -1,4 +1,4 @@
-"""A study from its settings to its folder: what is run, what is kept, what is written."""
+"""Runs of a study: trials that run, trials that are kept, and the result folder."""
 
 import json
 
@@ -46,10 +46,10 @@ class TestTables:
             assert (row["cameras.count"], row["seed"], row["variant"]) == (scenario.cameras.count, seed, variant)
             expected = made_up(scenario, variant)
             assert {key: row[key] for key in SCORES} == expected.scores
-            mine = (pl.col("trial") == row["trial"]) & (pl.col("variant") == variant)
+            row_filter = (pl.col("trial") == row["trial"]) & (pl.col("variant") == variant)
             for table in ("frames", "people", "failures"):
-                found = getattr(results, table).filter(mine).drop("trial", "variant")
-                assert found.equals(getattr(expected, table))
+                part = getattr(results, table).filter(row_filter).drop("trial", "variant")
+                assert part.equals(getattr(expected, table))
 
     def test_a_trial_can_be_made_again_from_its_row(self, tmp_path, run):
         study = study_of(tmp_path, cameras=(3, 5), more="people.count = 2")
@@ -58,7 +58,7 @@ class TestTables:
         with pytest.raises(ValueError, match="no trial ff"):
             results.scenario_of("ff")
 
-    def test_what_is_read_is_what_was_returned(self, tmp_path, run):
+    def test_the_read_results_equal_the_returned_ones(self, tmp_path, run):
         results = run(study_of(tmp_path))
         again = read_study(results.folder)
         assert again.info == results.info
@@ -67,7 +67,7 @@ class TestTables:
 
     @pytest.mark.parametrize("table", TABLES)
     def test_arrow_reads_them(self, tmp_path, run, table):
-        """What the page of a study says of its Parquet files."""
+        """The page of a study states that Arrow reads its Parquet files."""
         results = run(study_of(tmp_path, cameras=(3, 5)))
         rows, file = getattr(results, table).rows(), str(results.folder / f"{table}.parquet")
         arrow = pytest.importorskip("pyarrow.parquet").read_table(file)
@@ -94,7 +94,7 @@ class TestTables:
         assert read.columns == getattr(results, table).columns
         assert read.fetchall() == getattr(results, table).rows()
 
-    def test_settings_that_are_the_same_trial_are_run_once_and_stand_in_the_table_twice(self, tmp_path, run):
+    def test_settings_that_share_a_trial_run_once_and_have_two_rows(self, tmp_path, run):
         more = "[cases.one]\npeople.count = 2\n[cases.same]\npeople.count = 2\n[cases.other]\npeople.count = 3\n"
         path = tmp_path / "cases.toml"
         path.write_text(f'name = "cases"\nvariants = ["fast"]\n{more}')
@@ -119,7 +119,7 @@ class TestResuming:
         assert len(called(run.calls)) == 4
         assert len(results.trials) == 8
 
-    def test_a_changed_factor_runs_what_is_new(self, tmp_path, run):
+    def test_a_changed_factor_runs_the_new_settings(self, tmp_path, run):
         run(study_of(tmp_path, cameras=(3, 4)))
         assert counts(run(study_of(tmp_path, cameras=(4, 5)))) == (4, 2, 2, 0)
         assert called(run.calls)[4:] == ["0 5 full+fast", "1 5 full+fast"]
@@ -136,7 +136,7 @@ class TestResuming:
         assert results.trials["variant"].to_list() == ["full", "fast"] * 2
 
     @pytest.mark.parametrize("entries", range(1, 7))
-    def test_an_interruption_after_any_entry_says_what_is_finished(self, tmp_path, run, monkeypatch, entries):
+    def test_an_interruption_after_any_entry_reports_the_finished_trials(self, tmp_path, run, monkeypatch, entries):
         study, write, written = study_of(tmp_path, seeds=3), Store.write, []
 
         def interrupted(store, identity, entry):
@@ -150,7 +150,7 @@ class TestResuming:
             with pytest.raises(Interrupted) as stopped:
                 run(study)
         finished, half = divmod(entries, 2)
-        assert str(stopped.value).startswith(f"interrupted: {finished} of 3 trials are kept")
+        assert str(stopped.value).startswith(f"interrupted: {finished} of 3 trials are stored")
         before = len(called(run.calls))
         assert counts(run(study)) == (3, finished, 3 - finished, 0)
         if half:
@@ -164,7 +164,7 @@ class TestResuming:
         assert results.folder.name == "renamed"
         assert results.scenario_of(results.trials["trial"][0]).name == "renamed"
 
-    def test_a_damaged_entry_is_run_again_and_told_of(self, tmp_path, run):
+    def test_a_damaged_entry_is_run_again_and_reported(self, tmp_path, run):
         study = study_of(tmp_path)
         before = run(study)
         identity = entry_identity(before.trials["trial"][0], "fast")
@@ -178,7 +178,7 @@ class TestResuming:
 
 
 class TestFailures:
-    def test_the_rest_goes_on_and_nothing_unfinished_looks_finished(self, tmp_path, run):
+    def test_other_trials_go_on_and_failed_ones_are_listed(self, tmp_path, run):
         study = study_of(tmp_path, cameras=(3, 4), seeds=3)
         results = run(study, harm={1: ("raise", ALWAYS)})
         assert counts(results) == (6, 0, 4, 2)
@@ -195,21 +195,21 @@ class TestFailures:
         assert sorted(results.trials["seed"].unique()) == [0, 2]
         assert times(run.calls)[1] == 2 * (3 + 2)  # three times together, then each variant once
 
-    def test_they_are_noted_with_their_traceback_and_tried_again_next_time(self, tmp_path, run):
+    def test_failures_are_stored_with_traceback_and_tried_again_next_time(self, tmp_path, run):
         study = study_of(tmp_path)
         failed = run(study, harm={1: ("raise", 3 + 2)}).info["failed"]
         identity = entry_identity(failed[0]["trial"], "full")
-        noted = Store(run.store).failure(identity)
-        assert noted["error"] == "ZeroDivisionError: by zero"
-        assert noted["traceback"].startswith("Traceback")
-        assert "fakes.py" in noted["traceback"]
+        failure = Store(run.store).failure(identity)
+        assert failure["error"] == "ZeroDivisionError: by zero"
+        assert failure["traceback"].startswith("Traceback")
+        assert "fakes.py" in failure["traceback"]
         results = run(study, harm={1: ("raise", 3 + 2)})
         assert counts(results) == (2, 1, 1, 0)
         assert Store(run.store).failure(identity) is None
 
-    def test_what_the_scenario_is_to_blame_for_is_tried_once(self, tmp_path, run):
+    def test_an_error_of_the_scenario_is_tried_once(self, tmp_path, run):
         results = run(study_of(tmp_path), harm={1: ("refuse", ALWAYS)})
-        assert [each["error"] for each in results.info["failed"]] == ["nobody fits"]
+        assert [each["error"] for each in results.info["failed"]] == ["no room"]
         assert times(run.calls) == {0: 1, 1: 1}
 
     def test_a_study_may_fail_altogether(self, tmp_path, run):
@@ -236,7 +236,7 @@ class TestInfo:
         for key in ("name", "description", "seeds", "variants", "factors", "one_at_a_time", "settings", "gate"):
             assert getattr(again, key) == getattr(study, key), key
 
-    def test_what_was_run_and_how_is_told(self, tmp_path, run):
+    def test_the_info_describes_the_study_and_the_run(self, tmp_path, run):
         info = run(study_of(tmp_path, cameras=(3, 4)), command="simharness study x").info
         assert info == json.loads((tmp_path / "out" / "views" / "study.json").read_text())
         assert info["name"] == "views"
@@ -253,19 +253,19 @@ class TestPlaces:
     def test_only_a_study_is_replaced(self, tmp_path, run):
         (tmp_path / "out" / "views").mkdir(parents=True)
         (tmp_path / "out" / "views" / "thesis.tex").touch()
-        with pytest.raises(ValueError, match="holds no study"):
+        with pytest.raises(ValueError, match="is not the result folder of a study"):
             run(study_of(tmp_path))
         assert (tmp_path / "out" / "views" / "thesis.tex").exists()
         assert not called(run.calls)
 
     def test_the_store_is_never_replaced(self, tmp_path, run):
-        with pytest.raises(ValueError, match="place of the store"):
+        with pytest.raises(ValueError, match="would replace the store"):
             run(study_of(tmp_path, name="store"))
-        with pytest.raises(ValueError, match="place of the store"):
+        with pytest.raises(ValueError, match="would replace the store"):
             run(study_of(tmp_path), store=tmp_path / "out" / "views" / "inside")
         assert not called(run.calls)
 
-    def test_a_folder_that_cannot_be_made_is_known_before_the_work(self, tmp_path):
+    def test_a_folder_that_cannot_be_created_is_refused_before_the_run(self, tmp_path):
         (tmp_path / "file").touch()
         fake = Fake(tmp_path / "calls")
         with pytest.raises(ValueError, match="cannot"):
@@ -276,7 +276,7 @@ class TestPlaces:
     def test_a_folder_with_a_file_missing_is_no_study(self, tmp_path, run, name):
         folder = run(study_of(tmp_path)).folder
         (folder / name).unlink()
-        with pytest.raises(ValueError, match=rf"not the folder of a study.*{name}"):
+        with pytest.raises(ValueError, match=rf"not the result folder of a study.*{name}"):
             read_study(folder)
 
     @pytest.mark.parametrize("name", ["study.json", "frames.parquet"])
@@ -289,15 +289,15 @@ class TestPlaces:
 
 class TestShards:
     @pytest.mark.parametrize("parts", [1, 2, 3, 5])
-    def test_every_trial_is_in_one(self, tmp_path, run, parts):
+    def test_every_trial_is_in_one_shard(self, tmp_path, run, parts):
         study, fake = study_of(tmp_path, cameras=(3, 4), seeds=2), Fake(run.calls)
-        tallies = [run_shard(study, (i + 1, parts), store=run.store, measure=fake) for i in range(parts)]
-        assert sum(tally.trials for tally in tallies) == sum(tally.run for tally in tallies) == 4
+        outcomes = [run_shard(study, (i + 1, parts), store=run.store, measure=fake) for i in range(parts)]
+        assert sum(each.trials for each in outcomes) == sum(each.run for each in outcomes) == 4
         assert sorted(called(run.calls)) == ["0 3 full+fast", "0 4 full+fast", "1 3 full+fast", "1 4 full+fast"]
         assert counts(run(study)) == (4, 4, 0, 0)
 
     @pytest.mark.parametrize("shard", [(0, 3), (4, 3), (1, 0)])
-    def test_one_that_is_not_is_refused(self, tmp_path, run, shard):
+    def test_a_shard_that_does_not_exist_is_refused(self, tmp_path, run, shard):
         with pytest.raises(ValueError, match="from 1 to n"):
             run_shard(study_of(tmp_path), shard, store=run.store, measure=Fake(run.calls))
 

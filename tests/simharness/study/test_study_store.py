@@ -1,4 +1,4 @@
-"""The store of finished trials."""
+"""Store of finished trials."""
 
 import dataclasses
 import json
@@ -34,7 +34,7 @@ def files(folder):
     return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
-def test_what_is_written_is_read(tmp_path, entry):
+def test_an_entry_is_read_as_it_was_written(tmp_path, entry):
     store = Store(tmp_path)
     assert store.read(ID) is None
     assert not store.has(ID)
@@ -61,7 +61,7 @@ def content(tmp_path_factory, entry):
 
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory):
-    """Put bytes where an entry is, and open the store."""
+    """Write bytes in place of an entry and open the store."""
     folder = tmp_path_factory.mktemp("broken")
 
     def put(content, identity=ID):
@@ -80,12 +80,12 @@ class TestDamage:
         flipped = bytearray(content)
         flipped[place // 8] ^= 1 << place % 8
         store = broken(bytes(flipped))
-        found = store.read(ID)
-        if found is None:
+        result = store.read(ID)
+        if result is None:
             assert store.damaged == {ID}
             assert not store.has(ID)
-        else:  # a bit that means nothing, such as the date of a file in the archive
-            same(found, entry)
+        else:  # a bit without effect, such as the date of a file in the archive
+            same(result, entry)
 
     def test_a_flipped_bit_in_the_tables_is_noticed(self, content, broken):
         at = content.index(b"PAR1") + 100
@@ -104,7 +104,7 @@ class TestDamage:
         assert not store.has(OTHER)
         assert store.damaged == {OTHER}
 
-    def test_a_whole_entry_takes_its_place(self, content, broken, entry):
+    def test_a_damaged_entry_can_be_written_again(self, content, broken, entry):
         store = broken(content[:-1])
         assert not store.has(ID)
         store.write(ID, entry)
@@ -115,20 +115,20 @@ class TestDamage:
 class TestFolders:
     def test_another_format_is_refused(self, tmp_path):
         Store(tmp_path)
-        said = json.loads((tmp_path / "store.json").read_text())
-        (tmp_path / "store.json").write_text(json.dumps({**said, "format": said["format"] + 1}))
-        with pytest.raises(ValueError, match=rf"format {said['format'] + 1}.*--store.*delete"):
+        content = json.loads((tmp_path / "store.json").read_text())
+        (tmp_path / "store.json").write_text(json.dumps({**content, "format": content["format"] + 1}))
+        with pytest.raises(ValueError, match=rf"format {content['format'] + 1}.*--store.*delete"):
             Store(tmp_path)
 
     @pytest.mark.parametrize("text", ["", "[1]", "{}", "\xff"])
-    def test_a_store_that_does_not_say_its_format_is_refused(self, tmp_path, text):
+    def test_a_store_without_a_format_is_refused(self, tmp_path, text):
         (tmp_path / "store.json").write_text(text)
         with pytest.raises(ValueError, match=r"store\.json cannot be read.*delete"):
             Store(tmp_path)
 
-    def test_a_folder_of_other_things_is_refused(self, tmp_path):
+    def test_a_folder_with_other_files_is_refused(self, tmp_path):
         (tmp_path / "thesis.tex").touch()
-        with pytest.raises(ValueError, match=r"no store.*thesis\.tex"):
+        with pytest.raises(ValueError, match=r"not a store.*thesis\.tex"):
             Store(tmp_path)
         assert files(tmp_path) == [tmp_path / "thesis.tex"]
 
@@ -137,7 +137,7 @@ class TestFolders:
         with pytest.raises(ValueError, match="cannot be used"):
             Store(tmp_path / "file" / "store")
 
-    def test_what_killed_processes_left_goes_after_a_day(self, tmp_path, entry):
+    def test_temporary_files_of_killed_processes_are_removed_after_a_day(self, tmp_path, entry):
         store = Store(tmp_path)
         store.write(ID, entry)
         old, new = (store.file_of(ID).with_name(f".{name}.trial.1.2.partial") for name in ("old", "new"))
@@ -149,15 +149,15 @@ class TestFolders:
         assert new.exists()
 
 
-def test_nothing_is_left_of_an_entry_that_cannot_be_written(tmp_path, entry):
+def test_an_entry_that_cannot_be_written_leaves_no_file(tmp_path, entry):
     store = Store(tmp_path)
     store.file_of(ID).mkdir(parents=True)  # no file can be renamed to it
-    with pytest.raises(StoreError, match=r"cannot be written to.*the same command goes on"):
+    with pytest.raises(StoreError, match=r"cannot be written.*the same command again"):
         store.write(ID, entry)
     assert files(tmp_path) == [tmp_path / "store.json"]
 
 
-def test_failures_are_noted_until_there_is_an_entry(tmp_path, entry):
+def test_a_failure_is_stored_until_the_entry_is_written(tmp_path, entry):
     store = Store(tmp_path)
     store.write_failure(ID, {"error": "by zero"})
     assert store.failure(ID) == {"error": "by zero"}
@@ -167,20 +167,20 @@ def test_failures_are_noted_until_there_is_an_entry(tmp_path, entry):
 
 
 def hammer(folder, entry, start, results):
-    """Write and read a few entries over and over."""
+    """Write and read a few entries many times."""
     start.wait()
     seen = set()
     for turn in range(20):
         store, identity = Store(folder), f"{turn % 4:02x}" * 16
         store.write(identity, entry)
-        found = store.read(identity)
-        seen.add(found is not None and found.result.scores == entry.result.scores)
+        result = store.read(identity)
+        seen.add(result is not None and result.result.scores == entry.result.scores)
         seen.add(not store.damaged)
     results.put(seen)
 
 
 @pytest.mark.slow
-def test_two_processes_at_one_store_do_no_harm(tmp_path, entry):
+def test_two_processes_can_use_one_store(tmp_path, entry):
     spawn = multiprocessing.get_context("spawn")
     start, results = spawn.Event(), spawn.Queue()
     arguments = tmp_path / "new", entry, start, results

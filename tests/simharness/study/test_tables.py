@@ -1,4 +1,4 @@
-"""Columns of factors."""
+"""Tables of a study: columns of factors."""
 
 import polars as pl
 import pytest
@@ -23,21 +23,21 @@ from simharness.study.tables import factor_column, tables
         ([], pl.String, []),
     ],
 )
-def test_a_factor_has_the_plainest_type_that_holds_it(values, dtype, shown):
+def test_a_factor_has_the_simplest_type_for_its_values(values, dtype, shown):
     column = factor_column(values)
     assert column.dtype == dtype
     assert column.to_list() == shown
 
 
 @given(values=st.lists(st.none() | st.booleans() | st.integers(-9, 9) | st.floats(-9, 9) | st.sampled_from("ab")))
-def test_values_that_differ_differ_in_the_table(values):
+def test_different_values_differ_in_the_table(values):
     column = factor_column(values).to_list()
     known = {(type(value) is bool, value) for value in values if value is not None}
     assert len(set(column) - {None}) >= len(known)
     assert [value is None for value in column] == [value is None for value in values]
 
 
-def test_a_study_of_nothing_has_its_columns():
+def test_an_empty_study_has_its_columns():
     empty = tables([], ["cameras.count"])
     assert empty.trials.columns[:6] == ["trial", "case", "varied", "seed", "variant", "cameras.count"]
     assert empty.trials.columns[-2:] == ["seconds", "scenario"]
