@@ -1,1 +1,1 @@
-"""Processes, progress and files: what every long command needs and no result depends on."""
+"""Processes, progress, files and versions: tools of every long command, on which no result depends."""

@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all."""
+"""Atomic writing of files and folders: they appear only when they are complete."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pathlib import Path
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write a file by renaming, in the place of one that is there.
+    """Write a file by renaming; it replaces an existing file.
 
     Raises:
-        OSError: it cannot be written; nothing is left of it.
+        OSError: the file cannot be written; no part of it is left.
     """
     partial = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.partial")
     try:
@@ -28,10 +28,10 @@ def write_atomic(path: Path, content: bytes) -> None:
 
 @contextlib.contextmanager
 def atomic_folder(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder beside ``folder`` to write into; it takes that name when the block ends well.
+    """Give a temporary folder to write into, which is renamed to ``folder`` when the block ends without an error.
 
-    A block that raises leaves nothing. A process that is killed leaves ``.NAME.PID.partial``, which nobody
-    can take for a result. A folder that had the name before is there until the new one is whole.
+    A block that raises leaves nothing. A process that is killed leaves ``.NAME.PID.partial``, which cannot be mistaken
+    for a result. An earlier folder of that name stays until the new one is complete.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
@@ -46,7 +46,7 @@ def atomic_folder(folder: Path) -> Iterator[Path]:
 
 
 def _replace(new: Path, folder: Path) -> None:
-    """Rename. No folder can be renamed onto a full one: the old one steps aside, and back if that fails."""
+    """Rename ``new`` to ``folder``. An old folder is renamed first, because it is not empty, and back on an error."""
     old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
     shutil.rmtree(old, ignore_errors=True)
     existed = folder.exists()

@@ -1,4 +1,4 @@
-"""Frames shared out among processes: the same results in the same order, whatever the number of workers."""
+"""Map over frames in several processes, with results that do not depend on the number of processes."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from simharness.runtime.errors import RunError
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
 
-_CHUNKS_PER_WORKER = 8  # enough for the slowest chunk not to hold the others up, few enough to send cheaply
+_CHUNKS_PER_WORKER = 8  # many, so that a slow chunk delays little; few, so that sending them costs little
 
 
 class FrameFunction(Protocol[Result_co]):
-    """What can be mapped over frames: gets consecutive frame indices, keeps nothing between calls.
+    """Function of consecutive frame indices that keeps no state between calls.
 
-    It is pickled once for each worker, so what it carries (a model, a sequence) travels once and not with
-    every chunk: a frozen dataclass with ``__call__`` or a ``functools.partial`` of a module's function.
+    It is pickled once for each worker, so that its data (a model, a sequence) is sent once and not with every chunk. It
+    is a frozen dataclass with ``__call__``, or a ``functools.partial`` of a function of a module.
     """
 
     def __call__(self, frames: range, /) -> Result_co:
-        """The result of these frames."""
+        """Return the result of these frames."""
         ...
 
 
@@ -39,18 +39,18 @@ def map_frames(
 ) -> list[Result]:
     """Call ``function`` on consecutive chunks of ``frames`` and return the results in their order.
 
-    Where chunks begin and end depends on the number of workers; what they add up to must not.
+    The chunks depend on the number of workers; the joined results must not.
 
     Args:
         function: see :class:`FrameFunction`.
         frames: consecutive frame indices.
-        workers: processes; 1 works in this one. They are spawned, not forked, for the parent may hold threads
-            or a GL context, and their linear algebra keeps to one thread.
-        progress: called with the number of frames of each chunk that is done.
+        workers: number of processes; with 1 the work is done in this process. Processes are spawned, not forked,
+            because the parent may hold threads or a GL context. Their linear algebra uses one thread.
+        progress: called with the number of frames of each finished chunk.
 
     Raises:
         ValueError: fewer than one worker.
-        RunError: the function raised, or a worker died. The function's own error is its cause, if it is no RunError.
+        RunError: the function raised, or a worker died. An error of the function is its cause, unless it is a RunError.
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
@@ -96,7 +96,7 @@ def _map_in_pool(
             span = _span(range(chunks[0].start, chunks[-1].stop))
             raise RunError(
                 f"a worker process died within {span}; it may have run out of memory: try fewer workers, "
-                "or --workers 1 to see it happen in this process"
+                "or --workers 1 to run in this process"
             ) from error
         except RunError:
             raise
@@ -115,11 +115,11 @@ def _span(chunk: range) -> str:
     return f"frame {chunk.start}" if len(chunk) == 1 else f"frames {chunk.start} to {chunk.stop - 1}"
 
 
-_installed: FrameFunction[Any] | None = None  # of a worker process; None in the parent
+_installed: FrameFunction[Any] | None = None  # function of a worker process; None in the parent
 
 
 def _install(function: FrameFunction[Any]) -> None:
-    global _installed  # noqa: PLW0603 (how an initializer hands over state)
+    global _installed  # noqa: PLW0603 (state set by the initializer)
     threadpoolctl.threadpool_limits(1)
     _installed = function
 

@@ -1,4 +1,4 @@
-"""Progress of long commands on stderr: one protocol for every command, from a run's stages to a study's trials."""
+"""Progress of long commands on stderr: one protocol for the stages of a run and the trials of a study."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-_LINE_SECONDS = 10.0  # between two lines where stderr is no terminal
+_LINE_SECONDS = 10.0  # seconds between two lines where stderr is not a terminal
 _UNSETTLED = 2  # first steps include compilation: a rate that counts them gives many times the remaining time
-_TIMED_SECONDS = 2.0  # from the first steps on, for two workers finish at nearly the same time
+_TIMED_SECONDS = 2.0  # least duration that a rate is measured over: workers finish at nearly the same time
 
 
 class Advance(Protocol):
@@ -45,10 +45,10 @@ def _ignore(steps: int, /, *, failed: int = 0) -> None:
 
 
 class Pace:
-    """Rate of a stage, and the time that it still needs.
+    """Rate and remaining time of a stage.
 
-    Steps that were finished in an earlier run do not count, nor do the first ones of this run: they include imports
-    and compilation.
+    Steps that were finished in an earlier run do not count, nor do the first steps of this run, because they include
+    imports and compilation.
 
     Args:
         total: steps of the stage.

@@ -1,4 +1,4 @@
-"""Stages of a run: timed, reported, and named in errors."""
+"""Stages of a run, with their times, progress and names in errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Stages:
     """Timer and reporter of stages. An error in a stage becomes a RunError with the name of the stage in front.
 
     Attributes:
-        seconds: duration of each stage that has ended, by name.
+        seconds: duration of each finished stage, by name.
     """
 
     def __init__(self, reporter: Reporter, seconds: dict[str, float] | None = None) -> None:
@@ -26,9 +26,12 @@ class Stages:
         """Run one stage.
 
         Args:
-            name: of the stage.
-            total: steps of the stage.
-            input_errors: let a ValueError pass unchanged, because the scenario is at fault.
+            name: name of the stage.
+            total: number of steps of the stage.
+            input_errors: let a ValueError pass unchanged, because the scenario is wrong.
+
+        Raises:
+            RunError: an error in the stage, with the name of the stage in front.
         """
         start = time.perf_counter()
         try:

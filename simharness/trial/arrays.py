@@ -152,7 +152,8 @@ def timing_arrays(estimates: Sequence[Estimate]) -> Arrays:
     """Return the timings of one variant: ``stages`` (S,) by name, ``seconds`` (T, S), NaN where not timed."""
     stages = list(dict.fromkeys(stage for estimate in estimates for stage in estimate.timings))
     seconds = [[estimate.timings.get(stage, np.nan) for stage in stages] for estimate in estimates]
-    return {"stages": np.array(stages, dtype=str), "seconds": np.array(seconds, float).reshape(len(estimates), len(stages))}
+    table = np.array(seconds, float).reshape(len(estimates), len(stages))
+    return {"stages": np.array(stages, dtype=str), "seconds": table}
 
 
 def timings_of(arrays: Arrays) -> list[dict[str, float]]:

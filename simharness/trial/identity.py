@@ -20,18 +20,17 @@ seen: ``rendering.renderer = "auto"`` takes one renderer or the other depending 
 
 from __future__ import annotations
 
-import ast
 import functools
 import hashlib
 import importlib.metadata
 import json
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mvpose
 import simharness
+from simharness.runtime.code_digest import digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
 
@@ -76,61 +75,6 @@ def code() -> Code:
 
 
 _FOLDERS = {"simulation": SIMULATION, "scores": SCORES, "failures": FAILURES}
-
-
-def digest_of_folders(root: Path, folders: Iterable[str]) -> str:
-    """Return the digest of all code and data in some folders of a package, hexadecimal.
-
-    Args:
-        root: folder of the package.
-        folders: folders relative to it; "" for all of it.
-    """
-    digest = hashlib.blake2b(digest_size=_SIZE)
-    files = {file for folder in folders for file in files_of(root / folder)}
-    for file in sorted(files):
-        content = _meaning(file)
-        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
-        digest.update(content)
-    return digest.hexdigest()
-
-
-def files_of(folder: Path) -> Iterator[Path]:
-    """Yield the modules and data files of a folder of code, not what Python, numba and build tools put there."""
-    for file in folder.rglob("*"):
-        inside = file.relative_to(folder).parts
-        generated = any(part in _GENERATED or part.endswith(".egg-info") for part in inside)
-        packaging = len(inside) == 1 and file.name in ("pyproject.toml", "README.md", "LICENSE")
-        if file.is_file() and not generated and not packaging and not file.name.startswith("."):
-            yield file
-
-
-_GENERATED = ("__pycache__", "build", "dist")
-
-
-def _meaning(file: Path) -> bytes:
-    """Return what a file means: the syntax tree of a module without its documentation, the bytes of any other file."""
-    content = file.read_bytes()
-    if file.suffix != ".py":
-        return content
-    return ast.dump(_Undocumented().visit(ast.parse(content))).encode()
-
-
-class _Undocumented(ast.NodeTransformer):
-    """Removes docstrings, and the descriptions of pydantic fields, from a syntax tree; comments are not in it."""
-
-    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
-        """Drop a string that is a statement by itself."""
-        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            return None
-        self.generic_visit(node)
-        return node
-
-    def visit_Call(self, node: ast.Call) -> ast.Call:
-        """Drop ``description=`` of ``Field(...)``."""
-        if isinstance(node.func, ast.Name) and node.func.id == "Field":
-            node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
-        self.generic_visit(node)
-        return node
 
 
 def versions() -> dict[str, str]:

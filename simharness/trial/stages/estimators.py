@@ -37,8 +37,8 @@ from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
 from mvpose.pipeline import Estimator
 from simharness.runtime.errors import RunError
-from simharness.scenario.sections.scenario import Method
 from simharness.scenario.sections.method import wrong_variants
+from simharness.scenario.sections.scenario import Method
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 

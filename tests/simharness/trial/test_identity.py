@@ -9,12 +9,13 @@ import pytest
 
 import mvpose
 import simharness
+from simharness.runtime.code_digest import files_of
 from simharness.scenario.load import load
 from simharness.scenario.sections.section import Section
 from simharness.scenario.study_definition import load_study
 from simharness.study.plan import plan
 from simharness.trial import identity
-from simharness.trial.identity import entry_identity, estimator_code, files_of, trial_identity
+from simharness.trial.identity import entry_identity, estimator_code, trial_identity
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 
