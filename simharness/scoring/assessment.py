@@ -16,10 +16,11 @@ from simharness.pairing.pairing import Pairing
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.catalogue import AP_MM, PCK_MM
 from simharness.scoring.frame import FrameScore, score_frame
-from simharness.scoring.joint_errors import bone_errors, jitter, joint_errors
+from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
+from simharness.scoring.registry import ScoreInput, registered_scores
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
 from simharness.types.recording import Recording
@@ -83,7 +84,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         | _joint_scores(errors)
         | _precision_scores(truth, estimates)
         | _pck_scores(errors)
-        | _bone_and_jitter_scores(truth, placed)
+        | _registered_scores(ScoreInput(recording, tuple(estimates), truth, placed))
         | _picture_scores(recording, placed)
         | _matching_scores(summary, groups)
         | _time_scores(summary)
@@ -182,11 +183,8 @@ def _pck_scores(errors: Floats) -> Scores:
     return {**shares, "pck_auc": _finite(pck_area(errors, PCK_MM[-1] / 1000.0))}
 
 
-def _bone_and_jitter_scores(truth: Floats, placed: Floats) -> Scores:
-    return {
-        "bone_mm": _statistic(np.mean, 1000.0 * np.abs(bone_errors(truth, placed))),
-        "jitter_mm": _statistic(np.mean, 1000.0 * jitter(truth, placed)),
-    }
+def _registered_scores(given: ScoreInput) -> Scores:
+    return {key: each.compute(given) for key, each in registered_scores().items()}
 
 
 def _picture_scores(recording: Recording, placed: Floats) -> Scores:

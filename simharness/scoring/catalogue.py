@@ -6,36 +6,13 @@ A score is None (null in tables) where it does not apply: the error of pairs wit
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
 from mvpose import COCO17
 from simharness.scoring.pcp import GROUPS
+from simharness.scoring.registry import ScoreInfo, registered_scores
 
-Better = Literal["higher", "lower"]
-
-
-@dataclass(frozen=True)
-class ScoreInfo:
-    """Description of a score.
-
-    Attributes:
-        key: name of its column in tables.
-        title: short name for headings.
-        unit: unit; empty for none.
-        about: explanation in one line.
-        better: direction of better values.
-        digits: digits after the decimal point.
-    """
-
-    key: str
-    title: str
-    unit: str
-    about: str
-    better: Better
-    digits: int
-
+__all__ = ["AP_MM", "HEADLINE", "PCK_MM", "SCORES", "ScoreInfo"]
 
 AP_MM = (25, 50, 75, 100, 125, 150)
 """Thresholds of average precision, mm."""
@@ -46,7 +23,7 @@ PCK_MM = (50, 100, 150)
 _FAILURES = {
     "missed": "true people without an estimate who are neither merged nor split",
     "ghost": "estimates that match no person and are not the second estimate of a split",
-    "merged": "people whose estimate contains detections of another person",
+    "merged": "wrong people in an estimate that mixes detections of several people",
     "split": "people whose detections are divided among several estimates",
     "swapped_limb": "people with a joint at the place of its left-right counterpart or of another person's joint",
     "displaced_joint": "people with a displaced joint and none of the other failures",
@@ -85,9 +62,7 @@ def _pose() -> Iterator[ScoreInfo]:
     for limit in PCK_MM:
         yield _higher(f"pck{limit}", f"PCK {limit}", f"true joints of all people estimated within {limit} mm")
     yield _higher("pck_auc", "PCK area", f"mean of PCK over all limits from 0 to {PCK_MM[-1]} mm")
-    yield _lower("bone_mm", "Bone length", "mm", "mean absolute error of the bone lengths of the people found")
-    about = "mean second difference of the joint error over frames; grows with the time between frames"
-    yield _lower("jitter_mm", "Jitter", "mm", about)
+    yield from (each.info for each in registered_scores().values())
     about = "median error of the reprojected estimates at visible, detected joints"
     yield _lower("reprojection_px", "Reprojection", "px", about, digits=2)
     about = "median error of the detections at the joints of Reprojection; should be the larger one"

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mvpose import COCO17, Skeleton
 from mvpose.arrays import Floats
+from simharness.scoring.registry import ScoreInfo, ScoreInput, finite_mean, score
 
 
 def joint_errors(truth: ArrayLike, estimate: ArrayLike) -> Floats:
@@ -52,6 +53,23 @@ def jitter(truth: ArrayLike, estimate: ArrayLike) -> Floats:
     """
     error = np.asarray(estimate, float) - np.asarray(truth, float)
     return np.linalg.norm(np.diff(error, n=2, axis=0), axis=-1)
+
+
+@score(
+    ScoreInfo("bone_mm", "Bone length", "mm", "mean absolute error of the bone lengths of the people found", "lower", 1)
+)
+def bone_length_score(given: ScoreInput) -> float | None:
+    """Return the mean absolute error of the bone lengths, mm."""
+    return finite_mean(1000.0 * np.abs(bone_errors(given.truth, given.paired)))
+
+
+_JITTER = "mean second difference of the joint error over frames; grows with the time between frames"
+
+
+@score(ScoreInfo("jitter_mm", "Jitter", "mm", _JITTER, "lower", 1))
+def jitter_score(given: ScoreInput) -> float | None:
+    """Return the mean jitter, mm."""
+    return finite_mean(1000.0 * jitter(given.truth, given.paired))
 
 
 def _bone_lengths(joints: Floats, skeleton: Skeleton) -> Floats:

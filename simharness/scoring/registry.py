@@ -1,0 +1,120 @@
+"""Registry of scores that are computed from a recording, its estimates and the paired joints.
+
+How to add a score:
+
+1. Write one module in ``simharness/scoring`` with a function of :class:`ScoreInput`, decorated with :func:`score`::
+
+       @score(ScoreInfo("ankle_mm", "Ankle height", "mm", "mean error of the height of ankles", "lower", 1))
+       def ankle_height(given: ScoreInput) -> float | None: ...
+
+2. Add the name of the module to :data:`MODULES`.
+
+Tables, reports, thresholds of ``simharness report`` and :func:`simharness.testing.assert_robust` take all scores from
+:data:`simharness.scoring.catalogue.SCORES`, which contains the registered ones. A score that does not apply is None,
+never zero. Keys end in ``_mm``, ``_px`` or ``_ms`` where that is the unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from mvpose.arrays import Floats
+
+if TYPE_CHECKING:
+    from mvpose import Estimate
+    from simharness.types.recording import Recording
+
+MODULES = ("joint_errors",)
+"""Modules of ``simharness.scoring`` that register scores, in the order of the columns of tables."""
+
+Better = Literal["higher", "lower"]
+
+
+@dataclass(frozen=True)
+class ScoreInfo:
+    """Description of a score.
+
+    Attributes:
+        key: name of its column in tables.
+        title: short name for headings.
+        unit: unit; empty for none.
+        about: explanation in one line.
+        better: direction of better values.
+        digits: digits after the decimal point.
+    """
+
+    key: str
+    title: str
+    unit: str
+    about: str
+    better: Better
+    digits: int
+
+
+@dataclass(frozen=True)
+class ScoreInput:
+    """Input of a registered score.
+
+    Attributes:
+        recording: T frames, with the truth of P people.
+        estimates: estimates of the variant, T.
+        truth: true joints, (T, P, 17, 3), metres.
+        paired: joints of the estimate that is paired with each true person, (T, P, 17, 3), metres; NaN where the person
+            is missed or the joint was not placed.
+    """
+
+    recording: Recording
+    estimates: tuple[Estimate, ...]
+    truth: Floats
+    paired: Floats
+
+
+ScoreFunction = Callable[[ScoreInput], float | None]
+
+
+@dataclass(frozen=True)
+class Score:
+    """A registered score: its description and its function."""
+
+    info: ScoreInfo
+    compute: ScoreFunction
+
+
+_registered: dict[str, Score] = {}
+
+
+def score(info: ScoreInfo) -> Callable[[ScoreFunction], ScoreFunction]:
+    """Register the decorated function as a score.
+
+    Raises:
+        ValueError: the key is registered already.
+    """
+    if info.key in _registered:
+        raise ValueError(f"the score {info.key!r} is registered twice: choose another key for one of them")
+
+    def register(function: ScoreFunction) -> ScoreFunction:
+        _registered[info.key] = Score(info, function)
+        return function
+
+    return register
+
+
+@cache
+def registered_scores() -> Mapping[str, Score]:
+    """Return all registered scores by key, in the order of :data:`MODULES`."""
+    modules = [import_module(f"simharness.scoring.{module}").__name__ for module in MODULES]
+    ordered = sorted(_registered.items(), key=lambda item: modules.index(item[1].compute.__module__))
+    return MappingProxyType(dict(ordered))
+
+
+def finite_mean(values: Floats) -> float | None:
+    """Return the mean of the finite values; None without any."""
+    values = values[np.isfinite(values)]
+    return float(np.mean(values)) if len(values) else None
