@@ -91,7 +91,7 @@ class SeedEvaluation:
     def summary(self) -> dict[str, Any]:
         """Return all results, ready for JSON."""
         first, *others = self.scenario.method.variants
-        everyone = range(self.scenario.people.count)
+        people = range(self.scenario.people.count)
         return {
             "name": self.scenario.name,
             "detector": self.scenario.detector.name,
@@ -100,7 +100,7 @@ class SeedEvaluation:
             "seeds": list(self.seeds),
             "head": self.head,
             "pcp": {name: vars(self.pcp(name)) for name in (first, *others)},
-            "pcp_people": {name: [vars(self.pcp(name, [person])) for person in everyone] for name in (first, *others)},
+            "pcp_people": {name: [vars(self.pcp(name, [person])) for person in people] for name in (first, *others)},
             f"ahead_of_{first}": {name: vars(self.difference(name, first)) for name in others},
             "summaries": {name: self.pooled(name).summary() for name in (first, *others)},
         }

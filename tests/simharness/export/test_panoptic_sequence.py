@@ -18,6 +18,7 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.export.panoptic_sequence import ExportPlan, export_sequence
 from simharness.formats.calibration.panoptic import read_calibration
 from simharness.formats.openpose import read_frame
+from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras, Faults, People, Room
 from simharness.trial.provenance import PROVENANCE
@@ -308,7 +309,7 @@ class TestAtomicFolder:
             raise OSError("the disk is full")
 
         monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", fail)
-        with pytest.raises(OSError, match="disk is full"):
+        with pytest.raises(RunError, match="disk is full"):
             export_sequence(trial.scenario, ExportPlan(tmp_path / "tiny"))
         assert done
         assert not list(tmp_path.iterdir())
@@ -317,7 +318,7 @@ class TestAtomicFolder:
         made, _ = exported(trial.scenario, tmp_path / "tiny", pictures=False)
         before = {file: file.read_bytes() for file in made.rglob("*.json")}
         monkeypatch.setattr("simharness.capture.picture.PictureSource.picture", lambda *_, **__: 1 / 0)
-        with pytest.raises(ZeroDivisionError):
+        with pytest.raises(RunError, match="ZeroDivisionError"):
             export_sequence(trial.scenario, ExportPlan(made))
         assert {file: file.read_bytes() for file in made.rglob("*.json")} == before
 

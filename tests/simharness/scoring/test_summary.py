@@ -78,8 +78,8 @@ def test_timings_are_in_milliseconds_by_stage():
 
 
 def test_scores_that_do_not_apply_are_null_and_never_nan():
-    nobody = frame([], [], estimates=0)
-    for variant in (VariantScores(()), VariantScores((nobody,))):
+    no_people = frame([], [], estimates=0)
+    for variant in (VariantScores(()), VariantScores((no_people,))):
         summary = summarize("empty", {"full": variant}, frames=len(variant.frames), seeds=1)
         scores = json.loads(json.dumps(summary, allow_nan=False))["variants"]["full"]
         assert set(scores) == KEYS
@@ -87,7 +87,7 @@ def test_scores_that_do_not_apply_are_null_and_never_nan():
             assert scores[key] is None
         assert scores["mpjpe_mm"] == {"mean": None, "median": None}
         assert scores["matching"] == {"precision": None, "recall": None, "f1": None}
-    assert VariantScores((nobody,)).summary()["ghosts_per_frame"] == 0.0
+    assert VariantScores((no_people,)).summary()["ghosts_per_frame"] == 0.0
 
 
 def test_summaries_have_the_shared_keys_and_further_ones():
