@@ -20,7 +20,7 @@ FAILED = 3
 
 @contextlib.contextmanager
 def exit_on_error() -> Iterator[None]:
-    """Turn errors into messages and exit codes.
+    """Exit with a message and an exit code on an error.
 
     A ValueError means bad input, because code that works on validated input raises a RunError instead:
     :func:`simharness.report.run.result_folder.run` and :func:`run_errors_only` ensure it.

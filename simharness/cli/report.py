@@ -21,10 +21,14 @@ def add_to(app: typer.Typer) -> None:
 
 
 def report(
-    study: Annotated[Path, typer.Argument(help="The result folder of a study.", metavar="STUDY")],
+    study: Annotated[
+        Path, typer.Argument(help="Result folder of a study; with --rerun also of a run.", metavar="FOLDER")
+    ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="File of the report. [dim]\\[default: STUDY/report.html][/]", dir_okay=False),
+        typer.Option(
+            metavar="FILE", help="File of the report. [dim]\\[default: FOLDER/report.html][/]", dir_okay=False
+        ),
     ] = None,
     threshold: Annotated[
         list[str] | None,
@@ -65,7 +69,12 @@ def report(
             raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
         thresholds = _thresholds(threshold or [])
         from simharness.study.result_folder import read_study
+        from simharness.trial.run_folder import is_run
 
+        if is_run(study):
+            _write_rerun_of_run(study, trial, rerun)
+            typer.echo(f"recording: {rerun}")
+            return
         results = read_study(study)
         if rerun is not None:
             _write_rerun(results, trial, rerun)
@@ -103,18 +112,36 @@ def _thresholds(given: list[str]) -> dict[str, float]:
 
 
 def _write_rerun(results: Results, trial: str | None, path: Path) -> None:
+    """Write the recording of a trial of a study, which is run again."""
     from simharness.report.study.replay import replay
     from simharness.report.study.rerun_recording import require_sdk, write_rerun
 
     require_sdk()
-    frame = _chosen(results, trial)
+    frame = _choose_frame(results, trial)
     scenario = results.scenario_of(frame.trial)
     with run_errors_only():
         again = replay(scenario, frame.variant)
     write_rerun(again, path)
 
 
-def _chosen(results: Results, trial: str | None) -> WorstFrame:
+def _write_rerun_of_run(folder: Path, trial: str | None, path: Path | None) -> None:
+    """Write the recording of a run, from its result folder."""
+    if path is None:
+        raise ValueError(
+            f"{folder}: this is the result folder of a run, whose report is {folder / 'report.html'}; give the "
+            "folder of a study, or add --rerun FILE"
+        )
+    if trial is not None:
+        raise ValueError(f"--trial {trial}: {folder} is the folder of a run, which has one trial; remove --trial")
+    from simharness.report.study.replay import replay_run
+    from simharness.report.study.rerun_recording import require_sdk, write_rerun
+    from simharness.trial.run_folder import read_run
+
+    require_sdk()
+    write_rerun(replay_run(read_run(folder)), path)
+
+
+def _choose_frame(results: Results, trial: str | None) -> WorstFrame:
     """Return the worst frame of a trial, or of all trials."""
     from simharness.report.study.worst_frames import worst_frames
 

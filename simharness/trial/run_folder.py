@@ -136,6 +136,11 @@ def read_run(folder: Path | str) -> Record:
     )
 
 
+def is_run(folder: Path) -> bool:
+    """Return whether a folder is the result folder of a run."""
+    return (folder / "estimates.npz").is_file() and (folder / "summary.json").is_file()
+
+
 def timings_table(estimates: Mapping[str, Sequence[Estimate]]) -> pl.DataFrame:
     """Seconds of every stage: columns variant, frame, stage, seconds."""
     rows = [

@@ -1,24 +1,77 @@
 """Recording for the rerun viewer, written and read back."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from simharness.cli import app
+from simharness.report.run.result_folder import run as run_scenario
+from simharness.report.study.replay import replay_run
 from simharness.report.study.rerun_recording import write_rerun
+from simharness.scenario.load import load
+from simharness.trial.run_folder import read_run
 
 MAGIC = b"RRF2"
 
 
-def test_without_the_sdk_the_message_says_what_to_install(ran, tmp_path, monkeypatch):
+def test_without_the_sdk_the_message_has_the_command_to_install_it(ran, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)  # as if it were not installed
     file = tmp_path / "worst.rrd"
     result = CliRunner().invoke(app, ["report", str(ran.folder), "--rerun", str(file)], catch_exceptions=False)
     assert result.exit_code == 2
     assert "pip install -e '.[viewer]'" in result.stderr
     assert not file.exists()
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    """Return the result folder of a small run of two variants."""
+    small = ("duration=0.4", "rate=5", "people.count=2", "cameras.count=3", "rendering.renderer=rays")
+    scenario = load(Path("quickstart"), overrides=[*small, 'variants=["full", "fast"]'])
+    return run_scenario(scenario, out=tmp_path_factory.mktemp("runs"), workers=1)
+
+
+class TestRunFolder:
+    """``simharness report FOLDER --rerun FILE`` with the result folder of ``simharness run``."""
+
+    def test_the_replay_holds_the_stored_estimates_of_the_worst_variant(self, run_folder):
+        record = read_run(run_folder)
+        again = replay_run(record)
+        pcp = {name: scores["pcp"] for name, scores in record.summary["variants"].items()}
+        assert pcp[again.variant] == min(pcp.values())
+        assert again.truth == record.truth
+        assert again.detections == record.detections
+        assert again.estimates == record.estimates[again.variant]
+        for camera, believed in zip(record.rig, again.trial.exposures.believed_rig, strict=True):
+            np.testing.assert_array_equal(camera.P, believed.P)
+        assert {solid.kind for solid in again.trial.scene.solids} > {"room"}
+        for frame in range(len(again.time)):
+            assert again.owners(frame).max(initial=-1) < 2
+
+    def test_the_command_writes_it(self, run_folder, tmp_path, monkeypatch):
+        written = {}
+        monkeypatch.setattr("simharness.report.study.rerun_recording.require_sdk", lambda: None)
+        monkeypatch.setattr(
+            "simharness.report.study.rerun_recording.write_rerun", lambda replay, path: written.update({path: replay})
+        )
+        result = self.call(str(run_folder), "--rerun", str(tmp_path / "run.rrd"))
+        assert result.exit_code == 0, result.stderr
+        assert list(written) == [tmp_path / "run.rrd"]
+        assert len(written[tmp_path / "run.rrd"].estimates) == 2
+
+    def test_only_the_recording_is_made_of_a_run(self, run_folder, tmp_path):
+        result = self.call(str(run_folder))
+        assert result.exit_code == 2
+        assert f"whose report is {run_folder / 'report.html'}" in result.stderr
+        result = self.call(str(run_folder), "--rerun", str(tmp_path / "run.rrd"), "--trial", "ab")
+        assert result.exit_code == 2
+        assert "which has one trial; remove --trial" in result.stderr
+
+    def call(self, *arguments):
+        return CliRunner().invoke(app, ["report", *arguments], catch_exceptions=False)
 
 
 class TestWithTheSdk:
@@ -46,6 +99,11 @@ class TestWithTheSdk:
             times = [time for batch in entities[entity] for time in batch.column("time").to_pylist()]
             seconds = sorted(time.total_seconds() for time in times)
             np.testing.assert_allclose(seconds, again.time, atol=1e-6)
+
+    def test_a_run_is_written_from_its_result_folder(self, run_folder, tmp_path):
+        arguments = ["report", str(run_folder), "--rerun", str(tmp_path / "run.rrd")]
+        assert CliRunner().invoke(app, arguments, catch_exceptions=False).exit_code == 0
+        assert {"world/truth/person1", "world/estimates"} <= set(self.read(tmp_path / "run.rrd"))
 
     def test_true_limbs_end_at_true_joints(self, shown, tmp_path):
         _, again = shown[0]
