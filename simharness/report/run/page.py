@@ -14,26 +14,18 @@ from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
 from simharness.pairing.pairing import pair
 from simharness.report.documents import fill_template
-from simharness.report.figures.palette import css, person_color
 from simharness.report.run import plots
+from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Animation
 from simharness.report.run.headline import COLUMNS, NOTHING
 from simharness.report.run.pictures import Picture
+from simharness.report.run.standard_figures import line_color, person_errors
 from simharness.scenario.toml_files import dumps
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.trial.run_folder import Record
-from simharness.types.views import Visibility
 from simharness.world.motion.choreography import roles
 
 _HIPS = [COCO17.index("left_hip"), COCO17.index("right_hip")]
-_MAX_LUMA = 165.0  # of a line on white, 0 to 255
-_VISIBILITY_LABELS = {
-    Visibility.VISIBLE: "visible",
-    Visibility.SELF_OCCLUDED: "self-occluded",
-    Visibility.OCCLUDED_BY_PERSON: "behind a person",
-    Visibility.OCCLUDED_BY_CLUTTER: "behind clutter",
-    Visibility.OUTSIDE: "outside",
-}
 
 
 def render(
@@ -69,6 +61,7 @@ def render(
         pictures=pictures,
         animation=animation,
         plots=_plots(record, main, things),
+        figures=draw_figures(record, main),
         stages=summary.get("run", {}).get("stages_s", {}),
         command=_command(record),
         resolved=dumps(record.scenario),
@@ -118,7 +111,7 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": f"person {person}",
-                "color": _line_color(person),
+                "color": line_color(person),
                 "activity": doing[person],
                 "found": f"{100 * found.mean():.1f}",
                 "pcp": f"{100 * correct / counted.sum():.1f}" if counted.any() else NOTHING,
@@ -126,14 +119,6 @@ def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
-    """Return the mean joint error of every true person in every frame, (T, P) millimetres; NaN where not found."""
-    rows = scores.filter(pl.col("variant") == variant).sort("frame")["errors_mm"].to_list()
-    return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
-        len(rows), -1
-    )
 
 
 def _parts(scores: pl.DataFrame, variant: str) -> NDArray[np.int8]:
@@ -154,19 +139,11 @@ def joint_errors(record: Record, variant: str) -> Floats:
     return errors
 
 
-def _line_color(person: int) -> str:
-    """Return the colour of a person, darkened where a line of it would be invisible on white."""
-    color = person_color(person)
-    luma = float(np.dot(color, (0.299, 0.587, 0.114)))  # Rec. 601
-    red, green, blue = (round(part * min(1.0, _MAX_LUMA / luma)) for part in color)
-    return css((red, green, blue))
-
-
 def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Markup]:
     """Return the SVG of each plot by name; plots without data are left out."""
     joints = np.stack([true.joints for true in record.truth])
     people = joints.shape[1]
-    colors = [_line_color(person) for person in range(people)]
+    colors = [line_color(person) for person in range(people)]
     found = np.concatenate([estimate.joints[:, _HIPS, :2].mean(axis=1) for estimate in record.estimates[main]])
     drawn = {
         "plan": plots.floor_plan(
@@ -187,13 +164,7 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
         ),
     }
     if people:
-        labels = np.stack([true.visibility for true in record.truth])
-        shares = np.stack([(labels == label).mean(axis=(0, 2, 3)) for label in _VISIBILITY_LABELS], axis=1)
-        drawn["visibility"] = plots.visibility_shares(
-            [camera.name for camera in record.rig], shares, labels=list(_VISIBILITY_LABELS.values())
-        )
         drawn["distribution"] = plots.error_distribution(
             {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
         )
-        drawn["errors"] = plots.error_over_time(record.time, person_errors(record.scores, main), colors=colors)
     return {name: Markup(svg) for name, svg in drawn.items()}

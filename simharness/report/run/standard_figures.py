@@ -1,0 +1,66 @@
+"""Figures of the report of a run: error of each person over time, visibility in each camera."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+
+from mvpose.arrays import Floats
+from simharness.report.figures.palette import css, person_color
+from simharness.report.run import plots
+from simharness.report.run.figures import figure
+from simharness.trial.run_folder import Record
+from simharness.types.views import Visibility
+
+_MAX_LUMA = 165.0  # of a line on white, 0 to 255
+_VISIBILITY_LABELS = {
+    Visibility.VISIBLE: "visible",
+    Visibility.SELF_OCCLUDED: "self-occluded",
+    Visibility.OCCLUDED_BY_PERSON: "behind a person",
+    Visibility.OCCLUDED_BY_CLUTTER: "behind clutter",
+    Visibility.OUTSIDE: "outside",
+}
+
+
+@figure(
+    "Error over time",
+    "Mean joint error of each person, variant {variant}. "
+    "Squares below the axis: frames in which the person was not found.",
+)
+def error_over_time(record: Record, variant: str) -> str | None:
+    """Plot the mean joint error of each person over time; None without people."""
+    errors = person_errors(record.scores, variant)
+    colors = [line_color(person) for person in range(errors.shape[1])]
+    return plots.error_over_time(record.time, errors, colors=colors) if colors else None
+
+
+@figure(
+    "Visibility of the joints in each camera",
+    "Share of all joints of all people in all frames, visible or by the cause of the occlusion.",
+    grows=True,
+)
+def visibility(record: Record, variant: str) -> str | None:
+    """Plot the visibility of the joints in each camera; None without people."""
+    labels = np.stack([true.visibility for true in record.truth])
+    if not labels.shape[2]:
+        return None
+    shares = np.stack([(labels == label).mean(axis=(0, 2, 3)) for label in _VISIBILITY_LABELS], axis=1)
+    return plots.visibility_shares(
+        [camera.name for camera in record.rig], shares, labels=list(_VISIBILITY_LABELS.values())
+    )
+
+
+def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
+    """Return the mean joint error of every true person in every frame, (T, P) millimetres; NaN where not found."""
+    rows = scores.filter(pl.col("variant") == variant).sort("frame")["errors_mm"].to_list()
+    return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
+        len(rows), -1
+    )
+
+
+def line_color(person: int) -> str:
+    """Return the colour of a person, darkened where a line of it would be invisible on white."""
+    color = person_color(person)
+    luma = float(np.dot(color, (0.299, 0.587, 0.114)))  # Rec. 601
+    red, green, blue = (round(part * min(1.0, _MAX_LUMA / luma)) for part in color)
+    return css((red, green, blue))
