@@ -153,7 +153,7 @@ def test_the_page_has_breaking_points_of_the_given_thresholds(tmp_path):
     assert "PCP under 90 %" in render_study(results)
     page = render_study(results, thresholds={"pcp": 80.0, "ghosts": 1.0})
     assert "PCP under 80 %" in page
-    assert "Ghosts over 1 a frame" in page
+    assert "Ghosts over 1 per frame" in page
     assert "below 3.92" in page  # (80 - 60.375) / 5 = 3.925
 
 
