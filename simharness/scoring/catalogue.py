@@ -48,8 +48,8 @@ def _pose() -> Iterator[ScoreInfo]:
         yield _higher(f"pcp_{group}", f"PCP {name}", f"correct body parts, {name} only")
     yield _higher("recall", "Recall", "true people paired with an estimate within 500 mm")
     yield _higher("precision", "Precision", "estimates paired with a true person within 500 mm")
-    yield _lower("ghosts", "Ghosts", "a frame", "estimates that match no person", digits=2)
-    yield _lower("missed", "Missed", "a frame", "true people without an estimate", digits=2)
+    yield _lower("ghosts", "Ghosts", "per frame", "estimates that match no person", digits=2)
+    yield _lower("missed", "Missed", "per frame", "true people without an estimate", digits=2)
     yield _lower("mpjpe_mm", "MPJPE", "mm", "mean joint error of the people found; ignores missed people")
     yield _lower("mpjpe_median_mm", "Median error", "mm", "median over the people found of their mean joint error")
     for joint in COCO17.joints:
@@ -74,11 +74,11 @@ def _matching() -> Iterator[ScoreInfo]:
     yield _higher("match_recall", "Match recall", "pairs of detections of the same person that are matched")
     yield _higher("match_f1", "Match F1", "harmonic mean of match precision and match recall")
     about = "detections that share an estimate with another detection of their view; always 0 for a valid matching"
-    yield _lower("violations", "Violations", "a frame", about, digits=2)
+    yield _lower("violations", "Violations", "per frame", about, digits=2)
     about = "estimates from detections of two or more true people"
-    yield _lower("merged", "Merged estimates", "a frame", about, digits=2)
+    yield _lower("merged", "Merged estimates", "per frame", about, digits=2)
     about = "true people whose detections are divided among several estimates"
-    yield _lower("split", "Split people", "a frame", about, digits=2)
+    yield _lower("split", "Split people", "per frame", about, digits=2)
     yield _lower("phantoms_admitted", "Phantoms admitted", "%", "phantoms that are part of an estimate")
     yield _higher("phantoms_pruned", "Phantoms pruned", "phantoms that are part of no estimate")
 
@@ -92,7 +92,7 @@ def _times() -> Iterator[ScoreInfo]:
 
 def _failures() -> Iterator[ScoreInfo]:
     for kind, about in _FAILURES.items():
-        yield _lower(f"failures_{kind}", f"Failures, {kind.replace('_', ' ')}", "a frame", about, digits=2)
+        yield _lower(f"failures_{kind}", f"Failures, {kind.replace('_', ' ')}", "per frame", about, digits=2)
     for stage in ("detection", "matching", "reconstruction"):
         about = f"failures removed by the truth in place of {stage}, and not in place of an earlier stage"
         yield _lower(f"blame_{stage}", f"Blame {stage}", "%", about)

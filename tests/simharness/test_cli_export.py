@@ -1,4 +1,4 @@
-"""``simharness export`` from the command line: what it says and how it exits."""
+"""``simharness export`` from the command line: output, messages and exit codes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def call(tmp_path, monkeypatch):
     return call
 
 
-def test_it_writes_a_sequence_and_says_where(call, tmp_path, monkeypatch):
+def test_it_writes_a_sequence_and_prints_the_folder(call, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", ["simharness", "export", "quickstart.toml", "bench"])
     result = call(QUICKSTART, "bench", *TINY, "--seed", "3")
     assert result.exit_code == 0, result.stderr
@@ -35,9 +35,9 @@ def test_it_writes_a_sequence_and_says_where(call, tmp_path, monkeypatch):
     assert result.stdout.startswith(f"{len(files)} files, ")
     assert result.stdout.endswith(" MB, in bench/quickstart\n")
     assert len([file for file in files if file.suffix == ".jpg"]) == 6
-    said = json.loads((tmp_path / "bench" / "quickstart" / "manifest.json").read_text())
-    assert said["seed"] == 3
-    assert said["provenance"]["command"] == "simharness export quickstart.toml bench"
+    content = json.loads((tmp_path / "bench" / "quickstart" / "manifest.json").read_text())
+    assert content["seed"] == 3
+    assert content["provenance"]["command"] == "simharness export quickstart.toml bench"
 
 
 def test_pictures_may_be_left_out(call, tmp_path):
@@ -53,13 +53,13 @@ def test_pictures_may_be_left_out(call, tmp_path):
         ((QUICKSTART, "bench", "--set", "people.cuont=2"), "did you mean people.count?"),
         ((QUICKSTART, "bench", *TINY, "--set", "cameras.radius=4.5"), "cameras.radius"),
         ((QUICKSTART, "file"), "file/quickstart: this folder cannot be created"),
-        ((QUICKSTART, "mine"), "mine/quickstart: already exists and is no export"),
+        ((QUICKSTART, "existing"), "existing/quickstart: already exists and is no export"),
         (("nothing.toml", "bench"), "nothing.toml: no such file"),
     ],
 )
 def test_bad_input_is_one_message(call, tmp_path, arguments, message):
     (tmp_path / "file").touch()
-    (tmp_path / "mine" / "quickstart").mkdir(parents=True)
+    (tmp_path / "existing" / "quickstart").mkdir(parents=True)
     result = call(*arguments)
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
@@ -68,7 +68,7 @@ def test_bad_input_is_one_message(call, tmp_path, arguments, message):
     assert not (tmp_path / "bench").exists()
 
 
-def test_an_error_of_ours_shows_its_traceback(call, tmp_path, monkeypatch):
+def test_an_internal_error_shows_its_traceback(call, tmp_path, monkeypatch):
     def broken(*_args, **_options):
         raise ValueError("wrong turn")
 
@@ -76,5 +76,5 @@ def test_an_error_of_ours_shows_its_traceback(call, tmp_path, monkeypatch):
     result = call(QUICKSTART, "bench", *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr
-    assert "the run failed: ValueError: wrong turn" in result.stderr
+    assert "the run failed: write: ValueError: wrong turn" in result.stderr
     assert not list((tmp_path / "bench").iterdir())
