@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
 from mvpose.arrays import Bools, Floats, Integers
-from simharness.world.humans.body import Part
+from simharness.world.humans.body import FacePart
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES
 
 ByBone = dict[str, Floats]
@@ -153,10 +153,10 @@ def cut_and_label(body: MeanBody) -> tuple[sparse.csr_array, Integers, Integers,
     mesh = cut(mesh, is_head[mesh.origin], hair)
 
     # First the parts that whole faces belong to, then those that depend on the pieces.
-    whole = np.full(len(faces), int(Part.TORSO))
-    whole[is_skin] = np.where(is_head[is_skin], Part.SKIN, Part.HAND)
-    whole[: first[1]][_brow(points[skin].mean(1), points[body.eyes].mean(1))] = Part.BROW
-    whole[: first[1]][masks["lips"]] = Part.LIPS
+    whole = np.full(len(faces), int(FacePart.TORSO))
+    whole[is_skin] = np.where(is_head[is_skin], FacePart.SKIN, FacePart.HAND)
+    whole[: first[1]][_brow(points[skin].mean(1), points[body.eyes].mean(1))] = FacePart.BROW
+    whole[: first[1]][masks["lips"]] = FacePart.LIPS
     whole[is_eye] = _eye_parts(points[body.eyes].mean(1))
     ears = np.zeros(len(faces), bool)
     ears[: first[1]] = masks["ears"]
@@ -164,17 +164,17 @@ def cut_and_label(body: MeanBody) -> tuple[sparse.csr_array, Integers, Integers,
     level = np.where(is_suit[mesh.origin], mesh.on_faces(trunk), 0.0)
     height = mesh.on_faces(hair)
     scalp = (is_head & ~ears)[mesh.origin] & (height > 0)
-    part[scalp], level[scalp] = Part.SCALP, np.clip(height[scalp] / HAIR_DEPTH, 0, 1)
+    part[scalp], level[scalp] = FacePart.SCALP, np.clip(height[scalp] / HAIR_DEPTH, 0, 1)
     for (_, limb), (weight, along) in limbs.items():
         on_limb = is_suit[mesh.origin] & (mesh.on_faces(weight) > 0.5)
         if limb == "Leg":
             on_limb &= mesh.on_faces(trunk) < 0
-        part[on_limb] = Part.ARM if limb == "Arm" else Part.LEG
+        part[on_limb] = FacePart.ARM if limb == "Arm" else FacePart.LEG
         level[on_limb] = mesh.on_faces(along)[on_limb]
-    part[(part == Part.LEG) & (level > LEGS["long"])] = Part.SHOE
-    part[(part == Part.SHOE) & (mesh.on_faces(floor) < SOLE)] = Part.SOLE
+    part[(part == FacePart.LEG) & (level > LEGS["long"])] = FacePart.SHOE
+    part[(part == FacePart.SHOE) & (mesh.on_faces(floor) < SOLE)] = FacePart.SOLE
 
-    above_collar = (part == Part.TORSO) & (mesh.on_faces(collar) > 0)
+    above_collar = (part == FacePart.TORSO) & (mesh.on_faces(collar) > 0)
     in_socket = is_eye[mesh.origin] & (mesh.on_faces(points)[:, 0] < points[body.eyes, 0].max() - 0.014)
     keep = ~above_collar & ~in_socket
     used, kept = np.unique(mesh.faces[keep], return_inverse=True)
@@ -230,9 +230,9 @@ def _brow(middle: Floats, eyes: Floats) -> Bools:
 
 def _eye_parts(centers: Floats) -> Integers:
     """Return the part of eye faces, sclera or iris, from their centres (k, 3)."""
-    part = np.full(len(centers), int(Part.SCLERA))
+    part = np.full(len(centers), int(FacePart.SCLERA))
     for side in (1, -1):
         eye = centers[:, 1] * side > 0
         pupil = centers[eye][np.argmax(centers[eye][:, 0])]
-        part[eye & (np.linalg.norm(centers - pupil, axis=1) < 0.0065)] = Part.IRIS
+        part[eye & (np.linalg.norm(centers - pupil, axis=1) < 0.0065)] = FacePart.IRIS
     return part
