@@ -295,5 +295,5 @@ def test_the_fields_of_a_recording_must_agree():
     with pytest.raises(ValueError, match=r"frame 1 has \(3, 17\)"):
         replace(recording, truth=(recording.truth[0], *record(2, 3).truth))
     other = record(3, 2, 4)
-    with pytest.raises(ValueError, match="frame 0: 6 detections in 3 views, but truth of 8 in 4"):
+    with pytest.raises(ValueError, match="frame 0: 6 detections in 3 views, but truth for 8 detections in 4 views"):
         replace(recording, truth=other.truth)
