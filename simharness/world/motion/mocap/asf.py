@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
-from simharness.world.motion.mocap.skeleton import END, RecordedMotion, MocapSkeleton
+from simharness.world.motion.mocap.skeleton import END, MocapSkeleton, RecordedMotion
 
 RATE = 120.0  # Hz: AMC files do not state the rate; this is the rate of CMU recordings
 _TURNS, _SHIFTS = ("rx", "ry", "rz"), ("tx", "ty", "tz")

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from simharness.world.motion.mocap.line_reader import Line, Reader, quoted
-from simharness.world.motion.mocap.skeleton import END, RecordedMotion, MocapSkeleton
+from simharness.world.motion.mocap.skeleton import END, MocapSkeleton, RecordedMotion
 
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 _MOST_JOINTS = 2000

@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
-from simharness.world.motion.mocap.skeleton import RecordedMotion, MocapSkeleton, lowest_common_ancestor
+from simharness.world.motion.mocap.skeleton import MocapSkeleton, RecordedMotion, lowest_common_ancestor
 
 # Joint names by role, without the side, best first: of CMU, MotionBuilder, Biovision, Poser, 3ds Max and Blender. Two
 # roles of a limb may share a name ("shoulder" is the clavicle in one skeleton and the upper arm in another), so the
