@@ -42,6 +42,7 @@ class TwoViews:
 
 
 def main() -> None:
+    """Print the scores of both methods."""
     scenario = simharness.load_scenario("quickstart", overrides=["duration=1.0", 'rendering.renderer="rays"'])
     recording = simharness.simulate(scenario)
     for name, method in {"two views": TwoViews(), "full": Pipeline.preset("full")}.items():

@@ -25,6 +25,7 @@ def camera(name: str, position: tuple[float, float, float]) -> Camera:
 
 
 def main() -> None:
+    """Simulate the quickstart scenario with three cameras of a calibration file."""
     positions = {"door": (3.2, 2.6, 2.3), "window": (-3.2, 2.6, 2.3), "shelf": (0.3, -2.7, 2.4)}
     rig = Rig([camera(name, position) for name, position in positions.items()])
     with TemporaryDirectory() as folder:

@@ -44,6 +44,7 @@ def write_simulated(folder: Path) -> tuple[int, int]:
 
 
 def main() -> None:
+    """Run on the folder of the command line, or on a simulated recording."""
     if len(sys.argv) > 1:
         people_of(Path(sys.argv[1]), size=(1032, 776), frames=5)
         return

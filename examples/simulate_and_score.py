@@ -5,6 +5,7 @@ from mvpose import Pipeline
 
 
 def main() -> None:
+    """Print the scores of one preset."""
     scenario = simharness.load_scenario("quickstart", overrides=["duration=1.0", 'rendering.renderer="rays"'])
     recording = simharness.simulate(scenario)  # detections and truth of each frame, and the cameras
     pipeline = Pipeline.preset("full")

@@ -22,6 +22,7 @@ cameras.count = [2, 3, 4]
 
 
 def main() -> None:
+    """Run a study of three settings and print a table."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "cameras.toml"
         file.write_text(STUDY)

@@ -1,4 +1,4 @@
-"""Simulated people, calibrated cameras and 2D detectors with exact ground truth, and scores of the method under test."""
+"""Simulated people, cameras and 2D detectors with exact ground truth, and scores of the method under test."""
 
 from __future__ import annotations
 
