@@ -131,12 +131,12 @@ def evaluate_seeds(
 def _estimator(name: str) -> Estimator:
     """Return a preset, or a user-defined estimator given as FILE.py:NAME."""
     from mvpose import Pipeline
-    from simharness.trial.stages.estimators import OwnEstimator, load_estimator
+    from simharness.trial.stages.estimators import UserEstimator, load_estimator
 
     if ":" not in name:
         return Pipeline.preset(name)
     load_estimator(name)  # so that errors appear before the first frame
-    return OwnEstimator("--method", name)
+    return UserEstimator("--method", name)
 
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:

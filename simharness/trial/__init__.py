@@ -1,1 +1,1 @@
-"""One trial: a scenario at a seed built, captured, detected, estimated, audited and scored."""
+"""Trials: a scenario at a seed is built, captured, audited, detected, estimated and scored."""

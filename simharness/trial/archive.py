@@ -34,7 +34,7 @@ from simharness.trial.detected_sequence import DetectedSequence
 
 @dataclass(frozen=True)
 class TrialArchive:
-    """What is stored of a trial, so that it need not be simulated again.
+    """Stored detections and estimates of a trial, so that it need not be simulated again.
 
     Attributes:
         detected: archive of detections and truth; empty where they cannot be restored.
@@ -77,12 +77,18 @@ def unpack_detected(content: bytes, scenario: Scenario) -> DetectedSequence:
     truth = truth_of(truth_part, detection["frame"])
     frames = []
     rows = rows_of_frames(detection["frame"], len(detections))
-    for found, true, row in zip(detections, truth, rows, strict=True):
+    for frame_detections, frame_truth, row in zip(detections, truth, rows, strict=True):
         peaks = None
         if "rivals" in arrays:
             rivals = arrays["rivals"][row]
-            peaks = Peaks(found.boxes, found.keypoints, found.scores, rivals, scenario.detector.heatmaps)
-        frames.append(Detected(found, true, peaks))
+            peaks = Peaks(
+                frame_detections.boxes,
+                frame_detections.keypoints,
+                frame_detections.scores,
+                rivals,
+                scenario.detector.heatmaps,
+            )
+        frames.append(Detected(frame_detections, frame_truth, peaks))
     return DetectedSequence(truth_part["time"], rig_of_arrays(_part("rig", arrays)), tuple(frames))
 
 
@@ -96,7 +102,7 @@ def unpack_estimates(content: bytes, detected: DetectedSequence) -> tuple[Estima
 
     Args:
         content: from :func:`pack_estimates`.
-        detected: the detections that they were made from.
+        detected: the detections from which they were made.
     """
     arrays = _unpacked(content)
     counts = [len(frame.detections) for frame in detected.frames]

@@ -1,7 +1,7 @@
 """Rigs, detections, truth and estimates of a sequence as plain arrays, for files.
 
-Arrays that have a row for each detection or estimate of all T frames come with ``frame``, the frame of each row,
-ascending.
+Arrays with a row for each detection or estimate of all T frames have an array ``frame`` beside them: the frame of each
+row, ascending.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
     have it, ``covariance`` of the k estimated people; ``labels`` (n,) of the detections; ``iterations``, ``residuals``,
     ``objective`` and ``converged`` of the matching of each frame.
     """
-    certain = all(estimate.covariance is not None for estimate in estimates)
-    keys = ("joints", "scores", "covariance") if certain else ("joints", "scores")
+    has_covariance = all(estimate.covariance is not None for estimate in estimates)
+    keys = ("joints", "scores", "covariance") if has_covariance else ("joints", "scores")
     matchings = [estimate.matching for estimate in estimates]
     return {
         "frame": _frame_index(map(len, estimates)),

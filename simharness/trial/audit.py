@@ -1,7 +1,7 @@
-"""The self-audit of every run: is what was filmed what was asked for, and does the truth fit the pictures?
+"""Audit of a simulated trial: it must be what its scenario describes, and its truth must fit its pictures.
 
-Checked by other means than those that made it: projection by OpenCV, ids and depths of freshly drawn pictures. What
-fails here is a fault of the harness, never of the method, and no score of such a run would mean anything.
+The checks use other code than the simulation: projection by OpenCV, and ids and depths of newly rendered pictures. A
+failed check is a fault of the harness, never of the method, and scores of such a trial would have no meaning.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from simharness.world.scene.playback import Playback
 
 _FRAMES = 3  # frames in which projections are checked
 _PICTURES, _PICTURES_LEAST = 0.01, 3  # share and least number of the pictures that are rendered again
-_DEVIATIONS = 4.0  # standard deviations of a count that are allowed beside its expected value
-_PIXELS = 0.01  # between two projections of one point
-_SHARE = 0.98  # of the visible joints must be found where they should be: outlines are ragged
-_SIGMAS = 6.0  # an error of so many standard deviations is a mistake
-_DEPTH = 0.04  # metres beside a joint's own radius: clothes and flat limbs
-_WINDOW = 2  # pixels about a joint in which its person must be seen
+_DEVIATIONS = 4.0  # allowed deviation of a count from its expected value, in standard deviations
+_PIXELS = 0.01  # allowed distance between two projections of one point
+_SHARE = 0.98  # share of visible joints that must lie on their person; outlines have pixel steps
+_SIGMAS = 6.0  # largest allowed error, in standard deviations
+_DEPTH = 0.04  # metres added to the radius of a joint, for clothes and flat limbs
+_WINDOW = 2  # pixels around a joint in which its person must be visible
 
 
 class AuditError(RunError):
-    """A simulated trial that is not what its scenario describes."""
+    """Failed check: the simulated trial is not what its scenario describes."""
 
 
 def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequence: Sequence, views: Views) -> None:
     """Check a simulated trial before its detections are made.
 
-    Clocks and calibration are checked in whole. Projections are checked in three frames, rendered pictures in one per
-    cent of all, at least three: the audit costs less than two per cent of a trial.
+    Clocks and calibration are checked in all frames. Projections are checked in three frames, and one per cent of the
+    rendered pictures, at least three: the audit costs less than two per cent of a trial.
 
     Args:
         scenario: the scenario that was requested.
@@ -55,7 +55,7 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
     check_calibration(scenario.faults, exposures)
     playback = Playback(scene)
     frames = np.unique(np.linspace(0, len(views) - 1, min(len(views), _FRAMES)).astype(int))
-    if not exposures.readout:  # a rolling shutter has no single moment to compare with
+    if not exposures.readout:  # a picture of a rolling shutter has no single time
         for frame in map(int, frames):
             _check_projection(playback, exposures, views, frame)
     if scenario.rendering.renderer != "rays":
@@ -71,7 +71,7 @@ def sampled_pictures(exposures: ExposureSchedule, seed: int) -> list[tuple[int, 
 
 
 def check_clocks(faults: Faults, exposures: ExposureSchedule, time: Floats) -> None:
-    """Check that every picture was taken when the faults' dials allow.
+    """Check that the time of every picture agrees with the parameters of section [faults].
 
     Raises:
         AuditError: a picture at another time, a dead camera that delivers, a frozen picture of a later time.
@@ -89,22 +89,22 @@ def check_clocks(faults: Faults, exposures: ExposureSchedule, time: Floats) -> N
     if (exposures.source > np.arange(len(time))[:, None]).any():
         raise AuditError("clocks: a camera delivers a picture before it is taken")
     frozen = taken & (exposures.source != np.arange(len(time))[:, None])
-    for asked, found, what in (
-        (faults.dropped > 0 or bool(faults.dead), not taken.all(), "faults.dropped and faults.dead"),
+    for expected, present, keys in (
+        (faults.dropped > 0 or bool(faults.dead), not taken.all(), "faults.dropped or faults.dead"),
         (faults.frozen > 0, bool(frozen.any()), "faults.frozen"),
     ):
-        if found and not asked:
-            raise AuditError(f"clocks: pictures are missing or repeated, and {what} ask for none")
+        if present and not expected:
+            raise AuditError(f"clocks: pictures are missing or repeated, but the scenario does not set {keys}")
     for camera in faults.dead:
         if taken[:, camera].any() and not any(camera in pair for pair in faults.swapped):
-            raise AuditError(f"clocks: camera {camera} delivers pictures, and faults.dead says that it is dead")
+            raise AuditError(f"clocks: camera {camera} delivers pictures, but faults.dead contains it")
 
 
 def check_calibration(faults: Faults, exposures: ExposureSchedule) -> None:
-    """Check that the true cameras differ from the believed ones as much as the faults' dials allow, and no more.
+    """Check that true and believed cameras differ by no more than the parameters of section [faults] allow.
 
     Raises:
-        AuditError: a camera that is off by more.
+        AuditError: a camera with a larger difference.
     """
     swapped = {view for pair in faults.swapped for view in pair}
     frames = np.unique([0, len(exposures.time) - 1])
@@ -116,7 +116,7 @@ def check_calibration(faults: Faults, exposures: ExposureSchedule) -> None:
             if not exposures.delivered[frame, view]:
                 continue
             true = exposures.camera(frame, view)
-            for what, off, allowed in (
+            for quantity, difference, allowed in (
                 ("orientation, degrees", np.degrees(_angle(true.R @ believed.R.T)),
                  faults.rotation + faults.rotation_drift * minutes),
                 ("position, metres", float(np.abs(true.center - believed.center).max()),
@@ -125,32 +125,33 @@ def check_calibration(faults: Faults, exposures: ExposureSchedule) -> None:
                  abs(float(np.log(true.K[0, 0] / believed.K[0, 0]))), faults.focal),
                 ("principal point, pixels", float(np.abs(true.K[:2, 2] - believed.K[:2, 2]).max()), faults.center),
             ):  # fmt: skip
-                if off > _SIGMAS * allowed + 1e-6:
+                if difference > _SIGMAS * allowed + 1e-6:
                     raise AuditError(
-                        f"calibration: camera {believed.name!r} in frame {frame} is off in its {what}, by {off:.3g}; "
+                        f"calibration: camera {believed.name!r} in frame {frame} differs in {quantity} by "
+                        f"{difference:.3g}; "
                         f"the faults allow {_SIGMAS * allowed:.3g}"
                     )
 
 
-def _angle(turn: Floats) -> float:
-    """Of a rotation (3, 3), radians; exact where it is small."""
-    return float(np.linalg.norm(cv2.Rodrigues(turn)[0]))
+def _angle(rotation: Floats) -> float:
+    """Return the angle of a rotation matrix (3, 3) in radians; exact for small angles."""
+    return float(np.linalg.norm(cv2.Rodrigues(rotation)[0]))
 
 
 def _check_projection(playback: Playback, exposures: ExposureSchedule, views: Views, frame: int) -> None:
     for view in np.flatnonzero(exposures.delivered[frame]):
-        camera, said = exposures.camera(frame, int(view)), views.pixels[frame, view]
-        if not said.size:
+        camera, pixels = exposures.camera(frame, int(view)), views.pixels[frame, view]
+        if not pixels.size:
             continue
         joints = playback.at(exposures.time[frame, view]).joints
         expected = _projected(camera, joints)
-        # Beyond the picture a lens may image nothing, which OpenCV does not ask.
-        off = np.where(camera.inside(said), np.linalg.norm(said - expected, axis=-1), 0.0)
-        if not (off <= _PIXELS).all():
-            person, joint = map(int, np.unravel_index(np.nan_to_num(off, nan=np.inf).argmax(), off.shape))
+        # OpenCV also projects points outside the picture that the lens does not image.
+        error = np.where(camera.inside(pixels), np.linalg.norm(pixels - expected, axis=-1), 0.0)
+        if not (error <= _PIXELS).all():
+            person, joint = map(int, np.unravel_index(np.nan_to_num(error, nan=np.inf).argmax(), error.shape))
             raise AuditError(
                 f"projection: frame {frame}, view {view}, person {person}, joint {joint} is at "
-                f"{said[person, joint].round(2).tolist()} px in the truth and OpenCV projects it to "
+                f"{pixels[person, joint].round(2).tolist()} px in the truth and OpenCV projects it to "
                 f"{expected[person, joint].round(2).tolist()}"
             )
 
@@ -181,10 +182,10 @@ def _check_pictures(scenario: Scenario, playback: Playback, exposures: ExposureS
             gap = np.abs(image.depth[window][surface] - depth).min(initial=np.inf)
             deep += bool(gap <= radii[person][joint] + _DEPTH + 0.05 * depth)
     allowed = (1.0 - _SHARE) * count
-    allowed += _DEVIATIONS * np.sqrt(allowed)  # of few joints a few more may fail by chance
-    for what, right in (("shows its person at", shown), ("is as deep as the surface at", deep)):
-        if count - right > allowed:
+    allowed += _DEVIATIONS * np.sqrt(allowed)  # of few joints some more may fail by chance
+    for relation, correct in (("shows its person at", shown), ("is as deep as the surface at", deep)):
+        if count - correct > allowed:
             raise AuditError(
-                f"pictures: of {count} visible joints in {len(pictures)} sampled pictures only {right} lie where the "
-                f"picture {what} their pixel; expected {count - int(allowed)} or more"
+                f"pictures: of {count} visible joints in {len(pictures)} sampled pictures only {correct} lie where the "
+                f"picture {relation} their pixel; expected {count - int(allowed)} or more"
             )

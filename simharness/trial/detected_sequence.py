@@ -1,4 +1,4 @@
-"""DetectedSequence of a trial: what the method is given, and the truth about it."""
+"""Detections of a trial, which the method is given, with their truth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simharness.types.recording import Recording
 
 @dataclass(frozen=True)
 class DetectedSequence:
-    """Detections and truth of T frames, and the believed cameras. Estimation and scoring need nothing else.
+    """Detections and truth of T frames, and the believed cameras: the input of estimation and scoring.
 
     Attributes:
         time: time of each frame, (T,), seconds.

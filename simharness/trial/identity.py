@@ -1,21 +1,21 @@
-"""Identities of results: hashes of everything that determines a result, and of nothing else.
+"""Identities of results: hashes of everything that determines a result.
 
 A trial is a scenario at a seed. Its results are made in steps, and each step has an identity:
 
 - detections and truth: the values of the resolved scenario with its seed, the content of the files that it names, the
   code of the folders in :data:`SIMULATION`, the versions of :data:`PACKAGES`;
-- estimates of a variant: those, the variant, and the code of ``mvpose``; of a user-defined estimator also its place and
-  the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
-- scores: those, and the code of the folders in :data:`SCORES`;
-- failures and the stage to blame: the estimates', and the code of the folders in :data:`FAILURES`.
+- estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose``; for a user-defined
+  estimator also its place and the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
+- scores: the identity of the estimates, and the code of the folders in :data:`SCORES`;
+- failures and the stage to blame: the identity of the estimates, and the code of the folders in :data:`FAILURES`.
 
 The code of a folder is the syntax trees of its modules without docstrings, comments and field descriptions, and the
 bytes of its other files. So a changed docstring changes no identity, and a changed score keeps the simulation and the
 estimates.
 
 Names and descriptions of scenarios, detectors and studies, the folder of the study, other variants, the number of
-workers and the machine change nothing; nor does code of the command line, of reports and of the gate. One thing is not
-seen: ``rendering.renderer = "auto"`` takes one renderer or the other depending on the machine.
+workers and the machine change nothing; nor does code of the command line, of reports and of the gate. One
+difference is not detected: ``rendering.renderer = "auto"`` chooses a renderer that depends on the machine.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def trial_identity(scenario: Scenario) -> str:
     """Return the identity of a trial's detections and truth, 32 hexadecimal digits.
 
     Args:
-        scenario: resolved, with its seed; its variants do not count.
+        scenario: resolved scenario with its seed; its variants do not count.
     """
     values = scenario.model_dump(mode="json", exclude={"name": True, "description": True, "method": True})
     del values["detector"]["name"]
@@ -137,12 +137,12 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
 
 
 def _beside(file: Path, *suffixes: str) -> list[Path]:
-    there = sorted(file.parent.iterdir()) if file.parent.is_dir() else []
-    return [each for each in there if each.suffix.lower() in suffixes and each != file]
+    files = sorted(file.parent.iterdir()) if file.parent.is_dir() else []
+    return [each for each in files if each.suffix.lower() in suffixes and each != file]
 
 
 def _content(files: list[Path]) -> dict[str, str | None]:
-    """Digests by name; None of a file that is not there."""
+    """Return digests by name; None for a missing file."""
     content: dict[str, str | None] = {}
     for file in files:
         if file.is_file():
@@ -155,7 +155,7 @@ def _content(files: list[Path]) -> dict[str, str | None]:
 
 @functools.lru_cache(maxsize=256)
 def _digest_of_file(file: Path, size: int, changed: int) -> str:
-    """Of a file as it was at a time, so that ten thousand trials read a network once."""
+    """Return the digest of a file. It is cached by size and time of change: ten thousand trials read a network once."""
     with file.open("rb") as opened:
         return hashlib.file_digest(opened, lambda: hashlib.blake2b(digest_size=_SIZE)).hexdigest()
 

@@ -1,7 +1,7 @@
-"""Compile the method's kernels in a second process while this one builds and films.
+"""Compilation of the method's kernels in a second process while this one builds and films.
 
-The first run after an installation spends a quarter of its time on it. What is compiled lands in numba's cache on
-disk, where the processes that estimate find it.
+Compilation takes a quarter of the first run after an installation. The compiled kernels are written to numba's cache on
+disk, from which the processes that estimate load them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mvpose.pipeline import NEED_DESCRIPTORS
 
 
 class Compilation:
-    """A process that compiles; a failure costs nothing but the head start. A program needs it once."""
+    """Process that compiles kernels. If it fails, kernels are compiled later, when they are first used."""
 
     _compiled: ClassVar[set[str]] = set()
 
@@ -28,21 +28,21 @@ class Compilation:
         self._process = spawn.Process(target=compile_kernels, args=(self._variants,), daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the process, unless all variants have been compiled."""
         if self._variants:
             self._process.start()
 
     def wait(self) -> None:
-        """Return when all is compiled."""
+        """Wait until all kernels are compiled."""
         if self._variants:
             self._process.join()
             self._compiled.update(self._variants)
 
 
 def compile_kernels(variants: Iterable[str]) -> None:
-    """Compile whatever these presets of :class:`mvpose.Pipeline` use, or load it from the cache.
+    """Compile the kernels of presets of :class:`mvpose.Pipeline`, or load them from the cache.
 
-    Two cameras side by side see one stick of a person: the least that goes through every stage.
+    The input is one simple person seen by two cameras: the least that runs through every stage.
     """
     K = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
     rig = Rig([Camera(K, np.eye(3), np.array([x, 0.0, 3.0]), size=(640, 480)) for x in (-0.5, 0.5)])
@@ -52,4 +52,4 @@ def compile_kernels(variants: Iterable[str]) -> None:
     for variant in variants:
         for detections in (described,) if variant in NEED_DESCRIPTORS else (bare, described):
             if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
-                raise RuntimeError(f"{variant}: the one person before two perfect cameras was not found")
+                raise RuntimeError(f"{variant}: expected one person from two perfect views, got another number")

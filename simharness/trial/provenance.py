@@ -1,4 +1,4 @@
-"""What a result that is kept says of where it comes from."""
+"""Provenance of stored results: command, code, versions and machine."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ PROVENANCE = ("command", "seeds", "variants", "code", "digests", "versions", "ma
 
 
 def provenance(*, command: str | None, seeds: Iterable[int], variants: Iterable[str], seconds: float) -> dict[str, Any]:
-    """Where a result comes from, JSON-ready.
+    """Return the provenance of a result, ready for JSON.
 
     Args:
-        command: how the user asked for it.
-        seeds: of its scenes; none of recorded data.
-        variants: of the method.
-        seconds: that it took.
+        command: command line of the user.
+        seeds: seeds of the scenes; empty for recorded data.
+        variants: variants of the method.
+        seconds: duration of the run.
 
     Returns:
-        These, and ``code`` (version), ``digests`` (of the code: simulation, method), ``versions`` (of packages),
-        ``machine``.
+        The arguments, and ``code`` (version), ``digests`` (of the code: simulation, method, scores, failures),
+        ``versions`` (of packages), ``machine``.
     """
     return {
         "command": command,

@@ -1,35 +1,36 @@
-"""A run on disk: what its files hold, how they are written and read back.
+"""Result folder of a run: its files, written and read.
 
 A result folder holds, for T frames, V cameras, P people, J joints and n detections in all frames together:
 
 `scenario.toml`
-    the whole scenario, defaults and overrides written out; files that it names are relative to where the run was
-    started.
+    the complete scenario with defaults and overrides; the files that it names are relative to the folder in which the
+    run was started.
 `rig.npz`
     the calibration: ``names`` (V,), ``K`` (V, 3, 3), ``R`` (V, 3, 3), ``t`` (V, 3) metres,
     ``distortion`` (V, 5), ``size`` (V, 2) width and height.
 `detections.npz`
-    all that the method sees beside the rig: ``frames`` () is T; ``frame`` (n,) ascending; ``view`` (n,),
+    input of the method beside the rig: ``frames`` () is T; ``frame`` (n,) ascending; ``view`` (n,),
     ``keypoints`` (n, J, 2) px, ``scores`` (n, J), ``boxes`` (n, 4), ``box_scores`` (n,), ``skeleton`` () its
-    name, and ``descriptors`` (n, D) where there are any.
+    name, and ``descriptors`` (n, D) if detections have them.
 `truth.npz`
-    what only the scorer sees: ``time`` (T,) s, ``joints`` (T, P, J, 3) m, ``pixels`` (T, V, P, J, 2),
+    ground truth, which only the scorer reads: ``time`` (T,) s, ``joints`` (T, P, J, 3) m, ``pixels`` (T, V, P, J, 2),
     ``visibility`` (T, V, P, J), ``boxes`` (T, V, P, 4); and for each detection, in the order of
     `detections.npz`, ``person`` (n,) and ``error`` (n, J).
 `estimates.npz`
-    ``variants`` names them; for each, over k estimated people of all frames, ``NAME/frame`` (k,) ascending,
+    ``variants`` are their names; for each, over k estimated people of all frames, ``NAME/frame`` (k,) ascending,
     ``NAME/joints`` (k, J, 3) m, ``NAME/scores`` (k, J), ``NAME/covariance`` (k, J, 3, 3) m² where the variant
     has it; ``NAME/labels`` (n,) of the detections; and of the matching of each frame ``NAME/iterations``
     (T,), ``NAME/residuals`` (T, 2), ``NAME/objective`` (T,), ``NAME/converged`` (T,). The relaxed P is not
-    kept.
+    stored.
 `scores.parquet`
     a row for each frame and variant: :mod:`simharness.scoring.summary`.
 `timings.parquet`
-    ``variant``, ``frame``, ``stage``, ``seconds``: apart, for all files above are the same bytes in two runs.
+    ``variant``, ``frame``, ``stage``, ``seconds``: a separate file, because all files above are the same bytes in two
+    runs.
 `film.webp`, `mosaic.png`, `report.html`
-    for people: what the cameras recorded, a typical frame with everything drawn in, and the page of both.
+    pictures of all cameras, a typical frame with all people drawn into it, and the report.
 `summary.json`
-    the headline numbers (DESIGN, "Machine-readable output"), the time of each stage of the run, the command.
+    the headline scores, the duration of each stage of the run, the command.
 """
 
 from __future__ import annotations
@@ -66,17 +67,17 @@ from simharness.types.truth import Truth
 
 @dataclass(frozen=True)
 class Record:
-    """A whole run: input, truth, answers and scores.
+    """Complete run: input, truth, estimates and scores.
 
     Attributes:
-        scenario: as resolved.
-        rig: the cameras that the method was told of.
-        time: of each frame, (T,), seconds.
-        detections: what the method saw, one for each frame.
-        truth: what it should have found, one for each frame.
-        estimates: what each variant answered, one for each frame.
+        scenario: the resolved scenario.
+        rig: the believed cameras.
+        time: time of each frame, (T,), seconds.
+        detections: detections of each frame, T.
+        truth: truth of each frame, T.
+        estimates: estimates of each variant for each frame, T.
         scores: a row for each frame and variant.
-        summary: the headline numbers.
+        summary: the headline scores.
     """
 
     scenario: Scenario
@@ -91,7 +92,9 @@ class Record:
     def __post_init__(self) -> None:
         counts = {len(self.time), len(self.detections), len(self.truth), *map(len, self.estimates.values())}
         if len(counts) != 1:
-            raise ValueError(f"time, detections, truth and estimates must have one entry a frame, got {sorted(counts)}")
+            raise ValueError(
+                f"time, detections, truth and estimates must have an entry for each frame, got {sorted(counts)}"
+            )
 
 
 def write_run(record: Record, folder: Path) -> None:
@@ -112,7 +115,7 @@ def write_run(record: Record, folder: Path) -> None:
 
 
 def read_run(folder: Path | str) -> Record:
-    """Read a result folder back.
+    """Read a result folder.
 
     Raises:
         ValueError: the folder is not a result folder, or a file of it is missing.
@@ -121,8 +124,8 @@ def read_run(folder: Path | str) -> Record:
     names = ("scenario.toml", "rig.npz", "detections.npz", "truth.npz", "estimates.npz", "scores.parquet")
     missing = [name for name in (*names, "timings.parquet", "summary.json") if not (folder / name).is_file()]
     if missing:
-        raise ValueError(f"{folder}: not the folder of a finished run: it has no {', '.join(missing)}")
-    rig, detected, true, answered = (dict(np.load(folder / name)) for name in names[1:5])
+        raise ValueError(f"{folder}: not the result folder of a run: missing {', '.join(missing)}")
+    rig, detected, true, estimated = (dict(np.load(folder / name)) for name in names[1:5])
     detections = detections_of(detected)
     return Record(
         scenario=load(folder / "scenario.toml", folder=Path()),
@@ -130,7 +133,7 @@ def read_run(folder: Path | str) -> Record:
         time=true["time"],
         detections=detections,
         truth=truth_of(true, detected["frame"]),
-        estimates=_estimates(answered, detected["frame"], pl.read_parquet(folder / "timings.parquet")),
+        estimates=_estimates(estimated, detected["frame"], pl.read_parquet(folder / "timings.parquet")),
         scores=pl.read_parquet(folder / "scores.parquet"),
         summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")),
     )
@@ -142,11 +145,11 @@ def is_run(folder: Path) -> bool:
 
 
 def timings_table(estimates: Mapping[str, Sequence[Estimate]]) -> pl.DataFrame:
-    """Seconds of every stage: columns variant, frame, stage, seconds."""
+    """Return the timings of all stages: columns variant, frame, stage, seconds."""
     rows = [
         (variant, frame, stage, seconds)
-        for variant, answers in estimates.items()
-        for frame, estimate in enumerate(answers)
+        for variant, frames in estimates.items()
+        for frame, estimate in enumerate(frames)
         for stage, seconds in estimate.timings.items()
     ]
     schema = {"variant": pl.String, "frame": pl.Int64, "stage": pl.String, "seconds": pl.Float64}

@@ -39,14 +39,14 @@ from simharness.types.views import Views
 from simharness.world.scene.playback import simulate
 
 Goal = Literal["detect", "estimate", "score", "classify", "blame"]
-"""Last stage of a trial that is wanted. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
+"""Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
 
 _GOALS: tuple[str, ...] = get_args(Goal)
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """What only simulating a trial gives; stored detections have none of it.
+    """Scene, true poses and views of a simulated trial, which stored detections do not have.
 
     Attributes:
         trial: the built scenario.
@@ -66,7 +66,7 @@ class Known:
     Attributes:
         detected: detections and truth of the trial; None where they have to be simulated.
         estimates: estimates by variant. They need the detections that they were made from.
-        failures: table of failures by variant, from the last stage that is wanted now.
+        failures: table of failures by variant, from the last requested stage.
     """
 
     detected: DetectedSequence | None = None
@@ -76,13 +76,13 @@ class Known:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """Everything that a trial gave, up to its goal.
+    """Result of a trial up to its goal.
 
     Attributes:
         scenario: the resolved scenario at its seed.
-        detected: what the method was given, and the truth.
-        simulation: scene and pictures behind the detections; None where these were known.
-        estimates: estimates of each variant, one a frame; empty before the goal ``estimate``.
+        detected: detections, which the method was given, and the truth.
+        simulation: scene and views from which detections were made; None where detections were known.
+        estimates: estimates of each variant, one for each frame; empty before the goal ``estimate``.
         assessments: scores of each variant; empty before the goal ``score``.
         failures: table of failures of each variant; empty before the goal ``classify``.
         seconds: duration of each stage that ran.
@@ -142,15 +142,15 @@ def run_trial(
     Args:
         scenario: a resolved scenario with its seed.
         variants: variants of the method; the scenario's by default.
-        until: last stage that is wanted.
-        workers: processes that share the frames; the results do not depend on how many.
+        until: last requested stage.
+        workers: number of processes that share the frames; the results do not depend on it.
         previews: frames whose colour pictures are kept in the views.
         compile_ahead: compile the method's kernels in a second process while this one simulates.
         known: results of stages that need not run again.
         reporter: receiver of progress.
 
     Raises:
-        ValueError: the scenario cannot be built at this seed, or an unknown goal.
+        ValueError: the scenario cannot be built at this seed, or the goal is unknown.
         RunError: any error after that, with the stage in front; :class:`simharness.trial.audit.AuditError` where the
             trial is not what the scenario describes.
     """
@@ -236,12 +236,12 @@ def _estimate(
 ) -> dict[str, tuple[Estimate, ...]]:
     """Return the estimates of all variants; those that are known are not made again."""
     missing = {name: pipeline for name, pipeline in pipelines.items() if name not in known}
-    estimates = {name: tuple(answers) for name, answers in known.items()}
+    estimates = {name: tuple(frames) for name, frames in known.items()}
     if missing:
-        frames = range(len(detected.frames))
-        with stages.stage("estimate", len(frames)) as advance:
+        indices = range(len(detected.frames))
+        with stages.stage("estimate", len(indices)) as advance:
             estimation = EstimateFrames(detected.rig, detected.frames, missing)
-            parts = map_frames(estimation, frames, workers=workers, progress=advance)
+            parts = map_frames(estimation, indices, workers=workers, progress=advance)
             estimates |= {name: tuple(each for part in parts for each in part[name]) for name in missing}
     return {name: estimates[name] for name in pipelines}
 
@@ -278,7 +278,7 @@ def _find_failures(
 def _blame(
     detected: DetectedSequence, variant: str, pipeline: Estimator, estimates: Sequence[Estimate]
 ) -> Iterator[Blamed]:
-    """Find the failures of a variant and the stage to blame, a frame at a time: heat maps of all frames are large."""
+    """Find failures of a variant and the stage to blame, frame by frame, because heat maps of all frames are large."""
     recording = detected.recording
     estimation = EstimateFrames(detected.rig, detected.frames, {variant: pipeline})
     for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):

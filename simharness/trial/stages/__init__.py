@@ -1,1 +1,1 @@
-"""The stages of a trial that make its detections and estimates; their code is part of a trial's identity."""
+"""Stages of a trial that make its detections and estimates; their code is part of the identity of a trial."""

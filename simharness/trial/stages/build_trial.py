@@ -1,4 +1,4 @@
-"""Build stage: everything that a scenario describes, built and checked before any work is done."""
+"""Build stage: build and check everything that a scenario describes, before any other stage runs."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from simharness.world.scene.build import Scene, build
 
 @dataclass(frozen=True)
 class Trial:
-    """A built scenario: everything in it exists and is checked.
+    """Built and checked scenario.
 
     Attributes:
         scenario: the resolved scenario at its seed.
-        scene: the compiled room with its people and their motions.
-        exposures: time and true camera of every picture; also the believed calibration.
+        scene: the compiled scene with its people and their motions.
+        exposures: time and true camera of every picture, and the believed calibration.
         pipelines: variants of the method, by name.
-        descriptors: how descriptors are drawn; None where none are drawn.
+        descriptors: settings of drawn descriptors; None where none are drawn.
     """
 
     scenario: Scenario
@@ -43,7 +43,8 @@ def build_trial(scenario: Scenario) -> Trial:
     """Build what a scenario describes.
 
     Raises:
-        ValueError: it cannot be built: people that do not fit, a camera in a wall, an unknown variant, no network.
+        ValueError: the scenario cannot be built, for example because people do not fit, a camera is in a wall, or a
+            variant or network does not exist.
     """
     descriptors = descriptor_settings(scenario)
     if scenario.detector.onnx:
@@ -70,9 +71,9 @@ def build_variants(scenario: Scenario) -> dict[str, Estimator]:
     described = scenario.appearance.source != "none"
     appearance = re_id(scenario).affinity if described else AppearanceAffinity()
     pipelines = estimators_of(scenario.method, appearance=appearance)
-    if not described and (blind := NEED_DESCRIPTORS & pipelines.keys()):
+    if not described and (unusable := NEED_DESCRIPTORS & pipelines.keys()):
         raise ValueError(
-            f"method.variants: {', '.join(blind)} uses descriptors alone, and detections have none; choose "
+            f"method.variants: {', '.join(unusable)} needs descriptors, but detections have none; choose "
             'appearance.source = "pictures" or "drawn", or another variant'
         )
     return pipelines

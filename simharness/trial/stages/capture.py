@@ -1,4 +1,4 @@
-"""Capture stage: what every camera records of the scene, frame by frame, in any process."""
+"""Capture stage: the pictures and visibility of every camera, frame by frame, in any process."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CaptureFrames:
     previews: frozenset[int]
 
     def __call__(self, frames: range) -> Views:
-        """Return what the cameras see in these frames."""
+        """Return the views of these frames."""
         from simharness.capture.film import film
         from simharness.world.scene.playback import Playback
 
@@ -73,7 +73,7 @@ def picture_source_of(scenario: Scenario, playback: Playback) -> PictureSource:
 def renderer_of(name: RendererName) -> Renderer:
     """Return the renderer of this process by name.
 
-    There is one of each name: two GL contexts cannot share a scene, and shaders load once.
+    Each renderer is made once, because two GL contexts cannot share a scene, and shaders need to be loaded only once.
     """
     from simharness.capture.rendering.renderer import make_renderer
 

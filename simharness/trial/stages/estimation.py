@@ -1,4 +1,4 @@
-"""Estimation stage: every variant of the method on every frame's detections."""
+"""Estimation stage: run every variant of the method on the detections of every frame."""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-"""The variants of a scenario: presets of :class:`mvpose.Pipeline`, and methods of one's own.
+"""Variants of a scenario: presets of :class:`mvpose.Pipeline` and user-defined estimators.
 
-A method of one's own is any object with ``estimate(rig, detections) -> mvpose.Estimate``, the protocol
-:class:`mvpose.pipeline.Estimator`. A scenario says where it is::
+A user-defined estimator is any object with ``estimate(rig, detections) -> mvpose.Estimate``, the protocol
+:class:`mvpose.pipeline.Estimator`. A scenario gives its place::
 
-    variants = ["full", "mine"]
+    variants = ["full", "mean", "lifted"]
 
     [method.estimators]
-    mine = "mine.py:Mine"             # a file, relative to the scenario's, and a name in it
-    theirs = "package.module:method"  # a name in a module that can be imported
+    mean = "mean.py:Mean"             # a file, relative to the scenario file, and a name in it
+    lifted = "package.module:method"  # a name in a module that can be imported
 
-The name stands for such an object; or for a class or a function that makes one when called without arguments. It may
-be a :class:`mvpose.Pipeline` with stages of one's own. A file is loaded by itself, not as part of a package, and every
-process that estimates loads it anew. Frames come in any order, so a method must not remember the last one.
+The name refers to such an object, or to a class or function that returns one when it is called without arguments. The
+object may be a :class:`mvpose.Pipeline` with custom stages. A file is loaded alone, not as part of a package, and each
+process that estimates loads it once. Frames come in any order, so an estimator must not depend on earlier frames.
 """
 
 from __future__ import annotations
@@ -44,32 +44,33 @@ _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
 
 
 def estimators_of(method: Method, *, appearance: AppearanceAffinity | None = None) -> dict[str, Estimator]:
-    """The variants of a scenario, by name.
+    """Return the variants of a scenario, by name.
 
     Args:
         method: section [method].
-        appearance: what distances of descriptors mean to presets.
+        appearance: affinity of descriptors, for presets.
 
     Raises:
-        ValueError: a variant that is neither, or a method of one's own that cannot be loaded.
+        ValueError: an unknown variant, or a user-defined estimator that cannot be loaded.
     """
-    for key, said in wrong_variants(method):
-        raise ValueError(f"method.{key}: {said}")
+    for key, message in wrong_variants(method):
+        raise ValueError(f"method.{key}: {message}")
     places = method.estimators.places
     return {
-        name: _own(name, places[name]) if name in places else Pipeline.preset(name, appearance=appearance)
+        name: _user_estimator(name, places[name]) if name in places else Pipeline.preset(name, appearance=appearance)
         for name in method.variants
     }
 
 
 @dataclass(frozen=True)
-class OwnEstimator:
-    """A method of one's own. Only where it is travels between processes: each loads it for itself, once.
+class UserEstimator:
+    """User-defined estimator. Only its place is sent to other processes; each process loads the object once.
 
-    What it answers is checked, and timed: whoever wraps a pipeline hands on that one's time, not its own.
+    Its estimates are checked, and their total time is measured here, because an estimator that wraps a pipeline returns
+    the timings of the pipeline without its added time.
 
     Attributes:
-        name: of the variant.
+        name: name of the variant.
         place: "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE".
     """
 
@@ -78,41 +79,41 @@ class OwnEstimator:
 
     @property
     def loaded(self) -> Estimator:
-        """The object itself.
+        """The loaded object.
 
         Raises:
-            ValueError: it cannot be loaded.
+            ValueError: the object cannot be loaded.
         """
         return load_estimator(self.place)
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Find the people of one frame.
+        """Estimate the people of one frame.
 
         Raises:
-            RunError: the method raised, or answered what is no estimate of these detections.
+            RunError: the estimator raised an error, or returned no valid estimate of these detections.
         """
         estimator = self.loaded
         start = time.perf_counter()
         try:
-            answer = estimator.estimate(rig, detections)
+            estimate = estimator.estimate(rig, detections)
         except Exception as error:
-            raise RunError(f"{self.name} ({self.place}): {_said(error, _file_of(estimator))}") from error
+            raise RunError(f"{self.name} ({self.place}): {_describe_error(error, _file_of(estimator))}") from error
         seconds = time.perf_counter() - start
         try:
-            _check(answer, detections)
+            _check(estimate, detections)
         except ValueError as error:
             raise RunError(f"{self.name} ({self.place}): {error}") from None
-        return replace(answer, timings={**answer.timings, "total": seconds})
+        return replace(estimate, timings={**estimate.timings, "total": seconds})
 
 
 def load_estimator(place: str) -> Estimator:
-    """What is at a place, loaded once a process.
+    """Return the estimator at a place; each process loads it once.
 
     Args:
         place: "FILE.py:ATTRIBUTE", the file relative to the working directory, or "PACKAGE.MODULE:ATTRIBUTE".
 
     Raises:
-        ValueError: no such file, module or attribute; an error inside; or nothing that estimates.
+        ValueError: the file, module or attribute does not exist, raises an error, or is no estimator.
     """
     source, colon, attribute = place.rpartition(":")
     if not (source and colon and attribute):
@@ -121,34 +122,34 @@ def load_estimator(place: str) -> Estimator:
 
 
 def sources_of(place: str) -> Mapping[str, bytes]:
-    """The source files that a method of one's own is made of, by name, as they are when this process first asks.
+    """Return the Python source files of a user-defined estimator by name, as they are at the first call in a process.
 
-    Of a file those beside it, too, for a method may run or read them; of a module its top-level package. Only Python's:
-    what else a method runs or reads is not known.
+    For a file these are all Python files of its folder, because an estimator may run or read them; for a module all
+    files of its top-level package. Other files that an estimator runs or reads are not known.
     """
     return _sources(_absolute(place.rpartition(":")[0]))
 
 
-def _own(name: str, place: str) -> OwnEstimator:
-    own = OwnEstimator(name, place)
+def _user_estimator(name: str, place: str) -> UserEstimator:
+    estimator = UserEstimator(name, place)
     try:
-        _ = own.loaded
+        _ = estimator.loaded
     except ValueError as error:
         raise ValueError(f"method.estimators.{name}: {error}") from None
-    return own
+    return estimator
 
 
 @functools.cache
 def _sources(source: str) -> Mapping[str, bytes]:
     if source.endswith(".py"):
-        found = [(file.name, file) for file in Path(source).parent.glob("*.py")]
+        files = [(file.name, file) for file in Path(source).parent.glob("*.py")]
     else:
         spec = importlib.util.find_spec(source.partition(".")[0])
         folders = list((spec and spec.submodule_search_locations) or ())
-        found = [(str(file.relative_to(folder)), file) for folder in folders for file in Path(folder).rglob("*.py")]
+        files = [(str(file.relative_to(folder)), file) for folder in folders for file in Path(folder).rglob("*.py")]
         if spec and spec.origin and not folders:
-            found = [(Path(spec.origin).name, Path(spec.origin))]
-    return {name: file.read_bytes() for name, file in sorted(found)}
+            files = [(Path(spec.origin).name, Path(spec.origin))]
+    return {name: file.read_bytes() for name, file in sorted(files)}
 
 
 def _absolute(source: str) -> str:
@@ -159,19 +160,19 @@ def _absolute(source: str) -> str:
 def _loaded(source: str, attribute: str) -> Estimator:
     module = _module(source)
     if not hasattr(module, attribute):
-        there = [name for name in vars(module) if not name.startswith("_")]
-        near = difflib.get_close_matches(attribute, there, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(there) or 'none'}"
+        names = [name for name in vars(module) if not name.startswith("_")]
+        near = difflib.get_close_matches(attribute, names, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names) or 'no names'}"
         raise ValueError(f"{source} has no {attribute}; {hint}")
-    found: Any = getattr(module, attribute)
-    if isinstance(found, type) or (callable(found) and not hasattr(found, "estimate")):
+    value: Any = getattr(module, attribute)
+    if isinstance(value, type) or (callable(value) and not hasattr(value, "estimate")):
         try:
-            found = found()
+            value = value()
         except Exception as error:
-            raise ValueError(f"{source}: {attribute}() raised {_said(error, module.__file__)}") from error
-    if not callable(getattr(found, "estimate", None)):
-        raise ValueError(f"{source}: {attribute} is {type(found).__name__}, which has no {_PROTOCOL}")
-    estimator: Estimator = found
+            raise ValueError(f"{source}: {attribute}() raised {_describe_error(error, module.__file__)}") from error
+    if not callable(getattr(value, "estimate", None)):
+        raise ValueError(f"{source}: {attribute} is {type(value).__name__}, which has no {_PROTOCOL}")
+    estimator: Estimator = value
     return estimator
 
 
@@ -183,42 +184,49 @@ def _module(source: str) -> ModuleType:
         except Exception as error:
             if isinstance(error, ModuleNotFoundError) and error.name and f"{source}.".startswith(f"{error.name}."):
                 raise ValueError(
-                    f"there is no module {error.name}: install it or put its folder into PYTHONPATH, or name a file, "
+                    f"there is no module {error.name}: install it, add its folder to PYTHONPATH, or give a file, "
                     '"FILE.py:ATTRIBUTE"'
                 ) from None
-            raise ValueError(f"{source} cannot be imported: {_said(error, None)}") from error
+            raise ValueError(f"{source} cannot be imported: {_describe_error(error, None)}") from error
     if not Path(source).is_file():
         raise ValueError(
-            f"{source}: no such file; one that a scenario file names is looked for beside it, one of --set where the "
-            "command is run"
+            f"{source}: no such file; a path in a scenario file is relative to that file, a path in --set to the "
+            "working directory"
         )
-    # A name of its own in sys.modules, where dataclasses look for the module that they are in.
-    name = f"_own_{Path(source).stem}_{hashlib.blake2b(source.encode(), digest_size=4).hexdigest()}"
+    # A unique name in sys.modules, because dataclasses look up their module there.
+    name = f"_estimator_{Path(source).stem}_{hashlib.blake2b(source.encode(), digest_size=4).hexdigest()}"
     spec = importlib.util.spec_from_file_location(name, source)
     assert spec is not None
     assert spec.loader is not None
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # a script may end itself when it is imported
+    except (Exception, SystemExit) as error:  # a script may call sys.exit when it is imported
         del sys.modules[name]
-        raise ValueError(f"{source} cannot be loaded: {_said(error, source)}") from error
+        raise ValueError(f"{source} cannot be loaded: {_describe_error(error, source)}") from error
     return module
 
 
-def _check(answer: object, detections: Detections) -> None:
-    """Whether an answer is one to these detections."""
-    if not isinstance(answer, Estimate):
+def _check(estimate: object, detections: Detections) -> None:
+    """Check the return value of an estimator.
+
+    Raises:
+        ValueError: it is no estimate, or not a valid one of these detections.
+    """
+    if not isinstance(estimate, Estimate):
         raise ValueError(
-            f"estimate returned {type(answer).__name__}, expected mvpose.Estimate: Estimate.of_joints(joints) makes one"
+            f"estimate returned {type(estimate).__name__}, expected mvpose.Estimate: Estimate.of_joints(joints) "
+            "makes one"
         )
     skeleton = detections.skeleton
-    joints = as_array(answer.joints, ("n", len(skeleton), 3), f"joints ({skeleton.name})")
+    joints = as_array(estimate.joints, ("n", len(skeleton), 3), f"joints ({skeleton.name})")
     if np.isinf(joints).any():
-        raise ValueError("joints must be finite, or NaN where a joint could not be placed, got infinite ones")
-    if not np.isfinite(answer.scores).all():
-        raise ValueError("scores must be finite, 0 where a joint could not be placed, got NaN or infinite ones")
-    labels = answer.matching.labels_of(len(detections))
+        raise ValueError("joints must be finite, or NaN for a joint that could not be placed, got infinite values")
+    if not np.isfinite(estimate.scores).all():
+        raise ValueError(
+            "scores must be finite, and 0 for a joint that could not be placed, got NaN or infinite values"
+        )
+    labels = estimate.matching.labels_of(len(detections))
     if len(labels) and not -1 <= labels.min() <= labels.max() < len(joints):
         raise ValueError(
             f"labels must be -1, or 0 to n - 1 of n = {len(joints)} people, got {labels.min()} to {labels.max()}"
@@ -229,11 +237,11 @@ def _file_of(estimator: Estimator) -> str | None:
     return getattr(sys.modules.get(type(estimator).__module__), "__file__", None)
 
 
-def _said(error: BaseException, file: str | None) -> str:
-    """An error in a line, with the last line of a file that it went through; of any file where none is named."""
+def _describe_error(error: BaseException, file: str | None) -> str:
+    """Return an error as one line, with the last line of ``file`` in its traceback; of any file where it is None."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}, line {error.lineno})"
-    said = f"{type(error).__name__}: {error}"
+    message = f"{type(error).__name__}: {error}"
     frames = [each for each in traceback.extract_tb(error.__traceback__) if each.filename != __file__]
-    own = [each for each in frames if (each.filename == file if file else not each.filename.startswith("<"))]
-    return f"{said} ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else said
+    lines = [each for each in frames if (each.filename == file if file else not each.filename.startswith("<"))]
+    return f"{message} ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else message

@@ -65,7 +65,7 @@ def pose_head(scenario: Scenario) -> PoseHead:
     """Open the pose head of a scenario.
 
     Raises:
-        ValueError: its file is no pose head; the message names the key.
+        ValueError: the file is no pose head; the message names the key.
     """
     from mvpose.networks import PoseHead
 
@@ -79,7 +79,7 @@ def re_id(scenario: Scenario) -> ReId:
     """Open the re-ID network of a scenario.
 
     Raises:
-        ValueError: its file is no re-ID network; the message names the key.
+        ValueError: the file is no re-ID network; the message names the key.
     """
     from mvpose.networks import ReId
 

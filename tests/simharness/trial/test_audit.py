@@ -1,4 +1,4 @@
-"""The self-audit: a good run passes, and each thing that can be wrong is found."""
+"""Audit of simulated trials: a correct trial passes, and every kind of fault is found."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def ready() -> Ready:
     return Ready(small())
 
 
-def test_a_good_run_passes(ready):
+def test_a_correct_trial_passes(ready):
     ready.audit()
     assert (ready.views.visibility == Visibility.VISIBLE).sum() > 100  # or it would pass for want of joints
 
@@ -72,11 +72,11 @@ def test_a_good_run_passes(ready):
     ],
     ids=["faults", "rolling shutter", "distortion", "rays", "nobody"],
 )
-def test_whatever_is_asked_for_passes(sections):
+def test_every_kind_of_scenario_passes(sections):
     Ready(small(**sections)).audit()
 
 
-def test_a_truth_that_is_off_by_a_pixel_is_found(ready):
+def test_a_truth_with_an_error_of_a_pixel_is_found(ready):
     with pytest.raises(AuditError, match=r"projection: frame 0, view 0, person \d, joint \d+ is at .* OpenCV"):
         ready.audit(views=replace(ready.views, pixels=ready.views.pixels + 1.0))
 
@@ -87,33 +87,37 @@ def test_a_person_in_the_place_of_another_is_found(ready):
         ready.audit(views=swapped)
 
 
-def test_joints_called_visible_that_are_hidden_are_found(ready):
+def test_hidden_joints_that_are_labelled_visible_are_found(ready):
     inside = ready.views.visibility != Visibility.OUTSIDE
-    lying = np.where(inside, Visibility.VISIBLE, Visibility.OUTSIDE).astype(np.int8)
+    labels = np.where(inside, Visibility.VISIBLE, Visibility.OUTSIDE).astype(np.int8)
     with pytest.raises(AuditError, match=r"pictures: of \d+ visible joints .* only \d+ lie where"):
-        ready.audit(views=replace(ready.views, visibility=lying))
+        ready.audit(views=replace(ready.views, visibility=labels))
 
 
 @pytest.mark.parametrize(
-    ("done", "asked", "said"),
+    ("actual", "expected", "message"),
     [
         (Faults(clock_offset=0.1), Faults(), "clocks: the picture of view .* ms late"),
         (Faults(clock_jitter=0.1), Faults(clock_jitter=0.001), "clocks: the picture of view"),
         (Faults(dropped=0.5), Faults(), "clocks: pictures are missing"),
-        (Faults(frozen=0.5), Faults(dropped=0.5), "clocks: pictures are missing or repeated, and faults.frozen"),
+        (
+            Faults(frozen=0.5),
+            Faults(dropped=0.5),
+            "clocks: pictures are missing or repeated, but the scenario .* faults.frozen",
+        ),
         (Faults(), Faults(dead=(1,)), "clocks: camera 1 delivers"),
     ],
 )
-def test_clocks_that_are_not_as_asked_are_found(ready, done, asked, said):
+def test_clocks_that_differ_from_the_scenario_are_found(ready, actual, expected, message):
     time = np.arange(30) / 10.0
-    exposures = schedule_exposures(ready.exposures.true_cameras, done, time, seed=0)
-    check_clocks(done, exposures, time)
-    with pytest.raises(AuditError, match=said):
-        check_clocks(asked, exposures, time)
+    exposures = schedule_exposures(ready.exposures.true_cameras, actual, time, seed=0)
+    check_clocks(actual, exposures, time)
+    with pytest.raises(AuditError, match=message):
+        check_clocks(expected, exposures, time)
 
 
 @pytest.mark.parametrize(
-    ("done", "said"),
+    ("actual", "quantity"),
     [
         (Faults(focal=0.01), "focal length"),
         (Faults(center=2.0), "principal point"),
@@ -124,17 +128,17 @@ def test_clocks_that_are_not_as_asked_are_found(ready, done, asked, said):
         (Faults(swapped=((0, 1),)), "position"),
     ],
 )
-def test_a_calibration_that_is_not_as_asked_is_found(ready, done, said):
-    exposures = schedule_exposures(ready.exposures.true_cameras, done, np.arange(30) / 10.0, seed=0)
-    check_calibration(done, exposures)
+def test_a_calibration_that_differs_from_the_scenario_is_found(ready, actual, quantity):
+    exposures = schedule_exposures(ready.exposures.true_cameras, actual, np.arange(30) / 10.0, seed=0)
+    check_calibration(actual, exposures)
     with pytest.raises(
-        AuditError, match=f"calibration: camera .* is off in its .*{said if said != 'position' else ''}"
+        AuditError, match=f"calibration: camera .* differs in .*{quantity if quantity != 'position' else ''}"
     ):
         check_calibration(Faults(), exposures)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
-def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, share):
+def test_errors_of_focal_length_pass_up_to_the_allowed_size(ready, share):
     """The error is log-normal: three deviations up are more than three down."""
     time = np.arange(3) / 10.0
     faults = Faults(focal=share)
@@ -149,7 +153,7 @@ def test_focal_lengths_as_far_off_as_asked_are_right_and_farther_wrong(ready, sh
 
 
 def moved_projections(monkeypatch, pixels):
-    """Let the truth in the pictures be off by some pixels, as a wrong projection would have it."""
+    """Add an error of some pixels to the truth in the pictures, as from a wrong projection."""
     captured = CaptureFrames.__call__
 
     def wrong(self, frames):

@@ -30,7 +30,7 @@ from simharness.testing import assert_robust
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.estimation import EstimateFrames
-from simharness.trial.stages.estimators import OwnEstimator, estimators_of, load_estimator, sources_of
+from simharness.trial.stages.estimators import UserEstimator, estimators_of, load_estimator, sources_of
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
 MINE = """
@@ -213,18 +213,18 @@ class TestLoading:
 
 class TestAnswers:
     def test_they_are_those_of_the_object_and_timed(self, mine):
-        mined = OwnEstimator("own", f"{mine}:Silent").estimate(RIG, SEEN)
+        mined = UserEstimator("own", f"{mine}:Silent").estimate(RIG, SEEN)
         np.testing.assert_array_equal(mined.joints, Pipeline.preset("fast").estimate(RIG, SEEN).joints)
         assert len(mined) == 2
         assert 0 < mined.timings["total"] < 60
 
     def test_times_of_stages_are_kept_and_the_whole_is_timed_here(self, mine):
         """What wraps a pipeline and answers that one's estimate must not pass for as fast."""
-        timings = OwnEstimator("own", f"{mine}:Mine").estimate(RIG, SEEN).timings
+        timings = UserEstimator("own", f"{mine}:Mine").estimate(RIG, SEEN).timings
         stages = {stage: seconds for stage, seconds in timings.items() if stage != "total"}
         assert set(stages) == {"affinity", "matching", "reconstruction"}
         assert timings["total"] >= sum(stages.values())
-        assert OwnEstimator("own", f"{mine}:Slow").estimate(RIG, SEEN).timings["total"] >= 0.1
+        assert UserEstimator("own", f"{mine}:Slow").estimate(RIG, SEEN).timings["total"] >= 0.1
 
     @pytest.mark.parametrize(
         ("name", "said"),
@@ -241,10 +241,10 @@ class TestAnswers:
     )
     def test_what_is_wrong_with_them_is_said(self, mine, name, said):
         with pytest.raises(RunError, match=rf"^own \(.*mine\.py:{name}\): .*{said}"):
-            OwnEstimator("own", f"{mine}:{name}").estimate(RIG, SEEN)
+            UserEstimator("own", f"{mine}:{name}").estimate(RIG, SEEN)
 
     def test_only_the_place_travels(self, mine):
-        own = OwnEstimator("own", f"{mine}:make")
+        own = UserEstimator("own", f"{mine}:make")
         assert own.loaded
         assert len(pickle.dumps(own)) < 200 + len(str(mine))
         assert pickle.loads(pickle.dumps(own)) == own

@@ -89,7 +89,7 @@ def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
     [
         ('[appearance]\nsource = "pictures"\nnetwork = "none.onnx"\n', "appearance.network: .*none.onnx"),
         ('[appearance]\nsource = "pictures"\nnetwork = "tiny.toml"\n', "appearance.network: .*tiny.toml"),
-        ("", 'appearance uses descriptors alone.*appearance.source = "pictures"'),
+        ("", 'appearance needs descriptors.*appearance.source = "pictures"'),
     ],
 )
 def test_mistakes_are_named_before_any_work(scenario, text, message):

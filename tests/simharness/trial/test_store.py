@@ -1,4 +1,4 @@
-"""What is written is read back; and it is the same bytes every time."""
+"""Result folder of a run: written, read back, and the same bytes every time."""
 
 import json
 
@@ -15,29 +15,29 @@ FRAMES, VIEWS = 5, 3
 
 
 def make_record(*, people: int, empty: bool = False, seed: int = 0) -> Record:
-    """A run of random numbers, with frames in which nothing is detected and nobody is found."""
+    """Return a run of random numbers, with frames without detections and without estimates."""
     rng = np.random.default_rng(seed)
     rig = Rig([_camera(rng, f"cam{view}") for view in range(VIEWS)])
     detections, truth, estimates = [], [], []
     for frame in range(FRAMES):
-        found = 0 if empty or frame == 2 else int(rng.integers(1, 6))
-        scores = rng.random((found, 17))
+        count = 0 if empty or frame == 2 else int(rng.integers(1, 6))
+        scores = rng.random((count, 17))
         scores[scores < 0.2] = 0.0
-        boxes = rng.random((found, 4))
-        views = rng.integers(0, VIEWS, found)
-        keypoints = rng.normal(size=(found, 17, 2))
-        detections.append(Detections(views, keypoints, scores, boxes, rng.random(found)))
+        boxes = rng.random((count, 4))
+        views = rng.integers(0, VIEWS, count)
+        keypoints = rng.normal(size=(count, 17, 2))
+        detections.append(Detections(views, keypoints, scores, boxes, rng.random(count)))
         truth.append(
             Truth(
                 joints=rng.normal(size=(people, 17, 3)),
                 pixels=rng.normal(size=(VIEWS, people, 17, 2)),
                 visibility=rng.integers(0, 5, (VIEWS, people, 17)).astype(np.int8),
                 boxes=rng.random((VIEWS, people, 4)),
-                person=rng.integers(-1, people, found),
-                error=rng.integers(0, 6, (found, 17)).astype(np.int8),
+                person=rng.integers(-1, people, count),
+                error=rng.integers(0, 6, (count, 17)).astype(np.int8),
             )
         )
-        estimates.append(_estimate(rng, found))
+        estimates.append(_estimate(rng, count))
     return Record(
         scenario=Scenario(name="x", method=Method(variants=("full",))),
         rig=rig,
@@ -58,12 +58,12 @@ def _camera(rng: np.random.Generator, name: str) -> Camera:
     return Camera(np.diag([500.0, 501.0, 1.0]), rotation, rng.normal(size=3), rng.normal(size=5), (640, 480), name)
 
 
-def _estimate(rng: np.random.Generator, found: int) -> Estimate:
-    people = int(rng.integers(0, found + 1))
+def _estimate(rng: np.random.Generator, count: int) -> Estimate:
+    people = int(rng.integers(0, count + 1))
     joints = rng.normal(size=(people, 17, 3))
     joints[rng.random((people, 17)) < 0.1] = np.nan
     matching = Matching(
-        labels=rng.integers(-1, people, found),
+        labels=rng.integers(-1, people, count),
         iterations=int(rng.integers(100)),
         residuals=(rng.random(), rng.random()),
         objective=rng.normal(),
@@ -79,7 +79,7 @@ def assert_same(a, b, fields):
 
 
 @pytest.mark.parametrize(("people", "empty"), [(3, False), (0, True), (1, True)])
-def test_a_run_survives_the_disk(tmp_path, people, empty):
+def test_a_run_is_read_as_it_was_written(tmp_path, people, empty):
     record = make_record(people=people, empty=empty)
     write_run(record, tmp_path)
     back = read_run(tmp_path)
@@ -87,23 +87,23 @@ def test_a_run_survives_the_disk(tmp_path, people, empty):
     assert back.summary == record.summary
     assert back.scores.equals(record.scores)
     np.testing.assert_array_equal(back.time, record.time)
-    for mine, theirs in zip(record.rig, back.rig, strict=True):
-        assert_same(mine, theirs, ("K", "R", "t", "distortion", "size", "name"))
-    for mine, theirs in zip(record.detections, back.detections, strict=True):
-        assert_same(mine, theirs, ("view", "keypoints", "scores", "boxes", "box_scores"))
-        assert theirs.skeleton == mine.skeleton
-    for mine, theirs in zip(record.truth, back.truth, strict=True):
-        assert_same(mine, theirs, ("joints", "pixels", "visibility", "boxes", "person", "error"))
+    for one, other in zip(record.rig, back.rig, strict=True):
+        assert_same(one, other, ("K", "R", "t", "distortion", "size", "name"))
+    for one, other in zip(record.detections, back.detections, strict=True):
+        assert_same(one, other, ("view", "keypoints", "scores", "boxes", "box_scores"))
+        assert other.skeleton == one.skeleton
+    for one, other in zip(record.truth, back.truth, strict=True):
+        assert_same(one, other, ("joints", "pixels", "visibility", "boxes", "person", "error"))
     assert list(back.estimates) == list(record.estimates)
-    for mine, theirs in zip(record.estimates["full"], back.estimates["full"], strict=True):
-        assert_same(mine, theirs, ("joints", "scores", "covariance"))
-        assert_same(mine.matching, theirs.matching, ("labels",))
+    for one, other in zip(record.estimates["full"], back.estimates["full"], strict=True):
+        assert_same(one, other, ("joints", "scores", "covariance"))
+        assert_same(one.matching, other.matching, ("labels",))
         for field in ("iterations", "residuals", "objective", "converged"):
-            assert getattr(theirs.matching, field) == getattr(mine.matching, field)
-        assert theirs.timings == mine.timings
+            assert getattr(other.matching, field) == getattr(one.matching, field)
+        assert other.timings == one.timings
 
 
-def test_the_same_run_is_the_same_bytes(tmp_path):
+def test_the_same_run_gives_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         write_run(make_record(people=2), tmp_path / name)
@@ -112,10 +112,10 @@ def test_the_same_run_is_the_same_bytes(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["truth.npz", "summary.json", "scores.parquet"])
-def test_a_folder_that_lacks_a_file_is_no_run(tmp_path, name):
+def test_a_folder_without_a_file_is_refused(tmp_path, name):
     write_run(make_record(people=1), tmp_path)
     (tmp_path / name).unlink()
-    with pytest.raises(ValueError, match=f"not the folder of a finished run: it has no {name}"):
+    with pytest.raises(ValueError, match=f"not the result folder of a run: missing {name}"):
         read_run(tmp_path)
 
 
@@ -134,5 +134,5 @@ def test_the_summary_is_json(tmp_path):
 
 def test_frames_must_agree():
     record = make_record(people=1)
-    with pytest.raises(ValueError, match=r"one entry a frame, got \[4, 5\]"):
+    with pytest.raises(ValueError, match=r"an entry for each frame, got \[4, 5\]"):
         Record(**{**vars(record), "truth": record.truth[:-1]})
