@@ -63,7 +63,7 @@ def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
         pad_edge=False,
     )
     table.add_column("variant", no_wrap=True)
-    for column in ("real", "simulated", "difference", "mm, real", "mm, sim."):
+    for column in ("real", "simulated", "change", "mm, real", "mm, sim."):
         table.add_column(column, justify="right", no_wrap=True)
     for name, real in comparison.real.items():
         simulated = comparison.simulated[name]
