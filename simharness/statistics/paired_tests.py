@@ -78,7 +78,7 @@ def paired(
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Return Holm's adjusted p-values, in the order of ``p``; rejecting below a level controls the family-wise error rate.
+    """Return Holm's adjusted p-values, in the order of ``p``, which control the family-wise error rate.
 
     Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 1979.
 

@@ -36,7 +36,7 @@ def test_a_seed_determines_the_resamples():
 
 
 def test_block_intervals_cover_the_mean_of_correlated_frames_and_frame_intervals_do_not():
-    """AR(1) noise with a correlation time of 0.2 s, 300 recordings of 12 s: a 95 % interval covers its mean about as often."""
+    """AR(1) noise with a correlation time of 0.2 s: 300 recordings of 12 s, 95 % intervals of the mean."""
     rng = np.random.default_rng(1)
     kept = np.exp(-0.04 / 0.2)
     noise = rng.normal(size=(300, 300))
