@@ -22,24 +22,24 @@ _UNITS = {
     "p1 p2 k3",
     "joints19": "x y z in centimetres, confidence",
     "univTime": "milliseconds from the first frame",
-    "clock": "seconds that pictures are taken after their frames' times: their mean and standard deviation",
-    "lost": "frames whose picture never arrives: black here",
-    "repeated": "frames in which a camera repeats its picture of an earlier one: [frame, earlier one]",
-    "drift": "of the camera about its own axes, rad/s, and of its centre in simharness's axes, m/s",
+    "clock": "delay of the pictures behind the times of their frames, seconds: mean and standard deviation",
+    "lost": "frames whose picture never arrives; its file is black",
+    "repeated": "frames in which a camera repeats an earlier picture: [frame, earlier frame]",
+    "drift": "rotation of the camera about its axes, rad/s, and velocity of its centre in simharness's axes, m/s",
     "pose_keypoints_2d": "x y in pixels, score 0 to 1; 0 0 0 where missing",
     "rolling_shutter": "seconds from the first row of a picture to the last",
     "stature, mass": "metres, kilograms",
 }
 _AXES = "right-handed, y down, the floor at y = 0; (X, Y, Z) = 100 (x, -z, y) of simharness's metres, z up"
 _CALIBRATION = (
-    "of the cameras that take the pictures, as they hang at time 0; what a method is told of them, with the faults of "
-    "the scenario, is in calibration_believed, where that differs"
+    "the true cameras, which take the pictures, at time 0; the calibration that a method is given, with the faults of the "
+    "scenario, is in calibration_believed where it differs"
 )
 _BODIES = (
-    "everybody in every frame, hidden or not, at the frame's own time, whatever the cameras' clocks say; an id is one "
-    "person throughout"
+    "all people in every frame, hidden or not, at the time of the frame, also where the clocks of cameras differ; an id "
+    "stands for one person in all frames"
 )
-_MADE = "neck and mid_hip halfway between shoulders and hips, where both were detected; feet missing"
+_MADE = "neck and mid_hip are midpoints of shoulders and of hips, where both were detected; feet are missing"
 
 
 def manifest(
@@ -85,8 +85,8 @@ def manifest(
         "calibration": _CALIBRATION,
         "bodies": _BODIES,
         "confidence": {
-            "of a joint by how many pictures show it": CONFIDENCES,
-            "none": "hidden in all pictures, others of the person's joints are not",
+            "joint, by the number of pictures that show it": CONFIDENCES,
+            "none": "hidden in all pictures, which show other joints of the person",
             "nobody": "no picture shows any joint of the person",
         },
         "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _MADE},
