@@ -32,11 +32,11 @@ _UNITS = {
 }
 _AXES = "right-handed, y down, the floor at y = 0; (X, Y, Z) = 100 (x, -z, y) of simharness's metres, z up"
 _CALIBRATION = (
-    "the true cameras, which take the pictures, at time 0; the calibration that a method is given, with the faults of the "
-    "scenario, is in calibration_believed where it differs"
+    "the true cameras, which take the pictures, at time 0; the calibration that a method is given, with the faults of "
+    "the scenario, is in calibration_believed where it differs"
 )
 _BODIES = (
-    "all people in every frame, hidden or not, at the time of the frame, also where the clocks of cameras differ; an id "
+    "all people in every frame, hidden or not, at the time of the frame, also where clocks of cameras differ; an id "
     "stands for one person in all frames"
 )
 _MADE = "neck and mid_hip are midpoints of shoulders and of hips, where both were detected; feet are missing"
