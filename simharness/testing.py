@@ -3,7 +3,7 @@
     from simharness.testing import assert_robust
 
 
-    def test_people_are_found_whatever_happens():
+    def test_the_method_is_robust():
         assert_robust("scenarios/ci.toml", seeds=4, pcp=90, recall=95, ghosts=0.3)
 
 Any score of :data:`simharness.scoring.catalogue.SCORES` can be asserted.
@@ -44,8 +44,8 @@ def assert_robust(
         variant: variant of the method.
         seeds: number of seeds, or a list; the file's by default.
         workers: processes that share the trials.
-        keep: folder in which finished trials are kept, as ``simharness study --out`` keeps them. A second run measures
-            only what has changed, and ``simharness report`` shows what happened. By default nothing is kept.
+        keep: folder in which finished trials are stored, as by ``simharness study --out``. A second run measures only
+            trials that have changed, and ``simharness report`` shows the failures. By default nothing is stored.
         thresholds: by the keys of :data:`simharness.scoring.catalogue.SCORES`, in their units: the least allowed mean
             over all trials where more is better, the largest where less is better.
 
@@ -60,14 +60,14 @@ def assert_robust(
 
     _check(thresholds)
     study = load_study(scenario, seeds=seeds, variants=[variant])
-    scores = _measured(study, workers) if keep is None else _kept(study, Path(keep), workers)
-    wrong = [message for key, limit in thresholds.items() if (message := _wrong(key, limit, scores, study))]
-    if wrong:
-        raise AssertionError("\n".join([f"{scenario}, {variant}, {study.trials} trials", *wrong]))
+    scores = _run_unstored(study, workers) if keep is None else _run_stored(study, Path(keep), workers)
+    messages = [message for key, limit in thresholds.items() if (message := _message(key, limit, scores, study))]
+    if messages:
+        raise AssertionError("\n".join([f"{scenario}, {variant}, {study.trials} trials", *messages]))
 
 
-def _measured(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, float | None]]:
-    """Run a study without a store."""
+def _run_unstored(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, float | None]]:
+    """Run a study without a store, and return the scores of all trials."""
     from simharness.gate.suite import run_suite
 
     done = run_suite(study, workers=workers)
@@ -75,8 +75,8 @@ def _measured(study: Study, workers: int) -> Mapping[TrialKey, Mapping[str, floa
     return done.scores
 
 
-def _kept(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
-    """Run what is not finished of a study in a folder."""
+def _run_stored(study: Study, folder: Path, workers: int) -> dict[TrialKey, Mapping[str, float | None]]:
+    """Run the unfinished trials of a study in a folder, and return the scores of all trials."""
     from simharness.gate.trial_command import TrialKey, setting_name
     from simharness.study.plan import plan
     from simharness.study.runner import run_study
@@ -109,20 +109,24 @@ def _require_all(failed: Sequence[tuple[str, int, str]], study: Study) -> None:
 
 
 def _check(thresholds: Mapping[str, float]) -> None:
-    """Refuse thresholds that nothing can be held against: better now than after the run."""
+    """Check thresholds before the run.
+
+    Raises:
+        ValueError: no threshold, an unknown score, or a threshold that is no finite number.
+    """
     if not thresholds:
         raise ValueError("assert_robust needs a threshold, for example pcp=95")
     for key, limit in thresholds.items():
         if key not in SCORES:
             near = difflib.get_close_matches(key, SCORES, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(SCORES)}"
-            raise ValueError(f"no score {key!r}; {hint}")
+            hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(SCORES)}"
+            raise ValueError(f"unknown score {key!r}; {hint}")
         if not isinstance(limit, Real) or isinstance(limit, bool) or not math.isfinite(limit):
             raise ValueError(f"{key}={limit!r}: expected a finite number, for example {key}=95")
 
 
-def _wrong(key: str, limit: float, scores: Mapping[TrialKey, Mapping[str, float | None]], study: Study) -> str:
-    """What is wrong with a score; nothing where it is on the good side of its threshold."""
+def _message(key: str, limit: float, scores: Mapping[TrialKey, Mapping[str, float | None]], study: Study) -> str:
+    """Return a message if the mean of a score is beyond its threshold; "" otherwise."""
     from simharness.gate.trial_command import command_of
 
     info = SCORES[key]
@@ -137,7 +141,7 @@ def _wrong(key: str, limit: float, scores: Mapping[TrialKey, Mapping[str, float 
     case = min(sorted(by_case), key=lambda name: sign * by_case[name])
     trial = min((trial for trial in known if trial.case == case), key=lambda trial: sign * known[trial])
     what = f"{info.title} is {_number(info, mean)}, expected at {'least' if sign > 0 else 'most'} {limit:g}"
-    worst = f"worst case {case}: {_number(info, by_case[case])}, there seed {trial.seed}: {_number(info, known[trial])}"
+    worst = f"worst case {case}: {_number(info, by_case[case])}, at seed {trial.seed}: {_number(info, known[trial])}"
     return f"{what}; {worst}\n  {command_of(study, trial)}"
 
 

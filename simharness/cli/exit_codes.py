@@ -41,7 +41,7 @@ def exit_on_error() -> Iterator[None]:
 
 @contextlib.contextmanager
 def run_errors_only() -> Iterator[None]:
-    """Turn every error into a RunError: the input has been validated."""
+    """Turn every error into a RunError, because the input has been validated."""
     from simharness.runtime.errors import RunError
 
     try:

@@ -195,7 +195,7 @@ def _run(
                 else:
                     run += 1
                 advance(1, failed=int(isinstance(result, TrialFailure)))
-    except KeyboardInterrupt:  # may come between writing a trial and counting it, so the store is asked
+    except KeyboardInterrupt:  # may come between writing a trial and counting it: count in the store
         finished = sum(all(map(store.holds, unique[unit.trial].entries.values())) for unit in units)
         raise Interrupted(kept + finished, len(unique)) from None
     failures = tuple(_failed(each, failed[each.trial]) for each in planned if each.trial in failed)

@@ -1,4 +1,4 @@
-"""A scenario file as an assertion."""
+"""Assertions about a scenario file."""
 
 import re
 import subprocess
@@ -24,29 +24,29 @@ def small(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_what_is_good_enough_passes(small):
+def test_scores_within_the_thresholds_pass(small):
     assert_robust(small, variant="fast", seeds=2, pcp=60, recall=80, mpjpe_mm=90, ghosts=2.0)
 
 
 @pytest.mark.slow
-def test_what_is_not_says_where_and_how_to_see_it(small):
+def test_a_failed_assertion_has_the_worst_case_and_its_command(small):
     with pytest.raises(AssertionError) as caught:
         assert_robust(str(small), variant="fast", seeds=2, pcp=99.9, recall=10, mpjpe_mm=1.5)
     title, pcp, command, mpjpe, _ = str(caught.value).splitlines()
     assert title == f"{small}, fast, 4 trials"
-    said = re.fullmatch(
-        r"PCP is [\d.]+ %, expected at least 99.9; worst case (\w+): [\d.]+ %, there seed (\d): [\d.]+ %", pcp
+    match = re.fullmatch(
+        r"PCP is [\d.]+ %, expected at least 99.9; worst case (\w+): [\d.]+ %, at seed (\d): [\d.]+ %", pcp
     )
-    people = {"crowd": 5, "phantoms": 3}[said[1]]
-    assert re.fullmatch(rf"  simharness run \S+small.toml .*--set people.count={people}\b.* --seed {said[2]}", command)
+    people = {"crowd": 5, "phantoms": 3}[match[1]]
+    assert re.fullmatch(rf"  simharness run \S+small.toml .*--set people.count={people}\b.* --seed {match[2]}", command)
     assert mpjpe.startswith("MPJPE is ")
     assert "expected at most 1.5" in mpjpe
     mean, worst, single = map(float, re.findall(r"([\d.]+) %", pcp))
     assert single <= worst <= mean < 99.9
 
 
-def test_a_score_that_does_not_exist(small):
-    with pytest.raises(ValueError, match=r"no score 'pcpp'; did you mean pcp\?"):
+def test_an_unknown_score_is_refused(small):
+    with pytest.raises(ValueError, match=r"unknown score 'pcpp'; did you mean pcp\?"):
         assert_robust(small, pcpp=90)
     with pytest.raises(ValueError, match="needs a threshold"):
         assert_robust(small)
@@ -66,14 +66,14 @@ def test_a_threshold_may_be_any_number(small, monkeypatch, limit):
         assert_robust(small, pcp=limit)
 
 
-def test_a_file_or_a_variant_that_does_not_exist(small, tmp_path):
+def test_an_unknown_file_or_variant_is_refused(small, tmp_path):
     with pytest.raises(ScenarioError, match="no such file"):
         assert_robust(tmp_path / "none.toml", pcp=90)
     with pytest.raises(ScenarioError, match="did you mean fast"):
         assert_robust(small, variant="fats", pcp=90)
 
 
-def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
+def test_a_failed_trial_is_an_error_and_no_low_score(small, monkeypatch):
     def fail(scenario, *, variants, until):
         raise RunError("the ceiling came down")
 
@@ -82,7 +82,7 @@ def test_a_trial_that_cannot_be_run_is_no_low_score(small, monkeypatch):
         assert_robust(small, seeds=1, variant="fast", pcp=0)
 
 
-def test_a_score_that_applies_to_nothing_does_not_pass(small, monkeypatch):
+def test_a_score_that_applies_to_no_trial_does_not_pass(small, monkeypatch):
     class Nothing:
         def __init__(self, variant):
             from simharness.gate.trial_command import TrialKey
@@ -109,7 +109,7 @@ def test_kept_trials_are_not_run_again(small, tmp_path, monkeypatch):
 def test_the_traceback_ends_at_the_callers_line(tmp_path):
     (tmp_path / "test_users.py").write_text(
         "from simharness import testing\n"
-        "testing._measured = lambda study, workers: (_ for _ in ()).throw(AssertionError('PCP is 1'))\n"
+        "testing._run_unstored = lambda study, workers: (_ for _ in ()).throw(AssertionError('PCP is 1'))\n"
         "def test_it():\n"
         "    testing.assert_robust('quickstart', pcp=90)\n"
     )
