@@ -1,4 +1,4 @@
-"""The command line: what it says and how it exits."""
+"""Command line: output, messages and exit codes."""
 
 import json
 from pathlib import Path
@@ -28,13 +28,13 @@ def simharness(tmp_path, monkeypatch):
     return call
 
 
-def assert_refused(result, *said: str):
-    """One message and no traceback."""
+def assert_refused(result, *messages: str):
+    """Assert that there is one message and no traceback."""
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")
     assert "Traceback" not in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
-    for text in said:
+    for text in messages:
         assert text in result.stderr
     assert result.stdout == ""
 
@@ -50,7 +50,7 @@ COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_is_there(simharness, command):
+def test_help_is_printed(simharness, command):
     result = simharness(*command.split(), "--help")
     assert result.exit_code == 0
     assert "Usage" in result.stdout
@@ -90,7 +90,7 @@ class TestBadInput:
         result = simharness("run", QUICKSTART, *TINY, "--set", 'method.variants=["best"]')
         assert_refused(result, "method.variants", "'best'", "full")
 
-    def test_variants_that_have_nothing_to_go_by(self, simharness):
+    def test_a_variant_that_needs_missing_descriptors(self, simharness):
         assert_refused(
             simharness("run", QUICKSTART, *TINY, "--set", 'method.variants=["appearance"]'), "appearance", "descriptors"
         )
@@ -108,21 +108,21 @@ class TestBadInput:
     def test_unknown_method(self, simharness):
         assert_refused(simharness("evaluate", "shelf", "nowhere", "--method", "best"), "'best'", "full")
 
-    def test_a_method_of_ones_own_that_is_not_there(self, simharness):
+    def test_a_missing_user_defined_estimator(self, simharness):
         refused = simharness("evaluate", "shelf", "nowhere", "--method", "nobody.py:Mine")
         assert_refused(refused, "nobody.py", "no such file")
 
     @pytest.mark.slow
-    def test_a_method_of_ones_own_scores_what_it_is(self, simharness, tmp_path, shared_data):
-        """One that is a preset by another name."""
-        own, summary = tmp_path / "mine.py", tmp_path / "shelf.json"
-        own.write_text('from mvpose import Pipeline\n\nmine = Pipeline.preset("fast")\n')
-        methods = ["--method", "fast", "--method", f"{own}:mine"]
+    def test_a_user_defined_estimator_is_scored(self, simharness, tmp_path, shared_data):
+        """The estimator is a preset, so its scores are those of the preset."""
+        file, summary = tmp_path / "custom.py", tmp_path / "shelf.json"
+        file.write_text('from mvpose import Pipeline\n\ncustom = Pipeline.preset("fast")\n')
+        methods = ["--method", "fast", "--method", f"{file}:custom"]
         assert (
             simharness("evaluate", "shelf", str(shared_data / "shelf"), *methods, "--json", str(summary)).exit_code == 0
         )
-        fast, mine = json.loads(summary.read_text())["variants"].values()
-        assert mine["pcp"] == fast["pcp"] > 90
+        fast, custom = json.loads(summary.read_text())["variants"].values()
+        assert custom["pcp"] == fast["pcp"] > 90
 
     def test_nothing_is_left_behind(self, simharness, tmp_path):
         simharness("run", QUICKSTART, *TINY, "--set", "cameras.radius=4.5")
@@ -130,7 +130,7 @@ class TestBadInput:
 
 
 @pytest.mark.parametrize("error", [ValueError("wrong turn"), KeyError("lost"), RunError("film: frame 3")])
-def test_an_error_of_ours_shows_its_traceback(simharness, monkeypatch, tmp_path, error):
+def test_an_internal_error_shows_its_traceback(simharness, monkeypatch, tmp_path, error):
     def broken(*_args, **_options):
         raise error
 
@@ -143,7 +143,7 @@ def test_an_error_of_ours_shows_its_traceback(simharness, monkeypatch, tmp_path,
 
 
 @pytest.mark.slow
-def test_a_run_prints_the_numbers_and_where_the_report_is(simharness, tmp_path):
+def test_a_run_prints_the_scores_and_the_path_of_the_report(simharness, tmp_path):
     result = simharness("run", QUICKSTART, *TINY, "--seed", "3")
     assert result.exit_code == 0, result.stderr
     report = Path(result.stdout.strip().splitlines()[-1].removeprefix("report: "))
@@ -181,7 +181,7 @@ def test_a_detector_is_fitted_to_data_that_are_there(simharness, tmp_path):
 
 @pytest.mark.slow
 def test_fitting_prints_the_table_and_writes_a_profile_that_loads(simharness, tmp_path, shared_data):
-    out = tmp_path / "mine.toml"
+    out = tmp_path / "fitted.toml"
     result = simharness("fit-detector", "shelf", str(shared_data / "shelf"), "--out", str(out))
     assert result.exit_code == 0
     assert "Classes of errors" in result.stdout

@@ -27,7 +27,7 @@ def call(tmp_path, monkeypatch):
     return call
 
 
-def test_it_writes_a_sequence_and_prints_the_folder(call, tmp_path, monkeypatch):
+def test_the_command_writes_a_sequence_and_prints_the_folder(call, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", ["simharness", "export", "quickstart.toml", "bench"])
     result = call(QUICKSTART, "bench", *TINY, "--seed", "3")
     assert result.exit_code == 0, result.stderr
@@ -57,7 +57,7 @@ def test_pictures_may_be_left_out(call, tmp_path):
         (("nothing.toml", "bench"), "nothing.toml: no such file"),
     ],
 )
-def test_bad_input_is_one_message(call, tmp_path, arguments, message):
+def test_bad_input_gives_one_message(call, tmp_path, arguments, message):
     (tmp_path / "file").touch()
     (tmp_path / "existing" / "quickstart").mkdir(parents=True)
     result = call(*arguments)

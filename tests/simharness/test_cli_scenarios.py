@@ -68,7 +68,7 @@ def test_a_study_is_listed_with_its_trials(simharness):
 
 class TestShow:
     @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
-    def test_what_is_shown_is_read_back(self, simharness, tmp_path, path):
+    def test_the_shown_scenario_can_be_read(self, simharness, tmp_path, path):
         result = simharness("show", str(path))
         assert result.exit_code == 0
         (tmp_path / "shown.toml").write_text(result.stdout)
@@ -79,7 +79,7 @@ class TestShow:
         shown = tomllib.loads(simharness("show", str(SCENARIOS / "quickstart.toml"), *options).stdout)
         assert (shown["seed"], shown["people"]["count"], shown["cameras"]["layout"]) == (3, 9, "dome")
 
-    def test_a_study_says_what_it_varies_and_how_many_trials_that_makes(self, simharness, study):
+    def test_a_study_has_a_comment_with_its_factors_and_number_of_trials(self, simharness, study):
         comments = [line for line in simharness("show", str(study)).stdout.splitlines() if line.startswith("#")]
         assert comments[0] == "# trying: 80 settings x 20 seeds = 1,600 trials, each by 2 variants"
         rows = {line[4:].split("  ")[0]: line.split("  ")[-1].strip() for line in comments if line.startswith("#   ")}
@@ -107,7 +107,7 @@ class TestShow:
         assert tomllib.loads(result.stdout)["name"] == "trying"
 
     @pytest.mark.parametrize("text", ["sweep.people.cuont=[1]", "sweep.cameras.fov=[500]", "people.count=-1"])
-    def test_mistakes_are_refused_in_a_line(self, simharness, study, text):
+    def test_mistakes_give_one_message(self, simharness, study, text):
         result = simharness("show", str(study), "--set", text)
         assert (result.exit_code, result.stdout) == (2, "")
         assert result.stderr.startswith(f"error: --set {text}: ")
@@ -125,7 +125,7 @@ class TestShow:
 
 
 class TestNames:
-    """A shipped scenario is named without its folder, wherever the user is."""
+    """A shipped scenario is found by its name from any working directory."""
 
     @pytest.fixture(autouse=True)
     def elsewhere(self, tmp_path, monkeypatch):
@@ -160,17 +160,17 @@ class TestNames:
 
 
 class TestSchema:
-    def test_it_is_printed_or_written(self, simharness, tmp_path):
+    def test_the_schema_is_printed_or_written(self, simharness, tmp_path):
         assert simharness("schema").stdout == dumps()
         assert simharness("schema", "--out", str(tmp_path / "schema.json")).stdout == ""
         assert (tmp_path / "schema.json").read_text(encoding="utf-8") == dumps()
 
-    def test_a_place_where_nothing_can_be_written(self, simharness, tmp_path):
+    def test_an_unwritable_file_is_refused(self, simharness, tmp_path):
         result = simharness("schema", "--out", str(tmp_path / "none" / "schema.json"))
         assert result.exit_code == 2
         assert "schema.json: cannot be written: No such file or directory" in result.stderr
 
 
 @pytest.mark.parametrize("command", ["scenarios", "show", "schema"])
-def test_help_is_there(simharness, command):
+def test_help_is_printed(simharness, command):
     assert "Usage" in simharness(command, "--help").stdout

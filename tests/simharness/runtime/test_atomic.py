@@ -1,4 +1,4 @@
-"""Result folders appear whole or not at all."""
+"""Result folders appear complete or not at all."""
 
 import subprocess
 import sys
@@ -29,7 +29,7 @@ def test_an_error_leaves_nothing(tmp_path, error):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_error_leaves_the_old_folder_as_it_was(tmp_path):
+def test_an_error_leaves_the_old_folder_unchanged(tmp_path):
     def write(text: str, *, fail: bool) -> None:
         with atomic_folder(tmp_path / "run") as partial:
             (partial / "a").write_text(text)
@@ -42,14 +42,14 @@ def test_an_error_leaves_the_old_folder_as_it_was(tmp_path):
     assert (tmp_path / "run" / "a").read_text() == "1"
 
 
-def test_a_new_folder_replaces_the_old_one_whole(tmp_path):
+def test_a_new_folder_replaces_the_old_one_completely(tmp_path):
     for name in ("a", "b"):
         with atomic_folder(tmp_path / "run") as partial:
             (partial / name).touch()
     assert [path.name for path in tmp_path.rglob("*")] == ["run", "b"]
 
 
-def test_a_killed_process_leaves_nothing_that_looks_finished(tmp_path):
+def test_a_killed_process_leaves_no_result_folder(tmp_path):
     code = (
         "import os, pathlib, sys\n"
         "from simharness.runtime.atomic_files import atomic_folder\n"

@@ -1,4 +1,4 @@
-"""Frames shared out among processes."""
+"""Map over frames in several processes."""
 
 import itertools
 import os
@@ -19,7 +19,7 @@ def square(frames: range) -> list[int]:
 
 @dataclass(frozen=True)
 class Scaled:
-    """Static state that travels to the workers."""
+    """Frame function with static state that is pickled for the workers."""
 
     factors: np.ndarray
 
@@ -29,7 +29,7 @@ class Scaled:
 
 def fail_at(bad: int, frames: range) -> int:
     if bad in frames:
-        raise KeyError("lost the plot")
+        raise KeyError("planted")
     return len(frames)
 
 
@@ -50,7 +50,7 @@ def test_chunks_cover_the_frames_in_order(count):
     assert list(itertools.chain(*chunks)) == [frame**2 for frame in range(count)]
 
 
-def test_no_frames_no_results():
+def test_no_frames_give_no_results():
     assert map_frames(square, range(0)) == []
 
 
@@ -64,7 +64,7 @@ def test_progress_counts_every_frame_once():
     assert sum(seen) == 23
 
 
-def test_two_workers_give_what_one_gives():
+def test_two_workers_give_the_results_of_one():
     function = Scaled(np.random.default_rng(0).normal(size=(23, 5)))
     seen = []
     shared = map_frames(function, range(23), workers=2, progress=seen.append)
@@ -74,7 +74,7 @@ def test_two_workers_give_what_one_gives():
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_ends_the_run_and_names_the_frames(workers):
-    with pytest.raises(RunError, match=r"frame.* KeyError: 'lost the plot'") as caught:
+    with pytest.raises(RunError, match=r"frame.* KeyError: 'planted'") as caught:
         map_frames(partial(fail_at, 7), range(20), workers=workers)
     assert isinstance(caught.value.__cause__, KeyError)
 
@@ -85,12 +85,12 @@ def test_a_dead_worker_ends_the_run_and_does_not_hang():
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_linear_algebra_keeps_to_one_thread(workers):
+def test_linear_algebra_uses_one_thread(workers):
     for pools in map_frames(threads, range(4), workers=workers):
         assert pools
         assert set(pools) == {1}
 
 
-def test_no_workers_are_refused():
+def test_fewer_than_one_worker_is_refused():
     with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
         map_frames(square, range(3), workers=0)

@@ -30,6 +30,6 @@ def test_a_difference_shows_its_sign(value, digits):
     assert text[0] == ("+" if float(text) > 0 else "-" if float(text) < 0 else "0")
 
 
-def test_what_is_no_number_stays_so():
+def test_nan_and_infinity_stay():
     assert fixed(math.nan, 1) == "nan"
     assert signed(-math.inf, 1) == "-inf"

@@ -18,7 +18,7 @@ class Clock:
         return self.now
 
 
-def test_rate_and_remaining_time_count_neither_earlier_trials_nor_the_first_of_this_run():
+def test_the_rate_counts_neither_earlier_trials_nor_the_first_of_this_run():
     clock = Clock()
     pace = Pace(total=100, done=60, clock=clock)
     assert str(pace) == ""
@@ -45,7 +45,7 @@ def test_two_workers_that_finish_together_give_no_rate():
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(4.0, "15.0/min, 6 min left"), (60.0, "1.0/min, 97 min left")])
-def test_slow_trials_are_counted_by_the_minute(seconds, text):
+def test_slow_trials_have_a_rate_per_minute(seconds, text):
     clock = Clock()
     pace = Pace(total=100, clock=clock)
     for _ in range(3):
@@ -73,6 +73,6 @@ def test_a_log_gets_a_line_every_ten_seconds_at_most(monkeypatch):
     assert lines[-1] == "trials: 100 of 200, 2.0/s, 50 s left"
 
 
-def test_without_a_terminal_there_are_lines():
+def test_without_a_terminal_lines_are_printed():
     with reporter() as lines:
         assert isinstance(lines, Lines)

@@ -1,4 +1,4 @@
-"""Two different codes do not share a version."""
+"""Versions of code: different code has different versions."""
 
 import importlib.metadata
 import re
@@ -14,7 +14,7 @@ def test_a_checkout_adds_the_digest_of_its_code():
     assert re.fullmatch(re.escape(installed) + r"\+code\.[0-9a-f]{8}", code_version())
 
 
-def test_an_installed_wheel_has_its_version_alone(tmp_path, monkeypatch):
+def test_an_installed_wheel_has_the_plain_version(tmp_path, monkeypatch):
     monkeypatch.setattr(version, "_PACKAGE", tmp_path / "site-packages" / "simharness")
     code_version.cache_clear()
     try:

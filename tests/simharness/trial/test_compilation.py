@@ -1,3 +1,5 @@
+"""Compilation of kernels in a second process."""
+
 import importlib
 import pkgutil
 from dataclasses import replace
@@ -13,17 +15,17 @@ from simharness.trial.kernel_compilation import Compilation, compile_kernels
 
 
 def signatures():
-    """What every kernel of the method has been compiled or loaded for, by module and name."""
-    found = {}
+    """Return the signatures that every kernel of the method is compiled for, by module and name."""
+    compiled = {}
     for each in pkgutil.walk_packages(mvpose.__path__, "mvpose."):
         if not each.name.endswith("__main__"):
             for name, kernel in vars(importlib.import_module(each.name)).items():
                 if isinstance(kernel, numba.core.dispatcher.Dispatcher) and kernel.signatures:
-                    found[kernel.py_func.__module__, name] = list(kernel.signatures)
-    return found
+                    compiled[kernel.py_func.__module__, name] = list(kernel.signatures)
+    return compiled
 
 
-def test_a_real_frame_finds_everything_compiled():
+def test_a_real_frame_compiles_nothing_more():
     rng = np.random.default_rng(0)
     K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
     rig = Rig([Camera(K, np.eye(3), [x, 0, 4], [-0.1, 0, 0, 0, 0], (640, 480)) for x in (-1, 0, 1)])
@@ -41,7 +43,7 @@ def test_a_real_frame_finds_everything_compiled():
     assert signatures() == before
 
 
-def test_a_compilation_that_fails_costs_only_the_head_start():
+def test_a_failed_compilation_does_not_end_the_run():
     compilation = Compilation(["no such preset"])
     compilation.start()
     compilation.wait()

@@ -1,4 +1,4 @@
-"""Methods of one's own: where they are found, how they are asked, and what is said when that goes wrong."""
+"""User-defined estimators: loading, checks of their estimates, messages, and runs."""
 
 import html
 import importlib
@@ -33,7 +33,7 @@ from simharness.trial.stages.estimation import EstimateFrames
 from simharness.trial.stages.estimators import UserEstimator, estimators_of, load_estimator, sources_of
 
 WRAPPED = Path(__file__).parent / "foreign" / "wrapped.py"
-MINE = """
+CUSTOM = """
 import time
 from dataclasses import dataclass
 
@@ -43,7 +43,7 @@ from mvpose import Estimate, Pipeline
 
 
 @dataclass
-class Mine:
+class Custom:
     preset: str = "fast"
 
     def estimate(self, rig, detections):
@@ -52,13 +52,13 @@ class Mine:
 
 class Silent:
     def estimate(self, rig, detections):
-        return Estimate.of_joints(Mine().estimate(rig, detections).joints)
+        return Estimate.of_joints(Custom().estimate(rig, detections).joints)
 
 
 class Slow:
     def estimate(self, rig, detections):
         time.sleep(0.1)
-        return Mine().estimate(rig, detections)
+        return Custom().estimate(rig, detections)
 
 
 class Broken:
@@ -104,16 +104,16 @@ class Needs:
         self.weights = weights
 
 
-mine = Mine("no-3dps")
+instance = Custom("no-3dps")
 pipeline = Pipeline.preset("hungarian")
 number = 3
 
 
 def make():
-    return mine
+    return instance
 """
 SCENE = """
-name = "own"
+name = "custom"
 duration = 0.4
 rate = 5
 rendering.renderer = "rays"
@@ -123,18 +123,18 @@ detector.profile = "perfect"
 
 
 @pytest.fixture
-def mine(tmp_path):
-    path = tmp_path / "mine.py"
-    path.write_text(MINE)
+def file(tmp_path):
+    path = tmp_path / "custom.py"
+    path.write_text(CUSTOM)
     return path
 
 
 @pytest.fixture
-def scenario(mine):
-    """Write a scenario file beside ``mine.py``, with these lines besides."""
+def scenario(file):
+    """Write a scenario file beside ``custom.py``, with more lines."""
 
     def write(lines, variant):
-        path = mine.with_name("own.toml")
+        path = file.with_name("custom.toml")
         path.write_text(f'{SCENE}variants = ["{variant}"]\n{lines}')
         return path
 
@@ -146,90 +146,95 @@ SEEN, TRUTH = moment(RIG, crowd(2, spacing=1.2))
 
 
 class TestLoading:
-    @pytest.mark.parametrize("name", ["Mine", "mine", "make"])
-    def test_an_object_or_what_makes_one(self, mine, name):
-        estimator = load_estimator(f"{mine}:{name}")
-        assert estimator.preset == ("fast" if name == "Mine" else "no-3dps")
-        assert load_estimator(f"{mine}:{name}") is estimator
+    @pytest.mark.parametrize("name", ["Custom", "instance", "make"])
+    def test_an_object_or_a_class_or_function_that_returns_one(self, file, name):
+        estimator = load_estimator(f"{file}:{name}")
+        assert estimator.preset == ("fast" if name == "Custom" else "no-3dps")
+        assert load_estimator(f"{file}:{name}") is estimator
 
-    def test_a_module(self, mine, tmp_path, monkeypatch):
-        package = tmp_path / "own_package"
+    def test_a_module(self, file, tmp_path, monkeypatch):
+        package = tmp_path / "custom_package"
         package.mkdir()
         (package / "__init__.py").touch()
-        mine.rename(package / "method.py")
+        file.rename(package / "method.py")
         monkeypatch.syspath_prepend(tmp_path)
-        assert type(load_estimator("own_package.method:Mine")) is importlib.import_module("own_package.method").Mine
-        with pytest.raises(ValueError, match=re.escape("there is no module own_package.methods: install it")):
-            load_estimator("own_package.methods:Mine")
+        assert (
+            type(load_estimator("custom_package.method:Custom"))
+            is importlib.import_module("custom_package.method").Custom
+        )
+        with pytest.raises(ValueError, match=re.escape("there is no module custom_package.methods: install it")):
+            load_estimator("custom_package.methods:Custom")
 
-    def test_files_of_one_name_are_not_mistaken_for_each_other(self, mine, tmp_path, monkeypatch):
+    def test_files_of_the_same_name_are_different_modules(self, file, tmp_path, monkeypatch):
         (tmp_path / "other").mkdir()
-        (tmp_path / "other" / "mine.py").write_text(MINE.replace('"fast"', '"full"'))
+        (tmp_path / "other" / "custom.py").write_text(CUSTOM.replace('"fast"', '"full"'))
         for folder, preset in ((tmp_path, "fast"), (tmp_path / "other", "full")):
             monkeypatch.chdir(folder)
-            assert load_estimator("mine.py:Mine").preset == preset
+            assert load_estimator("custom.py:Custom").preset == preset
 
     @pytest.mark.parametrize(
-        ("text", "name", "said"),
+        ("text", "name", "message"),
         [
-            (None, "Mine", r"mine\.py: no such file"),
-            (MINE, "Mien", r"mine\.py has no Mien; did you mean Mine\?"),
-            (MINE, "number", r"number is int, which has no estimate\(rig, detections\) -> mvpose\.Estimate"),
-            (MINE, "Needs", r"Needs\(\) raised TypeError: .*weights"),
-            ("import os\nnothing_such\n", "Mine", r"NameError: name 'nothing_such' .* \(mine\.py, line 2\)"),
-            ("\n\ndef f(:\n", "Mine", r"SyntaxError: .* \(mine\.py, line 3\)"),
-            ("import sys\nsys.exit(4)\n", "Mine", r"SystemExit: 4 \(mine\.py, line 2\)"),
-            ("\nimport no_such_module\n", "Mine", r"No module named 'no_such_module' \(mine\.py, line 2\)"),
+            (None, "Custom", r"custom\.py: no such file"),
+            (CUSTOM, "Cutsom", r"custom\.py has no Cutsom; did you mean Custom\?"),
+            (CUSTOM, "number", r"number is int, which has no estimate\(rig, detections\) -> mvpose\.Estimate"),
+            (CUSTOM, "Needs", r"Needs\(\) raised TypeError: .*weights"),
+            ("import os\nnothing_such\n", "Custom", r"NameError: name 'nothing_such' .* \(custom\.py, line 2\)"),
+            ("\n\ndef f(:\n", "Custom", r"SyntaxError: .* \(custom\.py, line 3\)"),
+            ("import sys\nsys.exit(4)\n", "Custom", r"SystemExit: 4 \(custom\.py, line 2\)"),
+            ("\nimport no_such_module\n", "Custom", r"No module named 'no_such_module' \(custom\.py, line 2\)"),
         ],
     )
-    def test_what_is_wrong_is_said(self, mine, text, name, said):
-        mine.unlink() if text is None else mine.write_text(text)
-        method = Method(variants=("own",), estimators=Estimators(own=f"{mine}:{name}"))
-        with pytest.raises(ValueError, match=rf"^method\.estimators\.own: .*{said}"):
+    def test_errors_of_loading_are_reported(self, file, text, name, message):
+        file.unlink() if text is None else file.write_text(text)
+        method = Method(variants=("custom",), estimators=Estimators(custom=f"{file}:{name}"))
+        with pytest.raises(ValueError, match=rf"^method\.estimators\.custom: .*{message}"):
             estimators_of(method)
 
     def test_an_error_in_a_module_has_its_file_and_line(self, tmp_path, monkeypatch):
-        (tmp_path / "own_wrong.py").write_text("\n\nnothing_such\n")
+        (tmp_path / "custom_wrong.py").write_text("\n\nnothing_such\n")
         monkeypatch.syspath_prepend(tmp_path)
-        with pytest.raises(ValueError, match=r"own_wrong cannot be imported: NameError: .* \(own_wrong\.py, line 3\)"):
-            load_estimator("own_wrong:Mine")
+        with pytest.raises(
+            ValueError, match=r"custom_wrong cannot be imported: NameError: .* \(custom_wrong\.py, line 3\)"
+        ):
+            load_estimator("custom_wrong:Custom")
 
     @pytest.mark.parametrize("name", PRESETS)
     def test_no_name_of_a_preset_is_free(self, name):
         with pytest.raises(ValueError, match=rf"^method\.estimators\.{name}: this is the name of a preset"):
-            estimators_of(Method(estimators=Estimators(**{name: "mine.py:Mine"})))
+            estimators_of(Method(estimators=Estimators(**{name: "custom.py:Custom"})))
 
-    def test_the_nearest_variant_is_named_be_it_ones_own(self):
-        method = Method(variants=("moin",), estimators=Estimators(mine="mine.py:Mine"))
+    def test_the_nearest_variant_is_named_even_if_user_defined(self):
+        method = Method(variants=("cutsom",), estimators=Estimators(custom="custom.py:Custom"))
         with pytest.raises(
-            ValueError, match=r"^method\.variants: unknown variant 'moin'; did you mean mine\? .*full.*mine"
+            ValueError, match=r"^method\.variants: unknown variant 'cutsom'; did you mean custom\? .*full.*custom"
         ):
             estimators_of(method)
 
-    def test_who_is_not_asked_for_is_not_loaded(self):
-        method = Method(variants=("fast",), estimators=Estimators(mine="nowhere.py:Mine"))
+    def test_an_estimator_that_is_not_requested_is_not_loaded(self):
+        method = Method(variants=("fast",), estimators=Estimators(custom="nowhere.py:Custom"))
         assert isinstance(estimators_of(method)["fast"], Pipeline)
 
 
 class TestAnswers:
-    def test_they_are_those_of_the_object_and_timed(self, mine):
-        mined = UserEstimator("own", f"{mine}:Silent").estimate(RIG, SEEN)
-        np.testing.assert_array_equal(mined.joints, Pipeline.preset("fast").estimate(RIG, SEEN).joints)
-        assert len(mined) == 2
-        assert 0 < mined.timings["total"] < 60
+    def test_estimates_are_those_of_the_object_and_timed(self, file):
+        estimate = UserEstimator("custom", f"{file}:Silent").estimate(RIG, SEEN)
+        np.testing.assert_array_equal(estimate.joints, Pipeline.preset("fast").estimate(RIG, SEEN).joints)
+        assert len(estimate) == 2
+        assert 0 < estimate.timings["total"] < 60
 
-    def test_times_of_stages_are_kept_and_the_whole_is_timed_here(self, mine):
-        """What wraps a pipeline and answers that one's estimate must not pass for as fast."""
-        timings = UserEstimator("own", f"{mine}:Mine").estimate(RIG, SEEN).timings
+    def test_timings_of_stages_are_kept_and_the_total_is_measured(self, file):
+        """An estimator that wraps a pipeline and returns its estimate must not appear as fast as the pipeline."""
+        timings = UserEstimator("custom", f"{file}:Custom").estimate(RIG, SEEN).timings
         stages = {stage: seconds for stage, seconds in timings.items() if stage != "total"}
         assert set(stages) == {"affinity", "matching", "reconstruction"}
         assert timings["total"] >= sum(stages.values())
-        assert UserEstimator("own", f"{mine}:Slow").estimate(RIG, SEEN).timings["total"] >= 0.1
+        assert UserEstimator("custom", f"{file}:Slow").estimate(RIG, SEEN).timings["total"] >= 0.1
 
     @pytest.mark.parametrize(
-        ("name", "said"),
+        ("name", "message"),
         [
-            ("Broken", f"ZeroDivisionError: .*line {MINE[: MINE.index('# BROKEN')].count(chr(10)) + 1}"),
+            ("Broken", f"ZeroDivisionError: .*line {CUSTOM[: CUSTOM.index('# BROKEN')].count(chr(10)) + 1}"),
             ("Answers", r"returned NoneType, expected mvpose\.Estimate: Estimate\.of_joints\(joints\) makes one"),
             ("Dictionary", "returned dict, expected mvpose.Estimate"),
             ("Shelf", r"joints \(coco17\) must be \(n, 17, 3\), got \(1, 14, 3\)"),
@@ -239,17 +244,17 @@ class TestAnswers:
             ("OfNobody", "labels must be -1, or 0 to n - 1 of n = 1 people, got 1 to 1"),
         ],
     )
-    def test_what_is_wrong_with_them_is_said(self, mine, name, said):
-        with pytest.raises(RunError, match=rf"^own \(.*mine\.py:{name}\): .*{said}"):
-            UserEstimator("own", f"{mine}:{name}").estimate(RIG, SEEN)
+    def test_invalid_estimates_are_reported(self, file, name, message):
+        with pytest.raises(RunError, match=rf"^custom \(.*custom\.py:{name}\): .*{message}"):
+            UserEstimator("custom", f"{file}:{name}").estimate(RIG, SEEN)
 
-    def test_only_the_place_travels(self, mine):
-        own = UserEstimator("own", f"{mine}:make")
-        assert own.loaded
-        assert len(pickle.dumps(own)) < 200 + len(str(mine))
-        assert pickle.loads(pickle.dumps(own)) == own
+    def test_only_the_place_is_pickled(self, file):
+        custom = UserEstimator("custom", f"{file}:make")
+        assert custom.loaded
+        assert len(pickle.dumps(custom)) < 200 + len(str(file))
+        assert pickle.loads(pickle.dumps(custom)) == custom
 
-    def test_the_frame_is_named_in_whatever_process(self, scenario):
+    def test_the_frame_is_named_in_any_process(self, scenario):
         path = scenario('[method.estimators]\nlate = "late.py:Late"', "late")
         late = (
             "from mvpose import Estimate\n\n\nclass Late:\n    def estimate(self, rig, detections):\n"
@@ -267,80 +272,87 @@ class TestAnswers:
 
 
 class TestInTrials:
-    def test_a_trial_that_fails_says_who_and_where(self, scenario):
-        broken = load(scenario('[method.estimators]\nown = "mine.py:Broken"', "own"))
-        with pytest.raises(RunError, match=r"^estimate: frame \d: own \(.*mine\.py:Broken\): ZeroDivisionError"):
+    def test_a_failed_trial_names_stage_frame_and_estimator(self, scenario):
+        broken = load(scenario('[method.estimators]\ncustom = "custom.py:Broken"', "custom"))
+        with pytest.raises(RunError, match=r"^estimate: frame \d: custom \(.*custom\.py:Broken\): ZeroDivisionError"):
             measure(broken)
 
-    def test_it_scores_as_the_preset_that_it_is(self, scenario):
-        own = load(scenario('[method.estimators]\nown = "mine.py:Mine"', "own"), overrides=["detector.profile=poor"])
-        measured = measure(own, ["own", "fast"])
-        timeless = [key for key in measured["own"].scores if "time" not in key and not key.startswith("blame")]
-        assert measured["own"].scores["pcp"] < 100
+    def test_a_wrapped_preset_has_the_scores_of_the_preset(self, scenario):
+        custom = load(
+            scenario('[method.estimators]\ncustom = "custom.py:Custom"', "custom"), overrides=["detector.profile=poor"]
+        )
+        measured = measure(custom, ["custom", "fast"])
+        timeless = [key for key in measured["custom"].scores if "time" not in key and not key.startswith("blame")]
+        assert measured["custom"].scores["pcp"] < 100
         for key in timeless:
-            assert measured["own"].scores[key] == measured["fast"].scores[key], key
+            assert measured["custom"].scores[key] == measured["fast"].scores[key], key
 
-    def test_without_labels_nothing_is_said_of_matching(self, scenario):
-        own = load(scenario('[method.estimators]\nown = "mine.py:Silent"', "own"), overrides=["detector.profile=poor"])
-        measured = measure(own, ["own", "fast"])
-        silent, told = measured["own"].scores, measured["fast"].scores
+    def test_without_labels_the_scores_of_matching_are_none(self, scenario):
+        custom = load(
+            scenario('[method.estimators]\ncustom = "custom.py:Silent"', "custom"), overrides=["detector.profile=poor"]
+        )
+        measured = measure(custom, ["custom", "fast"])
+        silent, labelled = measured["custom"].scores, measured["fast"].scores
         for key in ("match_f1", "match_precision", "match_recall", "violations", "merged", "split"):
             assert silent[key] is None
-            assert told[key] is not None
-        assert silent["recall"] == told["recall"]
-        assert silent["mpjpe_mm"] == told["mpjpe_mm"]
+            assert labelled[key] is not None
+        assert silent["recall"] == labelled["recall"]
+        assert silent["mpjpe_mm"] == labelled["mpjpe_mm"]
         counts = ("pairs_correct", "violations", "merged", "phantoms")
-        assert measured["own"].frames.schema == measured["fast"].frames.schema
-        assert all(measured["own"].frames[key].is_null().all() for key in counts)
-        failures = measured["own"].failures
+        assert measured["custom"].frames.schema == measured["fast"].frames.schema
+        assert all(measured["custom"].frames[key].is_null().all() for key in counts)
+        failures = measured["custom"].failures
         assert len(failures)
         assert set(failures["stage"]) <= {"detection", "method"}
         assert failures["matching_alone"].is_null().all()
         assert not set(failures["kind"]) & {"merged", "split"}
 
-    def test_a_pipeline_of_ones_own_has_stages(self, scenario):
-        own = load(
-            scenario('[method.estimators]\nown = "mine.py:pipeline"', "own"), overrides=["detector.profile=poor"]
+    def test_a_custom_pipeline_has_stages(self, scenario):
+        custom = load(
+            scenario('[method.estimators]\ncustom = "custom.py:pipeline"', "custom"),
+            overrides=["detector.profile=poor"],
         )
-        failures = measure(own)["own"].failures
+        failures = measure(custom)["custom"].failures
         assert len(failures)
         assert set(failures["stage"]) <= {"detection", "matching", "reconstruction"}
         assert not failures["matching_alone"].is_null().any()
 
-    def test_heat_maps_are_given_where_there_are_any(self, scenario):
-        path = scenario('detector.heatmaps.size = "64x48"\n[method.estimators]\nown = "mine.py:Mine"', "own")
+    def test_heat_maps_are_given_if_the_scenario_has_them(self, scenario):
+        path = scenario('detector.heatmaps.size = "64x48"\n[method.estimators]\ncustom = "custom.py:Custom"', "custom")
         trial = build_trial(load(path))
         _, detected = simulated(trial.scenario)
         estimation = EstimateFrames(trial.exposures.believed_rig, tuple(detected), trial.pipelines)
-        assert estimation.input_of(0, "own").likelihoods is not None
+        assert estimation.input_of(0, "custom").likelihoods is not None
         assert estimation.input_of(0, "fast").likelihoods is None
 
     def test_it_can_be_asserted(self, scenario):
-        path = scenario('[method.estimators]\nown = "mine.py:Silent"', "own")
-        assert_robust(path, variant="own", recall=90, ghosts=0.1)
+        path = scenario('[method.estimators]\ncustom = "custom.py:Silent"', "custom")
+        assert_robust(path, variant="custom", recall=90, ghosts=0.1)
         with pytest.raises(AssertionError, match="Match F1 applies to none of the trials"):
-            assert_robust(path, variant="own", match_f1=50)
+            assert_robust(path, variant="custom", match_f1=50)
 
     def test_a_study_is_refused_before_its_trials(self, scenario, tmp_path):
-        study = load_study(scenario('seeds = 3\n[method.estimators]\nown = "mine.py:Mien"', "own"))
-        with pytest.raises(ValueError, match=r"^method\.estimators\.own: .* did you mean Mine\?"):
+        study = load_study(scenario('seeds = 3\n[method.estimators]\ncustom = "custom.py:Cutsom"', "custom"))
+        with pytest.raises(ValueError, match=r"^method\.estimators\.custom: .* did you mean Custom\?"):
             run_study(study, out=tmp_path / "out")
         assert not (tmp_path / "out" / "store").exists()
 
 
 @pytest.mark.slow
 def test_a_run_without_labels_is_read_as_it_was(scenario, tmp_path, capfd):
-    path = scenario('[method.estimators]\nown = "mine.py:Silent"', "own")
-    folder = run(load(path, overrides=['variants=["own", "fast"]']), out=tmp_path / "runs", workers=2)
+    path = scenario('[method.estimators]\ncustom = "custom.py:Silent"', "custom")
+    folder = run(load(path, overrides=['variants=["custom", "fast"]']), out=tmp_path / "runs", workers=2)
     assert "Traceback" not in capfd.readouterr().err  # of compiling what is no preset
     record = read_run(folder)
-    for detections, own, fast in zip(record.detections, record.estimates["own"], record.estimates["fast"], strict=True):
+    for detections, custom, fast in zip(
+        record.detections, record.estimates["custom"], record.estimates["fast"], strict=True
+    ):
         assert len(detections)
-        assert not own.matching.covers(len(detections))
+        assert not custom.matching.covers(len(detections))
         assert fast.matching.covers(len(detections))
-        np.testing.assert_array_equal(own.joints, fast.joints)
-    assert record.summary["variants"]["own"]["matching"]["f1"] is None
-    assert f'own = "{path.with_name("mine.py")}:Silent"' in (folder / "scenario.toml").read_text()
+        np.testing.assert_array_equal(custom.joints, fast.joints)
+    assert record.summary["variants"]["custom"]["matching"]["f1"] is None
+    assert f'custom = "{path.with_name("custom.py")}:Silent"' in (folder / "scenario.toml").read_text()
 
 
 @pytest.mark.slow
@@ -351,8 +363,8 @@ def test_a_foreign_program_is_stressed_like_any_preset(tmp_path, monkeypatch):
     for file in WRAPPED.parent.glob("*.py"):
         Path("methods", file.name).write_bytes(file.read_bytes())
     lines = 'seeds = 2\nvariants = ["full", "foreign"]\n[method.estimators]\nforeign = "methods/wrapped.py:Foreign"'
-    Path("own.toml").write_text(f"{SCENE}{lines}\n")
-    results = run_study(load_study("own.toml"), out=Path("studies"), workers=2)
+    Path("custom.toml").write_text(f"{SCENE}{lines}\n")
+    results = run_study(load_study("custom.toml"), out=Path("studies"), workers=2)
     assert results.info["failed"] == []
     rows = results.trials.filter(pl.col("variant") == "foreign")
     assert rows.height == 2
@@ -371,7 +383,7 @@ def test_a_foreign_program_is_stressed_like_any_preset(tmp_path, monkeypatch):
     assert all(len(estimate) == 2 for estimate in again.estimates)
     Path("methods/program.py").write_text("import sys\nsys.exit('out of order')\n")
     with pytest.raises(RunError, match=r"foreign \(methods/wrapped\.py:Foreign\): RuntimeError: .*out of order"):
-        measure(load("own.toml", overrides=["seeds=1"]), ["foreign"])
+        measure(load("custom.toml", overrides=["seeds=1"]), ["foreign"])
 
 
 def test_the_example_needs_no_simulator():
@@ -388,21 +400,21 @@ def test_the_example_needs_no_simulator():
 
 
 class TestSources:
-    def test_of_a_file_all_python_beside_it(self, tmp_path):
+    def test_sources_of_a_file_are_all_python_files_beside_it(self, tmp_path):
         for name in ("one.py", "two.py", "notes.txt"):
             (tmp_path / name).write_text(name)
         (tmp_path / "below").mkdir()
         (tmp_path / "below" / "three.py").write_text("three.py")
         assert sources_of(f"{tmp_path / 'one.py'}:A") == {"one.py": b"one.py", "two.py": b"two.py"}
 
-    def test_of_a_module_its_whole_package(self, tmp_path, monkeypatch):
-        folder = tmp_path / "own_whole" / "part"
+    def test_sources_of_a_module_are_its_whole_package(self, tmp_path, monkeypatch):
+        folder = tmp_path / "custom_whole" / "part"
         folder.mkdir(parents=True)
         for file in (folder.parent / "__init__.py", folder / "__init__.py", folder / "method.py"):
             file.write_text("1 / 0")  # which nobody needs to import
-        (tmp_path / "own_single.py").write_text("single")
+        (tmp_path / "custom_single.py").write_text("single")
         monkeypatch.syspath_prepend(tmp_path)
-        assert set(sources_of("own_whole.part.method:A")) == {"__init__.py", "part/__init__.py", "part/method.py"}
-        assert set(sources_of("own_single:A")) == {"own_single.py"}
-        assert sources_of("own_nowhere:A") == {}
-        assert not {"own_whole", "own_single"} & set(sys.modules)
+        assert set(sources_of("custom_whole.part.method:A")) == {"__init__.py", "part/__init__.py", "part/method.py"}
+        assert set(sources_of("custom_single:A")) == {"custom_single.py"}
+        assert sources_of("custom_nowhere:A") == {}
+        assert not {"custom_whole", "custom_single"} & set(sys.modules)

@@ -1,4 +1,4 @@
-"""What a trial is known by."""
+"""Identities of trials and entries: what they depend on."""
 
 import ast
 import shutil
@@ -26,7 +26,7 @@ def quickstart():
 
 
 def changed(section, above=()):
-    """Every scenario that differs in one value from this one, by the dotted key of that value."""
+    """Yield every scenario that differs from this one in one value, by the dotted key of the value."""
     for key, value in section:
         if isinstance(value, Section):
             for dotted, other in changed(value, (*above, key)):
@@ -49,22 +49,22 @@ NAMES = {"name", "description", "detector.name"}
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning:pydantic")  # changed values need not be of the right type
-def test_every_value_counts_but_names_and_variants(quickstart):
+def test_every_value_counts_except_names_and_variants(quickstart):
     identities = {dotted: trial_identity(other) for dotted, other in changed(quickstart)}
     assert len(identities) > 150
-    own = trial_identity(quickstart)
-    assert {dotted for dotted, each in identities.items() if each == own} == {*NAMES, "method.variants"}
-    others = [each for each in identities.values() if each != own]
+    current = trial_identity(quickstart)
+    assert {dotted for dotted, each in identities.items() if each == current} == {*NAMES, "method.variants"}
+    others = [each for each in identities.values() if each != current]
     assert len(set(others)) == len(others)
 
 
-def test_renamed_and_moved_it_is_the_same(tmp_path, quickstart):
+def test_a_renamed_and_moved_scenario_has_the_same_identity(tmp_path, quickstart):
     text = QUICKSTART.read_text().replace('name = "quickstart"', 'name = "renamed"')
     (tmp_path / "other.toml").write_text(text)
     assert trial_identity(load(tmp_path / "other.toml")) == trial_identity(quickstart)
 
 
-def test_however_a_study_says_it_a_trial_is_the_same(tmp_path):
+def test_a_trial_of_two_different_studies_has_the_same_identity(tmp_path):
     (tmp_path / "one.toml").write_text('name = "one"\nseeds = [3, 4]\n[cameras]\ncount = 4\n[people]\ncount = 2\n')
     (tmp_path / "base.toml").write_text('name = "base"\nseed = 4\npeople.count = 2\n')
     (tmp_path / "two.toml").write_text(
@@ -76,31 +76,31 @@ def test_however_a_study_says_it_a_trial_is_the_same(tmp_path):
 
 
 def test_code_and_versions_count(quickstart, monkeypatch):
-    own, trial = identity.code(), trial_identity(quickstart)
+    current, trial = identity.code(), trial_identity(quickstart)
     entry = entry_identity(trial, "full")
-    monkeypatch.setattr(identity, "code", lambda: replace(own, method="another"))
+    monkeypatch.setattr(identity, "code", lambda: replace(current, method="another"))
     assert trial_identity(quickstart) == trial
     assert entry_identity(trial, "full") != entry
-    monkeypatch.setattr(identity, "code", lambda: replace(own, simulation="another"))
+    monkeypatch.setattr(identity, "code", lambda: replace(current, simulation="another"))
     assert trial_identity(quickstart) != trial
-    monkeypatch.setattr(identity, "code", lambda: own)
+    monkeypatch.setattr(identity, "code", lambda: current)
     assert trial_identity(quickstart) == trial
     monkeypatch.setattr(identity, "_versions", lambda: (("numpy", "1.0"),))
     assert trial_identity(quickstart) != trial
 
 
-def test_an_entry_is_of_a_trial_and_a_variant(quickstart):
+def test_an_entry_depends_on_trial_and_variant(quickstart):
     trial = trial_identity(quickstart)
     identities = {entry_identity(each, name) for each in (trial, trial[::-1]) for name in ("full", "fast")}
     assert len(identities) == 4
 
 
-def test_a_method_of_ones_own_counts_by_its_content(tmp_path, monkeypatch):
+def test_a_user_defined_estimator_counts_by_its_content(tmp_path, monkeypatch):
     places = {}
     for folder, text in (("one", "1"), ("same", "1"), ("other", "2"), ("helped", "1")):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "mine.py").write_text(text)
-        places[folder] = f"{tmp_path / folder / 'mine.py'}:Mine"
+        (tmp_path / folder / "custom.py").write_text(text)
+        places[folder] = f"{tmp_path / folder / 'custom.py'}:Custom"
     (tmp_path / "helped" / "helper.py").write_text("3")
     digests = {folder: estimator_code(place) for folder, place in places.items()}
     assert digests["one"] == digests["same"]
@@ -108,18 +108,20 @@ def test_a_method_of_ones_own_counts_by_its_content(tmp_path, monkeypatch):
     assert len(set(digests.values())) == 4
 
     def identities(folder):
-        path = tmp_path / "own.toml"
-        path.write_text(f'name = "own"\nvariants = ["full", "mine"]\nmethod.estimators.mine = "{folder}/mine.py:Mine"')
+        path = tmp_path / "study.toml"
+        path.write_text(
+            f'name = "study"\nvariants = ["full", "custom"]\nmethod.estimators.custom = "{folder}/custom.py:Custom"'
+        )
         (planned,) = plan(load_study(path))
-        return planned.trial, planned.entries["full"], planned.entries["mine"]
+        return planned.trial, planned.entries["full"], planned.entries["custom"]
 
     assert identities("one") == identities("same")
     assert identities("one")[:2] == identities("other")[:2]
     assert identities("one")[2] != identities("other")[2]
-    own = identity.code()
-    mine = identities("one")[2]
-    monkeypatch.setattr(identity, "code", lambda: replace(own, method="another"))
-    assert identities("one")[2] != mine  # for it may use mvpose, too
+    current = identity.code()
+    before = identities("one")[2]
+    monkeypatch.setattr(identity, "code", lambda: replace(current, method="another"))
+    assert identities("one")[2] != before  # because it may use mvpose
 
 
 @pytest.mark.parametrize(
@@ -137,27 +139,27 @@ def test_files_count_by_their_content(tmp_path, quickstart, key, name, beside):
         more = ['people.activities=["mocap"]'] if key.startswith("people") else []
         return trial_identity(load(QUICKSTART, overrides=[f'{key}="{folder / name}"', *more]))
 
-    here, there = tmp_path / "here", tmp_path / "there"
-    here.mkdir()
-    absent = at(here)
+    one, copy = tmp_path / "one", tmp_path / "copy"
+    one.mkdir()
+    absent = at(one)
     for file in filter(None, (name, beside)):
-        (here / file).write_bytes(b"one")
-    (here / "README").write_text("nobody reads it")
-    shutil.copytree(here, there)
-    assert at(here) == at(there)
-    assert len({absent, at(here), trial_identity(quickstart)}) == 3
-    (there / "README").write_text("changed")
-    assert at(here) == at(there)
+        (one / file).write_bytes(b"one")
+    (one / "README").write_text("nobody reads it")
+    shutil.copytree(one, copy)
+    assert at(one) == at(copy)
+    assert len({absent, at(one), trial_identity(quickstart)}) == 3
+    (copy / "README").write_text("changed")
+    assert at(one) == at(copy)
     for file in filter(None, (beside, name)):
-        before = at(there)
-        (there / file).write_bytes(b"another")
-        assert at(there) != before
+        before = at(copy)
+        (copy / file).write_bytes(b"another")
+        assert at(copy) != before
 
 
 class TestCode:
     @pytest.fixture
     def copied(self, tmp_path, monkeypatch):
-        """Copies of both packages, and a function that gives their digests as they are now."""
+        """Return copies of both packages, and a function that returns their current digests."""
         for package in (simharness, mvpose):
             source = Path(package.__file__).parent
             shutil.copytree(source, tmp_path / source.name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -224,7 +226,7 @@ class TestCode:
 
 @pytest.mark.parametrize("folders", [identity.SIMULATION, identity.SCORES, identity.FAILURES])
 def test_folders_that_make_results_import_nothing_else(folders):
-    """What they import from the package lies in the folders too; ``runtime`` runs work and makes no results."""
+    """Their imports from the package are in these folders too; ``runtime`` runs work and makes no results."""
     root = Path(simharness.__file__).parent
     inside = {file for folder in folders for file in files_of(root / folder) if file.suffix == ".py"}
     assert len(inside) > 10
@@ -239,7 +241,7 @@ def test_folders_that_make_results_import_nothing_else(folders):
 
 
 def imported(tree):
-    """Modules of simharness that a syntax tree imports, wherever in it."""
+    """Return the modules of simharness that a syntax tree imports anywhere."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("simharness"):
             yield node.module

@@ -1,4 +1,4 @@
-"""Networks that look at the rendered pictures of a scenario."""
+"""Networks that read the rendered pictures of a scenario."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def scenario(tmp_path):
     return write
 
 
-def test_descriptors_are_read_off_the_pictures_and_kept(scenario, tmp_path):
+def test_descriptors_are_read_from_the_pictures_and_stored(scenario, tmp_path):
     mean_color(tmp_path / "colors.onnx")
     path = scenario('[appearance]\nsource = "pictures"\nnetwork = "colors.onnx"\n')
     record = read_run(run(load(path), out=tmp_path / "runs"))
@@ -69,7 +69,7 @@ def test_keypoints_are_read_in_the_simulated_boxes(scenario, tmp_path):
         np.testing.assert_array_equal(before.truth.person, after.truth.person)
         assert after.detections.likelihoods is not None
         assert (after.detections.keypoints != before.detections.keypoints).any()
-        # A head that looks for the brightest spot is right about hardly anything, and is told so.
+        # A head that returns the brightest pixel is nearly always wrong, and its errors are classified so.
         assert (after.truth.error > 0).mean() > 0.5
 
 
@@ -92,12 +92,12 @@ def test_drawn_descriptors_stay_where_keypoints_are_read(scenario, tmp_path):
         ("", 'appearance needs descriptors.*appearance.source = "pictures"'),
     ],
 )
-def test_mistakes_are_named_before_any_work(scenario, text, message):
+def test_mistakes_are_reported_before_any_work(scenario, text, message):
     with pytest.raises(ValueError, match=message):
         build_trial(load(scenario(text)))
 
 
-def test_a_pose_head_that_is_none_is_named(scenario):
+def test_a_file_that_is_no_pose_head_is_named(scenario):
     with pytest.raises(ValueError, match=r"detector\.onnx: .*tiny.toml"):
         build_trial(load(scenario('[rendering]\nrenderer = "rays"\n'), overrides=["detector.onnx=tiny.toml"]))
 

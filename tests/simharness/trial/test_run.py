@@ -1,4 +1,4 @@
-"""A whole run, small: determinism, atomic results, and the runs in which nobody is there or nothing is seen."""
+"""A small complete run: determinism, atomic results, and runs without people or detections."""
 
 import json
 import re
@@ -38,17 +38,17 @@ def tiny(**sections) -> Scenario:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> Path:
-    """The folder of a tiny run."""
+    """Return the folder of a tiny run."""
     return run(tiny(), out=tmp_path_factory.mktemp("runs"))
 
 
-def test_the_folder_is_named_and_whole(done):
+def test_the_folder_has_its_name_and_all_files(done):
     assert done.name == f"tiny-{fingerprint(tiny())}"
     assert {path.name for path in done.iterdir()} == FILES
     assert [path.name for path in done.parent.iterdir()] == [done.name]
 
 
-def test_what_was_run_can_be_read(done):
+def test_a_run_can_be_read(done):
     record = read_run(done)
     assert record.scenario == tiny()
     assert len(record.time) == 3
@@ -111,7 +111,7 @@ def test_another_seed_gives_other_detections(done, tmp_path):
     ],
     ids=["an empty room", "an empty room and no phantoms", "a detector that finds nothing"],
 )
-def test_nothing_found_is_a_valid_run(tmp_path, sections, people):
+def test_a_run_without_people_or_detections_is_valid(tmp_path, sections, people):
     folder = run(tiny(**sections), out=tmp_path)
     record = read_run(folder)
     for estimates in record.estimates.values():
@@ -128,10 +128,10 @@ def test_nothing_found_is_a_valid_run(tmp_path, sections, people):
 @pytest.mark.parametrize("stage", ["simulate", "CaptureFrames", "detect", "assess", "write_run"])
 def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     def broken(*_args, **_options):
-        raise ValueError("of our own making")
+        raise ValueError("planted error")
 
     monkeypatch.setattr(running if stage == "write_run" else run_trial, stage, broken)
-    with pytest.raises(RunError, match="ValueError: of our own making"):
+    with pytest.raises(RunError, match="ValueError: planted error"):
         run(tiny(), out=tmp_path)
     assert list(tmp_path.iterdir()) == []
 
@@ -152,18 +152,18 @@ def test_a_failed_run_leaves_the_earlier_result_alone(tmp_path, monkeypatch):
 
 class TestPrepare:
     @pytest.mark.parametrize(
-        ("scenario", "said"),
+        ("scenario", "message"),
         [
             (tiny(cameras=Cameras(count=1)), "expected at least 2"),
             (tiny(cameras=Cameras(count=2, radius=4.0)), "cam0.*wall"),
             (tiny(method=Method(variants=("full", "best"))), "method.variants: .*'best'"),
         ],
     )
-    def test_what_cannot_be_built_is_a_value_error(self, scenario, said):
-        with pytest.raises(ValueError, match=said):
+    def test_a_scenario_that_cannot_be_built_is_a_value_error(self, scenario, message):
+        with pytest.raises(ValueError, match=message):
             build_trial(scenario)
 
-    def test_a_renderer_that_is_not_there_is_named(self, monkeypatch):
+    def test_a_missing_renderer_is_named(self, monkeypatch):
         from simharness.capture.rendering.renderer import Unavailable
 
         def nothing(_name):
@@ -175,7 +175,7 @@ class TestPrepare:
 
 
 class TestScoring:
-    def test_everyone_missed_costs_the_limit(self):
+    def test_missed_people_have_the_largest_error(self):
         table = pl.DataFrame(
             {
                 "variant": ["a", "a", "a", "b"],
@@ -187,7 +187,7 @@ class TestScoring:
         )
         np.testing.assert_allclose(frame_costs(table, "a"), [530.0, 1002.0, 30.0])
 
-    def test_a_table_of_no_frames_has_no_rows(self):
+    def test_a_table_without_frames_has_no_rows(self):
         assert running.score_table({"full": VariantScores(())}).height == 0
 
 

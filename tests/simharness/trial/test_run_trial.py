@@ -1,4 +1,4 @@
-"""One trial, measured."""
+"""Runs of one trial: scores, failures, blame and errors."""
 
 from pathlib import Path
 
@@ -57,25 +57,25 @@ def test_failures_are_counted_in_the_scores(both):
         assert len(missed) == measured.people.filter(~pl.col("found")).height
 
 
-def test_a_variant_does_the_same_alone_as_beside_another(both):
+def test_a_variant_has_the_same_result_alone_and_beside_another(both):
     alone = measure(cheap(), ["fast"])["fast"]
     assert timeless(alone.scores) == timeless(both["fast"].scores)
     for table in ("frames", "people", "failures"):
         assert without_times(getattr(alone, table)).equals(without_times(getattr(both["fast"], table)))
 
 
-def test_without_blame_the_rest_is_the_same(both):
+def test_without_blame_the_other_scores_are_the_same(both):
     blameless = measure(cheap(), ["fast"], blame=False)["fast"]
     blamed = {key: score for key, score in both["fast"].scores.items() if key.startswith("blame_")}
     assert timeless(blameless.scores) == timeless(both["fast"].scores) | dict.fromkeys(blamed)
     assert blameless.failures["stage"].null_count() == len(blameless.failures) > 0
 
 
-def test_the_scenario_says_the_variants_where_nobody_does():
+def test_the_variants_default_to_those_of_the_scenario():
     assert list(measure(cheap('variants=["no-3dps"]'), blame=False)) == ["no-3dps"]
 
 
-def test_failures_are_looked_into_with_what_the_variant_saw(monkeypatch):
+def test_blame_uses_the_detections_that_the_variant_was_given(monkeypatch):
     seen = {}
 
     def look(recording, estimator, estimates, failures):
@@ -92,17 +92,17 @@ def test_failures_are_looked_into_with_what_the_variant_saw(monkeypatch):
     assert sorted(seen.values()) == [False, True]
 
 
-def test_people_that_do_not_fit_are_the_scenarios_fault():
+def test_people_that_do_not_fit_are_a_value_error():
     with pytest.raises(ValueError, match=r"people\."):
         measure(cheap("people.area=0.3"))
 
 
-def test_what_goes_wrong_later_is_not(monkeypatch):
+def test_an_error_of_a_later_stage_is_a_run_error_with_the_stage_in_front(monkeypatch):
     def broken(*_args):
         raise ValueError("wrong turn")
 
     monkeypatch.setattr(module, "assess", broken)
-    with pytest.raises(RunError, match="ValueError: wrong turn"):
+    with pytest.raises(RunError, match=r"^score: ValueError: wrong turn"):
         measure(cheap(), ["fast"])
 
 
@@ -114,7 +114,7 @@ def test_a_score_is_a_finite_number_or_none(both, score):
 
 
 @pytest.mark.slow
-def test_a_study_is_the_same_whatever_the_number_of_workers(tmp_path):
+def test_a_study_does_not_depend_on_the_number_of_workers(tmp_path):
     study = load_study(QUICKSTART, overrides=CHEAP, seeds=3, variants=["full", "fast"])
     one, two = (run_study(study, out=tmp_path / f"{workers}", workers=workers) for workers in (1, 2))
     assert len(one.trials) == 6
