@@ -411,7 +411,7 @@ class TestSources:
         folder = tmp_path / "custom_whole" / "part"
         folder.mkdir(parents=True)
         for file in (folder.parent / "__init__.py", folder / "__init__.py", folder / "method.py"):
-            file.write_text("1 / 0")  # which nobody needs to import
+            file.write_text("1 / 0")  # which is never imported
         (tmp_path / "custom_single.py").write_text("single")
         monkeypatch.syspath_prepend(tmp_path)
         assert set(sources_of("custom_whole.part.method:A")) == {"__init__.py", "part/__init__.py", "part/method.py"}
