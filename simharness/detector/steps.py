@@ -32,7 +32,8 @@ Rules for a step:
 - It changes no array of the block that it gets, and returns a new block (``dataclasses.replace``).
 - It keeps the fields consistent: where a keypoint is not reported, its coordinates are NaN, its score 0 and its error
   class ABSENT; a slot without a reported keypoint is not ``present``; where a keypoint moves far, ``error`` follows
-  (:func:`simharness.detector.error_classes.classify`). Appended slots go behind the others
+  (:func:`simharness.detector.error_classes.classify`, with the unit ``context.conditions.unit`` and the true pixels
+  ``context.views.pixels``). Appended slots go behind the others
   (:meth:`~simharness.detector.detection_block.DetectionBlock.concatenate`).
 - Random numbers come from ``context.draws``, under a key that begins with the name of the step, and never from
   another generator. Draw the whole block first and mask it afterwards, so that the draws depend on nothing but the key
@@ -71,10 +72,11 @@ MODULES = (
 
 
 class StepStage(IntEnum):
-    """StepStage of detection in which a step runs; what the block holds before it."""
+    """Stage of detection in which a step runs, and what the block holds before it."""
 
     KEYPOINTS = 1
-    """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1."""
+    """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1, boxes of the true silhouettes
+    (replaced in PEOPLE)."""
     SCORES = 2
     """Scores of keypoints. One slot for each person, keypoints with their errors."""
     PEOPLE = 3

@@ -35,7 +35,8 @@ def keypoints(frames):
 
 def test_steps_run_in_the_order_of_their_stages():
     names = [each.name for each in registered_steps()]
-    assert names == ["keypoints", "scores", "people", "phantoms", "decoys", "crops", "delivery"]
+    shipped = ["keypoints", "scores", "people", "phantoms", "decoys", "crops", "delivery"]
+    assert [name for name in names if name in shipped] == shipped
     stages = [each.stage for each in registered_steps()]
     assert stages == sorted(stages)
 
