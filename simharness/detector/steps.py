@@ -75,8 +75,8 @@ class StepStage(IntEnum):
     """Stage of detection in which a step runs, and what the block holds before it."""
 
     KEYPOINTS = 1
-    """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1; boxes are those of the true
-    silhouettes until PEOPLE."""
+    """Positions and error classes of keypoints. One slot for each person, scores of 0 and 1; until PEOPLE the boxes are
+    those of the true silhouettes."""
     SCORES = 2
     """Scores of keypoints. One slot for each person, keypoints with their errors."""
     PEOPLE = 3

@@ -3,10 +3,10 @@
 To add a format, write one module and register it once:
 
 1. a module beside this one with a function ``read(path, *, size, only) -> Rig`` of at least two cameras
-   (:mod:`.voxelpose` is an example; :mod:`.entries` converts the numbers of one camera, with messages that name it), and
-   a constant ``FORMAT``, a :class:`~simharness.formats.calibration.calibration_format.CalibrationFormat`, whose
-   ``recognises`` looks at the content: ``lambda file: "my_cameras" in (file.json or {})``, or ``file.content``, the bytes
-   of a text file;
+   (:mod:`.voxelpose` is an example; :mod:`.entries` converts the numbers of one camera, with messages that name it),
+   and a constant ``FORMAT``, a :class:`~simharness.formats.calibration.calibration_format.CalibrationFormat`. Its
+   ``recognises`` looks at the content: ``lambda file: "my_cameras" in (file.json or {})``, or at ``file.content``, the
+   bytes of a text file;
 2. ``FORMAT`` in the list :data:`FORMATS` below, before more general formats. Programs that use simharness as a library
    call :func:`register` instead.
 
