@@ -15,8 +15,8 @@ order: the real detections with the true labels, which shows what a perfect matc
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -29,6 +29,7 @@ from mvpose.pipeline import Estimator
 from simharness.failures.classification import Failure, FailureKind, failures_of_frame
 from simharness.failures.substitution import perfect_detections, true_labels, with_labels
 from simharness.pairing.pairing import mean_distances
+from simharness.runtime.errors import naming_frame
 from simharness.types.recording import Recording
 from simharness.types.truth import Truth
 
@@ -96,6 +97,32 @@ def blame(
         inputs = _FrameInput(recording.rig, recording.detections[frame], recording.truth[frame])
         blamed += _blame_frame(inputs, estimator, estimates[frame], list(group))
     return blamed
+
+
+def blame_frames(
+    recording: Recording,
+    estimator: Estimator,
+    estimates: Sequence[Estimate],
+    input_of: Callable[[int], Detections],
+) -> Iterator[Blamed]:
+    """Find failures and the stage to blame frame by frame, because heat maps of all frames are large.
+
+    Args:
+        recording: T frames.
+        estimator: the method.
+        estimates: its estimates, T.
+        input_of: detections of a frame as the method got them, with heat maps if it reads them.
+
+    Raises:
+        RunError: the method failed; the message names the frame.
+    """
+    for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
+        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
+            moment = Recording(recording.time[[frame]], recording.rig, (input_of(frame),), (truth,))
+            with naming_frame(frame):
+                blamed = blame(moment, estimator, [estimate], failures)
+            for each in blamed:
+                yield replace(each, failure=replace(each.failure, frame=frame))
 
 
 @dataclass(frozen=True)

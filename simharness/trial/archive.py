@@ -29,7 +29,7 @@ from simharness.trial.arrays import (
     truth_arrays,
     truth_of,
 )
-from simharness.trial.detected_sequence import DetectedSequence
+from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ already, such as those of a stored trial, are given as :class:`Known` and left o
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal, get_args
 
 import polars as pl
@@ -16,47 +17,26 @@ import threadpoolctl
 
 from mvpose import Estimate
 from mvpose.pipeline import PRESETS, Estimator
-from simharness.detector.detect import detect
-from simharness.failures.blame import Blamed, blame, failure_scores, failure_table
-from simharness.failures.classification import failures_of_frame, find_failures
-from simharness.runtime.frame_pool import map_frames
+from simharness.failures.blame import blame_frames, failure_scores, failure_table
+from simharness.failures.classification import find_failures
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.audit import audit
-from simharness.trial.detected_sequence import DetectedSequence
 from simharness.trial.kernel_compilation import Compilation
 from simharness.trial.stages.build_trial import Trial, build_trial, build_variants
-from simharness.trial.stages.capture import CaptureFrames
-from simharness.trial.stages.estimation import EstimateFrames, naming_frame
-from simharness.trial.stages.networks import ReadFrames
+from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.estimation import EstimateFrames, estimate_variants
+from simharness.trial.stages.simulation import Simulation, capture_trial, detect_trial
 from simharness.trial.variant_result import VariantResult
 from simharness.types.recording import Recording
-from simharness.types.sequence import Sequence as TrueSequence
-from simharness.types.views import Views
-from simharness.world.scene.playback import simulate
 
 Goal = Literal["detect", "estimate", "score", "classify", "blame"]
 """Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
 
 _GOALS: tuple[str, ...] = get_args(Goal)
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """Scene, true poses and views of a simulated trial, which stored detections do not have.
-
-    Attributes:
-        trial: the built scenario.
-        sequence: the true poses.
-        views: the truth in the pictures, with previews where they were requested.
-    """
-
-    trial: Trial
-    sequence: TrueSequence
-    views: Views
 
 
 @dataclass(frozen=True)
@@ -172,7 +152,9 @@ def run_trial(
                 pipelines = build_variants(scenario)
         result = TrialResult(scenario, detected, simulation, seconds=stages.seconds)
         if goal >= _GOALS.index("estimate"):
-            result = replace(result, estimates=_estimate(detected, pipelines, known.estimates, workers, stages))
+            result = replace(
+                result, estimates=estimate_variants(detected, pipelines, stages, known=known.estimates, workers=workers)
+            )
         if goal >= _GOALS.index("score"):
             result = replace(result, assessments=_score(result, stages))
         if goal >= _GOALS.index("classify"):
@@ -193,57 +175,19 @@ def _simulate(
     scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
 ) -> tuple[Simulation, DetectedSequence, Mapping[str, Estimator]]:
     """Run the stages from the build to the detections."""
-    frames = range(scenario.frames)
     with stages.stage("build", 1, input_errors=True):
         trial = build_trial(scenario)
     compilation = Compilation(trial.pipelines.keys() & PRESETS.keys()) if compile_ahead else None
     if compilation is not None:
         compilation.start()
-    with stages.stage("simulate", 1):
-        sequence = simulate(trial.scene)
-    with stages.stage("film", len(frames)) as advance:
-        capture = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset(previews))
-        views = Views.concatenate(map_frames(capture, frames, workers=workers, progress=advance))
+    simulation = capture_trial(trial, stages, workers=workers, previews=previews)
     with stages.stage("audit", 1):
-        audit(scenario, trial.scene, trial.exposures, sequence, views)
-    with stages.stage("detect", len(frames)):
-        frames_detected = detect(
-            sequence,
-            views,
-            trial.exposures.true_rig,
-            scenario.detector,
-            seed=scenario.seed,
-            descriptors=trial.descriptors,
-        )
-    if ReadFrames.needed(scenario):
-        with stages.stage("read", len(frames)) as advance:
-            reading = ReadFrames(scenario, trial.scene, trial.exposures, tuple(frames_detected))
-            parts = map_frames(reading, frames, workers=workers, progress=advance)
-            frames_detected = [each for part in parts for each in part]
+        audit(scenario, trial.scene, trial.exposures, simulation.sequence, simulation.views)
+    detected = detect_trial(simulation, stages, workers=workers)
     if compilation is not None:
         with stages.stage("compile", 1):
             compilation.wait()
-    detected = DetectedSequence(sequence.time, trial.exposures.believed_rig, tuple(frames_detected))
-    return Simulation(trial, sequence, views), detected, trial.pipelines
-
-
-def _estimate(
-    detected: DetectedSequence,
-    pipelines: Mapping[str, Estimator],
-    known: Mapping[str, Sequence[Estimate]],
-    workers: int,
-    stages: Stages,
-) -> dict[str, tuple[Estimate, ...]]:
-    """Return the estimates of all variants; those that are known are not made again."""
-    missing = {name: pipeline for name, pipeline in pipelines.items() if name not in known}
-    estimates = {name: tuple(frames) for name, frames in known.items()}
-    if missing:
-        indices = range(len(detected.frames))
-        with stages.stage("estimate", len(indices)) as advance:
-            estimation = EstimateFrames(detected.rig, detected.frames, missing)
-            parts = map_frames(estimation, indices, workers=workers, progress=advance)
-            estimates |= {name: tuple(each for part in parts for each in part[name]) for name in missing}
-    return {name: estimates[name] for name in pipelines}
+    return simulation, detected, trial.pipelines
 
 
 def _score(result: TrialResult, stages: Stages) -> dict[str, Assessment]:
@@ -268,24 +212,12 @@ def _find_failures(
             if variant in known:
                 tables[variant] = known[variant]
             elif blamed:
-                tables[variant] = failure_table(_blame(result.detected, variant, pipelines[variant], estimates))
+                inputs = EstimateFrames(result.detected.rig, result.detected.frames, pipelines)
+                blamed_failures = blame_frames(
+                    result.recording, pipelines[variant], estimates, partial(inputs.input_of, variant=variant)
+                )
+                tables[variant] = failure_table(blamed_failures)
             else:
                 tables[variant] = failure_table(find_failures(result.recording, estimates))
             advance(1)
     return tables
-
-
-def _blame(
-    detected: DetectedSequence, variant: str, pipeline: Estimator, estimates: Sequence[Estimate]
-) -> Iterator[Blamed]:
-    """Find failures of a variant and the stage to blame, frame by frame, because heat maps of all frames are large."""
-    recording = detected.recording
-    estimation = EstimateFrames(detected.rig, detected.frames, {variant: pipeline})
-    for frame, (truth, estimate) in enumerate(zip(recording.truth, estimates, strict=True)):
-        if failures := failures_of_frame(recording.rig, recording.detections[frame], truth, estimate):
-            detections = estimation.input_of(frame, variant)
-            moment = Recording(recording.time[[frame]], recording.rig, (detections,), (truth,))
-            with naming_frame(frame):
-                stages = blame(moment, pipeline, [estimate], failures)
-            for blamed in stages:
-                yield replace(blamed, failure=replace(blamed.failure, frame=frame))

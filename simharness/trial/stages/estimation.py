@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
 from mvpose.pipeline import PRESETS, READ_HEATMAPS, Estimator
-from simharness.runtime.errors import RunError
+from simharness.runtime.errors import naming_frame
+from simharness.runtime.frame_pool import map_frames
+from simharness.runtime.stages import Stages
 
 if TYPE_CHECKING:
     from simharness.detector.detect import Detected
+    from simharness.trial.stages.detected_sequence import DetectedSequence
 
 
 @dataclass(frozen=True)
@@ -67,14 +69,29 @@ _warm: set[str] = set()  # variants that this process has run
 _IGNORE_HEATMAPS = PRESETS.keys() - READ_HEATMAPS
 
 
-@contextlib.contextmanager
-def naming_frame(frame: int) -> Iterator[None]:
-    """Prefix the errors of an estimator with the frame's index.
+def estimate_variants(
+    detected: DetectedSequence,
+    pipelines: Mapping[str, Estimator],
+    stages: Stages,
+    *,
+    known: Mapping[str, Sequence[Estimate]],
+    workers: int = 1,
+) -> dict[str, tuple[Estimate, ...]]:
+    """Return the estimates of all variants for all frames.
 
-    Raises:
-        RunError: in place of one.
+    Args:
+        detected: the detections.
+        pipelines: variants by name.
+        stages: timer and reporter of the stage ``estimate``.
+        known: estimates of variants that need not run again.
+        workers: number of processes that share the frames.
     """
-    try:
-        yield
-    except RunError as error:
-        raise RunError(f"frame {frame}: {error}") from error
+    missing = {name: pipeline for name, pipeline in pipelines.items() if name not in known}
+    estimates = {name: tuple(frames) for name, frames in known.items()}
+    if missing:
+        indices = range(len(detected.frames))
+        with stages.stage("estimate", len(indices)) as advance:
+            estimation = EstimateFrames(detected.rig, detected.frames, missing)
+            parts = map_frames(estimation, indices, workers=workers, progress=advance)
+            estimates |= {name: tuple(each for part in parts for each in part[name]) for name in missing}
+    return {name: estimates[name] for name in pipelines}

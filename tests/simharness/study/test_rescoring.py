@@ -20,7 +20,8 @@ from simharness.study.runner import run_study
 from simharness.study.trial_store import EntryState, Store
 from simharness.trial import identity, run_trial
 from simharness.trial.archive import pack_detected, pack_estimates, unpack_detected, unpack_estimates
-from simharness.trial.detected_sequence import DetectedSequence
+from simharness.trial.stages import estimation
+from simharness.trial.stages.detected_sequence import DetectedSequence
 
 QUICKSTART = Path(__file__).parents[3] / "scenarios" / "quickstart.toml"
 CHEAP = ("rendering.renderer=rays", "duration=0.6", "rate=5", "people.count=2", "cameras.count=3")
@@ -42,9 +43,14 @@ class Counter:
 def stages(monkeypatch):
     """Counters of simulation, estimation by variants, scoring and blame."""
     counters = {}
-    for name in ("simulate", "EstimateFrames", "assess", "blame"):
-        counters[name] = Counter(getattr(run_trial, name))
-        monkeypatch.setattr(run_trial, name, counters[name])
+    for module, name in (
+        (run_trial, "capture_trial"),
+        (estimation, "EstimateFrames"),
+        (run_trial, "assess"),
+        (run_trial, "blame_frames"),
+    ):
+        counters[name] = Counter(getattr(module, name))
+        monkeypatch.setattr(module, name, counters[name])
     return counters
 
 
@@ -86,7 +92,7 @@ def without_times(table):
 
 def test_a_changed_score_is_computed_without_simulation(run, stages, code, monkeypatch):
     before = run()
-    assert calls(stages)["simulate"] == 3
+    assert calls(stages)["capture_trial"] == 3
     assert (before.info["kept"], before.info["run"]) == (0, 3)
 
     def halved(recording, estimates):
@@ -99,7 +105,7 @@ def test_a_changed_score_is_computed_without_simulation(run, stages, code, monke
     after = run()
     assert (after.info["kept"], after.info["run"]) == (0, 3)
     counted = calls(stages)
-    assert (counted["simulate"], counted["EstimateFrames"], counted["blame"]) == (0, 0, 0)
+    assert (counted["capture_trial"], counted["EstimateFrames"], counted["blame_frames"]) == (0, 0, 0)
     assert after.trials["pcp"].to_list() == [score / 2 for score in before.trials["pcp"]]
     assert without_times(after.people).equals(without_times(before.people))
     assert after.failures.equals(before.failures)
@@ -114,8 +120,8 @@ def test_unchanged_code_scores_stored_estimates_as_it_scored_them_fresh(run, sta
     code(scores="another", failures="another")
     after = run()
     counted = calls(stages)
-    assert (counted["simulate"], counted["assess"]) == (0, 6)
-    assert counted["blame"] > 0
+    assert (counted["capture_trial"], counted["assess"]) == (0, 6)
+    assert counted["blame_frames"] > 0
     assert after.trials.drop("seconds").equals(before.trials.drop("seconds"))
     for table in ("frames", "people", "failures"):
         assert getattr(after, table).equals(getattr(before, table))
@@ -127,7 +133,7 @@ def test_a_changed_method_estimates_anew_from_the_stored_detections(run, stages,
     code(method="another")
     after = run()
     counted = calls(stages)
-    assert counted["simulate"] == 0
+    assert counted["capture_trial"] == 0
     assert counted["EstimateFrames"] >= 3
     assert without_times(after.people).equals(without_times(before.people))
 
@@ -137,12 +143,12 @@ def test_changed_simulation_or_lost_detections_run_everything_again(run, stages,
     calls(stages)
     code(simulation="another")
     assert run().info["run"] == 3
-    assert calls(stages)["simulate"] == 3
+    assert calls(stages)["capture_trial"] == 3
     for file in (tmp_path / "store").glob("??/*.detections"):
         file.write_bytes(file.read_bytes()[:-30])
     code(simulation="another", scores="another")
     assert run().info["run"] == 3
-    assert calls(stages)["simulate"] == 3
+    assert calls(stages)["capture_trial"] == 3
 
 
 def test_an_entry_knows_its_state(run, code, tmp_path):

@@ -19,6 +19,7 @@ from simharness.scoring.summary import VariantScores
 from simharness.trial import run_trial
 from simharness.trial.run_folder import read_run
 from simharness.trial.stages import build_trial as trial
+from simharness.trial.stages import simulation
 from simharness.trial.stages.build_trial import build_trial
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
@@ -130,7 +131,8 @@ def test_a_stage_that_fails_leaves_no_result(tmp_path, monkeypatch, stage):
     def broken(*_args, **_options):
         raise ValueError("planted error")
 
-    monkeypatch.setattr(running if stage == "write_run" else run_trial, stage, broken)
+    modules = {"write_run": running, "assess": run_trial}
+    monkeypatch.setattr(modules.get(stage, simulation), stage, broken)
     with pytest.raises(RunError, match="ValueError: planted error"):
         run(tiny(), out=tmp_path)
     assert list(tmp_path.iterdir()) == []

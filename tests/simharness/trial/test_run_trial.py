@@ -6,6 +6,7 @@ import polars as pl
 import pytest
 from trials import measured as measure
 
+from simharness.failures import blame
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
@@ -86,8 +87,8 @@ def test_blame_uses_the_detections_that_the_variant_was_given(monkeypatch):
         seen.setdefault(id(estimator), detections.likelihoods is not None)
         return find_stages(recording, estimator, estimates, failures)
 
-    find_stages = module.blame
-    monkeypatch.setattr(module, "blame", look)
+    find_stages = blame.blame
+    monkeypatch.setattr(blame, "blame", look)
     measure(cheap("detector.heatmaps.size=64x48"), ["full", "fast"])
     assert sorted(seen.values()) == [False, True]
 

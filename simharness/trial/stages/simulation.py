@@ -1,0 +1,78 @@
+"""Simulation of a built trial: true poses, what the cameras record, and detections."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from simharness.detector.detect import detect
+from simharness.runtime.frame_pool import map_frames
+from simharness.runtime.stages import Stages
+from simharness.trial.stages.build_trial import Trial
+from simharness.trial.stages.capture import CaptureFrames
+from simharness.trial.stages.detected_sequence import DetectedSequence
+from simharness.trial.stages.networks import ReadFrames
+from simharness.types.sequence import Sequence
+from simharness.types.views import Views
+from simharness.world.scene.playback import simulate
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Scene, true poses and views of a simulated trial, which stored detections do not have.
+
+    Attributes:
+        trial: the built scenario.
+        sequence: the true poses.
+        views: the truth in the pictures, with previews where they were requested.
+    """
+
+    trial: Trial
+    sequence: Sequence
+    views: Views
+
+
+def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = ()) -> Simulation:
+    """Simulate the true poses and capture all frames.
+
+    Args:
+        trial: the built scenario.
+        stages: timer and reporter of the stages ``simulate`` and ``film``.
+        workers: number of processes that share the frames.
+        previews: frames whose colour pictures are kept.
+    """
+    frames = range(trial.scenario.frames)
+    with stages.stage("simulate", 1):
+        sequence = simulate(trial.scene)
+    with stages.stage("film", len(frames)) as advance:
+        capture = CaptureFrames(trial.scenario, trial.scene, trial.exposures, frozenset(previews))
+        views = Views.concatenate(map_frames(capture, frames, workers=workers, progress=advance))
+    return Simulation(trial, sequence, views)
+
+
+def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) -> DetectedSequence:
+    """Detect people in the captured frames; networks of the scenario read its pictures.
+
+    Args:
+        simulation: from :func:`capture_trial`.
+        stages: timer and reporter of the stages ``detect`` and ``read``.
+        workers: number of processes that share the frames.
+    """
+    trial, sequence = simulation.trial, simulation.sequence
+    scenario, exposures = trial.scenario, trial.exposures
+    frames = range(scenario.frames)
+    with stages.stage("detect", len(frames)):
+        detected = detect(
+            sequence,
+            simulation.views,
+            exposures.true_rig,
+            scenario.detector,
+            seed=scenario.seed,
+            descriptors=trial.descriptors,
+        )
+    if ReadFrames.needed(scenario):
+        with stages.stage("read", len(frames)) as advance:
+            reading = ReadFrames(scenario, trial.scene, exposures, tuple(detected))
+            parts = map_frames(reading, frames, workers=workers, progress=advance)
+            detected = [each for part in parts for each in part]
+    return DetectedSequence(sequence.time, exposures.believed_rig, tuple(detected))
