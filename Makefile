@@ -12,7 +12,7 @@ PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
 .PHONY: demo test lint docs wheels results clean
 
 demo: $(RUN)
-	$(BIN)/simharness run scenarios/quickstart.toml
+	$(BIN)/simharness run quickstart
 
 test: $(DEV)
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
