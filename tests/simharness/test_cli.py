@@ -134,7 +134,7 @@ def test_an_internal_error_shows_its_traceback(simharness, monkeypatch, tmp_path
     def broken(*_args, **_options):
         raise error
 
-    monkeypatch.setattr("simharness.trial.run_trial.detect", broken)
+    monkeypatch.setattr("simharness.trial.stages.simulation.detect", broken)
     result = simharness("run", QUICKSTART, *TINY)
     assert result.exit_code == 3
     assert "Traceback" in result.stderr
