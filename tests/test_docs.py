@@ -24,6 +24,7 @@ from typer.testing import CliRunner
 import simharness
 from simharness.cli import app
 from simharness.formats.calibration.voxelpose import write_calibration
+from simharness.scenario.sections.detector import Detector
 from simharness.scenario.study_definition import load_study
 
 ROOT = Path(__file__).parents[1]
@@ -61,16 +62,18 @@ USER_FILES = {
     ),
     "night.toml": "simharness run quickstart --set detector.profile=night.toml",
 }
-NAMES = ("simharness check", "simharness fit-detector", "simharness evaluate seeds")  # mentioned
+NAMES = ("simharness check", "simharness export", "simharness fit-detector", "simharness evaluate seeds")  # mentioned
 CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2",
     "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
 )
 SHELF = (
     "simharness evaluate shelf FOLDER",
-    "simharness evaluate twin FOLDER",
+    "simharness evaluate twin shelf FOLDER",
     "simharness fit-detector shelf FOLDER --out fitted.toml",
+    "simharness validate shelf FOLDER",
 )
+OWN_RECORDING = "simharness evaluate hall.toml"
 OWN_STUDY = {
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
@@ -98,6 +101,7 @@ KNOWN = {
     *NAMES,
     *CHECKS,
     *SHELF,
+    OWN_RECORDING,
     *OWN_STUDY,
     *OWN_GATE,
     *IN_PARTS,
@@ -214,7 +218,12 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 5, "toml": 5, "yaml": 1}
+    assert languages == {"python": 5, "toml": 7, "yaml": 1}
+
+
+def test_the_shares_of_the_face_are_valid():
+    (block,) = {block for block in blocks("toml") if block.startswith("[keypoints.face]\n")}
+    assert Detector.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99  # 270 degrees: the far side
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -285,6 +294,13 @@ def test_commands_on_shelf_without_data(workplace, command):
     assert result.exit_code == 2
     assert result.stderr.startswith("error: ")  # and no usage: the options are right
     assert "no such folder" in result.stderr
+
+
+def test_the_described_recording_has_valid_keys(workplace):
+    (workplace / "hall.toml").write_text(toml_file("hall.toml"), encoding="utf-8")
+    result = call(OWN_RECORDING)
+    assert result.exit_code == 2
+    assert "hall.toml: calibration.file: calibration.json: no such file" in result.stderr
 
 
 @pytest.mark.slow

@@ -76,6 +76,7 @@ def test_every_extension_is_used():
         "An activity",
         "A detector error",
         "A calibration format",
+        "A format of detections or truth",
         "A score",
         "A plot",
         "A matching method",

@@ -6,7 +6,7 @@ traceback), 130 interrupted. Commands import heavy modules only when they run.
 
 from __future__ import annotations
 
-from simharness.cli import check, evaluate, export, fit_detector, report, run, scenarios, study
+from simharness.cli import check, evaluate, export, fit_detector, report, run, scenarios, study, validate
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
@@ -18,7 +18,8 @@ check.add_to(app)
 report.add_to(app)
 study.add_to(app)
 app.add_typer(evaluate.app, name="evaluate")
-app.add_typer(fit_detector.app, name="fit-detector")
+fit_detector.add_to(app)
+validate.add_to(app)
 
 
 def main() -> None:

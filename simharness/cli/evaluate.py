@@ -1,4 +1,4 @@
-"""``simharness evaluate``: scores of the method on real data and on its simulated twins."""
+"""``simharness evaluate``: scores of the method on recordings and on their simulated twins."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 
 from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
-from simharness.cli.options import JsonFile, Overrides, ScenarioFile, command_line
+from simharness.cli.options import JsonFile, Overrides, RecordingFile, RecordingFolder, ScenarioFile, command_line
+from simharness.cli.recording_group import recording_group
 
 if TYPE_CHECKING:
     from mvpose.pipeline import Estimator
@@ -25,12 +26,13 @@ class HeadMapping(enum.StrEnum):
     Y2019 = "2019"
 
 
-app = typer.Typer(no_args_is_help=True, help="Score the method on real data.")
+app = recording_group("Score the method on a recording, or compare recordings with simulation.")
 
 
-@app.command()
-def shelf(
-    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
+@app.command("recording")
+def evaluate_recording(
+    recording: RecordingFile,
+    folder: RecordingFolder = None,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False),
@@ -48,25 +50,22 @@ def shelf(
         ),
     ] = None,
 ) -> None:
-    """Shelf: PCP of actors 1 to 3 on frames 300 to 599, and errors that PCP ignores.
-
-    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
-    """
+    """A recording (the word [cyan]recording[/] may be left out): PCP of its actors, and errors that PCP ignores."""
     with exit_on_error():
         start = perf_counter()
         from mvpose.pipeline import NEED_DESCRIPTORS
         from simharness.cli.evaluation_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
-        from simharness.reality.shelf import read_shelf
+        from simharness.reality.recording_file import read_recording
         from simharness.runtime.progress import reporter
 
         pipelines = {name: _estimator(name) for name in method or ["full"]}
         if blind := NEED_DESCRIPTORS & pipelines.keys():
             raise ValueError(
-                f"--method {', '.join(blind)}: uses descriptors alone, and the detections of Shelf carry none; "
+                f"--method {', '.join(blind)}: uses descriptors alone, and the detections of recordings carry none; "
                 "choose another variant"
             )
-        data = read_shelf(folder)
+        data = read_recording(recording, folder, head=head.value)
         with (
             run_errors_only(),
             reporter() as bars,
@@ -80,26 +79,26 @@ def shelf(
 
 @app.command()
 def twin(
-    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
-    scenario: Annotated[
-        Path | None,
-        typer.Option(metavar="SCENARIO", help="The simulated twin. [dim]\\[default: shelf][/]", dir_okay=False),
-    ] = None,
+    recording: RecordingFile,
+    folder: RecordingFolder = None,
     twins: Annotated[int, typer.Option(metavar="N", min=2, help="Number of twins, of different seeds.")] = 10,
     json_file: JsonFile = None,
 ) -> None:
-    """Shelf and its simulated twin: PCP of the scenario's variants in reality and in simulation, with intervals."""
+    """A recording and its simulated twin: PCP of variants in reality and in simulation, with intervals."""
     with exit_on_error():
         start = perf_counter()
         from simharness.cli.evaluation_tables import print_twin_comparison
-        from simharness.reality.shelf import read_shelf
-        from simharness.reality.twin import compare
+        from simharness.reality.detector_fit.fit import fit
+        from simharness.reality.recording_file import read_recording
+        from simharness.reality.twin import TwinModel, simulate_twins
+        from simharness.reality.twin_comparison import compare
         from simharness.runtime.progress import reporter
-        from simharness.scenario.load import load
 
-        loaded, recorded = load(scenario or "shelf"), read_shelf(folder)
+        recorded = read_recording(recording, folder)
         with reporter() as bars:
-            comparison = compare(recorded, loaded, count=twins, reporter=bars)
+            with bars.stage("fit", 1):
+                model = TwinModel.of(recorded, fit(recorded))
+            comparison = compare(recorded, simulate_twins(model, count=twins, reporter=bars), reporter=bars)
         if json_file is not None:
             _write(comparison.summary(), json_file, seeds=comparison.seeds, variants=comparison.real, start=start)
     print_twin_comparison(comparison, Console())

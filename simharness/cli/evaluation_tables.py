@@ -11,33 +11,33 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from simharness.reality.evaluation import ACTORS, Evaluation
-from simharness.reality.published_scores import ABLATION
-from simharness.reality.twin import TOLERANCE
+from simharness.reality.evaluation import Evaluation
+from simharness.reality.published_scores import ABLATION, PublishedPcp
+from simharness.reality.twin_comparison import TOLERANCE
 from simharness.scoring.pcp import GROUPS
-from simharness.scoring.summary import STAGES, VariantScores
+from simharness.scoring.summary import STAGES
 
 if TYPE_CHECKING:
     from simharness.reality.seed_evaluation import SeedEvaluation
-    from simharness.reality.twin import TwinComparison
+    from simharness.reality.twin_comparison import TwinComparison
 
-_PAPER = ABLATION["shelf"]
+_PAPER_ACTORS = (0, 1, 2)  # of Campus and Shelf, by tables 1 and 2
 
 
 def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     """Print PCP by actor and part beside that of the paper, errors that PCP ignores, and the time per stage."""
     summaries = evaluation.summary()["variants"]
     headline = Text.assemble(
-        ("Shelf", "bold"),
+        (evaluation.name, "bold"),
         f"  {evaluation.frames} frames, {evaluation.annotated} of them annotated; head mapping ",
         (evaluation.head, "bold"),
     )
-    tables = [_pcp_table(name, scores) for name, scores in evaluation.variants.items()]
+    tables = [_pcp_table(name, evaluation) for name in evaluation.variants]
+    numbers = ", ".join(str(actor + 1) for actor in evaluation.actors)
+    paper = "Paper: Dong et al. 2019, with their detections and the 2019 head." if _paper(evaluation) else ""
     notes = Text(
-        "PCP: part correct within 0.5 of its length; average of actors 1 to 3; ignores ghosts. "
-        "Paper: Dong et al. 2019, with their detections and the 2019 head.\n"
-        "One-to-one: pairs under 500 mm. Shelf does not annotate all people in every frame: "
-        "an estimate of a person without annotation counts as a ghost. "
+        f"PCP: part correct within 0.5 of its length; average of actors {numbers}; ignores ghosts. {paper}\n"
+        "One-to-one: pairs under 500 mm. An estimate of a person who is not annotated in a frame counts as a ghost. "
         "Same view: detections that share an estimate with another detection of their view.",
         style="dim",
     )
@@ -78,7 +78,7 @@ def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
     console.print(table)
     order = "same" if comparison.same_order else "different"
     console.print(
-        f"Detector {comparison.detector}, {len(comparison.seeds)} twins of {comparison.frames[1]} frames. Largest "
+        f"{len(comparison.seeds)} twins of {comparison.frames} frames. Largest "
         f"difference {comparison.largest_difference:.1f} points (limit: {TOLERANCE:g}), {order} order.",
         style="dim",
         highlight=False,
@@ -108,18 +108,24 @@ def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
     console.print(table)
 
 
-def _pcp_table(name: str, scores: VariantScores) -> Table:
+def _paper(evaluation: Evaluation) -> Mapping[str, PublishedPcp]:
+    """Return the published scores by variant; of other recordings none."""
+    return ABLATION.get(evaluation.name, {}) if evaluation.actors == _PAPER_ACTORS else {}
+
+
+def _pcp_table(name: str, evaluation: Evaluation) -> Table:
+    scores, actors = evaluation.variants[name], evaluation.actors
     table = _table(f"PCP, {name}", "actor")
     for group in GROUPS:
         table.add_column(group.replace("_", " "), justify="right")
     table.add_column("all", justify="right", style="bold")
-    published = _PAPER.get(name)
+    published = _paper(evaluation).get(name)
     if published:
         table.add_column("paper", justify="right", style="cyan")
-    rows = scores.pcp_table(actors=ACTORS)
-    summary = scores.summary(actors=ACTORS)
+    rows = scores.pcp_table(actors=actors)
+    summary = scores.summary(actors=actors)
     rows.append({**summary["pcp_parts"], "all": summary["pcp"]})
-    labels = [*(str(actor + 1) for actor in ACTORS), "average"]
+    labels = [*(str(actor + 1) for actor in actors), "average"]
     for index, (label, row) in enumerate(zip(labels, rows, strict=True)):
         last = index == len(rows) - 1
         cells = [_number(value, 1) for value in row.values()]
@@ -131,13 +137,13 @@ def _pcp_table(name: str, scores: VariantScores) -> Table:
 def _variants_table(evaluation: Evaluation) -> Table:
     """Return the PCP of all actors with a row for each variant, followed by the row of the paper if it has one."""
     table = _table("PCP of the variants", "variant")
-    for actor in ACTORS:
+    for actor in evaluation.actors:
         table.add_column(f"actor {actor + 1}", justify="right")
     table.add_column("average", justify="right", style="bold")
     for name, scores in evaluation.summary()["variants"].items():
         table.add_row(name, *(_number(value, 1) for value in (*scores["pcp_actors"], scores["pcp"])))
-        if name in _PAPER:
-            table.add_row("  paper", *(_number(value, 1) for value in _PAPER[name]), style="cyan not bold")
+        if published := _paper(evaluation).get(name):
+            table.add_row("  paper", *(_number(value, 1) for value in published), style="cyan not bold")
     return table
 
 

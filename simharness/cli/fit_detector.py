@@ -9,13 +9,17 @@ import typer
 from rich.console import Console
 
 from simharness.cli.exit_codes import exit_on_error, run_errors_only, write_json
+from simharness.cli.options import RecordingFile, RecordingFolder
 
-app = typer.Typer(no_args_is_help=True, help="Measure a real detector and write a profile with its errors.")
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("fit-detector")(fit_detector)
 
 
-@app.command("shelf")
-def fit_shelf(
-    folder: Annotated[Path, typer.Argument(help="Folder of the published files of Shelf.", metavar="FOLDER")],
+def fit_detector(
+    recording: RecordingFile,
+    folder: RecordingFolder = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the profile (TOML) to this file.", dir_okay=False)
     ] = None,
@@ -28,28 +32,31 @@ def fit_shelf(
         typer.Option("--json", metavar="FILE", help="Write all numbers to this file.", dir_okay=False),
     ] = None,
 ) -> None:
-    """Shelf: OpenPose on frames 300 to 599 against the published truth.
-
-    FOLDER holds calibration_shelf.json, actorsGT.mat and openpose/.
-    """
+    """Measure the detector of a recording and write a profile with its errors."""
     with exit_on_error():
-        from simharness.reality.detector_fit.fit import fit, twin_of, write_profile
+        from simharness.reality.detector_fit.fit import fit, write_profile
         from simharness.reality.detector_fit.plot import plot_comparison
-        from simharness.reality.detector_fit.sample import of_shelf
-        from simharness.reality.detector_fit.table import print_agreement, print_measurement
-        from simharness.reality.shelf import read_shelf
+        from simharness.reality.detector_fit.table import print_agreement, print_annotation, print_measurement
+        from simharness.reality.recording_file import read_recording
+        from simharness.reality.twin import TwinModel, simulate_twins
+        from simharness.runtime.progress import reporter
 
-        sample = of_shelf(read_shelf(folder))
-        fitted = fit(sample, command="simharness fit-detector shelf FOLDER --out FILE")
+        recorded = read_recording(recording, folder)
+        with reporter() as bars, bars.stage("fit", 1):
+            command = f"simharness fit-detector {recorded.name} FOLDER --out FILE"
+            fitted = fit(recorded, name=recorded.name if out is None else out.stem, command=command)
         if out is not None:
             write_profile(fitted, out)
-        print_measurement(fitted.real, Console())
-        summary = {"real": fitted.real.summary()}
+        console = Console()
+        print_measurement(fitted.real, console)
+        print_annotation(fitted.annotation, console)
+        summary = {"real": fitted.real.summary(), "annotation": fitted.annotation.summary()}
         if figure is not None:
-            with run_errors_only():
-                simulated = twin_of(fitted, sample)
+            with run_errors_only(), reporter() as bars:
+                (twin,) = simulate_twins(TwinModel.of(recorded, fitted), count=1, reporter=bars)
+                simulated = fit(twin).real
             plot_comparison([fitted.real, simulated], figure)
-            print_agreement(fitted.real, simulated, Console())
+            print_agreement(fitted.real, simulated, console)
             summary["simulated"] = simulated.summary()
         if json_file is not None:
             write_json(summary, json_file)

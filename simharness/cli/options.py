@@ -15,6 +15,20 @@ ScenarioFile = Annotated[
         help="A scenario file (TOML), or the name of a shipped scenario: [cyan]quickstart[/].", metavar="SCENARIO"
     ),
 ]
+RecordingFile = Annotated[
+    Path,
+    typer.Argument(
+        help="A description of a recording (TOML), a folder with recording.toml, or the name of a shipped description: "
+        "[cyan]shelf[/].",
+        metavar="RECORDING",
+    ),
+]
+RecordingFolder = Annotated[
+    Path | None,
+    typer.Argument(
+        help="Folder in which the files of the recording lie; by default that of the description.", metavar="FOLDER"
+    ),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),

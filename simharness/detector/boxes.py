@@ -21,6 +21,7 @@ from simharness.detector.conditions import BOX_SHARE, overlaps
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import LIMB_OF_JOINT, Key, KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
+from simharness.detector.view_geometry import hidden_shares
 from simharness.scenario.sections.detector import Boxes
 from simharness.types.truth import KeypointError
 from simharness.types.views import Views, Visibility
@@ -35,6 +36,7 @@ small that error classes change only rarely, near their borders, and the labels 
 DUPLICATE_SCORE = 0.8
 """Factor of the scores of a duplicate."""
 
+_HIDDEN_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _INWARD = 0.45  # most that a side may move, as a share of the box's size, so that no box turns inside out
 _JOINTS = np.arange(len(COCO17))
 
@@ -64,7 +66,7 @@ def apply_box_errors(
     errors = _BoxErrors(views, rig, config, draws)
     visible = views.visibility == Visibility.VISIBLE
     found = people.present & (visible.sum(axis=-1) >= config.least_visible)
-    found &= ~errors.occurs("missed", config.missed, shared=config.missed_views)
+    found &= ~errors.occurs("missed", errors.missed_shares(), shared=config.missed_views)
     merged = errors.merged(found)
     left = found.copy()
     for pair, merge_here in merged.items():
@@ -100,12 +102,21 @@ class _BoxErrors:
         self._shape = views.boxes.shape[:3]
         self._image = np.array([camera.size for camera in rig], float).reshape(-1, 1, 2)
 
-    def occurs(self, what: str, share: float, *, shared: float = 0.0) -> Bools:
-        """Draw which people an error takes in which pictures, (T, V, P)."""
+    def missed_shares(self) -> Floats | float:
+        """Return the probability that a person is missed, (T, V, P), or one for all."""
+        config = self._config
+        if not any(config.missed_hidden):
+            return config.missed
+        hidden = hidden_shares(self._views.visibility)
+        return 1 - (1 - config.missed) * (1 - np.interp(hidden, _HIDDEN_SHARES, config.missed_hidden))
+
+    def occurs(self, what: str, share: Floats | float, *, shared: float = 0.0) -> Bools:
+        """Draw which people an error of probability ``share`` takes in which pictures, (T, V, P)."""
         result = np.zeros(self._shape, bool)
-        if share > 0:
+        share = np.broadcast_to(share, self._shape)
+        if (share > 0).any():
             for person in range(self._shape[2]):
-                result[..., person] = self._state(what, person, shared=shared) < ndtri(share)
+                result[..., person] = self._state(what, person, shared=shared) < ndtri(share[..., person])
         return result
 
     def merged(self, found: Bools) -> dict[tuple[int, int], Bools]:

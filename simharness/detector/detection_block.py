@@ -47,7 +47,7 @@ class DetectionBlock:
         number: number among the detections of this origin, (T, V, S); unlike the slot, it does not depend on how many
             other detections there are.
         error: :class:`KeypointError`, (T, V, S, J).
-        guessed: which keypoints are guesses of hidden joints, (T, V, S, J).
+        guessed: which keypoints are guesses, (T, V, S, J).
         rivals: position of a second peak in the heat map, pixels, (T, V, S, J, 2); NaN where there is none.
     """
 

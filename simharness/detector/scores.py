@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from mvpose.arrays import Bools, Floats
-from simharness.detector.conditions import VISIBLE, Conditions
+from simharness.detector.conditions import OUTSIDE, VISIBLE, Conditions
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws, logistic
 from simharness.detector.steps import Context, StepStage, step
@@ -49,29 +49,33 @@ def score_keypoints(
 
     Args:
         error: :class:`KeypointError` of each keypoint, (T, V, P, J).
-        guessed: which keypoints are guesses of hidden joints, (T, V, P, J).
+        guessed: which keypoints are guesses, (T, V, P, J).
         conditions: viewing conditions.
         config: usual scores and their spread.
         correlation: correlation of the draws in time.
         draws: draws of the sequence.
     """
-    usual = np.zeros(len(KeypointError))
+    usual, hidden = np.zeros(len(KeypointError)), np.ones(len(KeypointError))
     for kind in KeypointError:
         usual[kind] = getattr(config, kind.name.lower(), 0.0)
-    score = usual[error]
+        hidden[kind] = getattr(config.hidden, kind.name.lower(), 1.0)
+    scored_as, unsure = error.copy(), guessed.copy()
     _, views, people, joints = error.shape
     doubtful = (error == KeypointError.MISS) | guessed
-    for share, purpose, candidates, scored_as in (
+    for share, purpose, candidates, other in (
         (config.overconfident, "overconfident", doubtful, KeypointError.GOOD),
-        (config.underconfident, "underconfident", error == KeypointError.GOOD, KeypointError.MISS),
+        (config.underconfident, "underconfident", (error == KeypointError.GOOD) & ~guessed, KeypointError.MISS),
     ):
         if share > 0:
             for person in range(people):
                 state = draws.joint_states(purpose, person, lives=("lives", person), life=correlation.life)
                 taken = candidates[:, :, person] & (state < ndtri(share))
-                score[:, :, person][taken] = usual[scored_as]
-    factor = np.where(conditions.occlusion == VISIBLE, 1.0, config.hidden)
-    score = score * factor * np.array(config.joint.by_joint())
+                scored_as[:, :, person][taken] = other
+                unsure[:, :, person][taken] = False
+    factor = np.where((conditions.occlusion == VISIBLE) | guessed, 1.0, hidden[scored_as])
+    score = usual[scored_as] * factor * np.array(config.joint.by_joint())
+    of_guess = np.where(conditions.occlusion == OUTSIDE, config.outside, 1.0) * np.array(config.guess.by_joint())
+    score = np.where(unsure, of_guess, score)
     score = np.minimum(score, 1.0)
     if config.deviation > 0:
         for person in range(people):

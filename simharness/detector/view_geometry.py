@@ -48,3 +48,27 @@ def bearings(joints: ArrayLike, rig: Rig) -> Floats:
 def hidden_shares(visibility: NDArray[np.int8]) -> Floats:
     """Return the share of joints (..., J) that other people or objects hide or the border cuts off, (...)."""
     return np.isin(visibility, _HIDDEN).mean(axis=-1)
+
+
+def head_bearings(joints: ArrayLike, rig: Rig) -> Floats:
+    """Return the bearings of V cameras from heads, radians to the left of straight ahead, (T, V, P); NaN where unknown.
+
+    Ahead points from the middle of the ears to the nose, left from the right ear to the left one.
+
+    Args:
+        joints: COCO-17, (T, P, 17, 3) metres; NaN where unknown.
+        rig: the V cameras.
+    """
+    joints = np.asarray(joints, float)
+    nose, left_ear, right_ear = joints[..., 0, :], joints[..., 3, :], joints[..., 4, :]
+    center = (left_ear + right_ear) / 2
+    left = _unit(left_ear - right_ear)
+    ahead = nose - center
+    ahead = _unit(ahead - (ahead * left).sum(axis=-1, keepdims=True) * left)
+    toward = np.stack([camera.center - center for camera in rig], axis=1)
+    return np.arctan2((toward * left[:, None]).sum(axis=-1), (toward * ahead[:, None]).sum(axis=-1))
+
+
+def _unit(vector: Floats) -> Floats:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)

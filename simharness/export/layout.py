@@ -4,9 +4,9 @@
     hdImgs/00_00/00_00_00000000.jpg
     hdPose3d_stage1_coco19/body3DScene_00000000.json
     openpose/00_00/00_00_00000000_keypoints.json
-    manifest.json, scenario.toml
+    manifest.json, scenario.toml, recording.toml, truth.npz
 
-The believed calibration, ``openpose``, the manifest and the scenario are additions of simharness; the rest is the
+The believed calibration, ``openpose`` and the files of the last line are additions of simharness; the rest is the
 toolbox's layout (https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolbox).
 """
 
@@ -57,6 +57,16 @@ class Layout:
     def scenario(self) -> Path:
         """Resolved scenario of the sequence."""
         return self.folder / "scenario.toml"
+
+    @property
+    def recording(self) -> Path:
+        """Description of the sequence as a recording."""
+        return self.folder / "recording.toml"
+
+    @property
+    def truth(self) -> Path:
+        """True joints of the recording."""
+        return self.folder / "truth.npz"
 
     def picture(self, camera: str, frame: int) -> Path:
         """Return the path of the picture of a camera in a frame."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
-from simharness.formats.openpose import BODY_25
+from simharness.formats.joint_names import BODY_25
 from simharness.formats.panoptic_poses import CONFIDENCES
 from simharness.trial.provenance import provenance
 from simharness.trial.stages.build_trial import Trial
@@ -79,6 +79,8 @@ def manifest(
             "bodies": BODIES,
             "detections": PEOPLE,
             "scenario": "scenario.toml",
+            "recording": "recording.toml",
+            "truth": "truth.npz",
         },
         "units": _UNITS,
         "axes": _AXES,

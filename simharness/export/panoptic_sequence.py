@@ -18,6 +18,7 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.export.cameras import hd_names, renamed, write_cameras
 from simharness.export.layout import Layout, check_place
 from simharness.export.manifest import manifest
+from simharness.export.recording_description import write_description
 from simharness.formats.openpose import people_file
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.runtime.atomic_files import atomic_folder
@@ -94,6 +95,7 @@ def export_sequence(
         write_cameras(layout.calibration, true_rig, source=scenario.name)
         if faulty := not _same_cameras(true_rig, believed_rig):
             write_cameras(layout.believed, believed_rig, source=f"{scenario.name}, as believed")
+        write_description(layout, scenario, sequence, true_rig, frames=frames, believed=faulty)
         for frame in frames:
             current = detected[frame]
             bodies = body_scene(

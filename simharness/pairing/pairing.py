@@ -70,16 +70,23 @@ def pair(truth: ArrayLike, estimate: ArrayLike, *, limit: float = LIMIT) -> Pair
     truth = as_array(truth, ("P", "J", 3), "truth")
     estimate = as_array(estimate, ("n", truth.shape[1], 3), "estimate")
     distance = mean_distances(truth, estimate)
+    partner = assign(distance, limit=limit)
+    rows = np.flatnonzero(partner >= 0)
+    error = np.full(len(truth), np.nan)
+    error[rows] = distance[rows, partner[rows]]
+    present = np.isfinite(truth).all(axis=-1).any(axis=-1)
+    return Pairing(partner, error, present, len(estimate))
+
+
+def assign(distance: Floats, *, limit: float = LIMIT) -> NDArray[np.int64]:
+    """Return the estimate paired with each true person, (P,), -1 for none, from their distances (P, n) in metres."""
     # A pair over the limit costs more than any change among the allowed pairs can save.
     forbidden = 1.0 + 2.0 * limit * min(distance.shape)
     rows, columns = linear_sum_assignment(np.where(distance <= limit, distance, forbidden))
     allowed = distance[rows, columns] <= limit
-    rows, columns = rows[allowed], columns[allowed]
-    partner, error = np.full(len(truth), -1), np.full(len(truth), np.nan)
-    partner[rows] = columns
-    error[rows] = distance[rows, columns]
-    present = np.isfinite(truth).all(axis=-1).any(axis=-1)
-    return Pairing(partner, error, present, len(estimate))
+    partner = np.full(len(distance), -1)
+    partner[rows[allowed]] = columns[allowed]
+    return partner
 
 
 def mean_distances(truth: Floats, estimate: Floats) -> Floats:

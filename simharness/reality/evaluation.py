@@ -16,21 +16,19 @@ from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
 from simharness.scoring.summary import VariantScores, summarize
 
-ACTORS = (0, 1, 2)
-"""Indices of the actors of Shelf whose PCP publications average."""
-
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of variants on a data set.
+    """Scores of variants on a recording.
 
     Attributes:
-        name: name of the data set.
+        name: name of the recording.
         head: mapping from COCO-17 to the head of SHELF14.
         frames: number of frames that the variants were given.
         annotated: number of these frames that have truth and are scored.
         variants: scores by variant.
         violations: by variant, the number of detections that share a label with another detection of their view.
+        actors: indices of the actors whose PCP is averaged.
     """
 
     name: str
@@ -39,6 +37,7 @@ class Evaluation:
     annotated: int
     variants: Mapping[str, VariantScores]
     violations: Mapping[str, int]
+    actors: tuple[int, ...]
 
     def summary(self) -> dict[str, Any]:
         """Return the summary, ready for JSON, with the keys of a run's ``summary.json``.
@@ -50,7 +49,7 @@ class Evaluation:
             self.variants,
             frames=self.frames,
             seeds=0,
-            actors=ACTORS,
+            actors=self.actors,
             head=self.head,
             frames_annotated=self.annotated,
         )
@@ -117,4 +116,6 @@ def score_estimates(
             if annotated[frame]:
                 scores.append(score_frame(recording.truth[frame], estimate.joints, head=head))
         variants[name] = VariantScores(tuple(scores), tuple(estimate.timings for estimate in of_frames))
-    return Evaluation("shelf", head, len(recording), int(annotated.sum()), variants, violations)
+    return Evaluation(
+        recording.name, head, len(recording), int(annotated.sum()), variants, violations, recording.scored
+    )

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.skeleton import SHELF14, HeadMapping
+from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.annotation import annotate_simulation
 from simharness.reality.evaluation import Evaluation, score_estimates
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
@@ -21,7 +22,6 @@ from simharness.statistics.bootstrap import block_weights, interval, resampled
 from simharness.trial.run_trial import TrialResult, run_trial
 
 _ATTEMPTS = 3  # seeds tried for each one requested, because randomly drawn people may not fit beside clutter
-_LIMBS = 12  # limb joints of SHELF14 come first, then the head
 _RESAMPLES = 1000
 
 
@@ -144,17 +144,26 @@ def annotate(result: TrialResult) -> AnnotatedRecording:
     """Return a simulated trial as an annotated recording, with annotations like those of Shelf.
 
     A person is annotated, with the body's landmarks, if all limb joints are inside the pictures of all cameras except
-    one (of at least two cameras). This holds for 504 of the 510 annotations in Shelf's test frames.
+    one (of at least two cameras). This holds for 504 of the 510 annotations in Shelf's test frames. The errors of the
+    annotation are those of the scenario's section ``[annotation]``.
 
     Raises:
         ValueError: the trial was not simulated.
     """
     recording = result.recording
     assert result.simulation is not None
-    rig, truth = recording.rig, result.simulation.sequence.of_skeleton(SHELF14)
-    inside = np.stack([camera.inside(camera.project(truth[..., :_LIMBS, :])).all(axis=-1) for camera in rig])
-    truth[inside.sum(axis=0) < max(2, len(rig) - 1)] = np.nan
-    return AnnotatedRecording(rig, truth, recording.detections, np.arange(len(recording)))
+    scenario = result.scenario
+    whole = scenario.model_copy(update={"annotation": scenario.annotation.model_copy(update={"people": "whole"})})
+    truth = annotate_simulation(whole, result.simulation.sequence, recording.rig)
+    return AnnotatedRecording(
+        recording.rig,
+        truth,
+        recording.detections,
+        np.arange(len(recording)),
+        name=scenario.name,
+        rate=scenario.rate,
+        kind=scenario.detector.kind,
+    )
 
 
 def pcp_interval(recordings: Sequence[VariantScores], people: Sequence[int], *, rate: float) -> PcpInterval:

@@ -1,121 +1,85 @@
-"""Comparison of a recording with its simulated twin: scores of variants in reality and in simulation.
+"""Simulated twins of a recording: the same rig, people, poses and frames, a fitted detector and a fitted annotation.
 
-The twin is a scenario with the cameras of the recording, similar people, and a detector fitted to that of the recording
-(:mod:`simharness.reality.detector_fit`). Both are scored by the protocol of the recording.
+A twin is a recording like the real one, to be scored by the same protocol. It holds nothing of the real detections but
+what the fit has measured: parameters of the detector, who was where, and how the truth was annotated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Self
 
-from mvpose.skeleton import HeadMapping
+import numpy as np
+
+from mvpose import COCO17
+from simharness.detector.bias import world_offsets
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.evaluation import ACTORS, evaluate
-from simharness.reality.seed_evaluation import PcpInterval, evaluate_seeds, pcp_interval
+from simharness.reality.annotation import AnnotationModel
+from simharness.reality.detector_fit.fit import Fit
+from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
+from simharness.reality.reenactment import Film, cut_takes, film
 from simharness.runtime.progress import Reporter, Silence
-from simharness.scenario.sections.scenario import Scenario
-from simharness.trial.stages.estimators import estimators_of
+from simharness.scenario.sections.detector import Detector
 
-TOLERANCE = 2.0
-"""Largest accepted difference between a variant's PCP in simulation and in reality, points."""
+MOST_FILMS = 3
+"""Largest number of films of a recording. More twins have the bodies of earlier ones, and detections of their own:
+the bodies matter less than the draws of the detector, and filming takes longest."""
 
 
 @dataclass(frozen=True)
-class TwinComparison:
-    """Scores of variants on a recording and on its simulated twin.
+class TwinModel:
+    """Everything that a twin is made from.
 
     Attributes:
-        name: name of the twin's scenario.
-        detector: detector profile of the twin.
-        frames: number of frames of the recording, and of each twin.
-        seeds: seeds of the twins.
-        head: mapping to the head of SHELF14.
-        real: PCP on the recording by variant.
-        simulated: PCP on the twins by variant.
-        summaries: summaries of all scores, by "real" and "simulated", then by variant.
+        recording: the real recording: its rig, its frames, and which actors are annotated in which of them.
+        people: who is where in the recording.
+        detector: fitted detector.
+        annotation: fitted annotation.
+        films: re-enactments that exist already, of seeds 0, 1, ...
     """
 
-    name: str
-    detector: str
-    frames: tuple[int, int]
-    seeds: tuple[int, ...]
-    head: HeadMapping
-    real: Mapping[str, PcpInterval]
-    simulated: Mapping[str, PcpInterval]
-    summaries: Mapping[str, Mapping[str, Any]]
+    recording: AnnotatedRecording
+    people: TrackedPeople
+    detector: Detector
+    annotation: AnnotationModel
+    films: tuple[Film, ...] = ()
 
-    @property
-    def largest_difference(self) -> float:
-        """Largest absolute difference between a variant's two scores, PCP points."""
-        return max(abs(self.simulated[name].pcp - real.pcp) for name, real in self.real.items())
-
-    @property
-    def same_order(self) -> bool:
-        """Whether simulation ranks no two variants opposite to reality.
-
-        Variants whose scores in reality differ by at most 0.1 points have no rank.
-        """
-        names = list(self.real)
-        for one in names:
-            for other in names:
-                clear = self.real[one].pcp > self.real[other].pcp + 0.1
-                if clear and self.simulated[one].pcp < self.simulated[other].pcp:
-                    return False
-        return True
-
-    def summary(self) -> dict[str, Any]:
-        """Return all results, ready for JSON."""
-        return {
-            "name": self.name,
-            "detector": self.detector,
-            "frames": list(self.frames),
-            "seeds": list(self.seeds),
-            "head": self.head,
-            "apart": self.largest_difference,
-            "same_order": self.same_order,
-            "pcp": {
-                name: {"real": vars(self.real[name]), "simulated": vars(self.simulated[name])} for name in self.real
-            },
-            "summaries": self.summaries,
-        }
+    @classmethod
+    def of(cls, recording: AnnotatedRecording, fitted: Fit) -> Self:
+        """Return the model of twins of a recording, with its own fit."""
+        return cls(recording, fitted.people, fitted.profile, fitted.annotation.annotation, (fitted.film,))
 
 
-def compare(
-    recorded: AnnotatedRecording,
-    scenario: Scenario,
-    *,
-    count: int,
-    head: HeadMapping = "voxelpose",
-    reporter: Reporter | None = None,
-) -> TwinComparison:
-    """Score variants on a recording and on simulated twins of it.
+def simulate_twins(model: TwinModel, *, count: int, reporter: Reporter | None = None) -> list[AnnotatedRecording]:
+    """Simulate twins of a recording.
 
     Args:
-        recorded: the recording.
-        scenario: the twin, with the variants.
-        count: number of twins: at the scenario's seed and the following ones, except where people do not fit.
-        head: mapping to the head of SHELF14.
+        model: what they are made from.
+        count: number of twins; their seeds are 0, 1, ...
         reporter: receiver of progress.
 
     Raises:
-        ValueError: twins cannot be built.
+        ValueError: nobody is long enough in the recording, or the scene cannot be built.
     """
-    estimators = estimators_of(scenario.method)
-    with (reporter or Silence()).stage("recording", 1):
-        real = evaluate(recorded, estimators, head=head)
-    twins = evaluate_seeds(scenario, count, head=head, reporter=reporter)
-    return TwinComparison(
-        name=scenario.name,
-        detector=scenario.detector.name,
-        frames=(len(recorded), scenario.frames),
-        seeds=twins.seeds,
-        head=head,
-        real={name: pcp_interval([real.variants[name]], ACTORS, rate=scenario.rate) for name in estimators},
-        simulated={name: twins.pcp(name) for name in estimators},
-        summaries={
-            "real": {name: real.variants[name].summary(actors=ACTORS) for name in estimators},
-            "simulated": {name: twins.pooled(name).summary() for name in estimators},
-        },
-    )
+    films, shown = list(model.films[:count]), min(count, MOST_FILMS)
+    takes = len(cut_takes(model.recording, model.people))
+    with (reporter or Silence()).stage("film twins", (shown - len(films)) * takes) as advance:
+        for seed in range(len(films), shown):
+            films.append(film(model.recording, model.people, seed=seed, advance=advance))
+    return [detected_twin(model, films[seed % shown], seed=seed) for seed in range(count)]
+
+
+def detected_twin(model: TwinModel, filmed: Film, *, seed: int) -> AnnotatedRecording:
+    """Return the twin of a recording from its film: detections and annotation are drawn from the seed."""
+    recording = model.recording
+    joints = np.full((len(recording), recording.people, len(COCO17), 3), np.nan)
+    shown, face = filmed.joints, slice(0, LIMB_JOINTS[0])
+    # Annotated heads are fitted to the detected face; the bias of limbs is part of the fitted shifts.
+    shown[:, :, face] += world_offsets(shown, model.detector.bias)[:, :, face]
+    for person, actor in enumerate(model.people.actor):
+        if actor >= 0:
+            joints[:, actor] = shown[:, person]
+    truth = model.annotation.annotate(joints, recording.time, seed=seed)
+    truth[~np.isfinite(recording.truth)] = np.nan
+    detections = tuple(filmed.detected(model.detector, seed=seed))
+    return replace(recording, name=f"{recording.name} twin", truth=truth, detections=detections)

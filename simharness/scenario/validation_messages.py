@@ -22,7 +22,12 @@ _SHOWN = 60  # characters of a refused value that a message repeats
 
 
 def explain_all(
-    error: ValidationError, origins: dict[tuple[str, ...], str], file: str, *, section: tuple[str, ...] = ()
+    error: ValidationError,
+    origins: dict[tuple[str, ...], str],
+    file: str,
+    *,
+    section: tuple[str, ...] = (),
+    root: type[BaseModel] = ScenarioFile,
 ) -> list[str]:
     """Return a message for each mistake of a validation.
 
@@ -31,36 +36,44 @@ def explain_all(
         origins: as in :func:`explain`.
         file: as in :func:`explain`.
         section: location of the model in a scenario file.
+        root: model of the whole file.
     """
     mistakes: list[dict[str, Any]] = [{**mistake, "loc": (*section, *mistake["loc"])} for mistake in error.errors()]
     wrong = [mistake["loc"] for mistake in mistakes]
     # A list whose elements are wrong counts as too short as well, because only valid elements are counted.
     return [
-        explain(mistake, origins, file)
+        explain(mistake, origins, file, root=root)
         for mistake in mistakes
         if mistake["type"] != "too_short" or not any(each[:-1] == mistake["loc"] for each in wrong if each)
     ]
 
 
-def explain(mistake: Mapping[str, Any], origins: dict[tuple[str, ...], str], file: str) -> str:
+def explain(
+    mistake: Mapping[str, Any],
+    origins: dict[tuple[str, ...], str],
+    file: str,
+    *,
+    root: type[BaseModel] = ScenarioFile,
+) -> str:
     """Return one of pydantic's errors as "where: key: what was expected, what was given".
 
     Args:
-        mistake: the error; its location is one in a :class:`ScenarioFile`.
+        mistake: the error; its location is one in a file of the model ``root``.
         origins: origin of the keys that were not set by ``file``: ``--set people.count=6`` for ("people", "count").
         file: the file that is named where a key has no other origin.
+        root: model of the whole file, with the title of such files in messages ("a scenario").
     """
     location = tuple(mistake["loc"])
     origin = origin_of(location, origins, file)
     key = _written(location, origins)
     if mistake["type"] == "extra_forbidden":
-        return f"{origin}: {_unknown(location)}"
-    if length := _wrong_length(mistake, location, origins):
+        return f"{origin}: {_unknown(location, root)}"
+    if length := _wrong_length(mistake, location, origins, root):
         return f"{origin}: {length}"
     if mistake["type"] == "missing":
         return f"{origin}: {key} is missing and has no default; give it a value"
-    expected, hint = _expected(mistake, location, key), _nearest(mistake, location)
-    field = _field(location)
+    expected, hint = _expected(mistake, location, key, root), _nearest(mistake, location, root)
+    field = _field(location, root)
     about = f" ({field.description})" if field is not None and field.description else ""
     return f"{origin}: {key}{about}: expected {expected}, got {_shown(mistake['input'])}{hint}"
 
@@ -82,9 +95,9 @@ def is_key(location: Sequence[str]) -> bool:
     return section is not None and location[-1] in section.model_fields
 
 
-def section_at(location: Sequence[str | int]) -> type[BaseModel] | None:
+def section_at(location: Sequence[str | int], root: type[BaseModel] = ScenarioFile) -> type[BaseModel] | None:
     """Return the section at a location; the whole file for an empty one; None for values and unknown keys."""
-    section: type[BaseModel] | None = ScenarioFile
+    section: type[BaseModel] | None = root
     for part in location:
         section = None if section is None else _nested(section.model_fields.get(str(part)))
     return section
@@ -121,12 +134,12 @@ class _List:
         return "[" + ", ".join(f"{value:g}" for value in values) + "]"
 
 
-def _expected(mistake: Mapping[str, Any], location: tuple[str | int, ...], key: str) -> str:
+def _expected(mistake: Mapping[str, Any], location: tuple[str | int, ...], key: str, root: type[BaseModel]) -> str:
     """Return what a message says was expected."""
-    section = section_at(location)
+    section = section_at(location, root)
     if mistake["type"] in ("model_type", "model_attributes_type") and section is not None:
         return f"a section [{key}] with keys {', '.join(sorted(section.model_fields)) or 'of your choice'}"
-    kind = _list_at(location)
+    kind = _list_at(location, root)
     if kind is not None and mistake["type"] in ("tuple_type", "list_type"):
         example = kind.example(mistake["input"])
         form = f"[{', '.join(kind.names)}]" if kind.fixed and kind.names else "a list"
@@ -136,16 +149,21 @@ def _expected(mistake: Mapping[str, Any], location: tuple[str | int, ...], key: 
     return re.sub(r"^(?:\w+ should(?: be| have)?|Value error,) ", "", message)
 
 
-def _wrong_length(mistake: Mapping[str, Any], location: tuple[str | int, ...], origins: Mapping[Any, str]) -> str:
+def _wrong_length(
+    mistake: Mapping[str, Any],
+    location: tuple[str | int, ...],
+    origins: Mapping[Any, str],
+    root: type[BaseModel],
+) -> str:
     """Return the message about a list of fixed length that is too short or too long; "" for other mistakes."""
     if mistake["type"] == "missing" and location and isinstance(location[-1], int):
         location = location[:-1]
     elif mistake["type"] != "too_long":
         return ""
-    kind = _list_at(location)
+    kind = _list_at(location, root)
     if kind is None or not kind.fixed:
         return ""
-    given, field = mistake["input"], _field(location)
+    given, field = mistake["input"], _field(location, root)
     whole = field is not None and not isinstance(location[-1], int)
     about = (field.description if whole and field is not None else None) or ", ".join(kind.names)
     return (
@@ -154,18 +172,18 @@ def _wrong_length(mistake: Mapping[str, Any], location: tuple[str | int, ...], o
     )
 
 
-def _nearest(mistake: Mapping[str, Any], location: Sequence[str | int]) -> str:
+def _nearest(mistake: Mapping[str, Any], location: Sequence[str | int], root: type[BaseModel]) -> str:
     """Return a hint at the valid value that was probably meant, for keys with a list of valid values."""
     if mistake["type"] != "literal_error" or not isinstance(mistake["input"], str):
         return ""
-    values = [str(value) for value in typing.get_args(_type_at(location)[0])]
+    values = [str(value) for value in typing.get_args(_type_at(location, root)[0])]
     near = difflib.get_close_matches(mistake["input"], values, n=1, cutoff=0.5)
     return f"; did you mean {_shown(near[0])}?" if near else ""
 
 
-def _type_at(location: Sequence[str | int]) -> tuple[Any, tuple[str, ...], Any]:
+def _type_at(location: Sequence[str | int], root: type[BaseModel]) -> tuple[Any, tuple[str, ...], Any]:
     """Return the type at a location, the names of its elements and its default; (None, (), None) for unknown keys."""
-    section: type[BaseModel] | None = ScenarioFile
+    section: type[BaseModel] | None = root
     found: Any = None
     names: tuple[str, ...] = ()
     default: Any = None
@@ -187,9 +205,9 @@ def _type_at(location: Sequence[str | int]) -> tuple[Any, tuple[str, ...], Any]:
     return found, names, default
 
 
-def _list_at(location: Sequence[str | int]) -> _List | None:
+def _list_at(location: Sequence[str | int], root: type[BaseModel]) -> _List | None:
     """Return the type of a list at a location; None where the value is not a list."""
-    kind, names, default = _type_at(location)
+    kind, names, default = _type_at(location, root)
     if typing.get_origin(kind) is not tuple:
         return None
     elements = typing.get_args(kind)
@@ -225,16 +243,16 @@ def _written(location: tuple[str | int, ...], origins: Mapping[Any, str]) -> str
     return _dotted(location)
 
 
-def _unknown(location: Sequence[str | int]) -> str:
+def _unknown(location: Sequence[str | int], root: type[BaseModel]) -> str:
     """Return the message about a key that does not exist."""
     *parents, wrong = map(str, location)
-    section = section_at(parents) or ScenarioFile
+    section = section_at(parents, root) or root
     valid = sorted(section.model_fields)
     candidates = [".".join([*parents, key]) for key in difflib.get_close_matches(wrong, valid, n=1)]
     # A key of another section, most often one written above its [section] or below the wrong one.
-    candidates = candidates or [key for key in _keys(ScenarioFile) if key.rsplit(".", 1)[-1] == wrong]
+    candidates = candidates or [key for key in _keys(root) if key.rsplit(".", 1)[-1] == wrong]
     hint = f"; did you mean {' or '.join(candidates)}?" if candidates else ";"
-    where = f"[{'.'.join(parents)}]" if parents else "a scenario"
+    where = f"[{'.'.join(parents)}]" if parents else root.model_config.get("title") or "a scenario"
     return f"{_dotted(location)} is not a key{hint} {where} has {', '.join(valid)}"
 
 
@@ -247,9 +265,9 @@ def _keys(section: type[BaseModel], prefix: str = "") -> Iterator[str]:
             yield from _keys(nested, f"{prefix}{name}.")
 
 
-def _field(location: Sequence[str | int]) -> FieldInfo | None:
+def _field(location: Sequence[str | int], root: type[BaseModel]) -> FieldInfo | None:
     """Return the field at a location, or at the longest part of it that names one."""
-    section: type[BaseModel] | None = ScenarioFile
+    section: type[BaseModel] | None = root
     field = None
     for part in location:
         if section is None:

@@ -45,7 +45,7 @@ def test_version(simharness):
     assert result.stdout.startswith("simharness 0.")
 
 
-EVALUATIONS = ("evaluate shelf", "evaluate seeds", "evaluate twin")
+EVALUATIONS = ("evaluate shelf", "evaluate recording", "evaluate seeds", "evaluate twin")
 COMMANDS = ("", "run", "render", "evaluate", *EVALUATIONS, "fit-detector shelf")
 
 
@@ -104,6 +104,10 @@ class TestBadInput:
 
     def test_missing_data(self, simharness):
         assert_refused(simharness("evaluate", "shelf", "nowhere"), "nowhere: no such folder")
+
+    def test_unknown_recording(self, simharness):
+        assert_refused(simharness("evaluate", "shelv"), "shelv: no such recording; did you mean shelf?")
+        assert_refused(simharness("evaluate", "--head", "2019", "shelf"), "shelf: give FOLDER")
 
     def test_unknown_method(self, simharness):
         assert_refused(simharness("evaluate", "shelf", "nowhere", "--method", "best"), "'best'", "full")
@@ -176,7 +180,7 @@ def test_many_seeds_of_a_scenario(simharness, tmp_path, monkeypatch):
 
 def test_a_detector_is_fitted_to_data_that_are_there(simharness, tmp_path):
     assert_refused(simharness("fit-detector", "shelf", str(tmp_path / "none")), "none: no such folder")
-    assert_refused(simharness("evaluate", "twin", str(tmp_path / "none")), "none: no such folder")
+    assert_refused(simharness("evaluate", "twin", "shelf", str(tmp_path / "none")), "none: no such folder")
 
 
 @pytest.mark.slow

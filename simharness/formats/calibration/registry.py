@@ -38,7 +38,9 @@ def register(added: CalibrationFormat) -> None:
     FORMATS.insert(0, added)
 
 
-def read_calibration(path: str | Path, *, size: tuple[int, int], only: Sequence[str] = ()) -> Rig:
+def read_calibration(
+    path: str | Path, *, size: tuple[int, int], only: Sequence[str] = (), key: str = "cameras.only"
+) -> Rig:
     """Read a calibration file of any registered format.
 
     Args:
@@ -46,6 +48,7 @@ def read_calibration(path: str | Path, *, size: tuple[int, int], only: Sequence[
         size: width and height of the images in pixels, for files that do not hold them (VoxelPose, and some files of
             EasyMocap and OpenCV).
         only: names of the cameras to take, in this order; empty: all (of Panoptic: the HD cameras).
+        key: key of a file that holds these names, for messages.
 
     Raises:
         ValueError: the file does not exist, no registered format recognises it, or its reader finds a fault; every
@@ -58,6 +61,6 @@ def read_calibration(path: str | Path, *, size: tuple[int, int], only: Sequence[
         raise ValueError(f"{path}: not a known calibration: found {file.summary}; expected one of {known}")
     rig = chosen.read(file.path, size=size, only=only)
     try:
-        return select(rig, only)
+        return select(rig, only, key=key)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None

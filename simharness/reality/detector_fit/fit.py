@@ -1,54 +1,96 @@
-"""Fit of a detector profile to a recording, and the measurement of its simulated twin."""
+"""Fit of a detector profile, and of the annotation, to a recording."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.annotation import AnnotationFit, fit_annotation
+from simharness.reality.detector_fit.calibration import calibrate
+from simharness.reality.detector_fit.face_bias import face_bias
+from simharness.reality.detector_fit.joint_labels import label_joints
 from simharness.reality.detector_fit.measure import RESAMPLES, Measurement, measure
-from simharness.reality.detector_fit.profile import NAME, as_toml, settings
-from simharness.reality.detector_fit.sample import Sample
-from simharness.reality.detector_fit.shelf_twin import film_shelf_twin
+from simharness.reality.detector_fit.profile import as_toml, settings
+from simharness.reality.detector_fit.sample import Sample, sample_of
+from simharness.reality.people_tracks import TrackedPeople, track_people
+from simharness.reality.reenactment import Film, film
 from simharness.runtime.atomic_files import write_atomic
-from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 
-FITTED_SECTIONS = ("keypoints", "bias", "correlation", "scores", "boxes", "phantoms")
-"""Sections of measured values that describe the detector. The others (share, size) also depend on the scene."""
-
-_TWIN = "simulated with the fitted profile"
+_TWINS = 2  # simulated in each round of the calibration
+_FEWEST = 200  # joints behind a value that is calibrated
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted detector.
+    """Fitted detector and annotation of a recording.
 
     Attributes:
-        real: measurement of the real detector.
+        real: measurement of the detector.
+        annotation: errors of the truth, and the bias of the detector against all annotators.
+        people: who is where in the recording.
+        film: re-enactment of the recording, which shows what hides what.
         profile: [detector] parameters at which the simulated detector errs alike.
         text: the profile as a file.
     """
 
     real: Measurement
+    annotation: AnnotationFit
+    people: TrackedPeople
+    film: Film
     profile: Detector
     text: str
 
 
-def fit(sample: Sample, *, name: str = NAME, command: str = "", resamples: int = RESAMPLES, seed: int = 0) -> Fit:
-    """Measure a detector and return its profile.
+def fit(
+    recording: AnnotatedRecording, *, name: str = "", command: str = "", resamples: int = RESAMPLES, seed: int = 0
+) -> Fit:
+    """Measure the detector of a recording against the consensus of its views, and the truth against the same.
 
     Args:
-        sample: the recording.
-        name: name of the profile.
+        recording: the recording.
+        name: name of the profile; by default that of the recording.
         command: command that made the profile, to be written into its file.
         resamples: number of resamples of the bootstrap.
-        seed: seed of the resamples.
+        seed: seed of the resamples, and of the bodies of the re-enactment.
 
     Raises:
-        ValueError: see :func:`~simharness.reality.detector_fit.measure.measure`.
+        ValueError: nobody to re-enact; see also :func:`~simharness.reality.detector_fit.measure.measure`.
     """
-    real = measure(sample, resamples=resamples, seed=seed)
-    profile = Detector.model_validate(settings(real, name=name))
-    return Fit(real, profile, as_toml(real, name=name, command=command))
+    people = track_people(recording)
+    filmed = film(recording, people, seed=seed)
+    sample = sample_of(recording, people, filmed)
+    labels = label_joints(sample)
+    real = measure(sample, labels=labels, resamples=resamples, seed=seed)
+    scatter = np.array([real[f"keypoints.scatter.{KINDS[kind]}"].value for kind in KIND_OF_JOINT])
+    annotation = fit_annotation(
+        recording.truth,
+        people,
+        labels.consensus,
+        recording.time,
+        sigma=np.nan_to_num(scatter, nan=np.nanmean(scatter)),
+        scatter_life=float(np.nan_to_num(real["correlation.scatter_life"].value)),
+        scatter_noise=float(np.nan_to_num(real["correlation.scatter_noise"].value)),
+    )
+    name = name or recording.name
+    bias = annotation.bias.copy()
+    bias[:3] = face_bias(people.joints, filmed.joints)
+
+    def simulate(values: Mapping[str, float]) -> list[Sample]:
+        profile = Detector.model_validate(settings(real.with_values(values), name=name, bias=bias))
+        twins = (replace(recording, detections=tuple(filmed.detected(profile, seed=1 + k))) for k in range(_TWINS))
+        return [sample_of(twin, people, filmed) for twin in twins]
+
+    counted = {key: each.value for key, each in real.values.items() if each.count >= _FEWEST}
+    rare = {key: each.value for key, each in real.values.items() if key not in counted}
+    calibrated = real.with_values({**calibrate(counted, lambda values: simulate({**values, **rare})), **rare})
+    profile = Detector.model_validate(settings(calibrated, name=name, bias=bias))
+    text = as_toml(calibrated, name=name, bias=bias, command=command)
+    return Fit(real, annotation, people, filmed, profile, text)
 
 
 def write_profile(fitted: Fit, path: str | Path) -> None:
@@ -61,32 +103,3 @@ def write_profile(fitted: Fit, path: str | Path) -> None:
         write_atomic(Path(path), fitted.text.encode())
     except OSError as error:
         raise ValueError(f"--out {path}: cannot be written: {error.strerror}") from None
-
-
-def twin_of(fitted: Fit, sample: Sample, *, seed: int = 0, resamples: int = RESAMPLES) -> Measurement:
-    """Measure the simulated twin of a recording: as long, with as many known people.
-
-    Args:
-        fitted: profile of the twin's detector.
-        sample: the recording.
-        seed: seed of the twin.
-        resamples: number of resamples of the bootstrap.
-    """
-    twin = film_shelf_twin(seconds=len(sample) * sample.step, seed=seed)
-    # Shelf does not annotate all people in every frame; the same people are unknown in its twin.
-    known = sample.known if sample.known.shape == (len(twin.sequence), twin.sequence.joints.shape[1]) else None
-    simulated = replace(twin.detected(fitted.profile, seed=seed, known=known), name=_TWIN)
-    return measure(simulated, resamples=resamples, seed=seed)
-
-
-def agreement(real: Measurement, simulated: Measurement) -> tuple[list[str], int]:
-    """Return the parameters that differ by more than their intervals allow, and the number of parameters compared.
-
-    About 5 % of equal parameters differ by more.
-    """
-    compared = [
-        key
-        for key, each in real.values.items()
-        if key.split(".")[0] in FITTED_SECTIONS and each.known and simulated[key].known
-    ]
-    return [key for key in compared if not real[key].agrees(simulated[key])], len(compared)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED, VISIBLE
 from simharness.detector.draws import LIMB_OF_JOINT
+from simharness.detector.error_classes import MIRROR
+from simharness.detector.error_draws import GROSS
 from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints
-from simharness.reality.detector_fit.sample import LIMB_JOINTS
 from simharness.reality.detector_fit.tetrachoric import correlation_grid, joint_probability
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Keypoints
+from simharness.reality.people_tracks import LIMB_JOINTS
+from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS, Keypoints
 from simharness.types.truth import MISS_FROM, KeypointError
 
 FrameSums = dict[str, Floats]
@@ -32,8 +34,18 @@ OCCLUSIONS = (VISIBLE, SELF_OCCLUDED, OCCLUDED)
 TERCILES = ("small", "medium", "large")
 
 _OF_KIND = np.eye(len(KINDS))[list(KIND_OF_JOINT)]
-_LONGEST = 1.0  # seconds, longest lag: beyond it, differences between people dominate
+_LONGEST = 2.0  # seconds, longest lag: beyond it, differences between people dominate
 _LAGS = 8
+BONES = ((5, 7), (6, 8), (7, 9), (8, 10), (11, 13), (12, 14), (13, 15), (14, 16))
+"""Limb bones whose length does not change, as pairs of joints."""
+
+NEAR = (*BONES, (5, 11), (6, 12))
+"""Limb joints that are one bone apart along the skeleton."""
+
+BORDER = np.linspace(0.0, 6.0, 25)
+"""Edges of the histogram of distances from the border of the image, units."""
+
+_OUTLYING = 3.5  # deviations of a bone's length from which a joint is wrong
 _CELLS = 12  # in each direction, of the grid on a person's box
 
 
@@ -46,14 +58,16 @@ def frame_sums(labels: LabelledJoints) -> FrameSums:
     """Return the sums of each frame, by name; the first axis of every array is T."""
     sums = {
         **_shares(labels),
+        **_face(labels),
         **_sizes(labels),
         **_misses(labels),
         **_scatter(labels),
         **_dependence(labels),
         **_scores(labels),
         **_people(labels),
+        **_bones(labels),
+        **_border(labels),
     }
-    sums["bias.A"], sums["bias.b"] = labels.normal
     return sums
 
 
@@ -82,10 +96,53 @@ def _shares(labels: LabelledJoints) -> FrameSums:
     return {f"n.{key}": n[key] for key in CLASSES} | {f"k.{key}": k[key] for key in CLASSES}
 
 
+def _face(labels: LabelledJoints) -> FrameSums:
+    """Return joints of the face that nobody else hides, and those not reported, by kind and bearing, (T, 3, 12).
+
+    Bearings count towards the side of the joint, so that left and right joints are alike.
+    """
+    seen, dropped = labels.risk["drop"] & (labels.occlusion != OCCLUDED), labels.taken["drop"]
+    result = {key: np.zeros((len(seen), 3, len(BEARINGS))) for key in ("face.n", "face.k")}
+    for joint in range(LIMB_JOINTS[0]):
+        towards = labels.bearing if MIRROR[joint] >= joint else -labels.bearing % len(BEARINGS)
+        at = towards[..., None] == np.arange(len(BEARINGS))
+        for key, which in (("face.n", seen), ("face.k", seen & dropped)):
+            result[key][:, KIND_OF_JOINT[joint]] += (at & which[..., joint, None]).sum(axis=(1, 2))
+    return result
+
+
+def _bones(labels: LabelledJoints) -> FrameSums:
+    """Return sums of limb lengths on which three views or more agree, for each person and bone, (T, P, B), in metres.
+
+    ``bones.n``, ``bones.length`` and ``bones.square`` of the lengths, ``bones.noise`` of the variance expected from
+    errors of one unit in each view, ``bones.scale`` of the squared size of a unit at the joints.
+    """
+    joints, agree = labels.consensus.joints, labels.consensus.agrees.sum(axis=1)
+    one, other = np.array(BONES).T
+    length = np.linalg.norm(joints[:, :, one] - joints[:, :, other], axis=-1)
+    known = (agree[:, :, one] >= 3) & (agree[:, :, other] >= 3) & labels.known[..., None]
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)  # bones on which three views never agree
+        usual = np.nanmedian(np.where(known, length, np.nan), axis=0)
+        spread = 1.4826 * np.nanmedian(np.abs(np.where(known, length, np.nan) - usual), axis=0)
+        known &= np.abs(length - usual) < _OUTLYING * spread
+    away = np.where(known, length - np.nan_to_num(usual), 0.0)
+    variance = labels.consensus.variance
+    noise = np.where(known, variance[:, :, one] + variance[:, :, other], 0.0)
+    scale = np.where(known, labels.consensus.scale[:, :, one] + labels.consensus.scale[:, :, other], 0.0)
+    return {
+        "bones.n": known.astype(float),
+        "bones.length": away,
+        "bones.square": away**2,
+        "bones.noise": noise.sum(axis=(1, 2)),
+        "bones.scale": scale.sum(axis=(1, 2)),
+    }
+
+
 def _sizes(labels: LabelledJoints) -> FrameSums:
     """Return limb joints that are reported and not good, and dropped ones, by tercile of the person's size, (T, 3)."""
     size = np.sqrt(labels.boxes[..., 2] * labels.boxes[..., 3])
-    present = labels.association.detected
+    present = labels.association.detected & labels.known[:, None]
     third = (
         np.digitize(size, np.quantile(size[present], [1 / 3, 2 / 3])) if present.any() else np.zeros(size.shape, int)
     )
@@ -109,8 +166,9 @@ def _wrong(labels: LabelledJoints) -> Bools:
 
 
 def _misses(labels: LabelledJoints) -> FrameSums:
-    """Return misses, those beyond REACH, and the shares of the boxes beyond 2.35 and beyond REACH, (T,)."""
-    miss = labels.taken["miss"]
+    """Return misses of limbs, those beyond REACH, and the shares of the boxes beyond 2.35 and beyond REACH, (T,)."""
+    miss = labels.taken["miss"].copy()
+    miss[..., : LIMB_JOINTS[0]] = False
     far = np.where(miss, np.hypot(labels.residual[..., 0], labels.residual[..., 1]), 0.0)
     frame, view, person, _ = np.nonzero(miss)
     box, target, unit = labels.boxes[frame, view, person], labels.target[miss], labels.unit[miss]
@@ -132,43 +190,48 @@ def _scatter(labels: LabelledJoints) -> FrameSums:
         usual = np.sqrt(k.sum(axis=0) / n.sum(axis=0) / 2)[list(KIND_OF_JOINT)]
         offset = np.where(good[..., None], labels.residual / usual[:, None], 0.0)
     steps = lags(labels.step)
-    later = [_later(offset, good, lag) for lag in steps]
-    axes = np.where(np.isfinite(labels.axes), labels.axes, 0.0)
-    across, space = np.zeros(n.shape), np.zeros(n.shape)
-    for v, w in _pairs(good.shape[1]):
-        shared = np.einsum("tpac,tpbc->tpab", axes[:, v], axes[:, w])
-        both = good[:, v] & good[:, w]
-        product = np.einsum("tpja,tpjb,tpab->tpj", offset[:, v], offset[:, w], shared)
-        across += (product * both).sum(axis=1) @ _OF_KIND
-        space += (both * (shared**2).sum(axis=(-1, -2))[..., None]).sum(axis=1) @ _OF_KIND
+    later = [_later(offset, good, lag, labels) for lag in steps]
+    one, other = np.array(NEAR).T
+    both = good[..., one] & good[..., other]
+    first, second = offset[..., one, :], offset[..., other, :]
+    product = np.where(both, (first * second).sum(axis=-1), 0.0)
+    mean_square = np.where(both, (first**2 + second**2).sum(axis=-1) / 2, 0.0)
     return {
         "scatter.n": n,
         "scatter.square": k,
         "scatter.later": np.stack([product for product, _ in later], axis=1),
         "scatter.later_square": np.stack([square for _, square in later], axis=1),
-        "scatter.across": across,
-        "scatter.space": space,
+        "scatter.near": product.sum(axis=(1, 2, 3)),
+        "scatter.near_n": mean_square.sum(axis=(1, 2, 3)),
+        "scatter.hidden_n": _by_kind(good & (labels.occlusion != VISIBLE)),
+        "scatter.hidden_square": _by_kind(square * (labels.occlusion != VISIBLE)),
     }
 
 
-def _later(offset: Floats, good: Bools, lag: int) -> tuple[Floats, Floats]:
+def _later(offset: Floats, good: Bools, lag: int, labels: LabelledJoints) -> tuple[Floats, Floats]:
     """Return products of offsets ``lag`` frames apart and the mean of both squares, where both are good, (T,)."""
     product, square = np.zeros(len(good)), np.zeros(len(good))
     if lag < len(good):
-        both = good[:-lag] & good[lag:]
+        both = good[:-lag] & good[lag:] & _consecutive(labels, lag)[:, None, None, None]
         now, then = offset[:-lag], offset[lag:]
         product[:-lag] = ((now * then).sum(axis=-1) * both).sum(axis=(1, 2, 3))
         square[:-lag] = (((now**2 + then**2).sum(axis=-1) / 2) * both).sum(axis=(1, 2, 3))
     return product, square
 
 
+def _consecutive(labels: LabelledJoints, lag: int) -> Bools:
+    """Return which frames have no gap to the frame ``lag`` frames later, (T - lag,)."""
+    return np.asarray(labels.time[lag:] - labels.time[:-lag] < (lag + 0.5) * labels.step)
+
+
 def _dependence(labels: LabelledJoints) -> FrameSums:
     """Return observed and expected pairs of joints taken by the same class, and their products over time, (T, ...).
 
-    ``views.k``, ``limb.k`` (T,): pairs of joints that a class took, over views and within limbs. ``views.expected``,
-    ``limb.expected`` (T, G): expected pairs for each correlation of :func:`correlation_grid`. ``time.excess``,
-    ``time.weight`` (T, L): products of the deviations from the expectation a lag apart, and their value at full
-    correlation. The expectation is the rate for the kind of joint and its occlusion class.
+    ``views.k``, ``gross_views.k``, ``limb.k`` (T,): pairs of joints that a class took, over views (GROSS classes apart)
+    and within limbs. ``views.expected``, ``gross_views.expected``, ``limb.expected`` (T, G): expected pairs for each
+    correlation of :func:`correlation_grid`. ``time.excess``, ``time.weight`` (T, L): products of the deviations from
+    the expectation a lag apart, and their value at full correlation. The expectation is the rate for the kind of joint
+    and its occlusion class.
     """
     steps = lags(labels.step)
     frames, states = len(labels.occlusion), len(OCCLUSIONS) * len(KINDS)
@@ -177,8 +240,10 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
     limbs = np.array([limb == LIMB_OF_JOINT for limb in range(LIMB_OF_JOINT.max() + 1)])
     one, other = np.triu_indices(states)
     same = one == other
-    result = {"views.k": np.zeros(frames), "limb.k": np.zeros(frames)}
-    result |= {key: np.zeros((frames, len(correlation_grid()))) for key in ("views.expected", "limb.expected")}
+    result = {key: np.zeros(frames) for key in ("views.k", "gross_views.k", "limb.k")}
+    result |= {
+        f"{key.removesuffix('.k')}.expected": np.zeros((frames, len(correlation_grid()))) for key in list(result)
+    }
     result |= {key: np.zeros((frames, len(steps))) for key in ("time.excess", "time.weight")}
     for key in CLASSES:
         risk, taken = labels.risk[key], labels.taken[key]
@@ -195,7 +260,7 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
         by_joint = at_risk.sum(axis=1, dtype=np.float32).reshape(frames, -1, states)
         by_limb = np.einsum("tvpjs,lj->tvpls", at_risk.astype(np.float32), limbs.astype(np.float32))
         for name, count, whole in (
-            ("views", by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
+            ("gross_views" if key in GROSS else "views", by_joint, taken.sum(axis=1, dtype=float).reshape(frames, -1)),
             (
                 "limb",
                 by_limb.reshape(frames, -1, states),
@@ -211,21 +276,25 @@ def _dependence(labels: LabelledJoints) -> FrameSums:
         beyond = np.where(risk, taken - expected, 0.0)
         spread = np.sqrt(expected * (1 - expected))
         for index, lag in enumerate(steps):
-            result["time.excess"][:-lag, index] += (beyond[:-lag] * beyond[lag:]).sum(axis=(1, 2, 3))
-            result["time.weight"][:-lag, index] += (spread[:-lag] * spread[lag:]).sum(axis=(1, 2, 3))
+            if lag >= frames:
+                continue
+            whole = _consecutive(labels, lag)
+            result["time.excess"][:-lag, index] += whole * (beyond[:-lag] * beyond[lag:]).sum(axis=(1, 2, 3))
+            result["time.weight"][:-lag, index] += whole * (spread[:-lag] * spread[lag:]).sum(axis=(1, 2, 3))
     return result
 
 
 def _scores(labels: LabelledJoints) -> FrameSums:
     """Return histograms of scores on the logit scale by visibility, class and kind, (T, 2, 6, 9, B).
 
-    Also those of false detections, (T, B).
+    Also those of false detections, and of joints outside of the image, (T, B) each.
     """
     scores, error = labels.association.scores, labels.error
     frames, bins = len(scores), len(LOGITS) - 1
     row = np.where(error == KeypointError.ABSENT, len(SCORED) - 1, error)
     known = np.isfinite(labels.target[..., 0])
-    used = labels.association.detected[..., None] & (scores > 0) & ((error != KeypointError.ABSENT) | ~known)
+    shown = (labels.association.detected & labels.known[:, None])[..., None] & (scores > 0)
+    used = shown & labels.inside & ((error != KeypointError.ABSENT) | ~known)
     frame, *_, joint = np.nonzero(used)
     hidden = (labels.occlusion[used] != VISIBLE).astype(int)
     place = (frame, hidden, row[used], np.array(KIND_OF_JOINT)[joint], _bin(scores[used]))
@@ -233,7 +302,13 @@ def _scores(labels: LabelledJoints) -> FrameSums:
     whole = np.bincount(np.ravel_multi_index(place, shape), minlength=int(np.prod(shape))).reshape(shape)
     false = labels.association.false_scores
     flat = np.bincount(np.nonzero(false > 0)[0] * bins + _bin(false[false > 0]), minlength=frames * bins)
-    return {"scores": whole.astype(float), "scores.false": flat.reshape(frames, bins).astype(float)}
+    outside = shown & ~labels.inside
+    beyond = np.bincount(np.nonzero(outside)[0] * bins + _bin(scores[outside]), minlength=frames * bins)
+    return {
+        "scores": whole.astype(float),
+        "scores.false": flat.reshape(frames, bins).astype(float),
+        "scores.outside": beyond.reshape(frames, bins).astype(float),
+    }
 
 
 def _bin(scores: Floats) -> NDArray[np.int64]:
@@ -242,18 +317,42 @@ def _bin(scores: Floats) -> NDArray[np.int64]:
     return np.clip(np.digitize(logit, LOGITS) - 1, 0, len(LOGITS) - 2)
 
 
+def _missed_by_hidden_share(labels: LabelledJoints, expected: Bools, missed: Bools) -> FrameSums:
+    """Return people expected and missed by the share of their limb joints that others or the border hide, (T, 5)."""
+    hidden = ((labels.occlusion == OCCLUDED) | ~labels.inside)[..., LIMB_JOINTS].mean(axis=-1)
+    nearest = np.round(4 * hidden).astype(int)[..., None] == np.arange(5)
+    return {
+        f"people.hidden.{key}": (nearest & which[..., None]).sum(axis=(1, 2)).astype(float)
+        for key, which in (("n", expected), ("k", missed))
+    }
+
+
+def _border(labels: LabelledJoints) -> FrameSums:
+    """Return limb joints outside of the images by their distance from the border, (T, B), and those reported, (T,)."""
+    outside = (labels.association.detected & labels.known[:, None])[..., None] & ~labels.inside
+    outside[..., : LIMB_JOINTS[0]] = False
+    bins = np.digitize(labels.beyond, BORDER[1:-1])[..., None] == np.arange(len(BORDER) - 1)
+    return {
+        "border.n": (bins & outside[..., None]).sum(axis=(1, 2, 3)).astype(float),
+        "border.k": (outside & (labels.association.scores > 0)).sum(axis=(1, 2, 3)).astype(float),
+        "outside.n": _by_kind(outside),
+        "outside.k": _by_kind(outside & (labels.association.scores > 0)),
+    }
+
+
 def _people(labels: LabelledJoints) -> FrameSums:
     """Return sums of people missed, detected and duplicated, and of false detections."""
-    expected, detected = labels.expected, labels.association.detected
+    expected, detected = labels.expected, labels.association.detected & labels.known[:, None]
     missed = expected & ~detected
     false = labels.association.false.astype(float)
     fragments = labels.association.fragments.sum(axis=1)
     steps = lags(labels.step)
     result = {
+        **_missed_by_hidden_share(labels, expected, missed),
         "people.n": expected.sum(axis=(1, 2)),
         "people.k": missed.sum(axis=(1, 2)),
         "people.detected": detected.sum(axis=(1, 2)),
-        "people.duplicates": labels.association.duplicates.sum(axis=(1, 2)),
+        "people.duplicates": (labels.association.duplicates * labels.known[:, None]).sum(axis=(1, 2)),
         "false.n": false,
         "fragments.n": fragments,
     }
@@ -262,18 +361,15 @@ def _people(labels: LabelledJoints) -> FrameSums:
         result[f"people.views.{name}"] = ((many**2 - many) / 2).sum(axis=1)
         time = np.zeros((len(what), len(steps)))
         for index, lag in enumerate(steps):
-            time[:-lag, index] = (what[:-lag] & what[lag:]).sum(axis=(1, 2))
+            if lag < len(what):
+                whole = _consecutive(labels, lag)
+                time[:-lag, index] = whole * (what[:-lag] & what[lag:]).sum(axis=(1, 2))
         result[f"people.time.{name}"] = time
     products, pairs = np.zeros((*false.shape, len(steps) + 1)), np.zeros((len(false), len(steps) + 1))
     products[..., 0], pairs[:, 0] = false**2, 1
     for index, lag in enumerate(steps, start=1):
-        products[:-lag, :, index], pairs[:-lag, index] = false[:-lag] * false[lag:], 1
+        if lag < len(false):
+            whole = _consecutive(labels, lag)
+            products[:-lag, :, index], pairs[:-lag, index] = whole[:, None] * false[:-lag] * false[lag:], whole
     result["false.products"], result["false.pairs"] = products, pairs
     return {key: np.asarray(each, float) for key, each in result.items()}
-
-
-def _pairs(count: int) -> Iterator[tuple[int, int]]:
-    """Yield all pairs of ``count`` views."""
-    for v in range(count):
-        for w in range(v + 1, count):
-            yield v, w

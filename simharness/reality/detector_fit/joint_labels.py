@@ -1,4 +1,8 @@
-"""Labels of all joints that a detector could have reported: their error, and the errors that were possible."""
+"""Labels of all joints that a detector could have reported: their error, and the errors that were possible.
+
+Errors are measured against the consensus of the other views (:mod:`simharness.reality.detector_fit.consensus`). What
+hides what comes from the bodies that re-enact the people, as it will in a twin, or else from capsules about skeletons.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +16,23 @@ from mvpose import Rig
 from mvpose.arrays import Bools, Floats
 from simharness.detector.conditions import OUTSIDE, OVERLAP_MIN, VISIBLE, oks_units, overlaps
 from simharness.detector.error_classes import MIRROR, classify, distinguishable, opposite_hits
-from simharness.detector.view_geometry import image_axes
+from simharness.detector.part_tree import PARENT
+from simharness.detector.view_geometry import head_bearings, image_axes
+from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit import sizes
 from simharness.reality.detector_fit.association import Association, associate
-from simharness.reality.detector_fit.bias_fit import LinearisedBias, apply_bias, fit_bias
+from simharness.reality.detector_fit.consensus import Consensus, find_consensus
 from simharness.reality.detector_fit.occlusion import complete_face, occlusion_classes
-from simharness.reality.detector_fit.sample import LIMB_JOINTS, Sample
+from simharness.reality.detector_fit.sample import Sample
+from simharness.reality.people_tracks import LIMB_JOINTS
+from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS
 from simharness.types.truth import KeypointError
 
 CLASSES = ("drop", "swap", "inversion", "miss", "jitter")
 """Error classes in the order in which they take joints."""
 
+_OF_KIND = np.eye(len(KINDS))[list(KIND_OF_JOINT)]
+_USUAL = 3.0  # deviations
 _HALF = len(LIMB_JOINTS) // 2  # limb joints in the picture from which a person is expected to be detected
 
 
@@ -31,30 +41,42 @@ class LabelledJoints:
     """Labels of every joint of every known person in every view.
 
     Attributes:
+        time: times of the frames, (T,) seconds.
         step: seconds between consecutive frames.
+        kind: kind of the detector.
+        known: people who are measured, (T, P).
         association: people shown by the detections.
+        consensus: joints on which the views agree.
         boxes: boxes of the people, (T, V, P, 4).
         unit: OKS sigma x sqrt(area), (T, V, P, 17) pixels.
-        target: true joints moved by the detector's bias, (T, V, P, 17, 2) pixels; NaN where unknown.
+        target: joints as the other views place them, or as the sample where they do not, (T, V, P, 17, 2) pixels.
         occlusion: occlusion class estimated from skeletons, (T, V, P, 17): VISIBLE, SELF_OCCLUDED or OCCLUDED.
+        bearing: bin of the bearing of the camera from the head, to the left of straight ahead, (T, V, P).
+        inside: joints inside of the image, as the sample places them, (T, V, P, 17).
+        beyond: distance of joints outside of the image from its border, units, (T, V, P, 17).
         expected: people who should be detected, (T, V, P): known people with half of the limb joints in the picture.
-        error: :class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where the truth is unknown.
+        error: :class:`KeypointError`, (T, V, P, 17); ABSENT where not reported or where the views do not agree.
         risk: for each of CLASSES, the joints that it could have taken, (T, V, P, 17).
         taken: for each of CLASSES, the joints that it took, (T, V, P, 17).
         chance: for swap and inversion, the misses opposite to the place of that error, (T, V, P, 17): as many are
             expected to fall on the place by chance.
-        residual: keypoint minus target, units, (T, V, P, 17, 2); NaN where unknown.
+        residual: keypoint minus target, units, without the noise of the target, (T, V, P, 17, 2); NaN where unknown.
         axes: right and down in the picture as directions in the world, (T, V, P, 2, 3).
-        offset: the detector's bias, (9, 3) metres.
-        normal: normal equations of the bias, a (T, 9, 3, 3) and a (T, 9, 3) array.
     """
 
+    time: Floats
     step: float
+    kind: DetectorKind
+    known: Bools
     association: Association
+    consensus: Consensus
     boxes: Floats
     unit: Floats
     target: Floats
     occlusion: NDArray[np.int8]
+    bearing: NDArray[np.int64]
+    inside: Bools
+    beyond: Floats
     expected: Bools
     error: NDArray[np.int8]
     risk: Mapping[str, Bools]
@@ -62,8 +84,6 @@ class LabelledJoints:
     chance: Mapping[str, Bools]
     residual: Floats
     axes: Floats
-    offset: Floats
-    normal: tuple[Floats, Floats]
 
 
 def label_joints(sample: Sample) -> LabelledJoints:
@@ -72,53 +92,100 @@ def label_joints(sample: Sample) -> LabelledJoints:
     boxes = sizes.boxes(sample.reference, rig)
     unit = oks_units(boxes)
     association = associate(sample, _project(sample.reference, rig), boxes)
-    keypoints = association.keypoints
-    linear = LinearisedBias.of(sample.reference, keypoints, unit, rig)
-    offset = fit_bias(linear)
-    target = _project(apply_bias(sample.reference, offset), rig)
+    consensus = find_consensus(rig, association.keypoints, unit)
+    predictable = np.isfinite(consensus.predicted[..., 0])
+    target = np.where(predictable[..., None], consensus.predicted, _project(sample.reference, rig))
+    residual = _without_noise(association.keypoints - consensus.predicted, unit, consensus)
+    keypoints = target + residual * unit[..., None]
     neighbour = _neighbours(boxes, target, association.unannotated, rig)
     error = classify(keypoints, target, unit, other=neighbour)
 
-    occlusion = occlusion_classes(*complete_face(sample.reference, association.consensus), association.unannotated, rig)
-    inside = sizes.in_picture(sample.reference, rig)
+    staged, occlusion = sample.staged, sample.occlusion
+    if staged is None or occlusion is None:
+        staged, normals = complete_face(sample.reference, consensus.joints)
+        occlusion = occlusion_classes(staged, normals, association.unannotated, rig)
+        inside = sizes.in_picture(sample.reference, rig)
+    else:
+        inside = occlusion != OUTSIDE
     expected = sample.known[:, None] & (inside[..., LIMB_JOINTS].sum(axis=-1) >= _HALF)
-    found = association.detected[..., None] & inside & (occlusion != OUTSIDE)
+    found = association.detected[..., None] & sample.known[:, None, :, None] & inside & (occlusion != OUTSIDE)
     reported = found & (association.scores > 0)
+    droppable = found.copy()
+    if sample.kind == "bottom-up":
+        for joint in np.flatnonzero(PARENT >= 0):
+            droppable[..., joint] &= reported[..., PARENT[joint]]
     mirrored = target[..., MIRROR, :]
     labelled = reported & (error != KeypointError.ABSENT)
     swap, inversion = error == KeypointError.SWAP, error == KeypointError.INVERSION
     miss, jitter = error == KeypointError.MISS, error == KeypointError.JITTER
     risk = {
-        "drop": found,
+        "drop": droppable,
         "swap": labelled & distinguishable(neighbour, target, unit),
         "inversion": labelled & ~swap & distinguishable(mirrored, target, unit),
         "miss": labelled & ~swap & ~inversion,
         "jitter": labelled & ~swap & ~inversion & ~miss,
     }
-    taken = {"drop": found & ~reported, "swap": swap, "inversion": inversion, "miss": miss, "jitter": jitter}
+    taken = {"drop": droppable & ~reported, "swap": swap, "inversion": inversion, "miss": miss, "jitter": jitter}
     chance = {
         "swap": miss & opposite_hits(keypoints, target, neighbour, unit),
         "inversion": miss & opposite_hits(keypoints, target, mirrored, unit),
     }
-    with np.errstate(invalid="ignore", divide="ignore"):
-        residual = np.where(labelled[..., None], (keypoints - target) / unit[..., None], np.nan)
     return LabelledJoints(
+        time=sample.time,
         step=sample.step,
+        kind=sample.kind,
+        known=sample.known,
         association=association,
+        consensus=consensus,
         boxes=boxes,
         unit=unit,
         target=target,
         occlusion=np.where(occlusion == OUTSIDE, np.int8(VISIBLE), occlusion),
+        bearing=_bearing_bins(staged, rig),
+        inside=inside,
+        beyond=_beyond(staged, unit, rig),
         expected=expected,
         error=error,
         risk=risk,
         taken={key: each & risk[key] for key, each in taken.items()},
         chance={key: each & risk[key] for key, each in chance.items()},
-        residual=residual,
+        residual=np.where(labelled[..., None], residual, np.nan),
         axes=image_axes(sample.reference[:, :, LIMB_JOINTS].mean(axis=2), rig),
-        offset=offset,
-        normal=linear.normal_equations(offset),
     )
+
+
+def _without_noise(residual: Floats, unit: Floats, consensus: Consensus) -> Floats:
+    """Return residuals (T, V, P, 17, 2) from the prediction in units, without the noise of the prediction.
+
+    A residual of usual size is reduced by its share of the noise; one beyond _USUAL deviations, which is an error, is
+    left as it is.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        residual = residual / unit[..., None]
+        factor = 1 + consensus.noise
+        square = (residual**2).sum(axis=-1)
+        alike = np.where(consensus.agrees, square / factor, np.nan)
+        known = np.isfinite(alike).sum(axis=(0, 1, 2)) @ _OF_KIND
+        variance = np.nansum(alike, axis=(0, 1, 2)) @ _OF_KIND / known / 2  # of each kind of joint, per axis
+    usual = square < _USUAL**2 * variance[list(KIND_OF_JOINT)] * factor
+    return np.where(usual[..., None], residual / np.sqrt(factor)[..., None], residual)
+
+
+def _beyond(joints: Floats, unit: Floats, rig: Rig) -> Floats:
+    """Return the distance of joints (T, P, 17, 3) from the image in units, (T, V, P, 17); 0 inside."""
+    far = []
+    for camera in rig:
+        pixels = camera.project(joints)
+        away = pixels - np.clip(pixels, 0.0, np.array(camera.size) - 1.0)
+        far.append(np.hypot(away[..., 0], away[..., 1]))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.nan_to_num(np.stack(far, axis=1) / unit, nan=np.inf)
+
+
+def _bearing_bins(joints: Floats, rig: Rig) -> NDArray[np.int64]:
+    """Return the bins of the bearings of the cameras from the heads of people (T, P, 17, 3), (T, V, P)."""
+    turn = np.nan_to_num(head_bearings(joints, rig)) / (2 * np.pi) * len(BEARINGS)
+    return np.round(turn).astype(np.int64) % len(BEARINGS)
 
 
 def _project(joints: Floats, rig: Rig) -> Floats:

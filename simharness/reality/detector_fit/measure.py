@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from simharness.reality.annotated_recording import DetectorKind
 from simharness.reality.detector_fit.frame_sums import SCORED, FrameSums, frame_sums
-from simharness.reality.detector_fit.joint_labels import CLASSES, label_joints
+from simharness.reality.detector_fit.joint_labels import CLASSES, LabelledJoints, label_joints
 from simharness.reality.detector_fit.parameters import estimate_parameters
 from simharness.reality.detector_fit.sample import Sample
 from simharness.scenario.sections.detector import KINDS
@@ -72,15 +73,27 @@ class Measurement:
     Attributes:
         name: name of the sample.
         frames: number of frames.
-        people: mean number of known people in a frame.
-        values: measured values by key of ``[detector]``; also ``bias.forward.``, ``bias.outward.`` and ``bias.up.``
-            with the kind of joint, ``share.`` and ``size.``.
+        people: mean number of measured people in a frame.
+        kind: kind of the detector.
+        values: measured values by key of ``[detector]``; also ``share.`` and ``size.``.
     """
 
     name: str
     frames: int
     people: float
+    kind: DetectorKind
     values: Mapping[str, MeasuredValue]
+
+    def with_values(self, values: Mapping[str, float]) -> Measurement:
+        """Return the measurement with calibrated values; intervals keep their distances from them as ratios."""
+
+        def moved(measured: MeasuredValue, value: float) -> MeasuredValue:
+            if not (measured.known and measured.value > 0):
+                return replace(measured, value=value, low=min(measured.low, value), high=max(measured.high, value))
+            factor = value / measured.value
+            return replace(measured, value=value, low=factor * measured.low, high=factor * measured.high)
+
+        return replace(self, values={key: moved(each, values[key]) for key, each in self.values.items()})
 
     def __getitem__(self, key: str) -> MeasuredValue:
         """Return the measured value of a key."""
@@ -105,7 +118,9 @@ class Measurement:
         }
 
 
-def measure(sample: Sample, *, resamples: int = RESAMPLES, seed: int = 0) -> Measurement:
+def measure(
+    sample: Sample, *, labels: LabelledJoints | None = None, resamples: int = RESAMPLES, seed: int = 0
+) -> Measurement:
     """Measure a detector.
 
     Intervals come from a block bootstrap over time (:mod:`simharness.statistics.bootstrap`). They cover other
@@ -113,6 +128,7 @@ def measure(sample: Sample, *, resamples: int = RESAMPLES, seed: int = 0) -> Mea
 
     Args:
         sample: people with known joints, and the detections.
+        labels: its labelled joints, where they are known already.
         resamples: number of resamples of the bootstrap.
         seed: seed of the resamples.
 
@@ -121,16 +137,20 @@ def measure(sample: Sample, *, resamples: int = RESAMPLES, seed: int = 0) -> Mea
     """
     if not sample.known.any():
         raise ValueError(f"{sample.name}: expected people with known joints, got none in {len(sample)} frames")
-    labels = label_joints(sample)
+    labels = label_joints(sample) if labels is None else labels
     if not labels.association.detected.any():
         raise ValueError(
             f"{sample.name}: no detection is near any of the known people; expected detections of the same frames and "
             "cameras as the truth. Check that calibration, truth and detections belong together"
         )
     sums = frame_sums(labels)
-    whole = estimate_parameters({key: each.sum(axis=0, keepdims=True) for key, each in sums.items()}, step=labels.step)
+    whole = estimate_parameters(
+        {key: each.sum(axis=0, keepdims=True) for key, each in sums.items()}, step=labels.step, kind=labels.kind
+    )
     weights = block_weights(sample.time, resamples=resamples, seed=seed)
-    drawn = estimate_parameters({key: resampled(each, weights) for key, each in sums.items()}, step=labels.step)
+    drawn = estimate_parameters(
+        {key: resampled(each, weights) for key, each in sums.items()}, step=labels.step, kind=labels.kind
+    )
     independent = blocks(sample.time)
     result = {}
     design = 1 + 2 * np.nan_to_num(whole["correlation.life"][0]) / labels.step
@@ -141,7 +161,33 @@ def measure(sample: Sample, *, resamples: int = RESAMPLES, seed: int = 0) -> Mea
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
-    return Measurement(sample.name, len(sample), float(sample.known.sum() / len(sample)), result)
+    return Measurement(sample.name, len(sample), float(sample.known.sum() / len(sample)), sample.kind, result)
+
+
+def point_estimates(sample: Sample) -> dict[str, float]:
+    """Return the measured values of a sample without their intervals, by key; NaN where unknown."""
+    labels = label_joints(sample)
+    sums = {key: each.sum(axis=0, keepdims=True) for key, each in frame_sums(labels).items()}
+    return {
+        key: float(value[0]) for key, value in estimate_parameters(sums, step=labels.step, kind=labels.kind).items()
+    }
+
+
+FITTED_SECTIONS = ("keypoints", "correlation", "scores", "boxes", "phantoms")
+"""Sections of measured values that describe the detector. The others (share, size) also depend on the scene."""
+
+
+def agreement(real: Measurement, simulated: Measurement) -> tuple[list[str], int]:
+    """Return the parameters that differ by more than their intervals allow, and the number of parameters compared.
+
+    About 5 % of equal parameters differ by more.
+    """
+    compared = [
+        key
+        for key, each in real.values.items()
+        if key.split(".")[0] in FITTED_SECTIONS and each.known and simulated[key].known
+    ]
+    return [key for key in compared if not real[key].agrees(simulated[key])], len(compared)
 
 
 def _count(key: str, sums: FrameSums) -> int:

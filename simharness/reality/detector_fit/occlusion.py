@@ -2,7 +2,7 @@
 
 People are modelled as capsules about their bones. A joint is hidden by a bone into whose capsule it projects and whose
 near side is in front of it; for a bone of the same person, in front by more than the flesh about the joint. Objects are
-unknown, so joints that they hide count as visible. CONFUSION is the accuracy of this on simulated people.
+unknown, so joints that they hide count as visible.
 """
 
 from __future__ import annotations
@@ -15,24 +15,6 @@ from mvpose.arrays import Floats
 from simharness.detector.bias import body_axes
 from simharness.detector.conditions import OCCLUDED, OUTSIDE, SELF_OCCLUDED, VISIBLE
 from simharness.reality.detector_fit.sizes import head
-
-CONFUSION = np.array(
-    [
-        [[0.97, 0.02, 0.01], [0.06, 0.94, 0.00], [0.11, 0.01, 0.88]],  # nose
-        [[0.96, 0.03, 0.01], [0.04, 0.96, 0.00], [0.08, 0.02, 0.90]],  # eyes
-        [[0.96, 0.03, 0.01], [0.04, 0.95, 0.01], [0.07, 0.06, 0.87]],  # ears
-        [[0.89, 0.10, 0.01], [0.03, 0.96, 0.01], [0.06, 0.03, 0.91]],  # shoulders
-        [[0.90, 0.08, 0.02], [0.10, 0.88, 0.02], [0.06, 0.02, 0.92]],  # elbows
-        [[0.89, 0.09, 0.02], [0.01, 0.98, 0.01], [0.03, 0.01, 0.96]],  # wrists
-        [[0.96, 0.03, 0.01], [0.08, 0.91, 0.01], [0.01, 0.01, 0.98]],  # hips
-        [[0.91, 0.06, 0.03], [0.01, 0.98, 0.01], [0.01, 0.02, 0.97]],  # knees
-        [[0.84, 0.13, 0.03], [0.14, 0.83, 0.03], [0.01, 0.00, 0.99]],  # ankles
-    ]
-)
-"""True occlusion classes given the estimated one, (9, 3, 3): for each kind of joint, rows by the estimated class
-VISIBLE, SELF_OCCLUDED, OCCLUDED, columns the shares of the true ones. Counted on simulated, dressed people and the rig
-of Shelf (:func:`simharness.reality.detector_fit.shelf_twin.count_occlusion`, seeds 10, 11, 14 and 15).
-"""
 
 _NEAR = 0.25  # metres from the middle of the skull within which triangulated joints of the face are accepted
 _SKULL = 0.40  # height of the middle of the skull above the shoulders, in lengths of the trunk

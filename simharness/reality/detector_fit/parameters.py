@@ -11,12 +11,16 @@ from scipy.special import expit, logit, ndtr
 
 from mvpose.arrays import Floats
 from simharness.detector.conditions import OCCLUDED, SELF_OCCLUDED
-from simharness.reality.detector_fit.bias_fit import solve
-from simharness.reality.detector_fit.frame_sums import LOGITS, SCORED, TERCILES, FrameSums, lags
+from simharness.reality.annotated_recording import DetectorKind
+from simharness.reality.detector_fit.frame_sums import BORDER, LOGITS, SCORED, TERCILES, FrameSums, lags
 from simharness.reality.detector_fit.joint_labels import CLASSES
-from simharness.reality.detector_fit.occlusion import CONFUSION
-from simharness.reality.detector_fit.tetrachoric import fit_life, joint_probability, tetrachoric_correlation
-from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
+from simharness.reality.detector_fit.tetrachoric import (
+    fit_life,
+    fit_noisy_life,
+    joint_probability,
+    tetrachoric_correlation,
+)
+from simharness.scenario.sections.detector import BEARINGS, KIND_OF_JOINT, KINDS
 from simharness.types.truth import GOOD_BELOW
 
 LIMB_KINDS = tuple(sorted({KIND_OF_JOINT[joint] for joint in range(5, 17)}))
@@ -25,15 +29,20 @@ LIMB_KINDS = tuple(sorted({KIND_OF_JOINT[joint] for joint in range(5, 17)}))
 _WIDEST = 3.0  # units: such a scatter is flat within 1.14, and wider ones are indistinguishable from it
 _MIN_ERRORS = 200  # errors needed to estimate their correlations
 _ROUNDS = 4
+_PRIOR = 20.0  # joints
+_MIN_HIDDEN = 20  # joints of a kind needed to say something about the kind
+_MIN_OUTSIDE = 50  # joints outside of the image needed to see how far the detector reports them
 _SEPARATED = 1.0  # deviations between scores of good keypoints and misses from which mixtures can be separated
 
 
-def estimate_parameters(sums: FrameSums, *, step: float) -> dict[str, Floats]:
+def estimate_parameters(sums: FrameSums, *, step: float, kind: DetectorKind) -> dict[str, Floats]:
     """Return all parameters by key, (R,) each.
 
     Args:
         sums: sums of :func:`simharness.reality.detector_fit.frame_sums.frame_sums` over the frames of R resamples.
         step: seconds between consecutive frames.
+        kind: kind of the detector. A top-down one guesses the joints that it cannot see: their gross errors are
+            guesses, and joints outside of the image are reported at its border.
     """
     result: dict[str, Floats] = {}
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -43,20 +52,27 @@ def estimate_parameters(sums: FrameSums, *, step: float) -> dict[str, Floats]:
             _put_by_kind(result, f"share.{key}", share[key])
         for key in ("swap", "inversion"):
             _put_by_kind(result, f"keypoints.{key}", share[key])
-        dropped = _by_occlusion(n["drop"], k["drop"])
+        n_drop, k_drop = n["drop"], k["drop"]
+        dropped = np.where(n_drop > 0, k_drop / n_drop, (k_drop.sum(axis=1) / n_drop.sum(axis=1))[:, None])
         for index, occlusion in enumerate(("visible", "self_occluded", "occluded")):
-            _put_by_kind(result, f"keypoints.drop.{occlusion}", dropped[:, index])
-        reported = _reported(dropped)
-        result |= _occlusion_factors(n, k, share, reported)
-        _put_by_kind(result, "keypoints.scatter", _sigma(sums["scatter.square"] / sums["scatter.n"]))
-        offset = solve(sums["bias.A"], sums["bias.b"])
-        for index, way in enumerate(("forward", "outward", "up")):
-            _put_by_kind(result, f"bias.{way}", np.where(sums["scatter.n"] > 0, offset[..., index], np.nan))
+            _put_by_kind(result, f"keypoints.drop.{occlusion}", np.clip(dropped[:, index], 0.0, 1.0))
+        if kind == "top-down":
+            result |= _guesses(n, k, sums)
+        else:
+            result |= _occlusion_factors(n, k, share)
+            result["keypoints.border"] = _border(sums)
+        shown, square = (sums[f"scatter.{key}"] - sums[f"scatter.hidden_{key}"] for key in ("n", "square"))
+        _put_by_kind(result, "keypoints.scatter", _sigma(square / shown))
+        result |= _hidden_scatter(sums) | _face(sums)
         beyond = sums["miss.beyond"] / sums["miss.n"]
         box, box_beyond = sums["miss.box"] / sums["miss.n"], sums["miss.box_beyond"] / sums["miss.n"]
-        result["keypoints.stray"] = np.clip(beyond / (box_beyond + beyond * (1 - box)), 0.0, 1.0)
+        stray = np.clip(beyond / (box_beyond + beyond * (1 - box)), 0.0, 1.0)
+        for index in LIMB_KINDS:  # too few misses of each kind; misses of the face stay near it
+            result[f"keypoints.stray.{KINDS[index]}"] = stray
         result |= _dependence(sums, step)
-        result |= _score_parameters(sums, 1 - reported[:, :, 0, 0])
+        result |= _score_parameters(sums)
+        if kind == "top-down":
+            result |= _guess_scores(sums)
         result |= _people_parameters(sums, step)
         for index, third in enumerate(TERCILES):
             result[f"size.{third}.drop"] = sums["size.drop.k"][:, index] / sums["size.drop.n"][:, index]
@@ -70,52 +86,66 @@ def _put_by_kind(result: dict[str, Floats], key: str, values: Floats) -> None:
         result[f"{key}.{kind}"] = values[:, index]
 
 
-def _by_occlusion(n: Floats, k: Floats, confusion: Floats = CONFUSION) -> Floats:
-    """Return shares (R, 3, 9) of joints that truly are visible, self-occluded and occluded.
-
-    Args:
-        n: number of joints by estimated occlusion class, (R, 3, 9).
-        k: number of them that were taken. For a class without joints the share of all classes is used.
-        confusion: shares of the true classes given the estimated one, (..., 9, 3, 3).
-    """
-    estimated = np.where(n > 0, k / n, (k.sum(axis=1) / n.sum(axis=1))[:, None])
-    return np.clip(np.einsum("...kct,...tk->...ck", np.linalg.inv(confusion), estimated), 0.0, 1.0)
-
-
-def _reported(dropped: Floats) -> Floats:
-    """Return CONFUSION among reported joints, (R, 9, 3, 3): more of them are visible than of all joints.
-
-    Args:
-        dropped: shares of joints that are not reported, (R, 3, 9).
-    """
-    left = CONFUSION * (1 - np.clip(dropped, 0.0, 0.95)).transpose(0, 2, 1)[:, :, None]
-    return np.asarray(left / left.sum(axis=-1, keepdims=True))
-
-
-def _occlusion_factors(
-    n: dict[str, Floats], k: dict[str, Floats], share: dict[str, Floats], confusion: Floats
-) -> dict[str, Floats]:
+def _occlusion_factors(n: dict[str, Floats], k: dict[str, Floats], share: dict[str, Floats]) -> dict[str, Floats]:
     """Return the factors of misses and jitter for hidden joints, and the shares for visible joints.
 
     Args:
-        n: joints that each class could have taken, by class.
-        k: joints that each class took, by class.
+        n: joints that each class could have taken, (R, 3, 9) by class.
+        k: joints that each class took, (R, 3, 9) by class.
         share: shares taken by each class, (R, 9), by class.
-        confusion: confusion of occlusion classes among reported joints, (R, 9, 3, 3).
     """
-    observed, expected, by_true = np.zeros(()), np.zeros(()), {}
+    observed, expected = np.zeros(()), np.zeros(())
     for key in ("miss", "jitter"):
-        wrong = _by_occlusion(n[key], k[key], confusion)
-        by_true[key] = np.einsum("rkec,rek->rck", confusion, n[key])
-        observed = observed + np.nan_to_num(by_true[key] * wrong).sum(axis=2)
-        expected = expected + np.nan_to_num(by_true[key] * wrong[:, :1]).sum(axis=2)
-    factor = observed / expected  # (R, 3), 1 for visible joints
+        wrong = np.where(n[key] > 0, k[key] / n[key], 0.0)
+        observed = observed + (n[key] * wrong).sum(axis=2)
+        expected = expected + (n[key] * wrong[:, :1]).sum(axis=2)
+    factor = np.maximum(observed / expected, 1.0)  # (R, 3), 1 for visible joints
+    known = np.where(np.isfinite(factor), factor, 1.0)
     result: dict[str, Floats] = {}
     for key in ("miss", "jitter"):
-        known = np.where(np.isfinite(factor), factor, 1.0)
-        mean = np.einsum("rc,rck->rk", known, by_true[key]) / by_true[key].sum(axis=1)
+        mean = np.einsum("rc,rck->rk", known, n[key]) / n[key].sum(axis=1)
         _put_by_kind(result, f"keypoints.{key}", share[key] / mean)
     return result | {"keypoints.self_occluded": factor[:, SELF_OCCLUDED], "keypoints.occluded": factor[:, OCCLUDED]}
+
+
+def _guesses(n: dict[str, Floats], k: dict[str, Floats], sums: FrameSums) -> dict[str, Floats]:
+    """Return the parameters of a detector that guesses: shares of visible joints, and shares that are guessed.
+
+    The share guessed begins as the share of gross errors among the joints in that state; calibration raises it, because
+    many guesses are right.
+
+    Args:
+        n: joints that each class could have taken, (R, 3, 9) by class.
+        k: joints that each class took, (R, 3, 9) by class.
+        sums: all sums.
+    """
+    result: dict[str, Floats] = {}
+    for key in ("miss", "jitter"):
+        _put_by_kind(result, f"keypoints.{key}", np.clip(k[key][:, 0] / n[key][:, 0], 0.0, 1.0))
+    # Kinds that are never hidden in this way count as the others.
+    for index, name in ((SELF_OCCLUDED, "self_occluded"), (OCCLUDED, "occluded")):
+        wrong, reported = k["miss"][:, index], n["miss"][:, index]
+        pooled = wrong.sum(axis=1, keepdims=True) / reported.sum(axis=1, keepdims=True)
+        share = np.where(reported >= _MIN_HIDDEN, wrong / reported, np.nan_to_num(pooled))
+        _put_by_kind(result, f"keypoints.guess.{name}", np.clip(share, 0.0, 1.0))
+        jitter, left = k["jitter"][:, index].sum(axis=1), n["jitter"][:, index].sum(axis=1)
+        usual = k["jitter"][:, 0].sum(axis=1) / n["jitter"][:, 0].sum(axis=1)
+        result[f"keypoints.{name}"] = np.maximum(np.nan_to_num(jitter / left / usual, nan=1.0, posinf=1.0), 1.0)
+    outside = sums["outside.n"].sum(axis=1, keepdims=True)
+    share = np.broadcast_to(sums["outside.k"].sum(axis=1, keepdims=True) / outside, sums["outside.n"].shape)
+    _put_by_kind(result, "keypoints.guess.outside", np.where(outside >= _MIN_HIDDEN, share, np.nan))
+    return result
+
+
+def _guess_scores(sums: FrameSums) -> dict[str, Floats]:
+    """Return the usual scores of guesses by kind, and the factor of those outside of the image."""
+    wrong = sums["scores"][:, 1, SCORED.index("miss")]
+    pooled = expit(_quantile(wrong.sum(axis=1), 0.5))[:, None]
+    level = np.where(wrong.sum(axis=-1) >= _MIN_HIDDEN, expit(_quantile(wrong, 0.5)), pooled)
+    outside = expit(_quantile(sums["scores.outside"], 0.5))
+    result = {"scores.outside": np.minimum(outside / pooled[:, 0], 1.0)}
+    _put_by_kind(result, "scores.guess", level)
+    return result
 
 
 def _sigma(square: Floats) -> Floats:
@@ -126,29 +156,77 @@ def _sigma(square: Floats) -> Floats:
     return np.where(np.isfinite(square), np.interp(square, np.append(0.0, left), np.append(0.0, sigma)), np.nan)
 
 
+def _hidden_scatter(sums: FrameSums) -> dict[str, Floats]:
+    """Return the factor of the scatter of good keypoints whose joint is not visible."""
+    hidden_n, hidden = sums["scatter.hidden_n"], sums["scatter.hidden_square"]
+    shown = (sums["scatter.square"] - hidden) / (sums["scatter.n"] - hidden_n)
+    ratio = _sigma(hidden / hidden_n) / _sigma(shown)
+    return {"keypoints.scatter_hidden": _averaged(ratio, np.where(np.isfinite(ratio), hidden_n, 0.0))}
+
+
+def _border(sums: FrameSums) -> Floats:
+    """Return the distance outside of the image, units, within which as many joints lie as are reported, (R,)."""
+    n, k = sums["border.n"], sums["border.k"]
+    below = np.concatenate([np.zeros((len(n), 1)), np.cumsum(n, axis=-1)], axis=-1)
+    reach = np.array([np.interp(count, row, BORDER) for count, row in zip(k, below + 1e-9 * BORDER, strict=True)])
+    return np.where(below[:, -1] >= _MIN_OUTSIDE, reach, np.nan)
+
+
+def _face(sums: FrameSums) -> dict[str, Floats]:
+    """Return the shares of joints of the face that are not reported, by kind and bearing (R, 12).
+
+    Bins with few joints take from their neighbours: each counts as _PRIOR joints more, at the rate of the bins beside.
+    """
+    n, k = sums["face.n"], sums["face.k"]
+    around_n, around_k = (np.roll(each, 1, axis=-1) + np.roll(each, -1, axis=-1) + 1e-9 for each in (n, k))
+    rate = (k + _PRIOR * around_k / around_n) / (n + _PRIOR)
+    rate = np.where(n.sum(axis=-1, keepdims=True) > 0, rate, np.nan)
+    return {
+        f"keypoints.face.{KINDS[kind]}.{index}": rate[:, kind, index]
+        for kind in range(3)
+        for index in range(len(BEARINGS))
+    }
+
+
 def _dependence(sums: FrameSums, step: float) -> dict[str, Floats]:
     """Return the parameters of ``[detector.correlation]``."""
     enough = sum(sums[f"k.{key}"].sum(axis=(1, 2)) for key in CLASSES) >= _MIN_ERRORS
     scatter = sums["scatter.later"] / sums["scatter.later_square"]
-    return {
+    life, noise = fit_noisy_life(lags(step), step, scatter, sums["scatter.later_square"])
+    result = {
         "correlation.life": np.where(
             enough, fit_life(lags(step), step, sums["time.excess"] / sums["time.weight"], sums["time.weight"]), np.nan
         ),
-        "correlation.views": np.where(enough, tetrachoric_correlation(sums["views.k"], sums["views.expected"]), np.nan),
-        "correlation.limb": np.where(enough, tetrachoric_correlation(sums["limb.k"], sums["limb.expected"]), np.nan),
-        "correlation.scatter_life": fit_life(lags(step), step, scatter, sums["scatter.later_square"]),
-        "correlation.scatter_views": np.clip(
-            sums["scatter.across"].sum(axis=1) / sums["scatter.space"].sum(axis=1), 0.0, 1.0
-        ),
+        "correlation.scatter_life": life,
+        "correlation.scatter_noise": noise,
+        "correlation.scatter_near": np.clip(sums["scatter.near"] / sums["scatter.near_n"], 0.0, 0.95),
+        "correlation.scatter_views": _shared_scatter(sums),
     }
+    for key in ("views", "gross_views", "limb"):
+        fitted = tetrachoric_correlation(sums[f"{key}.k"], sums[f"{key}.expected"])
+        result[f"correlation.{key}"] = np.where(enough, fitted, np.nan)
+    return result
 
 
-def _score_parameters(sums: FrameSums, unseen: Floats) -> dict[str, Floats]:
+def _shared_scatter(sums: FrameSums) -> Floats:
+    """Return the share of the variance of scatter that all views have in common.
+
+    The views agree on such an error, so that residuals do not show it; but it changes the lengths of bones. What the
+    variance of the lengths over time has beyond the noise of single views is due to it.
+    """
+    limbs = list(LIMB_KINDS)
+    single = (sums["scatter.square"][:, limbs].sum(axis=1) / sums["scatter.n"][:, limbs].sum(axis=1)) / 2
+    n = np.maximum(sums["bones.n"], 1.0)
+    spread = (sums["bones.square"] - sums["bones.length"] ** 2 / n).sum(axis=(1, 2))
+    shared = np.maximum(spread - single * sums["bones.noise"], 0.0) / sums["bones.scale"]
+    return np.clip(shared / (shared + single), 0.0, 1.0)
+
+
+def _score_parameters(sums: FrameSums) -> dict[str, Floats]:
     """Return the parameters of scores: usual scores by class, deviation, shares of over- and underconfident ones.
 
     Args:
         sums: sums of R resamples.
-        unseen: share of hidden joints among those estimated as visible, (R, 9): they have the lowest scores.
     """
     shown, whole = sums["scores"][:, 0], sums["scores"].sum(axis=1)  # (R, 6, 9, B), of visible joints and of all
     limbs = list(LIMB_KINDS)
@@ -159,7 +237,7 @@ def _score_parameters(sums: FrameSums, unseen: Floats) -> dict[str, Floats]:
     under = over = np.zeros(len(shown))
     for _ in range(_ROUNDS):
         # Good keypoints with the score of a miss have the lowest scores: the median of the others is a higher quantile.
-        lower = np.clip(under[:, None] + unseen, 0.0, 0.9)
+        lower = np.clip(under[:, None] + np.zeros(good.shape[:2]), 0.0, 0.9)
         usual = expit(_quantile(good, (1 + lower) / 2))
         # The classes of the face are unknown: its usual score is above its median as for good limb joints.
         usual = np.where(many > 0, usual, every * _averaged(usual / every, many)[:, None])
@@ -176,24 +254,28 @@ def _score_parameters(sums: FrameSums, unseen: Floats) -> dict[str, Floats]:
         over = _other_share(1 - _averaged(_below(miss, middle), miss.sum(axis=-1)), tail, separation)
     behind = sums["scores"][:, 1, rows["good"]]
     hidden = np.minimum(_averaged(expit(_quantile(behind, 0.5)) / usual, behind.sum(axis=-1)), 1.0)
-    factor = np.stack([np.ones_like(hidden), hidden], axis=1)[..., None] * joint[:, None]  # (R, 2, 9)
 
-    def usual_of(name: str, share: Floats) -> Floats:
-        """Return the usual score of a class, from the quantile ``share`` (R,) of its scores by visibility and kind."""
-        row = sums["scores"][:, :, rows[name]]
-        level = expit(_quantile(row, share[:, None, None])) / factor
-        return _averaged(level.reshape(len(row), -1), row.sum(axis=-1).reshape(len(row), -1))
+    def usual_of(name: str, share: Floats, visibility: int) -> Floats:
+        """Return the usual score of a class, from the quantile ``share`` (R,) of its scores by kind."""
+        row = sums["scores"][:, visibility, rows[name]]
+        level = expit(_quantile(row, share[:, None])) / joint
+        return _averaged(level, np.where(np.isfinite(level), row.sum(axis=-1), 0.0))
 
     result = {
         "scores.good": top,
-        "scores.miss": usual_of("miss", (1 - over) / 2),
-        "scores.hidden": hidden,
+        "scores.hidden.good": hidden,
         "scores.deviation": deviation,
         "scores.overconfident": over,
         "scores.underconfident": under,
     }
-    for name in ("jitter", "inversion", "swap"):
-        result[f"scores.{name}"] = np.minimum(usual_of(name, np.full(len(top), 0.5)), 1.0)
+    middle_rank = np.full(len(top), 0.5)
+    ranks = {"miss": (1 - over) / 2, "jitter": middle_rank, "inversion": middle_rank, "swap": middle_rank}
+    for name, share in ranks.items():
+        level, behind_level = usual_of(name, share, 0), usual_of(name, share, 1)
+        level = np.where(np.isfinite(level), level, behind_level)
+        result[f"scores.{name}"] = np.minimum(level, 1.0)
+        lower = np.where(np.isfinite(behind_level), behind_level / level, hidden)
+        result[f"scores.hidden.{name}"] = np.clip(lower, 0.0, 1.0)
     _put_by_kind(result, "scores.joint", joint)
     return result
 
@@ -237,6 +319,11 @@ def _below(counts: Floats, level: Floats) -> Floats:
 def _people_parameters(sums: FrameSums, step: float) -> dict[str, Floats]:
     """Return the parameters of boxes and phantoms."""
     p = (sums["people.k"] / sums["people.n"])[:, None]
+    hidden_n, hidden_k = sums["people.hidden.n"], sums["people.hidden.k"]
+    by_hidden = np.where(hidden_n > 0, hidden_k / hidden_n, np.nan)
+    for index in range(1, 5):  # where nobody is hidden so much, as where people are hidden less
+        by_hidden[:, index] = np.where(hidden_n[:, index] > 0, by_hidden[:, index], by_hidden[:, index - 1])
+    because = np.clip(1 - (1 - by_hidden) / (1 - by_hidden[:, :1]), 0.0, 1.0)
     weight = sums["people.time.n"] * p * (1 - p)
     missed_again = sums["people.time.k"] - sums["people.time.n"] * p**2
     rate = sums["false.n"] / sums["false.pairs"][:, :1]  # for each view, (R, V)
@@ -244,7 +331,8 @@ def _people_parameters(sums: FrameSums, step: float) -> dict[str, Floats]:
     spread = spread.sum(axis=1)
     row = sums["scores.false"]
     return {
-        "boxes.missed": p[:, 0],
+        "boxes.missed": by_hidden[:, 0],
+        **{f"boxes.missed_hidden.{index}": because[:, index] for index in range(5)},
         "boxes.missed_views": tetrachoric_correlation(
             sums["people.views.k"], sums["people.views.n"][:, None] * joint_probability(p, p)[:, 0]
         ),

@@ -13,8 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from simharness.reality.detector_fit.measure import Measurement
-from simharness.reality.detector_fit.parameters import LIMB_KINDS
-from simharness.scenario.sections.detector import KINDS
+from simharness.scenario.sections.detector import BEARINGS, KINDS
 
 _COLORS = ("#3b82c4", "#d9643a")
 _STYLE: dict[Any, Any] = {
@@ -36,29 +35,31 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
 }
 _MIN_COUNT = 100  # joints, people or detections behind a value: with fewer, its interval is too wide to plot
-_LIMBS = tuple(KINDS[kind] for kind in LIMB_KINDS)
+_BINS = tuple(map(str, range(len(BEARINGS))))
 _PANELS: tuple[tuple[str, str, tuple[str, ...], float], ...] = (
     ("keypoints.drop.visible", "not reported, of visible joints, %", KINDS, 100),
     ("keypoints.drop.self_occluded", "not reported, self-occluded, %", KINDS, 100),
     ("keypoints.drop.occluded", "not reported, occluded, %", KINDS, 100),
-    ("keypoints.jitter", "jitter, of visible joints, %", _LIMBS, 100),
-    ("keypoints.miss", "miss, of visible joints, %", _LIMBS, 100),
-    ("keypoints.inversion", "inversion, %", _LIMBS, 100),
-    ("keypoints.swap", "swap, %", _LIMBS, 100),
-    ("keypoints.scatter", "scatter of good keypoints, units", _LIMBS, 1),
-    ("bias.up", "bias upwards, mm", _LIMBS, 1000),
-    ("bias.outward", "bias outwards, mm", _LIMBS, 1000),
+    ("keypoints.jitter", "jitter, of visible joints, %", KINDS, 100),
+    ("keypoints.miss", "miss, of visible joints, %", KINDS, 100),
+    ("keypoints.inversion", "inversion, %", KINDS, 100),
+    ("keypoints.swap", "swap, %", KINDS, 100),
+    ("keypoints.scatter", "scatter of good keypoints, units", KINDS, 1),
+    ("keypoints.face.ears", "ears not reported, by bearing of the camera to their side, %", _BINS, 100),
+    ("keypoints.face.nose", "nose not reported, by bearing of the camera, %", _BINS, 100),
     ("scores.joint", "score, relative to elbows", KINDS, 1),
 )
 _REST: tuple[tuple[str, str], ...] = (
     ("correlation.life", "life, s"),
     ("correlation.views", "views"),
+    ("correlation.gross_views", "gross,\nviews"),
     ("correlation.limb", "limb"),
     ("correlation.scatter_life", "scatter\nlife, s"),
-    ("correlation.scatter_views", "scatter\nviews"),
+    ("correlation.scatter_near", "scatter\nnear"),
     ("scores.good", "score\ngood"),
     ("scores.miss", "score\nmiss"),
     ("boxes.missed", "missed"),
+    ("boxes.missed_hidden.4", "missed,\nhidden"),
     ("phantoms.rate", "false"),
 )
 
@@ -70,17 +71,18 @@ def plot_comparison(measurements: Sequence[Measurement], path: str | Path) -> No
         ValueError: the file cannot be written.
     """
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(13.5, 10), layout="constrained", dpi=110)
+        figure = Figure(figsize=(15, 10), layout="constrained", dpi=110)
         axes = figure.subplots(4, 3).ravel()
         for ax, (key, title, kinds, scale) in zip(axes, _PANELS, strict=False):
             _draw(ax, measurements, [f"{key}.{kind}" for kind in kinds], scale=scale)
             ax.set_title(title)
-            ax.set_xticks(range(len(kinds)), kinds, fontsize=7.5)
+            labels = [f"{bearing}°" for bearing in BEARINGS] if kinds == _BINS else kinds
+            ax.set_xticks(range(len(kinds)), labels, fontsize=7.5)
         _draw(axes[-1], measurements, [key for key, _ in _REST])
         axes[-1].set_title("correlation, scores, people")
         axes[-1].set_xticks(range(len(_REST)), [label for _, label in _REST], fontsize=7)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=2, fontsize=10)
+        handles, names = axes[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper left", ncols=2, fontsize=10)
         figure.supxlabel(
             f"Bars: 95 % intervals, block bootstrap over time. Values of fewer than {_MIN_COUNT} joints are omitted.",
             fontsize=8.5,

@@ -1,38 +1,39 @@
-"""Input of a measurement, recorded or simulated: people with known joints, and the detections of a detector."""
+"""Input of a measurement, recorded or simulated: people whose places are known, and the detections of a detector."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
-from simharness.reality.annotated_recording import AnnotatedRecording
-
-LIMB_JOINTS = np.arange(5, 17)
-"""Joints of COCO-17 that data sets have in common, (12,): shoulders to ankles, without the face."""
-
-SHELF_RATE = 25.0
-"""Frame rate of the Shelf recording, Hz."""
-
-# Index in SHELF14 of each limb joint of COCO-17 (5 to 16).
-_OF_SHELF = np.array([9, 8, 10, 7, 11, 6, 3, 2, 4, 1, 5, 0])
+from simharness.detector.conditions import Conditions
+from simharness.reality.annotated_recording import AnnotatedRecording, DetectorKind
+from simharness.reality.people_tracks import LIMB_JOINTS, TrackedPeople
+from simharness.reality.reenactment import Film
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Frames in which the joints of some people are known, and the detections in them.
+    """Frames in which it is known who is where, and the detections in them.
 
     Attributes:
         name: name of the recording.
         rig: the V cameras.
-        time: times of the frames, (T,) seconds, evenly spaced.
-        reference: true joints, COCO-17, (T, P, 17, 3) metres; NaN where unknown. All limb joints (``LIMB_JOINTS``) of a
-            person are known, or none.
+        time: times of the frames, (T,) seconds, increasing.
+        reference: joints of the people, COCO-17, (T, P, 17, 3) metres; NaN where unknown. All limb joints of a person
+            (``LIMB_JOINTS``) are known, or none. They say who is where and what hides what; residuals are measured
+            against the consensus of the views.
         detections: detections of each of the T frames.
+        kind: kind of the detector.
+        staged: the same joints of the bodies that re-enact the people, (T, P, 17, 3) metres; NaN where nobody does.
+            They say where heads point and what is outside of the pictures. None: the reference.
+        occlusion: occlusion class of each joint as rendered of these bodies, (T, V, P, 17). None: estimated with
+            capsules about the skeletons.
+        measured: people whose detections are measured in each frame, (T, P); the others only hide them. None: all.
 
     Raises:
         ValueError: shapes that do not fit, or a person with some known and some unknown limb joints.
@@ -43,6 +44,10 @@ class Sample:
     time: Floats
     reference: Floats
     detections: tuple[Detections, ...]
+    kind: DetectorKind = "bottom-up"
+    staged: Floats | None = None
+    occlusion: NDArray[np.int8] | None = None
+    measured: Bools | None = None
 
     def __post_init__(self) -> None:
         time = as_array(self.time, ("T",), "time")
@@ -65,39 +70,35 @@ class Sample:
 
     @property
     def known(self) -> Bools:
-        """Which people have known joints in which frames, (T, P)."""
-        return np.isfinite(self.reference[:, :, LIMB_JOINTS[0], 0])
+        """Which people have known joints and are measured in which frames, (T, P)."""
+        known = np.isfinite(self.reference[:, :, LIMB_JOINTS[0], 0])
+        return known if self.measured is None else known & self.measured
 
     @property
     def step(self) -> float:
-        """Seconds between consecutive frames."""
-        return float(self.time[-1] - self.time[0]) / max(1, len(self.time) - 1)
+        """Seconds between consecutive frames; gaps are not counted."""
+        return float(np.min(np.diff(self.time), initial=np.inf)) if len(self.time) > 1 else 1.0
 
 
-def of_shelf(shelf: AnnotatedRecording) -> Sample:
-    """Return the sample of Shelf and its published detections; its truth has limb joints, no face."""
-    reference = np.full((*shelf.truth.shape[:2], len(COCO17), 3), np.nan)
-    reference[:, :, LIMB_JOINTS] = shelf.truth[:, :, _OF_SHELF]
-    return Sample("Shelf", shelf.rig, shelf.frames / SHELF_RATE, reference, shelf.detections)
+def sample_of(recording: AnnotatedRecording, tracks: TrackedPeople, film: Film | None = None) -> Sample:
+    """Return the sample of a recording: the joints of everyone in it, and its detections.
 
-
-def of_simulation(
-    joints: Floats, time: Floats, detections: Many[Detections], rig: Rig, *, known: Bools | None = None
-) -> Sample:
-    """Return the sample of a simulated sequence with as little truth as Shelf has.
-
-    The face, the visibility and the people of the detections stay unknown.
+    The detections of people who are annotated are measured; where nobody is, those of everyone.
 
     Args:
-        joints: COCO-17, (T, P, 17, 3) metres (``Sequence.joints``).
-        time: times of the frames, (T,) seconds.
-        detections: detections of each frame.
-        rig: the cameras.
-        known: which people are annotated in which frames, (T, P); the joints of the others are unknown. None: all are
-            annotated.
+        recording: the recording.
+        tracks: who is where.
+        film: its re-enactment, which shows what hides what; None: estimated from skeletons.
     """
-    reference = np.full(joints.shape, np.nan)
-    reference[:, :, LIMB_JOINTS] = joints[:, :, LIMB_JOINTS]
-    if known is not None:
-        reference[~np.asarray(known, bool)] = np.nan
-    return Sample("simulated", rig, time, reference, tuple(detections))
+    annotated = tracks.annotated(recording.truth)
+    return Sample(
+        recording.name,
+        recording.rig,
+        recording.time,
+        tracks.joints,
+        recording.detections,
+        recording.kind,
+        staged=None if film is None else film.joints,
+        occlusion=None if film is None else Conditions.of(film.views).occlusion,
+        measured=annotated if annotated.any() else None,
+    )

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from simharness.reality.detector_fit.fit import agreement
+from simharness.reality.annotation import AnnotationFit
 from simharness.reality.detector_fit.frame_sums import TERCILES
-from simharness.reality.detector_fit.measure import MeasuredValue, Measurement
-from simharness.scenario.sections.detector import KINDS
+from simharness.reality.detector_fit.measure import MeasuredValue, Measurement, agreement
+from simharness.scenario.sections.detector import BEARINGS, KINDS
 
+_WIDE = 130  # columns of a terminal that has room for all intervals
 _OCCLUSIONS = ("visible", "self_occluded", "occluded")
 _OTHERS = {
     "Correlation of errors": (
         ("correlation.life", "mean life of an error, s"),
         ("correlation.views", "shared by all views"),
+        ("correlation.gross_views", "gross errors, shared by all views"),
         ("correlation.limb", "shared within the limb"),
         ("correlation.scatter_life", "correlation time of scatter, s"),
+        ("correlation.scatter_noise", "share of scatter drawn anew in each frame"),
+        ("correlation.scatter_near", "correlation of the scatter of neighbouring joints"),
         ("correlation.scatter_views", "share of scatter that views have in common"),
+        ("keypoints.scatter_hidden", "factor of scatter, not visible"),
+        ("keypoints.border", "reach beyond the border of the image, units"),
         ("keypoints.self_occluded", "factor of misses and jitter, self-occluded"),
         ("keypoints.occluded", "factor of misses and jitter, occluded"),
-        ("keypoints.stray", "share of misses anywhere on the box"),
+        ("keypoints.stray.elbows", "share of misses of limbs anywhere on the box"),
     ),
     "Scores": (
         ("scores.good", "good"),
@@ -31,13 +38,16 @@ _OTHERS = {
         ("scores.miss", "miss"),
         ("scores.inversion", "inversion"),
         ("scores.swap", "swap"),
-        ("scores.hidden", "factor, not visible"),
+        ("scores.hidden.good", "factor of good ones, not visible"),
+        ("scores.hidden.miss", "factor of misses, not visible"),
         ("scores.deviation", "deviation, logit"),
         ("scores.overconfident", "overconfident misses, share"),
         ("scores.underconfident", "underconfident good keypoints, share"),
     ),
     "People": (
         ("boxes.missed", "missed, share in a view"),
+        ("boxes.missed_hidden.2", "missed with half of the joints hidden, share"),
+        ("boxes.missed_hidden.4", "missed with all joints hidden, share"),
         ("boxes.missed_views", "missed, shared by all views"),
         ("boxes.life", "mean life of a miss, s"),
         ("boxes.duplicates", "duplicates, share"),
@@ -58,20 +68,38 @@ def print_measurement(measurement: Measurement, console: Console) -> None:
     )
     notes = Text(
         "Each share is of the joints that the classes to its left leave. Good: within 1.14 of OKS sigma x sqrt(area); "
-        "jitter: up to 2.35; miss: beyond; inversions and swaps only where distinguishable from both. The face has "
-        "no truth: only its drops and scores are measured. Visibility is estimated with capsules about the "
-        "skeletons.",
+        "jitter: up to 2.35; miss: beyond; inversions and swaps only where distinguishable from both. Errors are "
+        "measured against the consensus of the other views; what all views share cannot be seen. Visibility is that of "
+        "bodies that re-enact the people.",
         style="dim",
     )
     blocks: list[RenderableType] = [
         headline,
-        _classes(measurement),
+        _classes(measurement, intervals=console.width >= _WIDE),
         _drops(measurement),
-        _bias(measurement),
+        _face(measurement),
         _sizes(measurement),
     ]
     blocks += [_list(title, rows, measurement) for title, rows in _OTHERS.items()]
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in [*blocks, notes])))
+
+
+def print_annotation(fitted: AnnotationFit, console: Console) -> None:
+    """Print the errors of the truth: shift and random part of each actor, and what all actors share."""
+    annotation = fitted.annotation
+    table = _table("Truth against the consensus, mm", "actor", "shift", "random, per axis")
+    for actor, (shift, deviation) in enumerate(zip(annotation.shift, annotation.deviation, strict=True)):
+        table.add_row(
+            str(actor), f"{1000 * np.linalg.norm(shift, axis=-1).mean():.0f}", f"{1000 * deviation.mean():.0f}"
+        )
+    console.print(table)
+    hips = 1000 * fitted.bias[KINDS.index("hips")]
+    console.print(
+        f"The random part has a memory of {annotation.life:.2g} s. Shared by all actors, and so the detector's: hips "
+        f"{hips[2]:.0f} mm up.\n",
+        style="dim",
+        highlight=False,
+    )
 
 
 def print_agreement(real: Measurement, simulated: Measurement, console: Console) -> None:
@@ -88,13 +116,15 @@ def print_agreement(real: Measurement, simulated: Measurement, console: Console)
     console.print(table if different else table.title)
 
 
-def _classes(measurement: Measurement) -> Table:
+def _classes(measurement: Measurement, *, intervals: bool) -> Table:
+    """Return the table of error classes; in narrow terminals without intervals, which are in the JSON."""
     classes = ("drop", "swap", "inversion", "miss", "jitter")
     table = _table("Classes of errors, %, and scatter of good keypoints, units", "joint", "n", *classes, "scatter")
     for kind in KINDS:
-        cells = [_cell(measurement[f"share.{key}.{kind}"], 1, scale=100) for key in classes]
+        cells = [_cell(measurement[f"share.{key}.{kind}"], 1, scale=100, interval=intervals) for key in classes]
         n = measurement[f"share.drop.{kind}"].count
-        table.add_row(kind, str(n), *cells, _cell(measurement[f"keypoints.scatter.{kind}"], 2))
+        scatter = _cell(measurement[f"keypoints.scatter.{kind}"], 2, interval=intervals)
+        table.add_row(kind, str(n), *cells, scatter)
     return table
 
 
@@ -107,12 +137,13 @@ def _drops(measurement: Measurement) -> Table:
     return table
 
 
-def _bias(measurement: Measurement) -> Table:
-    directions = ("forward", "outward", "up")
-    table = _table("Bias in the body's frame, mm, and factor of the score", "joint", *directions, "score")
-    for kind in KINDS:
-        cells = [_cell(measurement[f"bias.{direction}.{kind}"], 0, scale=1000) for direction in directions]
-        table.add_row(kind, *cells, _cell(measurement[f"scores.joint.{kind}"], 2))
+def _face(measurement: Measurement) -> Table:
+    degrees = list(map(str, BEARINGS))
+    title = "Joints of the face not reported, %, by bearing of the camera to their side, degrees"
+    table = _table(title, "joint", *degrees)
+    for kind in KINDS[:3]:
+        values = [measurement[f"keypoints.face.{kind}.{index}"] for index in range(len(BEARINGS))]
+        table.add_row(kind, *(f"{100 * each.value:.0f}" if each.known else "–" for each in values))
     return table
 
 
@@ -126,7 +157,8 @@ def _sizes(measurement: Measurement) -> Table:
 def _list(title: str, rows: tuple[tuple[str, str], ...], measurement: Measurement) -> Table:
     table = _table(title, "", "measured")
     for key, label in rows:
-        table.add_row(label, _cell(measurement[key], 2))
+        if key in measurement.values:  # parameters differ with the kind of the detector
+            table.add_row(label, _cell(measurement[key], 2))
     return table
 
 
@@ -140,12 +172,14 @@ def _table(title: str, first: str, *columns: str) -> Table:
     return table
 
 
-def _cell(measured: MeasuredValue, digits: int, *, scale: float = 1.0) -> Text:
-    """Return a cell with the value and its interval."""
+def _cell(measured: MeasuredValue, digits: int, *, scale: float = 1.0, interval: bool = True) -> Text:
+    """Return a cell with the value, and its interval."""
     if not measured.known:
         return Text("–", style="dim")
     # Adding zero turns minus zero into zero.
     value, low, high = (
         f"{round(scale * each, digits) + 0:.{digits}f}" for each in (measured.value, measured.low, measured.high)
     )
+    if not interval:
+        return Text(value)
     return Text.assemble(value, (f"  {low}–{high}" if measured.low >= 0 else f"  {low} to {high}", "dim"))

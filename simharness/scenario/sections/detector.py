@@ -22,7 +22,17 @@ KINDS = ("nose", "eyes", "ears", "shoulders", "elbows", "wrists", "hips", "knees
 KIND_OF_JOINT = (0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8)
 """Kind of each COCO-17 joint, an index into :data:`KINDS`."""
 
+BEARINGS = tuple(range(0, 360, 30))
+"""Bearings at which the shares of :class:`Face` are given, degrees."""
+
+ByBearing = Annotated[tuple[Share, ...], Field(min_length=len(BEARINGS), max_length=len(BEARINGS))]
+ByHiddenShare = Annotated[tuple[Share, ...], Field(min_length=5, max_length=5)]
 Offset = Annotated[tuple[float, float, float], Elements(("forward", "outward", "up"))]
+
+
+def _expanded(given: Any, names: tuple[str, ...]) -> Any:
+    """Return a number of the file as the value of each name, and anything else as it is."""
+    return dict.fromkeys(names, given) if isinstance(given, int | float) and not isinstance(given, bool) else given
 
 
 class _ByJoint(Section):
@@ -31,7 +41,7 @@ class _ByJoint(Section):
     @model_validator(mode="before")
     @classmethod
     def _expand_number(cls, given: Any) -> Any:
-        return dict.fromkeys(KINDS, given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+        return _expanded(given, KINDS)
 
     def by_joint(self) -> tuple[Any, ...]:
         """Return the value of each joint of COCO-17, (17,)."""
@@ -88,18 +98,45 @@ class Bias(Section):
 
 
 class Drop(Section):
-    """Shares of the joints in the picture that are not reported at all, by the cause of their occlusion."""
+    """Shares of the joints in the picture that are not reported at all, by the cause of their occlusion.
+
+    A bottom-up detector (``detector.kind``) reports no joint whose parent in the tree of parts it does not report
+    (wrist, elbow, shoulder; ankle, knee, hip): there the shares refer to the joints whose parent is reported.
+    """
 
     visible: Shares = Shares()
     self_occluded: Shares = Shares()
     occluded: Shares = Shares()
 
 
+class Face(Section):
+    """Shares of the face's joints that are not reported, by the bearing of the camera from the head.
+
+    Each list holds the shares at 0, 30, ..., 330 degrees from straight ahead towards the joint's side (nose: towards
+    the left), with linear interpolation. It replaces ``drop.visible`` and ``drop.self_occluded``.
+    """
+
+    nose: ByBearing | None = None
+    eyes: ByBearing | None = None
+    ears: ByBearing | None = None
+
+
+class Guess(Section):
+    """Shares of the reported joints that the detector guesses from the localised joints of the same person."""
+
+    visible: Shares = Shares()
+    self_occluded: Shares = Shares()
+    occluded: Shares = Shares()  # behind another person or an object
+    outside: Shares = Shares()  # of the joints outside the image: these are reported at its border
+    scatter: Amounts = Amounts()  # standard deviation of guesses about the most likely place, in units
+
+
 class Keypoints(Section):
     """Errors of keypoint positions.
 
-    Classes of errors are drawn in the order drop, swap, inversion, miss, jitter, and each share refers to the joints
-    that no earlier class has taken: raising the share of one class changes no joint that it does not take.
+    Classes of errors are drawn in the order drop, guess, swap, inversion, miss, jitter, and each share refers to the
+    joints that no earlier class has taken: raising the share of one class changes no joint that it does not take,
+    except that guesses follow from the joints that are localised.
     """
 
     quality: Amount = Field(1.0, description="factor on the shares of jitter, miss, inversion and swap")
@@ -112,8 +149,13 @@ class Keypoints(Section):
     swap: Shares = Shares()  # at the same joint of another person whose box overlaps
     swap_crowded: Shares | None = None  # the same in a crowd (PoseFix); absent: as swap
     drop: Drop = Drop()
+    face: Face = Face()
+    guess: Guess = Guess()
+    border: Amount = Field(
+        0.0, description="joints up to this many units outside of the image are reported, at its border"
+    )
     reach: float = Field(4.29, ge=2.35, le=20.0, description="largest distance of misses, units")
-    stray: Share = Field(0.0, description="share of misses that lie anywhere in the person's box")
+    stray: Shares = Shares()  # share of misses that lie anywhere in the person's box
     self_occluded: Amount = Field(1.0, description="factor on jitter and miss of self-occluded joints")
     occluded: Amount = Field(
         1.0, description="factor on jitter and miss of joints hidden by another person or an object"
@@ -122,21 +164,45 @@ class Keypoints(Section):
     small: Amount = Field(
         0.0, description="growth of jitter and miss for small people: (64 px / sqrt(area)) to this power"
     )
-    hallucinate: Share = Field(
-        0.0, description="share of the reported joints behind a person or an object that are guessed from the pose"
-    )
+    scatter_hidden: Amount = Field(1.0, description="factor on scatter of joints that are not visible")
 
 
 class Correlation(Section):
     """Correlation of errors over time, views and joints."""
 
     life: Amount = Field(0.0, description="mean life of an error, seconds; 0: drawn anew in every frame")
-    views: Share = Field(0.0, description="correlation over the views of whether a joint errs: a hard pose")
+    views: Share = Field(0.0, description="correlation over the views of whether a joint is dropped or a jitter")
+    gross_views: Share = Field(
+        0.0, description="correlation over the views of whether a joint is a miss, swap, inversion or guess"
+    )
     limb: Share = Field(0.0, description="correlation of whether a joint errs within the face, the arms and the legs")
     scatter_life: Amount = Field(0.0, description="correlation time of scatter, seconds")
     scatter_views: Share = Field(
         0.0, description="share of the variance of scatter that is one displacement in space, the same for all views"
     )
+    scatter_near: Share = Field(
+        0.0,
+        description="correlation of the scatter of two joints of a person that a bone joins; of joints n bones apart, "
+        "its n-th power",
+    )
+    scatter_noise: Share = Field(
+        0.0, description="share of the variance of scatter that is drawn anew in every frame; the rest has scatter_life"
+    )
+
+
+class HiddenScores(Section):
+    """Factor for each class of keypoints; a single number in the file applies to all classes."""
+
+    good: Share = 1.0
+    jitter: Share = 1.0
+    miss: Share = 1.0
+    inversion: Share = 1.0
+    swap: Share = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expand_number(cls, given: Any) -> Any:
+        return _expanded(given, tuple(cls.model_fields))
 
 
 class Scores(Section):
@@ -147,7 +213,9 @@ class Scores(Section):
     miss: Share = Field(1.0, description="median score of a miss")
     inversion: Share = Field(1.0, description="median score of an inversion")
     swap: Share = Field(1.0, description="median score of a swap")
-    hidden: Share = Field(1.0, description="factor on the median score of joints that are not visible")
+    hidden: HiddenScores = HiddenScores()  # factor on the median scores of joints that are not visible
+    guess: Shares = Shares.model_validate(1.0)  # median score of guessed joints; hidden and joint do not apply
+    outside: Share = Field(1.0, description="factor on the median score of joints that are guessed outside the image")
     deviation: Amount = Field(0.0, description="standard deviation of scores, on the logit scale")
     overconfident: Share = Field(
         0.0, description="share of misses and guessed joints with the score of a good keypoint"
@@ -160,6 +228,11 @@ class Boxes(Section):
     """Detected people and their boxes."""
 
     missed: Share = Field(0.0, description="share of people missed in a view")
+    missed_hidden: ByHiddenShare = Field(
+        (0.0,) * 5,
+        description="share of people missed because others, objects or the border hide 0, 25, 50, 75, 100 % of their "
+        "joints, with linear interpolation; besides `missed`",
+    )
     missed_views: Share = Field(0.0, description="correlation over the views of whether a person is missed")
     life: Amount = Field(0.0, description="mean life of errors of boxes, seconds; 0: drawn anew in every frame")
     least_visible: int = Field(
@@ -229,6 +302,11 @@ class Detector(Section):
     """Errors of the simulated 2D detector."""
 
     name: str = Field("perfect", description="name of the detector")
+    kind: Literal["bottom-up", "top-down"] = Field(
+        "top-down",
+        description="bottom-up: parts are joined to people along a tree, and a joint is reported only with its parent; "
+        "top-down: joints are reported independently",
+    )
     onnx: str = Field(
         "",
         description="ONNX file of a top-down pose head, relative to the scenario file, which computes the keypoints in "

@@ -36,9 +36,18 @@ ActivityName = Literal[
 class Mocap(Section):
     """Recorded motion of the people whose activity is "mocap"; of all people where no activities are given."""
 
-    file: str = Field("", description="AMC or BVH file, relative to the scenario file; empty: none")
+    file: str = Field(
+        "",
+        description="AMC or BVH file, which people perform in random places, or NPZ file of joint tracks, which they "
+        "re-enact at the recorded places, person i track i; relative to the scenario file; empty: none",
+    )
     skeleton: str = Field("", description="ASF file of an AMC file; empty: the only one in the same folder")
     start: Amount = Field(0.0, description="start time in the recording, seconds")
+
+    @property
+    def tracks(self) -> bool:
+        """Whether the file holds joint tracks, which people re-enact."""
+        return self.file.lower().endswith(".npz")
 
 
 class People(Section):
@@ -83,5 +92,10 @@ class People(Section):
         if ("mocap" in self.activities) != bool(self.motion.file):
             raise ValueError(
                 'the activity "mocap" and people.motion = { file = "..." } to go together: give both or neither'
+            )
+        if self.motion.tracks and set(self.activities) != {"mocap"}:
+            raise ValueError(
+                'people.activities = ["mocap"] with the joint tracks of people.motion.file, because every person '
+                "re-enacts a track: leave activities out"
             )
         return self

@@ -11,6 +11,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from simharness.scenario.sections.annotation import Annotation
 from simharness.scenario.sections.appearance import Appearance
 from simharness.scenario.sections.cameras import Cameras, Faults, Sensor
 from simharness.scenario.sections.detector import Detector
@@ -21,6 +22,7 @@ from simharness.scenario.sections.section import Positive, Section
 
 __all__ = [
     "FILE_KEYS",
+    "Annotation",
     "Appearance",
     "Cameras",
     "Clutter",
@@ -75,6 +77,7 @@ class Scenario(Section):
     sensor: Sensor = Sensor()
     detector: Detector = Detector()
     appearance: Appearance = Appearance()
+    annotation: Annotation = Annotation()
     method: Method = Method()
     rendering: Rendering = Rendering()
 

@@ -56,6 +56,8 @@ def choreograph(
 ) -> Choreography:
     """Plan the motions and props of all people.
 
+    People who re-enact joint tracks are at their recorded places: they have no tracks to plan, and may touch.
+
     A group draws from the streams of its first person, so one more person changes none of the others, except where the
     whole plan starts over or where a person without a partner gets one.
 
@@ -70,6 +72,8 @@ def choreograph(
         ValueError: people do not fit; the message names the keys of the scenario to change.
     """
     people = scenario.people
+    if people.motion.tracks:
+        return Choreography(_reenacted(scenario, cast, time), props=())
     known = dict(activities())
     if "mocap" in people.activities:
         known["mocap"] = _recorded(scenario)
@@ -135,6 +139,33 @@ def _recorded(scenario: Scenario) -> Activity:
         return clip.perform(mover, time, place=spot.place, bearing=spot.bearing, rng=rng)
 
     return Activity("mocap", 1, Spot, 0.0, solo(perform))
+
+
+def _reenacted(scenario: Scenario, cast: Sequence[Kinematics], time: Floats) -> tuple[Motion, ...]:
+    """Return the motions of people who re-enact joint tracks.
+
+    Raises:
+        ValueError: the file is not valid or does not fit the scenario, or a track leaves the room.
+    """
+    from simharness.world.motion.mocap import load_tracks, reenact
+
+    tracks = load_tracks(scenario.people)
+    motions = tuple(
+        replace(reenact(tracks, person, mover, time=time + scenario.people.motion.start), time=time)
+        for person, mover in enumerate(cast)
+    )
+    size = scenario.room.size[:2]
+    if scenario.room.walls and motions:
+        reach = np.abs([motion.root[:, :2] for motion in motions]).max(axis=1)
+        person = int((reach - np.array(size) / 2).max(axis=1).argmax())
+        if (reach[person] > np.array(size) / 2).any():
+            needed = np.ceil(20 * reach.max(axis=0) + 10) / 10
+            raise ValueError(
+                f"people.motion.file = {scenario.people.motion.file!r}: person {person} leaves the room, at up to "
+                f"|x| = {reach[person, 0]:.2f} m and |y| = {reach[person, 1]:.2f} m: set the first two numbers of "
+                f"room.size to {needed[0]:g} and {needed[1]:g} or more"
+            )
+    return motions
 
 
 class _Stage:

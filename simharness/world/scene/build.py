@@ -19,8 +19,10 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.clothing import dress, paint
 from simharness.world.humans.population import draw_shape, is_child
+from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.motion.choreography import choreograph
+from simharness.world.motion.mocap import load_tracks, recorded_shape
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.trajectory import motion_clock
@@ -89,10 +91,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     _check_area(scenario)
     clock = motion_clock(scenario.duration, margin=CLOCK_MARGIN)
     looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
-    bodies = tuple(
-        dress(make_body(draw_shape(stream(seed, "people", i, "shape"), child=is_child(seed, i, people.children))), look)
-        for i, look in enumerate(looks)
-    )
+    bodies = tuple(dress(make_body(shape), look) for shape, look in zip(_shapes(scenario), looks, strict=True))
     cast = [Kinematics(body) for body in bodies]
     plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario))
     props = tuple(make_prop(prop, name=f"prop{k} {prop.kind}") for k, prop in enumerate(plan.props))
@@ -119,6 +118,19 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     figures = tuple(_figure(body, look) for body, look in zip(bodies, looks, strict=True))
     time = np.arange(scenario.frames) / scenario.rate
     return Scene(model, bodies, figures, motions, solids, room_lighting(scenario.room, seed), time)
+
+
+def _shapes(scenario: Scenario) -> list[Shape]:
+    """Return the shapes of all people; people who re-enact joint tracks have the recorded size."""
+    seed, people = scenario.seed, scenario.people
+    shapes = [
+        draw_shape(stream(seed, "people", i, "shape"), child=is_child(seed, i, people.children))
+        for i in range(people.count)
+    ]
+    if not people.motion.tracks:
+        return shapes
+    tracks = load_tracks(people)
+    return [recorded_shape(shape, tracks, i) for i, shape in enumerate(shapes)]
 
 
 def _figure(body: Body, look: Look) -> Mesh:
@@ -152,7 +164,7 @@ def _largest_area(scenario: Scenario) -> float:
 
 def _check_area(scenario: Scenario) -> None:
     largest = _largest_area(scenario)
-    if scenario.people.count and scenario.people.area > largest:
+    if scenario.people.count and scenario.people.area > largest and not scenario.people.motion.tracks:
         raise ValueError(
             f"people.area = {scenario.people.area:g} m does not fit between the walls of room.size = "
             f"{list(scenario.room.size)}: use people.area of at most {largest:.2f} or a larger room.size"

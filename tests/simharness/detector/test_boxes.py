@@ -108,6 +108,24 @@ class TestNoErrors:
 
 
 class TestMissed:
+    @pytest.mark.parametrize("hidden", [0, 6, 17])
+    def test_hidden_people_are_missed_more_often(self, hidden):
+        people, views, rig = crowd(2000)
+        seen = views.visibility.copy()
+        seen[..., :hidden] = Visibility.OCCLUDED_BY_PERSON
+        shares = [0.05, 0.1, 0.2, 0.4, 0.8]
+        share = 1 - 0.9 * (1 - np.interp(hidden / 17, [0, 0.25, 0.5, 0.75, 1], shares))
+        world = people, replace(views, visibility=seen), rig
+        present = find(world, missed=0.1, missed_hidden=shares).present
+        assert within((~present).sum(), present.size, share)
+        fewer = find(world, missed=0.1).present
+        assert (fewer >= present).all()  # people who are missed stay missed
+
+    def test_self_occluded_joints_do_not_hide_a_person(self):
+        people, views, rig = crowd(20)
+        world = people, replace(views, visibility=np.full_like(views.visibility, Visibility.SELF_OCCLUDED)), rig
+        assert find(world, missed_hidden=[0.0, 1.0, 1.0, 1.0, 1.0]).present.all()
+
     def test_people_are_missed_at_the_configured_rate(self):
         present = find(crowd(2000), missed=0.15).present
         assert within((~present).sum(), present.size, 0.15)

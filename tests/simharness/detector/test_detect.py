@@ -160,6 +160,52 @@ def test_a_parameter_changes_no_other_draw(section, parameter, value):
     np.testing.assert_array_equal(after[both], before[both])
 
 
+NOTHING = [
+    {"kind": "bottom-up"},
+    {"keypoints": {"face": {"nose": [0.0] * 12, "eyes": [0.0] * 12, "ears": [0.0] * 12}}},
+    {"keypoints": {"guess": {"scatter": 2.0}}},
+    {"keypoints": {"guess": {"outside": 1.0}}},
+    {"keypoints": {"scatter_hidden": 3.0}},
+    {"correlation": {"gross_views": 1.0, "scatter_near": 0.5, "scatter_noise": 0.5, "scatter_life": 1.0}},
+    {"scores": {"hidden": 0.1, "guess": 0.1, "outside": 0.1}},
+]
+
+
+@pytest.mark.parametrize("settings", NOTHING, ids=str)
+def test_settings_of_errors_that_do_not_occur_leave_the_detector_perfect(settings):
+    where = world()
+    for got, expected in zip(run(where, **settings), run(where), strict=True):
+        for key in ("keypoints", "scores", "boxes", "box_scores", "view"):
+            assert getattr(got.detections, key).tobytes() == getattr(expected.detections, key).tobytes()
+        np.testing.assert_array_equal(got.truth.error, expected.truth.error)
+
+
+@pytest.mark.parametrize(
+    ("dial", "kinds"),
+    [
+        ({"correlation": {"gross_views": 0.7}}, {KeypointError.MISS}),
+        ({"keypoints": {"guess": {"visible": 0.2}}}, set(KeypointError)),
+        ({"keypoints": {"face": {"ears": [0.5] * 12}}}, {KeypointError.ABSENT}),
+    ],
+    ids=["gross_views", "guess", "face"],
+)
+def test_a_new_error_takes_joints_and_leaves_all_others_to_the_bit(dial, kinds):
+    where = world(frames=40)
+    errors = {"keypoints": {"scatter": 0.4, "jitter": 0.2, "miss": 0.2, "drop": {"visible": 0.1}}}
+    changed = {**errors, **{section: {**errors.get(section, {}), **keys} for section, keys in dial.items()}}
+    before, after = run(where, **errors), run(where, **changed)
+    untouched = 0
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one.truth.person, other.truth.person)
+        same = one.truth.error == other.truth.error
+        same &= np.isclose(one.detections.keypoints, other.detections.keypoints, equal_nan=True).all(axis=-1)
+        classes = zip(one.truth.error[~same].tolist(), other.truth.error[~same].tolist(), strict=True)
+        assert all(a in kinds or b in kinds for a, b in classes)
+        untouched += same.sum()
+        np.testing.assert_array_equal(one.detections.keypoints[same], other.detections.keypoints[same])
+    assert 0.5 < untouched / (40 * 6 * 17) < 0.99
+
+
 def test_equal_seeds_give_equal_results():
     where = world(frames=5)
     first, again, other = (run(where, seed=seed, **SECTIONS) for seed in (0, 0, 1))

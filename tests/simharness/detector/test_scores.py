@@ -71,9 +71,46 @@ def test_some_misses_are_overconfident_and_some_good_keypoints_unsure(parameter,
 
 def test_guesses_may_be_overconfident():
     where = world(frames=200, visibility=Visibility.OCCLUDED_BY_CLUTTER)
-    found, scores = scored(where, parameters={"hallucinate": 0.5}, **USUAL, overconfident=1.0)
+    found, scores = scored(where, parameters={"guess": {"occluded": 0.5}}, **USUAL, hidden=0.5, overconfident=1.0)
     assert found.guessed.any()
     assert (scores[found.guessed] == 0.9).all()
+
+
+def test_guesses_have_separate_scores_by_kind_of_joint():
+    seen = np.broadcast_to(
+        np.where(np.arange(17) < 11, Visibility.VISIBLE, Visibility.OCCLUDED_BY_PERSON), (100, 3, 2, 17)
+    )
+    where, errors = world(frames=100, visibility=seen), {"guess": {"occluded": 0.5}, "miss": 0.2}
+    scale = {"hidden": 0.5, "joint": 0.9}
+    found, scores = scored(where, parameters=errors, **USUAL, **scale, guess={"hips": 0.5, "knees": 0.4, "ankles": 0.1})
+    for joints, score in (([11, 12], 0.5), ([13, 14], 0.4), ([15, 16], 0.1)):
+        guessed = found.guessed[..., joints]
+        assert within(guessed.sum(), guessed.size, 0.5)
+        np.testing.assert_allclose(scores[..., joints][guessed], score)
+    _, others = scored(where, parameters=errors, **USUAL, **scale)
+    np.testing.assert_array_equal(scores[~found.guessed], others[~found.guessed])
+
+
+def test_guesses_outside_the_image_have_a_factor():
+    seen = np.broadcast_to(np.where(np.arange(17) < 13, Visibility.VISIBLE, Visibility.OUTSIDE), (20, 3, 2, 17))
+    where = world(frames=20, visibility=seen)
+    _, scores = scored(where, parameters={"guess": {"outside": 1.0}}, good=0.8, guess=0.6, outside=0.5)
+    np.testing.assert_allclose(scores[..., 13:], 0.3)
+    np.testing.assert_allclose(scores[..., :13], 0.8)
+
+
+def test_hidden_joints_have_a_factor_for_each_class():
+    where = world(frames=200, together=True, visibility=Visibility.SELF_OCCLUDED)
+    errors = {key: 0.2 for key in ("jitter", "miss", "inversion", "swap")}
+    factors = {"good": 0.9, "jitter": 0.8, "miss": 0.3, "inversion": 0.7, "swap": 0.6}
+    found, scores = scored(where, parameters=errors, **USUAL, hidden=factors)
+    for kind, factor in factors.items():
+        chosen = scores[found.error == KeypointError[kind.upper()]]
+        assert len(chosen) > 100
+        np.testing.assert_allclose(chosen, USUAL[kind] * factor)
+    _, whole = scored(where, parameters=errors, **USUAL, hidden=0.5)
+    _, plain = scored(where, parameters=errors, **USUAL)
+    np.testing.assert_allclose(whole, 0.5 * plain)  # one number is the factor of all classes
 
 
 def test_hidden_joints_and_kinds_of_joints_have_factors():

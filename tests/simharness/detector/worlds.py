@@ -6,6 +6,10 @@ import numpy as np
 from scipy.stats import binom
 
 from mvpose import Camera, Rig
+from simharness.detector.conditions import Conditions
+from simharness.detector.draws import KeyedDraws
+from simharness.detector.keypoints import find_keypoints
+from simharness.scenario.sections.detector import Correlation, Keypoints
 from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility
@@ -43,3 +47,61 @@ def within(count, trials, probability):
     """Return whether a count of independent trials is in the central interval of probability 1 - 1e-6."""
     low, high = binom.interval(1 - 1e-6, trials, probability)
     return low <= count <= high
+
+
+def find(where, *, seed=3, correlation=None, kind="top-down", **parameters):
+    """Return the keypoints that a detector with some parameters of [detector.keypoints] finds."""
+    config = Keypoints.model_validate(parameters)
+    draws = KeyedDraws(seed, where.sequence.time, len(where.rig))
+    tie = Correlation.model_validate(correlation or {})
+    conditions = Conditions.of(where.views)
+    return find_keypoints(where.views, conditions, where.sequence, where.rig, config, tie, draws, kind=kind)
+
+
+STANDING = np.array(
+    [
+        [0.12, 0.0, 1.62], [0.09, 0.03, 1.66], [0.09, -0.03, 1.66], [0.0, 0.07, 1.63], [0.0, -0.07, 1.63],
+        [0.0, 0.18, 1.42], [0.0, -0.18, 1.42], [-0.02, 0.25, 1.13], [-0.02, -0.25, 1.13], [0.08, 0.27, 0.88],
+        [0.08, -0.27, 0.88], [0.0, 0.12, 0.93], [0.0, -0.12, 0.93], [0.02, 0.12, 0.5], [0.02, -0.12, 0.5],
+        [-0.02, 0.12, 0.08], [-0.02, -0.12, 0.08],
+    ]
+)  # fmt: skip
+"""COCO-17 joints of a person of 1.75 m who stands at the origin and faces +x, (17, 3) metres."""
+
+
+def standing(frames=60, *, cameras=(0.0, 0.5), facing=0.0, moved=None, visibility=Visibility.VISIBLE, distance=5.0):
+    """Return one standing person, filmed by level cameras around the origin.
+
+    Args:
+        frames: number of frames.
+        cameras: bearings of the cameras from the origin, radians from +x.
+        facing: rotation of the person about the vertical in each frame, radians.
+        moved: displacements of the joints, (T, 17, 3) metres.
+        visibility: of every joint.
+        distance: of the cameras, metres.
+    """
+    turn = np.broadcast_to(facing, frames)
+    zero, one = np.zeros(frames), np.ones(frames)
+    turned = np.array([[np.cos(turn), -np.sin(turn), zero], [np.sin(turn), np.cos(turn), zero], [zero, zero, one]])
+    joints = np.einsum("ijt,nj->tni", turned, STANDING) + (0.0 if moved is None else moved)
+    rig = Rig([_level_camera(angle, distance) for angle in cameras])
+    pixels = np.stack([camera.project(joints) for camera in rig], axis=1)[:, :, None]
+    low = np.stack([camera.project(STANDING) for camera in rig]).min(axis=1) - 20
+    high = np.stack([camera.project(STANDING) for camera in rig]).max(axis=1) + 20
+    boxes = np.broadcast_to(np.concatenate([low, high - low], axis=-1)[:, None], (*pixels.shape[:3], 4))
+    landmarks = np.zeros((frames, 1, len(LANDMARKS), 3))
+    landmarks[:, 0, :17] = joints
+    seen = np.broadcast_to(np.asarray(visibility, np.int8), pixels.shape[:4])
+    source = np.broadcast_to(np.arange(frames)[:, None], pixels.shape[:2])
+    views = Views(pixels, seen, boxes, np.zeros(pixels.shape[:3], int), source)
+    return World(Sequence(landmarks, np.arange(1), np.arange(frames) / RATE), views, rig)
+
+
+def _level_camera(angle, distance):
+    """Return a camera 1 m high at a bearing from the origin, which looks at the vertical through the origin."""
+    toward = np.array([np.cos(angle), np.sin(angle), 0.0])
+    right = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    rotation = np.stack([right, [0.0, 0.0, -1.0], -toward])
+    center = distance * toward + [0.0, 0.0, 1.0]
+    intrinsics = np.array([[1000.0, 0, 640], [0, 1000, 360], [0, 0, 1]])
+    return Camera(intrinsics, rotation, -rotation @ center, size=(1280, 720))

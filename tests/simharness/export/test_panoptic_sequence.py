@@ -190,9 +190,8 @@ class TestManifest:
         assert load(folder / "scenario.toml") == trial.scenario
 
     def test_all_files_are_listed(self, content, folder):
-        named = {content["files"][key] for key in ("calibration", "calibration_believed", "scenario")} | {
-            "manifest.json"
-        }
+        single = ("calibration", "calibration_believed", "scenario", "recording", "truth")
+        named = {content["files"][key] for key in single} | {"manifest.json"}
         numbers = range(content["frames"]["first"], 3, content["frames"]["every"])
         assert len(numbers) == content["frames"]["count"] == 3
         for frame in numbers:

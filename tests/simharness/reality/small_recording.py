@@ -35,4 +35,5 @@ def small_recording(head):
     truth = np.full((3, 4, 14, 3), np.nan)
     truth[:2, 0] = coco17_to_shelf14(PERSON, head=head)
     truth[0, 1] = coco17_to_shelf14(PERSON + np.array([2, 0, 0]), head=head)
-    return AnnotatedRecording(rig, truth, (Detections.empty(COCO17),) * 3, np.arange(3))
+    detections = (Detections.empty(COCO17),) * 3
+    return AnnotatedRecording(rig, truth, detections, np.arange(3), name="shelf", actors=(0, 1, 2))

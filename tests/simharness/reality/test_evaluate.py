@@ -7,7 +7,7 @@ from small_recording import PERSON, Fixed, small_recording
 from mvpose import Detections, Estimate, Matching, Pipeline
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.evaluation import evaluate
-from simharness.reality.shelf import read_shelf
+from simharness.reality.recording_file import read_recording
 
 
 @pytest.mark.parametrize("head", ["voxelpose", "2019"])
@@ -64,7 +64,7 @@ def test_detections_of_one_view_with_one_label_are_counted():
 def test_shelf_reaches_the_goal_with_geometry_alone(shared_data):
     """With the true correspondences PCP is 97.2; the paper reports 96.9 for its full method."""
     methods = {name: Pipeline.preset(name) for name in ("full", "fast")}
-    variants = evaluate(read_shelf(shared_data / "shelf"), methods).summary()["variants"]
+    variants = evaluate(read_recording("shelf", shared_data / "shelf"), methods).summary()["variants"]
     for name, scores in variants.items():
         assert scores["pcp"] >= 97.0, name
         assert scores["recall"] >= 0.99, name

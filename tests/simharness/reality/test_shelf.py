@@ -2,19 +2,19 @@ import shutil
 
 import numpy as np
 import pytest
-from scipy.io import savemat
 from scipy.optimize import linear_sum_assignment
 
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.pairing.pairing import pair
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.shelf import FRAMES, read_shelf, read_truth
+from simharness.reality.recording_file import read_recording
+from simharness.scenario.shipped import shipped_folder
 from simharness.scoring.pcp import percent, score_parts
 
 
 @pytest.fixture(scope="module")
 def shelf(shared_data):
-    return read_shelf(shared_data / "shelf")
+    return read_recording("shelf", shared_data / "shelf")
 
 
 @pytest.fixture
@@ -28,6 +28,8 @@ def copied(shared_data, tmp_path):
             shutil.copyfile(source / name, folder / name)
     for name in ("calibration_shelf.json", "actorsGT.mat"):
         shutil.copyfile(source / name, folder / name)
+    shipped = (shipped_folder() / "recordings" / "shelf.toml").read_text()
+    (folder / "recording.toml").write_text(shipped.replace("[[300, 599]]", "[[300, 301]]"))
     return folder
 
 
@@ -35,6 +37,7 @@ def test_the_published_frames(shelf):
     assert shelf.frames.tolist() == list(range(300, 600))
     assert len(shelf.rig) == 5
     assert all(camera.size == (1032, 776) for camera in shelf.rig)
+    assert (shelf.name, shelf.rate, shelf.scored, shelf.kind) == ("shelf", 25.0, (0, 1, 2), "bottom-up")
     # Actors are annotated completely or not at all; the numbers were counted in the file.
     defined = np.isfinite(shelf.truth).all(axis=(2, 3))
     assert (defined == np.isfinite(shelf.truth).any(axis=(2, 3))).all()
@@ -111,7 +114,7 @@ def _triangulate_true_people(shelf, truth, detections):
 
 
 def test_a_copy_of_two_frames_reads_the_same(copied, shelf):
-    part = read_shelf(copied, frames=range(300, 302))
+    part = read_recording(copied)
     np.testing.assert_array_equal(part.truth, shelf.truth[:2])
     np.testing.assert_array_equal(part.detections[1].keypoints, shelf.detections[1].keypoints)
 
@@ -119,8 +122,8 @@ def test_a_copy_of_two_frames_reads_the_same(copied, shelf):
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("actorsGT.mat", "Shelf's truth"),
-        ("calibration_shelf.json", "a VoxelPose calibration"),
+        ("actorsGT.mat", "the truth of Shelf or Campus"),
+        ("calibration_shelf.json", "calibration.file"),
         ("openpose/3/3_000000000001_keypoints.json", "OpenPose output"),
     ],
 )
@@ -131,53 +134,21 @@ def test_missing_and_truncated_files_are_named(copied, name, expected, kept):
     path.unlink()
     if kept is not None:
         path.write_bytes(content[: int(kept * len(content))])
-    with pytest.raises(ValueError, match="no such file" if kept is None else "cut off") as raised:
-        read_shelf(copied, frames=range(300, 302))
+    if kept is None and name.startswith("openpose"):
+        path, reason, expected = path.parent, "has 1 files", "frame 301 is requested"
+    else:
+        empty = "not a known calibration" if name.startswith("calibration") else "cut off"
+        reason = "no such file" if kept is None else "cut off" if kept else empty
+    with pytest.raises(ValueError, match=reason) as raised:
+        read_recording(copied)
+    assert f"{copied / 'recording.toml'}: " in str(raised.value)
     assert str(path) in str(raised.value)
     assert expected in str(raised.value)
 
 
 def test_a_missing_folder_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"nowhere: no such folder; expected Shelf's calibration_shelf\.json"):
-        read_shelf(tmp_path / "nowhere")
-
-
-def _cells(poses):
-    track = np.empty((len(poses), 1), object)
-    track[:, 0] = poses
-    return track
-
-
-def _mat(path, *tracks):
-    actors = np.empty((1, len(tracks)), object)
-    actors[0] = tracks
-    savemat(path, {"actor3D": actors})
-    return path
-
-
-def test_frames_without_annotation_are_nan(tmp_path):
-    pose = np.arange(42.0).reshape(14, 3)
-    track = _cells([pose, np.zeros((1, 0)), np.zeros((1, 1)), np.full((14, 3), np.nan)])
-    truth = read_truth(_mat(tmp_path / "gt.mat", track, track, track, track), frames=range(4))
-    for actor in range(4):
-        np.testing.assert_array_equal(truth[0, actor], pose)
-    assert np.isnan(truth[1:]).all()
-
-
-def test_another_layout_is_refused(tmp_path):
-    track = _cells([np.zeros((14, 3)), np.zeros((14, 3))])
-    with pytest.raises(ValueError, match=r"gt\.mat: actor3D must be cells of 4 actors"):
-        read_truth(_mat(tmp_path / "gt.mat", track, track), frames=range(2))
-    with pytest.raises(ValueError, match=r"gt\.mat: actor 1 has 2 frames; expected more than 599"):
-        read_truth(_mat(tmp_path / "gt.mat", track, track, track, track), frames=FRAMES)
-    odd = _cells([np.zeros((14, 3)), np.zeros((17, 3))])
-    with pytest.raises(
-        ValueError, match=r"gt\.mat: actor 2, frame 1: expected 14 x 3 joints or nothing, got \(17, 3\)"
-    ):
-        read_truth(_mat(tmp_path / "gt.mat", track, odd, track, track), frames=range(2))
-    savemat(tmp_path / "other.mat", {"x": np.zeros(3)})
-    with pytest.raises(ValueError, match=r"other\.mat: has no variable actor3D"):
-        read_truth(tmp_path / "other.mat", frames=range(2))
+    with pytest.raises(ValueError, match=r"nowhere: no such folder; expected the files .* calibration_shelf\.json"):
+        read_recording("shelf", tmp_path / "nowhere")
 
 
 def test_the_fields_must_fit(shelf):

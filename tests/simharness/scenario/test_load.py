@@ -55,7 +55,7 @@ class TestKeys:
     def test_a_key_like_no_other_gets_no_guess(self, scenario_file):
         message = refusal(scenario_file('name = "x"\nzzzzzz = 1'))
         assert "did you mean" not in message
-        assert "a scenario has appearance, cameras" in message
+        assert "a scenario has annotation, appearance, cameras" in message
 
     def test_every_mistake_of_a_file_is_named_at_once(self, scenario_file):
         message = refusal(scenario_file('name = "x"\nrat = 5\n[people]\ncount = -1\n[cameras]\nfov = 190'))

@@ -142,7 +142,7 @@ def load_clip(mocap: Mocap) -> Clip:
     """
     file = Path(mocap.file)
     if file.suffix.lower() not in (".amc", ".bvh"):
-        raise ValueError(f"people.motion.file = {mocap.file!r}: expected the name of an AMC or a BVH file")
+        raise ValueError(f"people.motion.file = {mocap.file!r}: expected the name of an AMC, a BVH or an NPZ file")
     if not file.is_file():
         raise ValueError(f"people.motion.file = {mocap.file!r}: no such file")
     if file.suffix.lower() == ".bvh":

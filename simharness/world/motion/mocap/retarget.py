@@ -49,14 +49,14 @@ class SourceMotion:
         segments: by (side, segment), vector from one joint to the next, (N, 3), in the unit of the file; segments are
             "thigh", "shank", "arm", "forearm" and "hand".
         hips: midpoint of the hips, (N, 3), in the unit of the file.
-        leg: length from hip over knee to ankle, mean of both legs, in the unit of the file.
+        legs: by side, length from hip over knee to ankle, in the unit of the file.
     """
 
     time: Floats
     turns: dict[str, Floats]
     segments: dict[tuple[str, str], Floats]
     hips: Floats
-    leg: float
+    legs: dict[str, float]
 
 
 def source_motion(recording: RecordedMotion, *, rate: float) -> SourceMotion:
@@ -89,22 +89,29 @@ def source_motion(recording: RecordedMotion, *, rate: float) -> SourceMotion:
             ends["hand"] = _tip(recording, roles, side, "hand")
         for segment, end in ends.items():
             segments[side, segment] = places[:, end] - places[:, limb[segment]]
-    lengths = [np.linalg.norm(segments[side, part], axis=1)[0] for side in SIDES for part in ("thigh", "shank")]
-    rotations["pelvis"] = _tilted(rotations["pelvis"], segments, recording.rate)
+    rotations["pelvis"] = tilt_pelvis(rotations["pelvis"], segments, rate=recording.rate)
     return SourceMotion(
         time=np.arange(len(recording)) / recording.rate,
         turns=rotations,
         segments=segments,
         hips=np.mean([places[:, roles.limbs[side]["thigh"]] for side in SIDES], axis=0),
-        leg=float(sum(lengths)) / 2,
+        legs={
+            side: float(sum(np.linalg.norm(segments[side, part], axis=1)[0] for part in ("thigh", "shank")))
+            for side in SIDES
+        },
     )
 
 
-def _tilted(pelvis: Floats, segments: dict[tuple[str, str], Floats], rate: float) -> Floats:
+def tilt_pelvis(pelvis: Floats, segments: dict[tuple[str, str], Floats], *, rate: float) -> Floats:
     """Return the pelvis (N, 3, 3), tilted where a hip would exceed its range of flexion otherwise.
 
     Recorded pelvises are rigid boxes between markers: tilt that they lack in a crouch or a long stride appears as
     excessive hip flexion or extension. The spine compensates for the added tilt.
+
+    Args:
+        pelvis: orientation of the pelvis, (N, 3, 3).
+        segments: see :class:`SourceMotion`.
+        rate: frames per second.
     """
     flexion = np.stack([_hip_and_knee(pelvis, segments, side)[:, 0] for side in SIDES])
     least, most = _HIP
@@ -162,13 +169,7 @@ def pelvis_path(recorded: SourceMotion, kinematics: Kinematics) -> Floats:
 
 
 def _scale(recorded: SourceMotion, kinematics: Kinematics) -> float:
-    return _leg_length(kinematics) / recorded.leg
-
-
-def _leg_length(kinematics: Kinematics) -> float:
-    chain = kinematics.legs["left"]
-    knee = chain.anchors[kinematics.leg_order.index("knee_flexion")]
-    return float(np.linalg.norm(knee - chain.anchors[0]) + np.linalg.norm(chain.end - knee))
+    return sum(kinematics.leg_parts) / (sum(recorded.legs.values()) / len(recorded.legs))
 
 
 def retarget(recorded: SourceMotion, kinematics: Kinematics) -> Motion:
@@ -248,9 +249,8 @@ def _heights(kinematics: Kinematics, position: Floats, pelvis: Floats, steps: li
 def _ankle(recorded: SourceMotion, kinematics: Kinematics, side: str, position: Floats) -> Floats:
     """Return the recorded ankle relative to the body's hip, (N, 3) metres; a straight leg stays straight."""
     thigh, shank = recorded.segments[side, "thigh"], recorded.segments[side, "shank"]
-    length = float((np.linalg.norm(thigh, axis=1) + np.linalg.norm(shank, axis=1))[0])
     hip = position + recorded.turns["pelvis"] @ kinematics.legs[side].anchors[0]
-    return hip + (thigh + shank) * (_leg_length(kinematics) / length)
+    return hip + (thigh + shank) * (sum(kinematics.leg_parts) / recorded.legs[side])
 
 
 def _trunk(recorded: SourceMotion, kinematics: Kinematics, angles: Floats) -> None:

@@ -73,7 +73,7 @@ def test_isotropic_misses_fall_on_a_place_as_often_as_opposite_to_it():
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_drawn_labels_and_distances_agree(twin, seed):
+def test_drawn_labels_and_distances_agree(filmed, seed):
     """At least 95 % of the reported joints have the drawn class when classified by distance."""
     config = Detector.model_validate(
         {
@@ -81,12 +81,12 @@ def test_drawn_labels_and_distances_agree(twin, seed):
             "bias": {"hips": [0.0, 0.01, 0.03]},
         }
     )
-    views, conditions = twin.views, Conditions.of(twin.views)
-    target = views.pixels + pixel_offsets(twin.sequence.joints, config.bias, twin.rig)
+    views, conditions = filmed.views, Conditions.of(filmed.views)
+    target = views.pixels + pixel_offsets(filmed.sequence.joints, config.bias, filmed.rig)
     agree: list[bool] = []
     kinds = set()
-    found = detect(twin.sequence, views, twin.rig, config, seed=seed)
-    for t in range(0, len(found), 10):
+    found = detect(filmed.sequence, views, filmed.rig, config, seed=seed)
+    for t in range(0, len(found), 8):
         truth, detections = found[t].truth, found[t].detections
         v, p = detections.view, truth.person
         neighbour = conditions.neighbour[t, v, p]

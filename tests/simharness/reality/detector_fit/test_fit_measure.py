@@ -1,169 +1,331 @@
+"""Detectors with known parameters are measured: every value is recovered, and none is invented."""
+
 import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from filmed_people import narrowed
 
 from mvpose import Detections
-from simharness.reality.detector_fit.fit import agreement, fit, twin_of, write_profile
-from simharness.reality.detector_fit.measure import MeasuredValue, measure
-from simharness.reality.detector_fit.profile import settings
-from simharness.reality.detector_fit.sample import of_shelf
-from simharness.reality.shelf import read_shelf
-from simharness.scenario.presets import read_profile
-from simharness.scenario.sections.detector import KINDS, Detector
-
-ALONE = {
-    "keypoints": {
-        "scatter": 0.4,
-        "jitter": 0.15,
-        "miss": 0.1,
-        "inversion": 0.08,
-        "swap": 0.1,
-        "stray": 0.3,
-        "drop": {"visible": 0.05, "self_occluded": 0.3, "occluded": 0.6},
-        "self_occluded": 1.5,
-        "occluded": 2.0,
-    },
-    "bias": {"hips": [0.01, 0.02, 0.03], "wrists": [0.0, -0.02, 0.01]},
-    "scores": {
-        "good": 0.85, "jitter": 0.7, "miss": 0.3, "inversion": 0.6, "swap": 0.5, "hidden": 0.8,
-        "deviation": 0.4, "overconfident": 0.3, "underconfident": 0.1,
-    },
-    "boxes": {"missed": 0.1, "duplicates": 0.1},
-    "phantoms": {"rate": 0.4, "score": 0.6, "deviation": 0.5},
-}  # fmt: skip
-
-TOGETHER = {
-    "keypoints": {
-        "scatter": 0.3,
-        "jitter": 0.2,
-        "miss": 0.15,
-        "drop": {"visible": 0.2, "self_occluded": 0.2, "occluded": 0.2},
-    },
-    "correlation": {"life": 0.2, "views": 0.3, "limb": 0.4, "scatter_life": 0.3, "scatter_views": 0.4},
-    "boxes": {"missed": 0.2, "missed_views": 0.4, "life": 0.3},
-    "scores": ALONE["scores"],
-    "phantoms": {"rate": 0.3, "life": 0.4},
-}
+from simharness.detector.part_tree import PARENT
+from simharness.detector.view_geometry import head_bearings
+from simharness.reality.detector_fit.frame_sums import frame_sums
+from simharness.reality.detector_fit.joint_labels import label_joints
+from simharness.reality.detector_fit.measure import MeasuredValue, agreement, measure, point_estimates
+from simharness.reality.detector_fit.profile import as_toml, settings
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 
 LIMB_KINDS = KINDS[3:]
+EARS = [0.3, 0.1, 0.05, 0.05, 0.05, 0.08, 0.1, 0.6, 0.95, 0.97, 0.97, 0.8]
+NOSE = [0.02, 0.02, 0.05, 0.05, 0.1, 0.3, 0.9, 0.3, 0.1, 0.05, 0.05, 0.02]
+
+DROPPING = {
+    "kind": "bottom-up",
+    "keypoints": {
+        "scatter": 0.3,
+        "scatter_hidden": 1.5,
+        "drop": {"visible": 0.03, "self_occluded": 0.1, "occluded": 0.3},
+        "face": {"nose": NOSE, "eyes": NOSE, "ears": EARS},
+    },
+    "correlation": {"scatter_life": 0.3, "scatter_noise": 0.4, "scatter_near": 0.5},
+    "boxes": {"missed": 0.05, "missed_hidden": [0.0, 0.1, 0.3, 0.5, 0.9], "duplicates": 0.1},
+    "phantoms": {"rate": 0.4, "score": 0.6, "deviation": 0.5},
+}
+"""Joints and people that are not reported."""
+
+ERRING = {
+    "kind": "bottom-up",
+    "keypoints": {
+        "scatter": 0.3, "jitter": 0.05, "miss": 0.04, "inversion": 0.03, "swap": 0.06,
+        "self_occluded": 1.5, "occluded": 2.0,
+    },
+    "scores": {
+        "good": 0.85, "jitter": 0.7, "miss": 0.3, "inversion": 0.6, "swap": 0.5, "hidden": 0.8,
+        "deviation": 0.3, "overconfident": 0.2, "underconfident": 0.05,
+    },
+}  # fmt: skip
+"""Joints that are wrong."""
+
+GUESSING = {
+    "kind": "top-down",
+    "keypoints": {"scatter": 0.3, "guess": {"self_occluded": 0.1, "occluded": 0.5, "outside": 0.6, "scatter": 1.0}},
+    "scores": {"good": 0.85, "deviation": 0.3, "guess": 0.3, "outside": 0.6},
+}
+"""Joints that a top-down detector guesses."""
+
+LASTING = {
+    "keypoints": {"scatter": 0.3, "miss": 0.05, "drop": {"visible": 0.1, "self_occluded": 0.1, "occluded": 0.1}},
+    "correlation": {"life": 0.2, "views": 0.3, "gross_views": 0.4, "limb": 0.4, "scatter_life": 0.3},
+    "boxes": {"missed": 0.2, "missed_views": 0.4, "life": 0.2},
+    "phantoms": {"rate": 0.3, "life": 0.4},
+}
+"""Errors that last, and that views and joints share."""
 
 
 @pytest.fixture(scope="module")
-def alone(twin):
-    return measure(twin.detected(Detector.model_validate(ALONE), seed=1), resamples=100)
+def dropping(filmed):
+    return measure(filmed.sample(**DROPPING), resamples=100)
 
 
 @pytest.fixture(scope="module")
-def together(twin):
-    return measure(twin.detected(Detector.model_validate(TOGETHER), seed=1), resamples=100)
+def erring(filmed):
+    return measure(filmed.sample(**ERRING), resamples=100)
+
+
+@pytest.fixture(scope="module")
+def lasting(filmed):
+    return measure(filmed.sample(**LASTING), resamples=100)
 
 
 def mean(measurement, key, kinds=LIMB_KINDS):
     return np.mean([measurement[f"{key}.{kind}"].value for kind in kinds])
 
 
-@pytest.mark.parametrize(
-    ("key", "expected", "within"),
-    [
-        ("keypoints.drop.visible", 0.05, 0.015),
-        ("keypoints.drop.self_occluded", 0.3, 0.03),
-        ("keypoints.drop.occluded", 0.6, 0.06),
-        ("keypoints.swap", 0.1, 0.025),  # by boxes from skeletons, another person may overlap more
-        ("keypoints.inversion", 0.08, 0.01),
-        ("keypoints.miss", 0.1, 0.01),
-        ("keypoints.jitter", 0.15, 0.015),
-        ("keypoints.scatter", 0.4, 0.015),
-    ],
-)
-def test_parameters_of_joints_are_recovered(alone, key, expected, within):
-    assert mean(alone, key) == pytest.approx(expected, abs=within)
+def part(sample, frames):
+    """Return the first frames of a sample."""
+    return replace(
+        sample,
+        time=sample.time[:frames],
+        reference=sample.reference[:frames],
+        detections=sample.detections[:frames],
+        measured=None if sample.measured is None else sample.measured[:frames],
+    )
 
 
-@pytest.mark.parametrize(
-    ("key", "expected", "within"),
-    [
-        ("keypoints.stray", 0.3, 0.06),
-        ("keypoints.self_occluded", 1.5, 0.2),
-        ("keypoints.occluded", 2.0, 0.35),
-        ("scores.good", 0.85, 0.01),
-        ("scores.jitter", 0.7, 0.02),
-        ("scores.miss", 0.3, 0.03),
-        ("scores.inversion", 0.6, 0.03),
-        ("scores.swap", 0.5, 0.04),
-        ("scores.hidden", 0.8, 0.03),
-        ("scores.deviation", 0.4, 0.05),
-        ("scores.overconfident", 0.3, 0.05),
-        ("scores.underconfident", 0.1, 0.03),
-        ("boxes.missed", 0.1, 0.02),
-        ("boxes.duplicates", 0.1, 0.02),
-        ("phantoms.rate", 0.4, 0.07),
-        ("phantoms.score", 0.6, 0.02),
-        ("phantoms.deviation", 0.5, 0.06),
-        ("bias.forward.hips", 0.01, 0.003),
-        ("bias.outward.hips", 0.02, 0.003),
-        ("bias.up.hips", 0.03, 0.003),
-        ("bias.outward.wrists", -0.02, 0.003),
-        ("bias.up.knees", 0.0, 0.003),
-        # Frames and views are independent.
-        ("correlation.life", 0.0, 0.02),
-        ("correlation.views", 0.0, 0.04),
-        ("correlation.limb", 0.0, 0.1),
-        ("correlation.scatter_life", 0.0, 0.02),
-        ("correlation.scatter_views", 0.0, 0.03),
-    ],
-)
-def test_other_parameters_are_recovered(alone, key, expected, within):
-    assert alone[key].value == pytest.approx(expected, abs=within)
+class TestDrops:
+    @pytest.mark.parametrize(
+        ("occlusion", "expected", "within"),
+        [("visible", 0.03, 0.008), ("self_occluded", 0.1, 0.02), ("occluded", 0.3, 0.05)],
+    )
+    def test_shares_by_occlusion(self, dropping, occlusion, expected, within):
+        """Of joints whose parent is reported, at capsules instead of bodies."""
+        assert mean(dropping, f"keypoints.drop.{occlusion}") == pytest.approx(expected, abs=within)
+        values = [dropping[f"keypoints.drop.{occlusion}.{kind}"] for kind in LIMB_KINDS]
+        slack = 0.1 * expected  # visibility from capsules is no better
+        assert sum(each.low - slack <= expected <= each.high + slack for each in values) >= 5  # of 6, at 95 %
+
+    def test_shares_of_staged_bodies(self, filmed):
+        """Where bodies show what hides what, shares of all limb joints together are exact."""
+        sample = filmed.sample(staged=True, **DROPPING)
+        found = frame_sums(label_joints(sample))
+        for index, expected in enumerate((0.03, 0.1, 0.3)):
+            n, k = (found[f"{key}.drop"][:, index, 3:].sum() for key in ("n", "k"))
+            assert k / n == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / n))
+
+    def test_joints_below_a_missing_one_do_not_count(self, filmed):
+        """The same detections as of a top-down detector: wrists also fall with their elbows and shoulders."""
+        sample = part(filmed.sample(**DROPPING), 80)
+        tree, flat = (point_estimates(replace(sample, kind=kind)) for kind in ("bottom-up", "top-down"))
+        for leaf, root in (("wrists", "shoulders"), ("ankles", "hips")):
+            key = "keypoints.drop.visible"
+            assert flat[f"{key}.{leaf}"] > tree[f"{key}.{leaf}"] + 0.02
+            assert flat[f"{key}.{root}"] == tree[f"{key}.{root}"]
+
+    def test_joints_at_risk_of_a_drop_have_a_parent(self, filmed):
+        labels = label_joints(part(filmed.sample(**DROPPING), 20))
+        reported = labels.association.scores > 0
+        for joint, parent in ((j, PARENT[j]) for j in np.flatnonzero(PARENT >= 0)):
+            assert not (labels.risk["drop"][..., joint] & ~reported[..., parent]).any()
+            assert not (reported[..., joint] & ~reported[..., parent]).any()  # the simulated tree
+
+    @pytest.mark.parametrize(("kind", "given", "joint", "side"), [("ears", EARS, 3, 1), ("nose", NOSE, 0, 1)])
+    def test_shares_of_the_face_by_bearing(self, filmed, dropping, kind, given, joint, side):
+        """Twelve shares: each is the mean of the given curve over the bearings of its bin."""
+        bearing = side * np.degrees(head_bearings(filmed.sequence.joints, filmed.rig)) % 360
+        curve = np.interp(bearing, np.arange(0, 361, 30), [*given, given[0]])
+        bins = np.round(bearing / 30).astype(int) % 12
+        expected = np.array([curve[bins == index].mean() for index in range(12)])
+        found = np.array([dropping[f"keypoints.face.{kind}.{index}"].value for index in range(12)])
+        assert np.abs(found - expected).mean() < 0.06
+        assert np.abs(found - expected).max() < 0.2  # bearings of heads seen from behind are not exact
+        assert np.corrcoef(found, expected)[0, 1] > 0.95
+        assert joint in (0, 3)
+
+    def test_people_hidden_by_others_are_missed(self, dropping):
+        found = np.array([dropping[f"boxes.missed_hidden.{index}"].value for index in range(5)])
+        np.testing.assert_allclose(found[:4], [0.0, 0.1, 0.3, 0.5], atol=0.15)
+        assert (np.diff(found) > 0).all()
+        assert dropping["boxes.missed"].value == pytest.approx(0.05, abs=0.015)
+
+    def test_joints_beyond_the_border(self, filmed):
+        """The detector reports joints up to 2 units beyond the border: nobody knows without the views beside."""
+        narrow = narrowed(filmed, width=420)
+        for border, within in ((2.0, 0.4), (0.0, 0.05)):
+            found = point_estimates(narrow.sample(kind="bottom-up", keypoints={"scatter": 0.2, "border": border}))
+            assert found["keypoints.border"] == pytest.approx(border, abs=within)
+
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [
+            ("boxes.duplicates", 0.1, 0.02),
+            ("phantoms.rate", 0.4, 0.09),  # some look as if they showed somebody
+            ("phantoms.score", 0.6, 0.02),
+            ("phantoms.deviation", 0.5, 0.06),
+            ("boxes.missed_views", 0.0, 0.02),
+            ("phantoms.life", 0.0, 0.02),
+        ],
+    )
+    def test_people(self, dropping, key, expected, within):
+        assert dropping[key].value == pytest.approx(expected, abs=within)
+
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [
+            ("correlation.scatter_life", 0.3, 0.06),
+            ("correlation.scatter_noise", 0.4, 0.12),  # the noise of predictions is drawn anew, too
+            ("correlation.scatter_near", 0.5, 0.08),
+            ("correlation.scatter_views", 0.0, 0.06),
+        ],
+    )
+    def test_structure_of_scatter(self, dropping, key, expected, within):
+        assert dropping[key].value == pytest.approx(expected, abs=within)
+
+    def test_scatter_of_hidden_joints(self, dropping, erring):
+        """A factor of 1.5; capsules take some visible joints for hidden ones, so less is seen."""
+        assert mean(dropping, "keypoints.scatter") == pytest.approx(0.3, abs=0.03)
+        assert 1.1 < dropping["keypoints.scatter_hidden"].low < dropping["keypoints.scatter_hidden"].high < 1.6
+        assert erring["keypoints.scatter_hidden"].value == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("key", "expected", "within"),
-    [
-        ("correlation.life", 0.2, 0.04),
-        ("correlation.views", 0.3, 0.1),
-        ("correlation.limb", 0.4, 0.1),
-        ("correlation.scatter_life", 0.3, 0.05),
-        ("correlation.scatter_views", 0.4, 0.05),
-        ("boxes.missed_views", 0.4, 0.2),
-        ("boxes.life", 0.3, 0.15),
-        ("phantoms.life", 0.4, 0.25),
-    ],
-)
-def test_correlations_and_lives_are_recovered(together, key, expected, within):
-    assert together[key].value == pytest.approx(expected, abs=within)
+class TestClasses:
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [
+            ("keypoints.scatter", 0.3, 0.025),
+            ("keypoints.jitter", 0.05, 0.01),
+            ("keypoints.miss", 0.04, 0.01),
+            ("keypoints.swap", 0.06, 0.015),  # by boxes from skeletons, another person may overlap more
+            ("keypoints.inversion", 0.03, 0.008),
+        ],
+    )
+    def test_shares_of_limb_joints(self, erring, key, expected, within):
+        assert mean(erring, key) == pytest.approx(expected, abs=within)
+
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [("keypoints.self_occluded", 1.5, 0.2), ("keypoints.occluded", 2.0, 0.25)],
+    )
+    def test_factors_of_hidden_joints(self, erring, key, expected, within):
+        assert erring[key].value == pytest.approx(expected, abs=within)
+
+    def test_nothing_is_dropped(self, erring):
+        for occlusion in ("visible", "self_occluded", "occluded"):
+            assert mean(erring, f"keypoints.drop.{occlusion}", KINDS) < 0.002
+
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [
+            ("good", 0.85, 0.01),
+            ("jitter", 0.7, 0.02),
+            ("miss", 0.3, 0.03),
+            ("inversion", 0.6, 0.02),
+            ("swap", 0.5, 0.03),
+            ("hidden.good", 0.8, 0.02),
+            ("hidden.miss", 0.8, 0.05),
+            ("hidden.jitter", 0.8, 0.03),
+            ("deviation", 0.3, 0.04),
+            ("overconfident", 0.2, 0.1),  # good keypoints beside a wrong prediction look overconfident
+            ("underconfident", 0.05, 0.02),
+        ],
+    )
+    def test_scores_by_class_and_visibility(self, erring, key, expected, within):
+        assert erring[f"scores.{key}"].value == pytest.approx(expected, abs=within)
+
+    def test_misses_are_not_taken_for_inversions_and_swaps(self, filmed):
+        """A fifth of all joints are misses, and some of them are near another joint by chance."""
+        found = point_estimates(part(filmed.sample(keypoints={"scatter": 0.2, "miss": 0.2}), 100))
+        for key in ("inversion", "swap"):
+            assert np.mean([found[f"share.{key}.{kind}"] for kind in LIMB_KINDS]) < 0.01
+        assert np.mean([found[f"share.miss.{kind}"] for kind in LIMB_KINDS]) == pytest.approx(0.2, abs=0.04)
+
+    def test_a_perfect_detector_has_no_errors(self, filmed):
+        found = measure(part(filmed.sample(), 100), resamples=50)
+        for kind in LIMB_KINDS:
+            for key in ("swap", "inversion", "miss", "jitter"):
+                assert not found[f"share.{key}.{kind}"].value > 0  # NaN where sides are never distinguishable
+            assert found[f"keypoints.scatter.{kind}"].value <= 0.05
+            assert found[f"share.drop.{kind}"].value < 0.002
+        assert found["boxes.missed"].value == found["phantoms.rate"].value == found["boxes.duplicates"].value == 0
+        assert not found["correlation.views"].known
+        never = found["keypoints.miss.knees"]  # an error without an occurrence may still be possible
+        assert never.value == 0
+        assert 0 < never.high < 0.01
 
 
-def test_lasting_errors_have_wider_intervals(alone, together):
-    def width(measurement, kind):
-        value = measurement[f"keypoints.jitter.{kind}"]
-        return (value.high - value.low) * np.sqrt(value.count / value.value)
+class TestGuesses:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def guessing(cls, filmed):
+        return point_estimates(narrowed(filmed, width=420).sample(**GUESSING))
 
-    assert np.mean([width(together, kind) / width(alone, kind) for kind in LIMB_KINDS]) > 1.5
+    def test_nothing_is_dropped(self, guessing):
+        for occlusion in ("visible", "self_occluded", "occluded"):
+            assert np.mean([guessing[f"keypoints.drop.{occlusion}.{kind}"] for kind in KINDS]) < 0.005
+
+    def test_gross_errors_of_hidden_joints_are_guesses(self, guessing):
+        """Lower bounds: many guesses are right, and capsules take some visible joints for hidden ones."""
+        occluded, self_occluded, visible = (
+            np.mean([guessing[f"keypoints.{key}.{kind}"] for kind in LIMB_KINDS])
+            for key in ("guess.occluded", "guess.self_occluded", "miss")
+        )
+        assert 0.1 < occluded < 0.5
+        assert 0.005 < self_occluded < 0.1
+        assert visible < 0.03  # some hidden joints are taken for visible ones, too
+
+    def test_joints_outside_of_the_picture(self, guessing):
+        found = np.mean([guessing[f"keypoints.guess.outside.{kind}"] for kind in LIMB_KINDS])
+        assert found == pytest.approx(0.6, abs=0.05)
+        assert guessing["scores.outside"] == pytest.approx(0.6, abs=0.08)
+        assert "keypoints.border" not in guessing
+
+    def test_scores_of_guesses(self, guessing):
+        assert np.mean([guessing[f"scores.guess.{kind}"] for kind in LIMB_KINDS]) == pytest.approx(0.3, abs=0.04)
+        assert guessing["scores.good"] == pytest.approx(0.85, abs=0.01)
 
 
-def test_a_perfect_detector_has_no_errors(twin):
-    found = measure(twin.detected(Detector()), resamples=50)
-    for kind in LIMB_KINDS:
-        for key in ("swap", "inversion", "miss", "jitter"):
-            assert found[f"share.{key}.{kind}"].value == 0
-        assert found[f"keypoints.scatter.{kind}"].value <= 0.05
-        assert found[f"share.drop.{kind}"].value < 0.002
-    assert found["boxes.missed"].value == found["phantoms.rate"].value == found["boxes.duplicates"].value == 0
-    assert not found["correlation.views"].known
-    never = found["keypoints.miss.knees"]  # an error without an occurrence may still be possible
-    assert never.value == 0
-    assert 0 < never.high < 0.01
+class TestDependence:
+    @pytest.mark.parametrize(
+        ("key", "expected", "within"),
+        [
+            ("correlation.life", 0.2, 0.06),
+            ("correlation.views", 0.3, 0.12),
+            ("correlation.gross_views", 0.4, 0.2),
+            ("correlation.limb", 0.4, 0.12),
+            ("correlation.scatter_life", 0.3, 0.06),
+            ("correlation.scatter_noise", 0.0, 0.05),
+            ("correlation.scatter_near", 0.0, 0.05),
+            ("boxes.missed_views", 0.4, 0.25),
+            ("boxes.life", 0.2, 0.12),
+            ("phantoms.life", 0.4, 0.25),
+        ],
+    )
+    def test_correlations_and_lives(self, lasting, key, expected, within):
+        assert lasting[key].value == pytest.approx(expected, abs=within)
+
+    def test_errors_of_single_frames_and_views(self, erring):
+        assert erring["correlation.life"].value < 0.02
+        assert erring["correlation.limb"].value < 0.03
+        assert erring["correlation.gross_views"].value < 0.1
+        # A jitter in one view moves the prediction in the others: a little correlation remains.
+        assert erring["correlation.views"].value < 0.2
+
+    def test_lasting_errors_have_wider_intervals(self, dropping, lasting):
+        def width(measurement, kind):
+            value = measurement[f"keypoints.drop.visible.{kind}"]
+            return (value.high - value.low) * np.sqrt(value.count / value.value)
+
+        assert np.mean([width(lasting, kind) / width(dropping, kind) for kind in LIMB_KINDS]) > 1.5
 
 
-def test_misses_are_not_taken_for_inversions_and_swaps(twin):
-    """Half of all joints are misses, and some of them are near another joint by chance."""
-    config = Detector.model_validate({"keypoints": {"scatter": 0.2, "miss": 0.5}})
-    found = measure(twin.detected(config), resamples=10)
-    assert mean(found, "share.inversion") < 0.004
-    assert mean(found, "share.swap") < 0.004
-    assert mean(found, "share.miss") == pytest.approx(0.5, abs=0.03)  # some near the border count as jitter
+def test_an_offset_that_all_views_share_is_not_seen(filmed):
+    """The consensus has the bias of the detector: residuals stay small, whatever it is."""
+    sample = part(filmed.sample(keypoints={"scatter": 0.2}), 60)
+    biased = part(filmed.sample(keypoints={"scatter": 0.2}, bias={"hips": [0.0, 0.02, 0.05]}), 60)
+    residuals = [label_joints(each).residual for each in (sample, biased)]
+    hips = np.array(KIND_OF_JOINT) == KINDS.index("hips")
+    one, other = (np.sqrt(np.nanmean(each[..., hips, :] ** 2)) for each in residuals)
+    assert other == pytest.approx(one, rel=0.05)
 
 
 def test_values_agree_within_the_interval_of_their_difference():
@@ -174,115 +336,58 @@ def test_values_agree_within_the_interval_of_their_difference():
     assert MeasuredValue(0.15, 0.12, 0.2, 100).agrees(one)
 
 
-def test_the_profile_contains_the_measured_values(twin, tmp_path):
-    sample = twin.detected(Detector.model_validate(ALONE), seed=1)
-    fitted = fit(sample, name="fitted", command="a command", resamples=50)
-    write_profile(fitted, tmp_path / "fitted.toml")
-    data = tomllib.loads((tmp_path / "fitted.toml").read_text())
-    profile = Detector.model_validate(data)
-    assert profile == fitted.profile == Detector.model_validate(settings(fitted.real, name="fitted"))
-    assert profile.name == "fitted"
-    assert profile.keypoints.miss.wrists == pytest.approx(fitted.real["keypoints.miss.wrists"].value, abs=1e-4)
-    assert profile.keypoints.drop.occluded.nose == pytest.approx(
-        fitted.real["keypoints.drop.occluded.nose"].value, abs=1e-4
-    )
-    assert profile.keypoints.jitter.nose == profile.keypoints.jitter.shoulders  # the stand-in
-    assert profile.scores.hidden == pytest.approx(0.8, abs=0.03)
-    assert profile.boxes.missed == pytest.approx(0.1, abs=0.02)
-    assert profile.bias.hips[2] == pytest.approx(0.03, abs=0.003)
-    assert profile.bias.nose == (0, 0, 0)
-    for line in fitted.text.splitlines():
-        assert len(line) <= 120
-        if line.startswith("knees = "):
-            assert "; n = " in line
-    with pytest.raises(ValueError, match=r"--out .*nowhere.*: cannot be written: No such file or directory"):
-        write_profile(fitted, tmp_path / "nowhere" / "fitted.toml")
-
-
-def test_samples_without_people_or_detections_are_refused(twin):
-    sample = twin.detected(Detector())
-    unknown = replace(sample, reference=np.full(sample.reference.shape, np.nan))
-    with pytest.raises(ValueError, match="expected people with known joints, got none in 300 frames"):
-        measure(unknown)
-    blind = replace(sample, detections=tuple(Detections.empty() for _ in sample.detections))
-    with pytest.raises(ValueError, match="no detection is near any of the known people"):
-        measure(blind)
-
-
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_a_profile_measured_on_its_own_simulation_is_recovered(twin, seed):
-    """Round trip without real data: measure, simulate with the measured profile, measure again."""
-    first = fit(twin.detected(Detector.model_validate(TOGETHER), seed=seed), resamples=200)
-    again = measure(twin.detected(first.profile, seed=seed + 10), resamples=200)
-    different, compared = agreement(first.real, again)
+def test_two_draws_of_one_detector_agree_and_two_detectors_do_not(filmed, dropping, erring):
+    again = measure(filmed.sample(seed=7, **DROPPING), resamples=100)
+    different, compared = agreement(dropping, again)
     assert compared > 90
-    # Of independent values 5 % would differ; many are correlated, so up to a tenth may.
-    assert len(different) <= 0.1 * compared, different
-
-
-def test_different_profiles_disagree(alone, together):
-    """The round trip can fail."""
-    different, compared = agreement(alone, together)
+    # Of independent values 5 % would differ; many are correlated, so up to a seventh may.
+    assert len(different) <= 0.15 * compared, different
+    different, compared = agreement(dropping, erring)
     assert len(different) > 0.3 * compared
 
 
-@pytest.fixture(scope="module")
-def shelf(shared_data):
-    return of_shelf(read_shelf(shared_data / "shelf"))
+def test_people_who_are_not_measured_only_hide_others(filmed):
+    """With one person measured, the shares are those of that person."""
+    sample = part(filmed.sample(**DROPPING), 100)
+    only = np.zeros(sample.reference.shape[:2], bool)
+    only[:, 1] = True
+    labels = label_joints(replace(sample, measured=only))
+    for key in ("drop", "jitter", "miss"):
+        assert not labels.risk[key][:, :, [0, 2]].any()
+        assert labels.risk[key][:, :, 1].any()
+    whole = label_joints(sample)
+    np.testing.assert_array_equal(labels.occlusion[:, :, 1], whole.occlusion[:, :, 1])
 
 
-@pytest.fixture(scope="module")
-def fitted(shelf):
-    return fit(shelf)
+def test_the_profile_contains_the_measured_values(dropping):
+    bias = np.zeros((9, 3))
+    bias[KINDS.index("hips")] = [0.01, 0.02, 0.03]
+    text = as_toml(dropping, name="fitted", bias=bias, command="a command")
+    profile = Detector.model_validate(tomllib.loads(text))
+    assert profile == Detector.model_validate(settings(dropping, name="fitted", bias=bias))
+    assert (profile.name, profile.kind) == ("fitted", "bottom-up")
+    for kind in LIMB_KINDS:
+        measured = dropping[f"keypoints.drop.occluded.{kind}"].value
+        assert getattr(profile.keypoints.drop.occluded, kind) == pytest.approx(measured, abs=1e-4)
+    expected = [dropping[f"keypoints.face.ears.{index}"].value for index in range(12)]
+    assert profile.keypoints.face.ears == pytest.approx(expected, abs=1e-4)
+    assert profile.keypoints.drop.visible.ears == 0.0  # face says it
+    hidden = [dropping[f"boxes.missed_hidden.{index}"].value for index in range(5)]
+    assert profile.boxes.missed_hidden == pytest.approx(hidden, abs=1e-4)
+    assert profile.bias.hips == (0.01, 0.02, 0.03)
+    assert profile.bias.nose == (0, 0, 0)
+    for line in text.splitlines():
+        assert len(line) <= 120 or line.startswith(tuple(KINDS))
+        if line.startswith("knees = 0.") and "[" not in line:
+            assert "; n = " in line
+    assert "# Made by: a command" in text
 
 
-def settings_of(detector):
-    """Return all parameters of a detector by dotted key."""
-    flat = {}
-
-    def take(path, value):
-        if isinstance(value, dict):
-            for key, each in value.items():
-                take((*path, key), each)
-        elif isinstance(value, list | tuple):
-            for index, each in enumerate(value):
-                take((*path, str(index)), each)
-        else:
-            flat[".".join(path)] = value
-
-    take((), detector.model_dump())
-    return flat
-
-
-class TestShelf:
-    def test_a_real_detector_does_not_report_hidden_joints(self, fitted):
-        for kind in ("nose", "eyes", "ears"):
-            visible, self_occluded = (
-                fitted.real[f"keypoints.drop.{occlusion}.{kind}"] for occlusion in ("visible", "self_occluded")
-            )
-            assert visible.high < 0.1
-            assert self_occluded.low > 0.5
-        assert fitted.real["keypoints.drop.occluded.wrists"].low > fitted.real["keypoints.drop.visible.wrists"].high
-        assert fitted.real["keypoints.drop.visible.shoulders"].high < 0.03
-
-    def test_the_shipped_profile_is_reproduced(self, fitted):
-        """Made by `simharness fit-detector shelf FOLDER --out scenarios/detectors/openpose-shelf.toml`."""
-        shipped = settings_of(read_profile("openpose-shelf"))
-        made = settings_of(fitted.profile)
-        assert shipped.keys() == made.keys()
-        for key, value in made.items():  # except the last digit, because sums differ between machines
-            assert shipped[key] == (pytest.approx(value, abs=2e-3) if isinstance(value, float) else value), key
-
-    def test_its_hips_are_higher_than_those_of_the_truth(self, fitted):
-        assert 0.03 < fitted.real["bias.up.hips"].low < fitted.real["bias.up.hips"].high < 0.06
-
-    @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-    def test_its_simulated_twin_agrees(self, shelf, fitted, seed):
-        """Round trip on the rig of Shelf: four people, as many known as in Shelf, 12 s.
-
-        Each value is compared with the interval of the difference of both (95 %, so 1 of 20 may differ by chance, and
-        they come in bunches): at least nine of ten must agree.
-        """
-        different, compared = agreement(fitted.real, twin_of(fitted, shelf, seed=seed))
-        assert compared > 100
-        assert len(different) <= 0.1 * compared, different
+def test_samples_without_people_or_detections_are_refused(filmed):
+    sample = filmed.sample()
+    unknown = replace(sample, reference=np.full(sample.reference.shape, np.nan))
+    with pytest.raises(ValueError, match="expected people with known joints, got none in 200 frames"):
+        measure(unknown)
+    blind = replace(part(sample, 5), detections=tuple(Detections.empty() for _ in range(5)))
+    with pytest.raises(ValueError, match="no detection is near any of the known people"):
+        measure(blind)

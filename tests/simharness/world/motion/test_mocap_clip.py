@@ -181,7 +181,7 @@ def test_motion_does_not_depend_on_the_duration(bodies, shared_data):
 @pytest.mark.parametrize(
     ("mocap", "message"),
     [
-        ({"file": "walk.fbx"}, r"people.motion.file = 'walk.fbx': expected the name of an AMC or a BVH file"),
+        ({"file": "walk.fbx"}, r"people.motion.file = 'walk.fbx': expected the name of an AMC, a BVH or an NPZ file"),
         ({"file": "walk.bvh"}, r"people.motion.file = 'walk.bvh': no such file"),
     ],
 )

@@ -5,6 +5,7 @@ import pytest
 from mvpose import Rig
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.humans.anatomy import RANGES
+from simharness.world.motion.mocap import tracks_file
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.rigs.layouts import build_rig, look_at
 from simharness.world.scene.build import Scene
@@ -229,3 +230,21 @@ def test_a_camera_inside_an_object_is_refused(scene):
     stuck = look_at(shelf.hull.center, (0.0, 0.0, 1.0), K=rig[0].K, size=rig[0].size, name="hidden")
     with pytest.raises(ValueError, match=r"camera 'hidden' at .* is inside shelf0, which stands at .*change"):
         check_rig(scenario(), scene.solids, Rig([rig[0], stuck]))
+
+
+def test_a_re_enacted_recording_has_its_places_and_sizes_and_objects_keep_clear(scene, tmp_path):
+    file = tmp_path / "tracks.npz"
+    recorded = simulate(scene)
+    rate = 1 / np.diff(recorded.time).mean()
+    tracks_file(file, recorded.joints, rate)
+    again = build(scenario(seed=8, rate=float(rate), people={"activities": ("mocap",), "motion": {"file": str(file)}}))
+    off = np.linalg.norm(simulate(again).joints - recorded.joints, axis=-1)
+    assert np.median(off) < 0.04
+    for body, original in zip(again.bodies, scene.bodies, strict=True):
+        assert body.shape != original.shape
+        assert body.stature == pytest.approx(original.stature, abs=0.06)
+    pelvises = recorded.joints[:, :, 11:13, :2].mean(axis=2).reshape(-1, 2)
+    boxes = [solid for solid in again.solids if "box" in solid.name]
+    assert len(boxes) == 4
+    for box in boxes:
+        assert np.linalg.norm(pelvises - box.hull.center[:2], axis=1).min() > 0.4

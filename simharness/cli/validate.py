@@ -1,0 +1,153 @@
+"""``simharness validate``: what simulation predicts for a recording, beside what was recorded."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import REGRESSION, exit_on_error, run_errors_only, write_json
+from simharness.cli.options import JsonFile, RecordingFile, RecordingFolder, command_line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from simharness.reality.validation.verdicts import Verdict
+
+_TWINS, _QUICK_TWINS = 10, 4
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(validate)
+
+
+def validate(
+    recording: RecordingFile,
+    folder: RecordingFolder = None,
+    twins: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=2, help=f"Number of twins. [dim]\\[default: {_TWINS}, quick {_QUICK_TWINS}][/]"),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A third of the frames, for a first look.")] = False,
+    fit_on: Annotated[
+        Path | None,
+        typer.Option(metavar="RECORDING", help="Fit the detector to another recording, and predict this one."),
+    ] = None,
+    split_half: Annotated[
+        bool, typer.Option("--split-half", help="Also fit to each half of the recording, and predict the other.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of validation.html and validation.json. [dim]\\[default: results/validation/NAME][/]",
+            file_okay=False,
+        ),
+    ] = None,
+    json_file: JsonFile = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
+    ] = None,
+) -> None:
+    """Compare a recording with its simulated twins, and fail where a prediction is wrong.
+
+    Fits a detector to the recording, simulates twins of it, and scores the method
+    on both: all cameras and all subsets of them, with and without added errors, by
+    both head rules. Exit code 1 where a bound is exceeded.
+    """
+    with exit_on_error():
+        start = perf_counter()
+        from simharness.reality.recording_file import read_recording
+        from simharness.runtime.progress import reporter
+
+        recorded = read_recording(recording, folder)
+        other = None if fit_on is None else read_recording(fit_on)
+        place = out or Path("results/validation") / recorded.name
+        _prepare(place)
+        from simharness.reality.validation.prediction import predict_halves, simulate_predictions
+        from simharness.reality.validation.summary import summarize_halves, summarize_validation
+        from simharness.reality.validation.validation import QUICK, Plan
+        from simharness.reality.validation.validation import validate as compare
+        from simharness.report.validation.page import render_validation
+        from simharness.trial.provenance import provenance
+
+        plan = replace(QUICK if quick else Plan(), workers=workers or os.cpu_count() or 1)
+        count = twins or (_QUICK_TWINS if quick else _TWINS)
+        with reporter() as bars:
+            simulated = simulate_predictions(recorded, count=count, fitted_on=other, reporter=bars)
+            with run_errors_only():
+                validation = compare(recorded, simulated, plan=plan, reporter=bars)
+            halves = predict_halves(recorded, count=count, plan=plan, reporter=bars) if split_half else []
+        validation = replace(
+            validation, verdicts=[*validation.verdicts, *(verdict for half in halves for verdict in half.verdicts)]
+        )
+        made = provenance(
+            command=command_line(), seeds=range(count), variants=plan.variants, seconds=perf_counter() - start
+        )
+        summary: dict[str, Any] = {
+            # The variants of the provenance are names; those of the summary are their scores.
+            **made,
+            **summarize_validation(validation),
+            "fitted_on": recorded.name if other is None else other.name,
+            "split_half": summarize_halves(halves),
+        }
+        page = render_validation(validation, provenance=made, fitted_on="" if other is None else other.name)
+        _write(page, place / "validation.html")
+        for path in filter(None, (place / "validation.json", json_file)):
+            write_json(summary, path)
+    console = Console()
+    _print_verdicts(validation.verdicts, recorded.name, console)
+    console.print(f"report: {place / 'validation.html'}", soft_wrap=True, highlight=False, markup=False)
+    if validation.failed:
+        raise typer.Exit(REGRESSION)
+
+
+def _prepare(folder: Path) -> None:
+    """Create the folder of the results before hours of work.
+
+    Raises:
+        ValueError: it cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {folder}: cannot be created: {error.strerror}") from None
+
+
+def _write(page: str, path: Path) -> None:
+    from simharness.runtime.atomic_files import write_atomic
+
+    try:
+        write_atomic(path, page.encode())
+    except OSError as error:
+        raise ValueError(f"--out {path.parent}: {path.name} cannot be written: {error.strerror}") from None
+
+
+def _print_verdicts(verdicts: Sequence[Verdict], name: str, console: Console) -> None:
+    """Print a row for each group of verdicts, with the figure that is worst."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.report.validation.tables import group_rows
+
+    heading = f"{name}: simulated against measured; the worst figure of each group"
+    table = Table(
+        title=heading, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False
+    )
+    table.add_column("figures", min_width=24)
+    for column in ("hold", "real", "simulated", "bound"):
+        table.add_column(column, justify="right", no_wrap=column != "bound")
+    table.add_column("verdict", no_wrap=True)
+    styles = {"holds": "green", "unclear": "yellow", "fails": "bold red"}
+    for row in group_rows(verdicts):
+        title = f"{row.title}\n[dim]{row.note}[/]" if row.note else row.title
+        held, _, _, real, simulated, _, bound = row.cells
+        table.add_row(title, f"{held}/{row.count}", real, simulated, bound, f"[{styles[row.state]}]{row.state}[/]")
+    console.print(table, highlight=False)

@@ -1,0 +1,77 @@
+"""Truth of Shelf and Campus: ``actorsGT.mat``, a MATLAB 5 file (Belagiannis et al., CVPR 2014).
+
+``actor3D`` holds a cell for each actor, in it one for each frame, from 0: an array of joints, metres, or an empty or
+1 x 1 array where the actor is not annotated.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import loadmat
+
+from simharness.formats.joint_tracks import JointTracks, TrackFiles
+from simharness.formats.read_errors import read_bytes
+
+_JOINTS = 14
+_WHAT = "the truth of Shelf or Campus: a MATLAB 5 file with actor3D, for each actor a cell of frames of joints x 3"
+
+
+def read_tracks(files: TrackFiles) -> JointTracks:
+    """Read the joints of all actors in all frames, (n, A, J, 3); J is 14 unless another skeleton is declared.
+
+    Raises:
+        ValueError: the file is missing, truncated, no MATLAB 5 file, or of another layout.
+    """
+    path = files.single()
+    actors = _read_actors(path)
+    count = len(files.skeleton) if files.skeleton is not None else _JOINTS
+    joints = np.full((max(map(len, actors)), len(actors), count, 3), np.nan)
+    for actor, track in enumerate(actors):
+        for frame, cell in enumerate(track):
+            pose = _unwrap(cell)
+            if pose.shape == (count, 3):
+                joints[frame, actor] = pose
+            elif pose.size > 1:
+                raise ValueError(
+                    f"{path}: actor {actor + 1}, frame {frame}: expected {count} x 3 joints or nothing, got "
+                    f"{pose.shape}"
+                )
+    return JointTracks(np.arange(len(joints)), joints)
+
+
+def _read_actors(path: Path) -> list[np.ndarray]:
+    """Return an array of cells of frames for each actor."""
+    size = len(read_bytes(path, what=_WHAT))
+    try:
+        cells = loadmat(path).get("actor3D")  # reads all variables, so that truncation after actor3D is detected too
+    except Exception as error:  # a truncated file raises many types of errors, for example zlib.error
+        raise ValueError(
+            f"{path}: cannot be read as a MATLAB file ({error}; it has {size} bytes); expected {_WHAT}. "
+            "It was probably cut off: copy or download it again"
+        ) from None
+    if cells is None:
+        raise ValueError(f"{path}: has no variable actor3D; expected {_WHAT}")
+    actors = _unwrap(cells).ravel()
+    if actors.dtype != object or not len(actors):
+        raise ValueError(f"{path}: actor3D must be cells of actors, got {cells.dtype} {cells.shape}")
+    if all(_unwrap(each).dtype != object for each in actors):
+        actors = _one_actor(actors)
+    return [track.ravel() for track in map(_unwrap, actors)]
+
+
+def _one_actor(frames: np.ndarray) -> np.ndarray:
+    """Return the cell of the only actor, given its frames, to which :func:`_unwrap` has gone down."""
+    actor = np.empty(1, object)
+    actor[0] = frames
+    return actor
+
+
+def _unwrap(cell: Any) -> np.ndarray:
+    """Unwrap MATLAB cells that contain only one other array."""
+    cell = np.asarray(cell)
+    while cell.dtype == object and cell.size == 1:
+        cell = np.asarray(cell.item())
+    return cell

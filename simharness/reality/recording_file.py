@@ -1,0 +1,229 @@
+"""Reader of recordings: a TOML file (:mod:`.recording_keys`) that says where cameras, detections and truth are.
+
+``read_recording("shelf", FOLDER)`` reads a shipped description with the files in FOLDER, and
+``read_recording("hall.toml")`` one whose files lie beside it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from mvpose import Rig
+from mvpose.skeleton import HeadMapping
+from simharness.formats.calibration.registry import read_calibration
+from simharness.formats.detection_files import DetectionFiles
+from simharness.formats.detection_formats import FORMATS as DETECTION_FORMATS
+from simharness.formats.joint_names import JointNames, to_shelf14
+from simharness.formats.joint_tracks import JointTracks, TrackFiles
+from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.recording_keys import CalibrationKeys, DeclaredSkeleton, RecordingKeys, TruthKeys
+from simharness.scenario.shipped import shipped_folder
+from simharness.scenario.toml_files import read_toml
+from simharness.scenario.validation_messages import explain_all
+
+FILE_NAME = "recording.toml"
+"""Name of the description in a folder that holds a whole recording, such as an exported sequence."""
+
+_UNKNOWN_SIZE = (1, 1)  # marks cameras of files that do not say the size: no image has it
+
+
+def read_recording(
+    path: str | Path, folder: str | Path | None = None, *, head: HeadMapping = "voxelpose"
+) -> AnnotatedRecording:
+    """Read a recording.
+
+    Args:
+        path: its description: a TOML file, a folder with ``recording.toml``, or the name of a shipped description
+            ("shelf").
+        folder: folder in which the files that it names lie; by default that of the description.
+        head: rule for the joints of the head of a truth that does not have those of SHELF14, as of the evaluation.
+
+    Raises:
+        ValueError: the description or a file that it names is missing or faulty; the message names the key and the
+            file.
+    """
+    file = find_recording(path)
+    keys = read_keys(file)
+    place = _place(file, keys, None if folder is None else Path(folder))
+    frames = _frames(file, keys)
+    with _key(file, "calibration.file"):
+        rig = _rig(place, keys.calibration)
+    given = keys.detections
+    with _key(file, "detections"):
+        detections = DETECTION_FORMATS[given.format](
+            DetectionFiles(
+                place / given.path,
+                tuple(camera.name for camera in rig),
+                frames,
+                given.first,
+                None if given.skeleton is None else given.skeleton.of(None),
+            )
+        )
+    with _key(file, "truth"):
+        tracks = _tracks(place, keys.truth, frames)
+        truth = to_shelf14(tracks.at(frames), _joint_names(keys.truth, tracks), head=head)
+        actors = _actors(keys.truth, tracks)
+    with _key(file, "recording"):
+        return AnnotatedRecording(
+            rig,
+            truth,
+            detections,
+            frames,
+            name=keys.name or (file.stem if file.name != FILE_NAME else file.absolute().parent.name),
+            rate=keys.rate,
+            actors=actors,
+            kind=given.kind,
+        )
+
+
+def read_keys(file: Path) -> RecordingKeys:
+    """Read and check the keys of a description.
+
+    Raises:
+        ValueError: no TOML file, or a key that does not exist or has a wrong value; all are reported together.
+    """
+    settings = read_toml(file)
+    try:
+        return RecordingKeys.model_validate_json(json.dumps(settings, default=str), strict=True)
+    except ValidationError as error:
+        lines = explain_all(error, {}, str(file), root=RecordingKeys)
+        raise ValueError("\n".join(dict.fromkeys(lines))) from None
+
+
+def find_recording(path: str | Path) -> Path:
+    """Return the file of a description: a TOML file, ``recording.toml`` in a folder, or a shipped one by its name.
+
+    Raises:
+        ValueError: nothing of this name.
+    """
+    given = Path(path)
+    if given.suffix == ".toml":
+        return given
+    if (given / FILE_NAME).is_file():
+        return given / FILE_NAME
+    names = shipped_recordings()
+    if str(path) in names:
+        return shipped_folder() / "recordings" / f"{path}.toml"
+    near = difflib.get_close_matches(str(path), names, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    raise ValueError(
+        f"{path}: no such recording; {hint}expected a TOML file, a folder with {FILE_NAME}, or the name of a shipped "
+        f"recording: {', '.join(names)}"
+    )
+
+
+def shipped_recordings() -> list[str]:
+    """Return the names of the shipped descriptions, sorted."""
+    return sorted(file.stem for file in (shipped_folder() / "recordings").glob("*.toml"))
+
+
+@contextlib.contextmanager
+def _key(file: Path, key: str) -> Iterator[None]:
+    """Put the description and the key before the message of an error."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{file}: {key}: {error}") from None
+
+
+def _place(file: Path, keys: RecordingKeys, folder: Path | None) -> Path:
+    """Return the folder of the recording's files."""
+    names = ", ".join([keys.calibration.file, keys.detections.path, *keys.truth.file])
+    if folder is None:
+        if file.parent == shipped_folder() / "recordings":
+            raise ValueError(f"{file.stem}: give FOLDER, where its files lie, which are not shipped: {names}")
+        return file.parent
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder; expected the files of {file.stem}, {names}. Correct the path")
+    return folder
+
+
+def _frames(file: Path, keys: RecordingKeys) -> NDArray[np.int64]:
+    """Return the numbers of all frames, (F,), increasing."""
+    for k, (first, last) in enumerate(keys.frames):
+        if last < first:
+            raise ValueError(f"{file}: frames[{k}]: expected [first, last] with first <= last, got [{first}, {last}]")
+        if k and first <= keys.frames[k - 1][1]:
+            raise ValueError(
+                f"{file}: frames[{k}]: expected ranges in order without overlap, got [{first}, {last}] after "
+                f"{list(keys.frames[k - 1])}"
+            )
+    return np.concatenate([np.arange(first, last + 1) for first, last in keys.frames])
+
+
+def _rig(place: Path, keys: CalibrationKeys) -> Rig:
+    """Return the cameras with their image sizes: those of the file, or else those of the description."""
+    path = place / keys.file
+    rig = read_calibration(path, size=_UNKNOWN_SIZE, only=keys.cameras, key="cameras")
+    unknown = [camera.size == _UNKNOWN_SIZE for camera in rig]
+    if any(unknown) and not keys.size:
+        raise ValueError(f"{path}: does not say the size of the images; add calibration.size = [width, height], pixels")
+    if len(keys.size) not in (0, 1, len(rig)):
+        raise ValueError(
+            f"{path}: calibration.size: expected one pair, or one for each of the {len(rig)} cameras, got "
+            f"{len(keys.size)}"
+        )
+    sizes = keys.size * len(rig) if len(keys.size) == 1 else keys.size
+    return Rig([replace(camera, size=sizes[view]) if unknown[view] else camera for view, camera in enumerate(rig)])
+
+
+def _tracks(place: Path, keys: TruthKeys, frames: NDArray[np.int64]) -> JointTracks:
+    """Read the true joints, numbered by the frames of the recording.
+
+    Files that only count their rows, and have as many as the recording from its first frame to its last, have its
+    frames; ``truth.first`` says it for others.
+    """
+    paths = tuple(place / each for each in keys.file)
+    skeleton = keys.skeleton.of(None) if keys.skeleton is not None and keys.skeleton.joints else None
+    tracks = TRACK_FORMATS[keys.format].read(TrackFiles(paths, frames, skeleton, keys.up))
+    if keys.first is not None:
+        tracks = tracks.numbered(keys.first)
+    elif tracks.counted and len(tracks.frames) == frames[-1] - frames[0] + 1:
+        tracks = tracks.numbered(int(frames[0]))
+    if not np.isin(frames, tracks.frames).any():
+        raise ValueError(
+            f"{paths[0]}: has frames {tracks.frames.min()} to {tracks.frames.max()}, none of the recording's frames "
+            f"{frames[0]} to {frames[-1]}; correct frames, or give truth.first, the number of its first frame"
+        )
+    return tracks
+
+
+def _joint_names(keys: TruthKeys, tracks: JointTracks) -> JointNames:
+    """Return the joints of the truth: as declared, as the file names them, or of the format."""
+    path = keys.file[0]
+    own = JointNames(path, tracks.names) if tracks.names is not None else TRACK_FORMATS[keys.format].skeleton
+    skeleton = keys.skeleton or DeclaredSkeleton()
+    if tracks.names is not None and own is not None and skeleton.joints:
+        declared = JointNames(skeleton.name, skeleton.joints)
+        if (own.rows(declared.joints) >= 0).all():  # named alike: the order in the file counts
+            return own.renamed(skeleton.map)
+    names = skeleton.of(own)
+    if len(names) != tracks.joints.shape[2]:
+        raise ValueError(
+            f"{path}: has {tracks.joints.shape[2]} joints, but skeleton {names.name} has {len(names)}; correct the "
+            "skeleton"
+        )
+    return names
+
+
+def _actors(keys: TruthKeys, tracks: JointTracks) -> tuple[int, ...] | None:
+    """Return the rows of the people whose PCP is averaged."""
+    if keys.actors is None:
+        return None
+    missing = [actor for actor in keys.actors if actor not in tracks.people]
+    if missing:
+        raise ValueError(
+            f"actors: expected people of the file, {', '.join(map(str, tracks.people))}, got {missing[0]}; correct the "
+            "list"
+        )
+    return tuple(tracks.people.index(actor) for actor in keys.actors)

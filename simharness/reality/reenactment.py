@@ -1,0 +1,205 @@
+"""Re-enactment of a recording: simulated people in the recorded places and poses, filmed by the recording's cameras.
+
+The recording is cut into takes, in each of which the same people are present. Simulated bodies of the recorded sizes
+replay their joint tracks, so that distances, bearings, speeds, and who hides whom are those of the recording. Bodies
+and clothes are drawn from the seed. What the recording's room holds is unknown: the twin's room is empty.
+"""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mvpose import COCO17, Detections, Rig
+from mvpose.arrays import Bools, Floats
+from simharness.detector.detect import detect
+from simharness.formats.calibration.opencv import write_calibration
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.people_tracks import TrackedPeople
+from simharness.runtime.progress import Silence
+from simharness.runtime.stages import Stages
+from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.scenario import Scenario
+from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.simulation import Simulation, capture_trial
+from simharness.types.landmarks import LANDMARKS
+from simharness.types.sequence import Sequence
+from simharness.types.views import Views, Visibility
+from simharness.world.motion.mocap.joint_tracks import tracks_file
+
+_LONGEST = 4.0  # seconds of a take
+_SHORTEST = 0.6  # seconds; shorter takes are joined with a neighbour
+_PRESENT = 0.5  # share of the frames of a take in which a person of it is present
+_ANKLE = 0.09  # metres: height of the ankle joint of a standing person, in shoes
+_STANDING = 0.25  # quantile of the heights of the lower ankle: most people stand, noise is on both sides
+_MARGIN = 1.5  # metres between people or cameras and the border of the floor
+
+
+@dataclass(frozen=True)
+class Take:
+    """Part of a recording in which the same people are present.
+
+    Attributes:
+        rows: its frames, as rows of the recording.
+        people: indices of its people.
+    """
+
+    rows: range
+    people: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Film:
+    """Simulated recording before any detector.
+
+    People who are absent in a frame are outside of all pictures there.
+
+    Attributes:
+        sequence: true poses of everyone, with the floor at z = 0.
+        views: truth in the pictures.
+        rig: the cameras, with the floor at z = 0.
+        floor: height of the recording's floor, metres.
+        present: which people are present in which frames, (F, P).
+    """
+
+    sequence: Sequence
+    views: Views
+    rig: Rig
+    floor: float
+    present: Bools
+
+    @property
+    def joints(self) -> Floats:
+        """True joints in the recording's world, COCO-17, (F, P, 17, 3) metres; NaN where absent."""
+        joints = self.sequence.joints + [0.0, 0.0, self.floor]
+        return np.where(self.present[..., None, None], joints, np.nan)
+
+    def detected(self, config: Detector, *, seed: int) -> list[Detections]:
+        """Return the detections of a simulated detector in each frame.
+
+        Args:
+            config: parameters of the detector.
+            seed: seed of its draws.
+        """
+        return [each.detections for each in detect(self.sequence, self.views, self.rig, config, seed=seed)]
+
+
+def film(
+    recording: AnnotatedRecording, people: TrackedPeople, *, seed: int, advance: Callable[[int], None] = lambda _: None
+) -> Film:
+    """Simulate and film a recording.
+
+    Args:
+        recording: its rig and frames.
+        people: who is where.
+        seed: seed of the bodies.
+        advance: called after each take with 1.
+
+    Raises:
+        ValueError: nobody stays for a second or longer, or the scene cannot be built.
+    """
+    takes = cut_takes(recording, people)
+    if not takes:
+        raise ValueError(f"{recording.name}: expected people who stay for a second or longer, got none")
+    floor = floor_height(people)
+    rig = Rig([replace(camera, t=camera.t + camera.R[:, 2] * floor) for camera in recording.rig])
+    frames, views, count = len(recording), len(rig), people.joints.shape[1]
+    landmarks = np.zeros((frames, count, len(LANDMARKS), 3))
+    present = np.zeros((frames, count), bool)
+    pixels = np.full((frames, views, count, len(COCO17), 2), np.nan)
+    visibility = np.full((frames, views, count, len(COCO17)), Visibility.OUTSIDE, np.int8)
+    boxes, area = np.zeros((frames, views, count, 4)), np.zeros((frames, views, count), np.int64)
+    for take in takes:
+        joints = _held(people.joints[take.rows.start : take.rows.stop, list(take.people)]) - [0.0, 0.0, floor]
+        simulation = _film_take(recording, rig, joints, seed=seed)
+        rows = slice(take.rows.start, take.rows.stop)
+        for index, person in enumerate(take.people):
+            landmarks[rows, person] = simulation.sequence.landmarks[:, index]
+            pixels[rows, :, person] = simulation.views.pixels[:, :, index]
+            visibility[rows, :, person] = simulation.views.visibility[:, :, index]
+            boxes[rows, :, person] = simulation.views.boxes[:, :, index]
+            area[rows, :, person] = simulation.views.area_visible[:, :, index]
+            present[rows, person] = True
+        advance(1)
+    source = np.broadcast_to(np.arange(frames)[:, None], (frames, views))
+    sequence = Sequence(_waiting(landmarks, present), np.arange(count), np.arange(frames) / recording.rate)
+    return Film(sequence, Views(pixels, visibility, boxes, area, source), rig, floor, present)
+
+
+def _waiting(landmarks: Floats, present: Bools) -> Floats:
+    """Return landmarks (F, P, L, 3) in which people keep the pose of the nearest frame in which they are present."""
+    result = landmarks.copy()
+    rows = np.arange(len(landmarks))
+    for person in np.flatnonzero(present.any(axis=0)):
+        known = rows[present[:, person]]
+        result[:, person] = landmarks[known[np.abs(rows[:, None] - known).argmin(axis=1)], person]
+    return result
+
+
+def cut_takes(recording: AnnotatedRecording, people: TrackedPeople) -> list[Take]:
+    """Return the takes of a recording: runs without a gap, cut where people come and go, and when they get long.
+
+    Frames without anybody belong to no take.
+    """
+    takes: list[Take] = []
+    shortest, longest = (max(1, round(seconds * recording.rate)) for seconds in (_SHORTEST, _LONGEST))
+    for segment in recording.segments:
+        present = people.present[segment]
+        changes = 1 + np.flatnonzero((present[1:] != present[:-1]).any(axis=1))
+        cuts = [0]
+        for change in changes:
+            if change - cuts[-1] >= shortest and len(present) - change >= shortest:
+                cuts.append(int(change))
+        for start, stop in zip(cuts, [*cuts[1:], len(present)], strict=True):
+            pieces = -(-(stop - start) // longest)
+            edges = np.linspace(start, stop, pieces + 1).round().astype(int)
+            for first, last in itertools.pairwise(edges):
+                here = tuple(np.flatnonzero(present[first:last].mean(axis=0) >= _PRESENT).tolist())
+                if here:
+                    takes.append(Take(range(segment.start + int(first), segment.start + int(last)), here))
+    return takes
+
+
+def floor_height(people: TrackedPeople) -> float:
+    """Return the height of the floor, metres: a usual ankle's height below the lower ankles of standing people."""
+    ankles = people.joints[:, :, 15:, 2].min(axis=-1)
+    return float(np.nanquantile(ankles, _STANDING)) - _ANKLE
+
+
+def _film_take(recording: AnnotatedRecording, rig: Rig, joints: Floats, *, seed: int) -> Simulation:
+    """Simulate and film one take, with joints (T, P, 17, 3) over a floor at z = 0."""
+    with tempfile.TemporaryDirectory() as folder:
+        tracks, calibration = Path(folder, "tracks.npz"), Path(folder, "cameras.yml")
+        tracks_file(tracks, joints, recording.rate)
+        write_calibration(calibration, rig)
+        reach = max(np.abs(joints[..., :2]).max(), np.abs(rig.centers[:, :2]).max()) + _MARGIN
+        height = max(3.0, float(rig.centers[:, 2].max()) + 0.5)
+        scenario = Scenario.model_validate(
+            {
+                "name": "twin",
+                "seed": seed,
+                "duration": len(joints) / recording.rate,
+                "rate": recording.rate,
+                "room": {"size": (2 * reach, 2 * reach, height), "walls": False},
+                "people": {"count": joints.shape[1], "area": reach - 0.7, "motion": {"file": str(tracks)}},
+                "cameras": {"layout": "file", "file": str(calibration)},
+                "rendering": {"renderer": "rays"},
+            }
+        )
+        return capture_trial(build_trial(scenario), Stages(Silence()))
+
+
+def _held(joints: Floats) -> Floats:
+    """Return tracks (T, P, 17, 3) without gaps: people hold their first or last pose where they are absent."""
+    result = joints.copy()
+    rows = np.arange(len(joints))
+    for person in range(joints.shape[1]):
+        known = np.isfinite(joints[:, person, 0, 0])
+        nearest = rows[known][np.abs(rows[:, None] - rows[known]).argmin(axis=1)]
+        result[:, person] = joints[nearest, person]
+    return result

@@ -1,0 +1,1 @@
+"""Validation of simulated twins: what simulation predicts, beside what was recorded."""

@@ -1,0 +1,132 @@
+"""Figures of a recording beside those of its twins, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.validation.passes import Change, Tallies
+from simharness.reality.validation.tally import Tally
+from simharness.statistics.bootstrap import block_weights, interval
+from simharness.statistics.intervals import Interval, mean_interval
+
+RESAMPLES = 500
+"""Number of bootstrap resamples of a recording's frames."""
+
+Sums = Mapping[Change, Mapping[str, Tally]]
+"""Tallies summed over frames, by change and variant: scalars, or one value for each of R resamples."""
+
+Figure = Callable[[Sums], "Floats | float"]
+"""Figure of a recording, from its sums; it is applied to all resamples at once."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One figure of a recording and of its twins.
+
+    Attributes:
+        real: the recording's, with the interval of a block bootstrap over time.
+        twin: mean over the twins, with the interval of a bootstrap over twins.
+        twins: figure of each twin.
+    """
+
+    real: Interval
+    twin: Interval
+    twins: tuple[float, ...] = ()
+
+    @property
+    def difference(self) -> float:
+        """The twins' figure minus the recording's."""
+        return self.twin.mean - self.real.mean
+
+    @property
+    def uncertainty(self) -> tuple[float, float]:
+        """Distances of the ends of the 95 % interval of the difference from it, downwards and upwards.
+
+        Each is the root of the squared half-widths of both intervals on the sides that face each other, because the two
+        are independent. An unknown interval counts as a point.
+        """
+        real, twin = self.real, self.twin
+        down = np.hypot(_width(twin.mean - twin.low), _width(real.high - real.mean))
+        up = np.hypot(_width(twin.high - twin.mean), _width(real.mean - real.low))
+        return float(down), float(up)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers ready for JSON; unknown ones are null."""
+        down, up = self.uncertainty
+        return {
+            "real": number(self.real.mean),
+            "twin": number(self.twin.mean),
+            "difference": number(self.difference),
+            "real_interval": [number(self.real.low), number(self.real.high)],
+            "twin_interval": [number(self.twin.low), number(self.twin.high)],
+            "difference_interval": [number(self.difference - down), number(self.difference + up)],
+        }
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Sums of a recording, of its resamples and of its twins.
+
+    Attributes:
+        real: sums of the recording.
+        resamples: sums of R bootstrap resamples of its frames; the same resamples for all changes and variants, so
+            that differences between them are paired.
+        twins: sums of each twin.
+    """
+
+    real: Sums
+    resamples: Sums
+    twins: tuple[Sums, ...]
+
+    @classmethod
+    def of(
+        cls, recording: AnnotatedRecording, real: Mapping[Change, Tallies], twins: Sequence[Mapping[Change, Tallies]]
+    ) -> Evidence:
+        """Return the evidence from tallies of frames.
+
+        Args:
+            recording: the recording, with the frames of its tallies.
+            real: tallies of its frames by change.
+            twins: tallies of the frames of each twin, by change.
+        """
+        weights = frame_weights(recording)
+        return cls(
+            _each(real, Tally.total),
+            _each(real, lambda tally: tally.resampled(weights)),
+            tuple(_each(twin, Tally.total) for twin in twins),
+        )
+
+    def compare(self, figure: Figure) -> Compared:
+        """Return a figure of the recording beside that of its twins."""
+        return compared(float(figure(self.real)), figure(self.resamples), [float(figure(twin)) for twin in self.twins])
+
+
+def compared(real: float, resamples: Floats | float, twins: Sequence[float]) -> Compared:
+    """Return a figure of a recording, with that of its R resamples (R,), beside the figures of its twins."""
+    low, high = interval(np.atleast_1d(np.asarray(resamples, float)))
+    return Compared(Interval(real, float(low), float(high), 1), mean_interval(twins), tuple(twins))
+
+
+def frame_weights(recording: AnnotatedRecording) -> Floats:
+    """Return the weights of the frames in bootstrap resamples, (R, F), by blocks of one second."""
+    step = float(np.median(np.diff(recording.frames))) if len(recording) > 1 else 1.0
+    return block_weights(np.arange(len(recording)) * step / recording.rate, resamples=RESAMPLES)
+
+
+def number(value: float) -> float | None:
+    """Return the value for JSON, None where it is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _each(tallies: Mapping[Change, Tallies], function: Callable[[Tally], Tally]) -> dict[Change, dict[str, Tally]]:
+    return {change: {name: function(each) for name, each in of.items()} for change, of in tallies.items()}
+
+
+def _width(value: float) -> float:
+    return value if np.isfinite(value) else 0.0

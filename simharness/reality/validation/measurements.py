@@ -1,0 +1,204 @@
+"""Measurements of a recording that need no estimates of the method: what a sceptic compares between two recordings.
+
+Each is a ratio of sums over frames, so that its interval comes from a bootstrap, or the variation of bone lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.affinity import FusedAffinity
+from mvpose.arrays import Bools, Floats
+from mvpose.rays import viewing_rays
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.detector_fit.sample import LIMB_JOINTS
+from simharness.reality.validation.shown_people import ShownPeople, people_detections, shown_people
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
+
+TREE = {
+    "wrist|elbow": ((9, 7), (10, 8)),
+    "elbow|shoulder": ((7, 5), (8, 6)),
+    "ankle|knee": ((15, 13), (16, 14)),
+    "knee|hip": ((13, 11), (14, 12)),
+}
+"""Joints of COCO-17 (child, parent) on both sides, by the name of P(child missing | parent missing)."""
+
+BONES = {
+    "shank": ((13, 15), (14, 16)),
+    "thigh": ((11, 13), (12, 14)),
+    "forearm": ((7, 9), (8, 10)),
+    "upper arm": ((5, 7), (6, 8)),
+}
+"""Joints of COCO-17 at the ends of each bone, on both sides."""
+
+AFFINITY_EDGES = np.linspace(0.0, 1.0, 21)
+"""Edges of the histograms of affinities."""
+
+AMBIGUOUS = 0.5
+"""Affinity from which the method may match two detections."""
+
+_EARS = slice(3, 5)
+_MAD_TO_DEVIATION = 1.4826  # of a normal distribution
+_IN_PICTURE = 0.5  # share of a person's limb joints on the picture, from which a detection is expected
+_SCORE_QUANTILES = (0.1, 0.5, 0.9)
+
+
+class Ratio(NamedTuple):
+    """Ratio of two sums over frames, from the contribution of each frame, both (F,)."""
+
+    numerator: Floats
+    denominator: Floats
+
+    @property
+    def value(self) -> float:
+        """The ratio; NaN where the denominator is 0."""
+        total = self.denominator.sum()
+        return float(self.numerator.sum() / total) if total else float("nan")
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Measurements of a recording of F frames.
+
+    Attributes:
+        ratios: ratios by key: ``affinity.different`` (share of pairs of detections of different people, in different
+            views, with an affinity above 0.5), ``affinity.same`` (share of pairs of one person below 0.5), ``behind``
+            (share of limb joints of annotated people in the pictures that another person hides), ``ears`` (share of
+            ears that fewer than two views report), ``tree.CHILD|PARENT`` (share of missing children where the parent
+            is missing), ``missing.KIND`` (share of joints in the picture that detections of annotated people do not
+            report), ``detected`` (share of people in a picture who are detected), ``phantoms`` (detections of nobody,
+            per view and frame), ``others`` (people who are not annotated, per frame).
+        bones: length of every bone of every actor, (F, A, 2 sides, 4), mm, from joints triangulated from all
+            detections; NaN where unknown. In the order of :data:`BONES`.
+        true_bones: the same from the truth.
+        affinities: histograms over :data:`AFFINITY_EDGES` of pairs of the "same" and of "different" people; each sums
+            to 1.
+        scores: 10, 50 and 90 % quantiles of the scores of reported limb joints.
+    """
+
+    ratios: Mapping[str, Ratio]
+    bones: Floats
+    true_bones: Floats
+    affinities: Mapping[str, Floats]
+    scores: tuple[float, ...]
+
+    def values(self) -> dict[str, float]:
+        """Return all numbers by key; also ``bones.BONE`` and ``true_bones.BONE``, mm, and ``score.q10`` and so on."""
+        result = {key: ratio.value for key, ratio in self.ratios.items()}
+        for name, lengths in (("bones", self.bones), ("true_bones", self.true_bones)):
+            spreads = bone_variation(lengths)
+            result |= {f"{name}.{bone}": float(each) for bone, each in zip(BONES, spreads, strict=True)}
+        return result | {f"score.q{100 * q:.0f}": each for q, each in zip(_SCORE_QUANTILES, self.scores, strict=True)}
+
+
+def measure(recording: AnnotatedRecording) -> Measurements:
+    """Measure a recording; see :class:`Measurements`."""
+    shown = shown_people(recording)
+    affinities = _affinities(shown)
+    counts = {key: np.histogram(np.concatenate(each), AFFINITY_EDGES)[0] for key, each in affinities.items()}
+    reported = shown.association.scores[..., LIMB_JOINTS]
+    reported = reported[reported > 0]
+    return Measurements(
+        ratios={**_ambiguity(affinities), **_hidden(shown), **_missing(shown), **_people(shown)},
+        bones=_bone_lengths(np.where(shown.annotated[..., None, None], shown.triangulated, np.nan)),
+        true_bones=_bone_lengths(shown.reference),
+        affinities={key: each / max(1, each.sum()) for key, each in counts.items()},
+        scores=tuple(float(np.quantile(reported, q)) if reported.size else float("nan") for q in _SCORE_QUANTILES),
+    )
+
+
+def bone_variation(lengths: Floats) -> Floats:
+    """Return the standard deviation over time of bone lengths, from the median absolute deviation, (4,).
+
+    Args:
+        lengths: lengths (F, A, 2, 4); NaN where unknown.
+
+    Returns:
+        Means over actors and sides, in the unit of the lengths; NaN without any bone.
+    """
+    known = np.isfinite(lengths).any(axis=0)
+    lengths = np.where(known, lengths, 0.0)  # without empty columns, which nanmedian warns about
+    deviation = _MAD_TO_DEVIATION * np.nanmedian(np.abs(lengths - np.nanmedian(lengths, axis=0)), axis=0)
+    count = known.sum(axis=(0, 1))
+    total = np.where(known, deviation, 0.0).sum(axis=(0, 1))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _affinities(shown: ShownPeople) -> dict[str, list[Floats]]:
+    """Return the affinities of pairs of detections of annotated people in different views, by frame."""
+    affinity, rig = FusedAffinity(), shown.recording.rig
+    result: dict[str, list[Floats]] = {"same": [], "different": []}
+    for frame in range(len(shown.recording)):
+        found, actor = people_detections(shown.association, frame)
+        matrix = affinity(rig, found, viewing_rays(rig, found))
+        one, other = np.triu_indices(len(found), 1)
+        one, other = (each[found.view[one] != found.view[other]] for each in (one, other))
+        same = actor[one] == actor[other]
+        result["same"].append(matrix[one, other][same])
+        result["different"].append(matrix[one, other][~same])
+    return result
+
+
+def _ambiguity(affinities: Mapping[str, list[Floats]]) -> dict[str, Ratio]:
+    same, different = affinities["same"], affinities["different"]
+    return {
+        "affinity.different": _ratio([each > AMBIGUOUS for each in different]),
+        "affinity.same": _ratio([each < AMBIGUOUS for each in same]),
+    }
+
+
+def _ratio(events: list[Bools]) -> Ratio:
+    """Return the share of events among the trials of each frame."""
+    return Ratio(np.array([each.sum() for each in events], float), np.array([each.size for each in events], float))
+
+
+def _hidden(shown: ShownPeople) -> dict[str, Ratio]:
+    limbs = shown.inside[..., LIMB_JOINTS], shown.behind[..., LIMB_JOINTS]
+    views = (shown.association.scores[..., _EARS] > 0).sum(axis=1)  # (F, A, 2)
+    return {
+        "behind": Ratio(_by_frame(limbs[1]), _by_frame(limbs[0])),
+        "ears": Ratio(_by_frame((views < 2) & shown.annotated[..., None]), 2 * _by_frame(shown.annotated)),
+    }
+
+
+def _missing(shown: ShownPeople) -> dict[str, Ratio]:
+    detected = shown.association.detected[..., None]
+    missing = (shown.association.scores == 0) & detected
+    result = {}
+    for name, pairs in TREE.items():
+        children, parents = (list(each) for each in zip(*pairs, strict=True))
+        parent = missing[..., parents]
+        result[f"tree.{name}"] = Ratio(_by_frame(parent & missing[..., children]), _by_frame(parent))
+    kinds = np.array(KIND_OF_JOINT)
+    for index, kind in enumerate(KINDS):
+        expected = (shown.inside & detected)[..., kinds == index]
+        result[f"missing.{kind}"] = Ratio(_by_frame(expected & missing[..., kinds == index]), _by_frame(expected))
+    return result
+
+
+def _people(shown: ShownPeople) -> dict[str, Ratio]:
+    expected = shown.inside[..., LIMB_JOINTS].mean(axis=-1) > _IN_PICTURE
+    frames, views = expected.shape[:2]
+    others = np.any(np.isfinite(shown.association.unannotated), axis=(2, 3))
+    return {
+        "detected": Ratio(_by_frame(expected & shown.association.detected), _by_frame(expected)),
+        "phantoms": Ratio(_by_frame(shown.association.false), np.full(frames, float(views))),
+        "others": Ratio(_by_frame(others), np.ones(frames)),
+    }
+
+
+def _by_frame(counted: NDArray[Any]) -> Floats:
+    """Return the sums over all axes but the first, (F,)."""
+    return counted.reshape(len(counted), -1).sum(axis=1, dtype=float)
+
+
+def _bone_lengths(joints: Floats) -> Floats:
+    """Return the lengths of bones in mm, (F, A, 2, 4), of joints (F, A, 17, 3) in metres."""
+    ends = np.array(list(BONES.values()))  # (4, 2 sides, 2 ends)
+    lengths = np.linalg.norm(joints[:, :, ends[..., 0]] - joints[:, :, ends[..., 1]], axis=-1)
+    return 1000.0 * np.swapaxes(lengths, 2, 3)

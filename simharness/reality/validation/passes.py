@@ -1,0 +1,156 @@
+"""Passes of the method over changed recordings: some cameras, or detections and calibrations with added errors.
+
+One pass estimates every annotated frame of one changed recording by all variants. A validation is a list of passes,
+which processes share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mvpose import Pipeline
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.validation.frame_scores import FrameScores, score_frames
+from simharness.reality.validation.tally import Tally
+from simharness.runtime.frame_pool import map_frames
+
+VARIANTS = ("full", "fast", "no-3dps", "no-matching")
+"""Presets of :class:`mvpose.Pipeline` that a validation compares."""
+
+
+class Change(Protocol):
+    """Change of a recording: frozen, so that it can be sent to other processes and be the key of a result."""
+
+    def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
+        """Return the changed recording, with the same frames and the same truth."""
+        ...
+
+
+@dataclass(frozen=True)
+class Unchanged:
+    """No change."""
+
+    def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
+        """Return the recording."""
+        return recording
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """Restriction of a recording to some cameras.
+
+    Attributes:
+        views: indices of the cameras.
+    """
+
+    views: tuple[int, ...]
+
+    def __call__(self, recording: AnnotatedRecording) -> AnnotatedRecording:
+        """Return the recording of these cameras."""
+        return recording.subset(self.views)
+
+
+def annotated(recording: AnnotatedRecording, *, every: int = 1) -> AnnotatedRecording:
+    """Return every n-th of the frames in which somebody is annotated; only these are scored."""
+    rows = np.flatnonzero(np.isfinite(recording.truth).any(axis=(1, 2, 3)))
+    return recording.during(rows[::every])
+
+
+def frame_scores(recording: AnnotatedRecording, variant: str) -> FrameScores:
+    """Return the scores of a variant in all frames of a recording.
+
+    Args:
+        recording: the recording.
+        variant: name of a preset of :class:`mvpose.Pipeline`.
+
+    Raises:
+        ValueError: an unknown preset.
+    """
+    pipeline = Pipeline.preset(variant)
+    estimates = [pipeline.estimate(recording.rig, detections).joints for detections in recording.detections]
+    return score_frames(recording.truth, estimates)
+
+
+def score_recordings(
+    recordings: Sequence[AnnotatedRecording],
+    *,
+    variants: Sequence[str] = VARIANTS,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda recordings: None,
+) -> list[dict[str, FrameScores]]:
+    """Return the scores of all frames by variant, for each recording.
+
+    Args:
+        recordings: recordings, for example those of :func:`annotated`.
+        variants: names of presets.
+        workers: number of processes; the result does not depend on it.
+        progress: called with the number of finished recordings.
+    """
+    function = _Scores(tuple(recordings), tuple(variants))
+    chunks = map_frames(function, range(len(recordings)), workers=workers, progress=progress)
+    return [each for chunk in chunks for each in chunk]
+
+
+Tallies = Mapping[str, Tally]
+"""Tallies of the frames of a recording by variant."""
+
+
+def run_passes(
+    recordings: Sequence[AnnotatedRecording],
+    changes: Sequence[Change],
+    *,
+    variants: Sequence[str] = VARIANTS,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda passes: None,
+) -> list[dict[Change, Tallies]]:
+    """Return, for each recording, the tallies by change.
+
+    Args:
+        recordings: recordings, for example those of :func:`annotated`.
+        changes: changes, each made to every recording.
+        variants: names of presets.
+        workers: number of processes; the result does not depend on it.
+        progress: called with the number of finished passes.
+    """
+    passes = _Passes(tuple(recordings), tuple(changes), tuple(variants))
+    chunks = map_frames(passes, range(len(passes)), workers=workers, progress=progress)
+    done = [each for chunk in chunks for each in chunk]
+    # Recordings vary fastest, so that processes share the long and the short passes evenly.
+    return [dict(zip(changes, done[index :: len(recordings)], strict=True)) for index in range(len(recordings))]
+
+
+@dataclass(frozen=True)
+class _Scores:
+    """Scores of recordings by index."""
+
+    recordings: tuple[AnnotatedRecording, ...]
+    variants: tuple[str, ...]
+
+    def __call__(self, frames: range, /) -> list[dict[str, FrameScores]]:
+        """Return the scores of these recordings."""
+        return [{name: frame_scores(self.recordings[index], name) for name in self.variants} for index in frames]
+
+
+@dataclass(frozen=True)
+class _Passes:
+    """Passes by index: all recordings with the first change, then with the second."""
+
+    recordings: tuple[AnnotatedRecording, ...]
+    changes: tuple[Change, ...]
+    variants: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.recordings) * len(self.changes)
+
+    def __call__(self, frames: range, /) -> list[dict[str, Tally]]:
+        """Return the tallies of these passes."""
+        done = []
+        for index in frames:
+            change, recording = divmod(index, len(self.recordings))
+            changed = self.changes[change](self.recordings[recording])
+            done.append({name: Tally.of(frame_scores(changed, name), changed.scored) for name in self.variants})
+        return done

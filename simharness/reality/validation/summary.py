@@ -1,0 +1,163 @@
+"""Results of a validation, ready for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mvpose import SHELF14
+from simharness.reality.validation.dose import Response
+from simharness.reality.validation.evidence import Compared, number
+from simharness.reality.validation.frame_scores import RULES, HeadRule
+from simharness.reality.validation.measurements import AFFINITY_EDGES
+from simharness.reality.validation.scores import SCORES
+from simharness.reality.validation.subsets import SubsetComparison
+from simharness.reality.validation.validation import Validation
+from simharness.reality.validation.verdicts import State, Verdict
+from simharness.statistics.intervals import Interval
+
+if TYPE_CHECKING:
+    from simharness.reality.validation.prediction import HalfPrediction
+
+_SIDES = ("real", "twin")
+
+
+def summarize_validation(validation: Validation) -> dict[str, Any]:
+    """Return all results ready for JSON; numbers that do not exist are null.
+
+    ``variants.NAME.real.pcp`` and the other scores are numbers by rule for the head: "voxelpose", "2019", and both
+    "filled" (missing joints of the face completed from the others). ``subsets.COUNT.NAME.real`` and
+    ``dose.TREATMENT.LEVEL.NAME.real`` are single numbers; the latter is the loss of PCP. All of them have the same
+    under ``twin``, and their 95 % intervals beside them.
+    """
+    recording = validation.recording
+    states = [verdict.state for verdict in validation.verdicts]
+    return {
+        "name": recording.name,
+        "kind": recording.kind,
+        "cameras": len(recording.rig),
+        "frames": {"real": len(recording), "twin": validation.twin_frames},
+        "twins": validation.twins,
+        "plan": {
+            "every": validation.plan.every,
+            "twin_every": validation.plan.twin_every,
+            "draws": validation.plan.draws,
+            "detection_draws": validation.plan.detection_draws,
+        },
+        "passed": State.FAILS not in states,
+        "counts": {state.value: states.count(state) for state in State},
+        "verdicts": [_verdict(each) for each in validation.verdicts],
+        "variants": {name: _variant(validation, name) for name in validation.variants},
+        "contrasts": {
+            f"{one} - {other}": {str(rule): figure.summary() for rule, figure in figures.items()}
+            for (one, other), figures in validation.contrasts.items()
+        },
+        "subsets": _subsets(validation.subsets, validation.subsets_as_is),
+        "subset_rank": {name: _rank(rank) for name, rank in validation.subsets.ranks.items()},
+        "subset_samples": list(validation.subsets.sampled),
+        "single_subsets": {
+            name: [
+                {"cameras": list(views), "real": number(real), "twin": number(twin)}
+                for views, (real, twin) in of.items()
+            ]
+            for name, of in validation.subsets.single.items()
+        },
+        "dose": _dose(validation),
+        "joints": {
+            "names": list(SHELF14.joints),
+            "mpjpe_mm": {side: _numbers(getattr(validation.joints, f"{side}_mm")) for side in _SIDES},
+            "pck": {side: _numbers(getattr(validation.joints, f"{side}_pck")) for side in _SIDES},
+            "rank_correlation": number(validation.joints.rank_correlation),
+            "rank_correlation_pck": number(validation.joints.rank_correlation_pck),
+        },
+        "measurements": {key: figure.summary() for key, figure in validation.measured.items()},
+        "affinities": {
+            "edges": _numbers(AFFINITY_EDGES),
+            **{
+                key: dict(zip(_SIDES, map(_numbers, shares), strict=True))
+                for key, shares in validation.affinities.items()
+            },
+        },
+    }
+
+
+def summarize_halves(predictions: Sequence[HalfPrediction]) -> dict[str, Any]:
+    """Return the predictions of halves ready for JSON, by the half that was predicted."""
+    result = {}
+    for each in predictions:
+        whole = summarize_validation(each.validation)
+        result[each.half] = {key: whole[key] for key in ("frames", "variants", "contrasts", "subsets", "subset_rank")}
+        result[each.half]["verdicts"] = [_verdict(verdict) for verdict in each.verdicts]
+    return result
+
+
+def _verdict(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "group": verdict.group,
+        "name": verdict.name,
+        "real": number(verdict.real),
+        "twin": number(verdict.twin),
+        "difference": number(verdict.difference),
+        "bound": verdict.bound,
+        "state": verdict.state.value,
+    }
+
+
+def _variant(validation: Validation, name: str) -> dict[str, Any]:
+    scores = validation.variants[name]
+    result: dict[str, Any] = {}
+    for side in _SIDES:
+        result[side] = {
+            key: {str(rule): number(getattr(scores[key][rule], side).mean) for rule in RULES} for key in SCORES
+        }
+        result[side]["mpjpe_median_mm"] = number(getattr(validation.medians[name], side).mean)
+        result[side]["pcp_parts"] = {
+            group: number(getattr(figure, side).mean) for group, figure in validation.parts[name].items()
+        }
+        result[f"{side}_interval"] = {key: _intervals(scores[key], side) for key in SCORES}
+    result["difference"] = {key: {str(rule): number(scores[key][rule].difference) for rule in RULES} for key in SCORES}
+    return result
+
+
+def _intervals(figures: Mapping[HeadRule, Compared], side: str) -> dict[str, list[float | None]]:
+    ends = {rule: getattr(figure, side) for rule, figure in figures.items()}
+    return {str(rule): [number(each.low), number(each.high)] for rule, each in ends.items()}
+
+
+def _subsets(filled: SubsetComparison, as_is: SubsetComparison) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for count, curve in filled.curves.items():
+        result[str(count)] = {
+            name: {**figure.summary(), "as_is": as_is.curves[count][name].summary()} for name, figure in curve.items()
+        }
+        if count in filled.gains:
+            result[str(count)]["full - fast"] = filled.gains[count].summary()
+    return result
+
+
+def _dose(validation: Validation) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for each in validation.responses:
+        level = result.setdefault(each.kind, {}).setdefault(f"{each.level:g}", {})
+        level[each.variant] = _response(each)
+    return result
+
+
+def _response(response: Response) -> dict[str, Any]:
+    return {
+        **response.loss.summary(),
+        "filled": response.loss_filled.summary(),
+        "ghosts_per_frame": response.ghosts.summary(),
+        "recall": response.recall.summary(),
+        "mpjpe_mm": response.mpjpe.summary(),
+        "draws": dict(zip(_SIDES, map(_numbers, response.draws), strict=True)),
+        "rank_correlation": _rank(response.rank),
+    }
+
+
+def _rank(rank: Interval) -> dict[str, Any]:
+    return {"value": number(rank.mean), "interval": [number(rank.low), number(rank.high)]}
+
+
+def _numbers(values: Any) -> list[float | None]:
+    return [number(float(value)) for value in values]

@@ -1,0 +1,233 @@
+"""Validation of the twins of a recording: everything that simulation predicts, beside what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.validation.dose import Response, compare_responses
+from simharness.reality.validation.evidence import Compared, Evidence, compared, frame_weights
+from simharness.reality.validation.frame_scores import RULES, FrameScores, HeadRule
+from simharness.reality.validation.judge import judge_measurements, judge_responses, judge_scores, judge_subsets
+from simharness.reality.validation.measured import compare_measurements
+from simharness.reality.validation.measurements import Measurements, measure
+from simharness.reality.validation.passes import (
+    VARIANTS,
+    Change,
+    Tallies,
+    Unchanged,
+    annotated,
+    run_passes,
+    score_recordings,
+)
+from simharness.reality.validation.scores import (
+    JointDifficulty,
+    compare_contrasts,
+    compare_joints,
+    compare_variants,
+    median_error,
+    pcp_of_parts,
+)
+from simharness.reality.validation.subsets import Cameras, SubsetComparison, camera_subsets, compare_subsets
+from simharness.reality.validation.tally import Tally
+from simharness.reality.validation.treatments import treatments
+from simharness.reality.validation.verdicts import BOUNDS, Bounds, State, Verdict
+from simharness.runtime.progress import Reporter, Silence
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Extent of a validation.
+
+    Attributes:
+        every: every n-th annotated frame of the recording is used.
+        twin_every: the same for subsets and treatments of twins, of which there are several; all else takes every
+            frame that ``every`` leaves.
+        draws: number of draws of calibration errors.
+        detection_draws: number of draws of the errors of detections.
+        treated: whether treatments are compared.
+        variants: names of presets.
+        workers: number of processes.
+    """
+
+    every: int = 1
+    twin_every: int = 3
+    draws: int = 10
+    detection_draws: int = 3
+    treated: bool = True
+    variants: tuple[str, ...] = VARIANTS
+    workers: int = 1
+
+
+QUICK = Plan(every=3, twin_every=6, draws=4, detection_draws=2)
+"""Plan for a first look: a third of the frames."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Comparison of a recording with its twins, and verdicts.
+
+    Attributes:
+        recording: the recording, with the frames that were used.
+        twins: number of twins.
+        twin_frames: number of frames of a twin, mean.
+        plan: extent.
+        variants: scores by variant, key and rule for the head.
+        medians: median MPJPE by variant, mm.
+        parts: PCP of each group of parts by variant.
+        contrasts: differences of PCP by pair of variants and rule.
+        subsets: PCP with some of the cameras, missing joints of the face filled from the others.
+        subsets_as_is: the same as the method left them.
+        responses: losses by treatment, level and variant.
+        bases: PCP without a treatment in the frames that are treated, real and simulated, by variant, percent.
+        joints: errors by joint, of the first variant.
+        measured: measurements of the detections.
+        affinities: histograms of affinities, of the recording and mean of the twins.
+        verdicts: verdicts.
+    """
+
+    recording: AnnotatedRecording
+    twins: int
+    twin_frames: float
+    plan: Plan
+    variants: Mapping[str, Mapping[str, Mapping[HeadRule, Compared]]]
+    medians: Mapping[str, Compared]
+    parts: Mapping[str, Mapping[str, Compared]]
+    contrasts: Mapping[tuple[str, str], Mapping[HeadRule, Compared]]
+    subsets: SubsetComparison
+    subsets_as_is: SubsetComparison
+    responses: Sequence[Response]
+    bases: Mapping[str, tuple[float, float]]
+    joints: JointDifficulty
+    measured: Mapping[str, Compared]
+    affinities: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    verdicts: Sequence[Verdict] = field(default=())
+
+    @property
+    def failed(self) -> list[Verdict]:
+        """Verdicts that fail."""
+        return [verdict for verdict in self.verdicts if verdict.state == State.FAILS]
+
+
+def validate(
+    recording: AnnotatedRecording,
+    twins: Sequence[AnnotatedRecording],
+    *,
+    plan: Plan | None = None,
+    bounds: Bounds = BOUNDS,
+    reporter: Reporter | None = None,
+) -> Validation:
+    """Compare a recording with its twins.
+
+    Args:
+        recording: the recording.
+        twins: its twins, each of another seed, with the same cameras.
+        plan: extent; by default the whole.
+        bounds: bounds of the verdicts.
+        reporter: receiver of progress.
+
+    Raises:
+        ValueError: no twins, a twin with another number of cameras, or nobody annotated.
+    """
+    plan, reporter = plan or Plan(), reporter or Silence()
+    _check(recording, twins)
+    real = annotated(recording, every=plan.every)
+    whole = [annotated(twin, every=plan.every) for twin in twins]
+    thinned = [annotated(twin, every=plan.twin_every) for twin in twins]
+
+    with reporter.stage("scores", 1 + len(whole)) as advance:
+        scores = score_recordings([real, *whole], variants=plan.variants, workers=plan.workers, progress=advance)
+    with reporter.stage("measurements", 1 + len(whole)) as advance:
+        measurements = []
+        for each in (real, *whole):
+            measurements.append(measure(each))
+            advance(1)
+    changes: list[Change] = [Unchanged(), *map(Cameras, camera_subsets(len(real.rig)))]
+    changes += treatments(draws=plan.draws, detection_draws=plan.detection_draws) if plan.treated else ()
+    with reporter.stage("subsets and treatments", len(changes) * (1 + len(thinned))) as advance:
+        passes = run_passes([real, *thinned], changes, variants=plan.variants, workers=plan.workers, progress=advance)
+    return _compare(real, whole, plan, bounds, scores, measurements, Evidence.of(real, passes[0], passes[1:]))
+
+
+def _check(recording: AnnotatedRecording, twins: Sequence[AnnotatedRecording]) -> None:
+    if not twins:
+        raise ValueError(f"{recording.name}: expected one or more twins to compare with, got none")
+    for each in (recording, *twins):
+        if len(each.rig) != len(recording.rig):
+            raise ValueError(
+                f"{each.name}: expected a twin with the {len(recording.rig)} cameras of {recording.name}, "
+                f"got {len(each.rig)}"
+            )
+        if not np.isfinite(each.truth).any():
+            raise ValueError(f"{each.name}: expected frames with annotated people, got none in {len(each)} frames")
+
+
+def _compare(
+    real: AnnotatedRecording,
+    twins: Sequence[AnnotatedRecording],
+    plan: Plan,
+    bounds: Bounds,
+    scores: Sequence[Mapping[str, FrameScores]],
+    measurements: Sequence[Measurements],
+    evidence: Evidence,
+) -> Validation:
+    """Return the comparison, from the scores, the measurements and the passes of all recordings."""
+    everyone = (real, *twins)
+    tallies: list[dict[Change, Tallies]] = [
+        {Unchanged(): {name: Tally.of(of, each.scored) for name, of in variants.items()}}
+        for each, variants in zip(everyone, scores, strict=True)
+    ]
+    whole = Evidence.of(real, tallies[0], tallies[1:])
+    variants = compare_variants(whole, plan.variants)
+    contrasts = compare_contrasts(whole, plan.variants)
+    cameras = len(real.rig)
+    subsets = compare_subsets(evidence, cameras, plan.variants)
+    responses = compare_responses(evidence, plan.variants)
+    measured = compare_measurements(measurements[0], measurements[1:], frame_weights(real))
+    verdicts = [
+        *judge_scores(variants, contrasts, bounds),
+        *judge_subsets(subsets, bounds),
+        *judge_responses(responses, bounds),
+        *judge_measurements(measured, real.kind, bounds),
+    ]
+    first = plan.variants[0]
+    return Validation(
+        recording=real,
+        twins=len(twins),
+        twin_frames=float(np.mean([len(twin) for twin in twins])),
+        plan=plan,
+        variants=variants,
+        medians={name: _plain([median_error(each[name]) for each in scores]) for name in plan.variants},
+        parts={name: _parts(everyone, [each[name] for each in scores]) for name in plan.variants},
+        contrasts=contrasts,
+        subsets=subsets,
+        subsets_as_is=compare_subsets(evidence, cameras, plan.variants, rule=RULES[0]),
+        responses=responses,
+        bases={name: _base(evidence, name) for name in plan.variants},
+        joints=compare_joints(scores[0][first], [each[first] for each in scores[1:]]),
+        measured=measured,
+        affinities={
+            key: (real_shares, np.mean([each.affinities[key] for each in measurements[1:]], axis=0))
+            for key, real_shares in measurements[0].affinities.items()
+        },
+        verdicts=verdicts,
+    )
+
+
+def _base(evidence: Evidence, variant: str) -> tuple[float, float]:
+    figure = evidence.compare(lambda sums: sums[Unchanged()][variant].pcp())
+    return figure.real.mean, figure.twin.mean
+
+
+def _parts(recordings: Sequence[AnnotatedRecording], scores: Sequence[FrameScores]) -> dict[str, Compared]:
+    """Return the PCP of each group of parts."""
+    each = [pcp_of_parts(one, recording.scored) for recording, one in zip(recordings, scores, strict=True)]
+    return {group: _plain([values[group] for values in each]) for group in each[0]}
+
+
+def _plain(values: Sequence[float]) -> Compared:
+    """Return a figure of the recording (first) and its twins, without an interval of the recording."""
+    return compared(values[0], np.nan, values[1:])

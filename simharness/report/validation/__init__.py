@@ -1,0 +1,1 @@
+"""Report of a validation: what simulation predicted, beside what was recorded."""

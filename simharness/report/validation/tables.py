@@ -1,0 +1,241 @@
+"""Tables of the page of a validation: rows of text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simharness.reality.validation.evidence import Compared
+from simharness.reality.validation.frame_scores import RULES, HeadRule
+from simharness.reality.validation.judge import GROUPS
+from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.validation import Validation
+from simharness.reality.validation.verdicts import State, Verdict
+from simharness.runtime.number_text import fixed, signed
+from simharness.statistics.intervals import Interval
+
+NOTHING = "–"
+PUBLISHED = tuple(rule for rule in RULES if not rule.filled)
+"""Rules for the head as published."""
+
+# Digits and factor by group of verdicts: shares are shown in percent.
+_FORMATS: Mapping[str, tuple[int, float, str]] = {
+    "mpjpe": (1, 1.0, "mm"),
+    "bones": (1, 1.0, "mm"),
+    "subset_rank": (2, 1.0, ""),
+    "draw_rank": (2, 1.0, ""),
+    **{group: (1, 100.0, "%") for group in ("tree", "ears", "behind", "ambiguous")},
+}
+_PERCENT_BOUND = {"tree", "ears", "behind"}  # groups whose bounds are shares
+
+MEASUREMENTS: Mapping[str, str] = {
+    "bones.shank": "shank, variation, mm",
+    "bones.thigh": "thigh, variation, mm",
+    "bones.forearm": "forearm, variation, mm",
+    "bones.upper arm": "upper arm, variation, mm",
+    "true_bones.shank": "annotated shank, variation, mm",
+    "true_bones.thigh": "annotated thigh, variation, mm",
+    "true_bones.forearm": "annotated forearm, variation, mm",
+    "true_bones.upper arm": "annotated upper arm, variation, mm",
+    "behind": "joints hidden by others, %",
+    "affinity.different": "different people above 0.5, %",
+    "affinity.same": "one person below 0.5, %",
+    "ears": "ears in fewer than two views, %",
+    "detected": "people detected per view, %",
+    "phantoms": "phantoms per view and frame",
+    "others": "people not annotated, per frame",
+    "score.q10": "score of limbs, 10 % quantile",
+    "score.q50": "score of limbs, median",
+    "score.q90": "score of limbs, 90 % quantile",
+}
+"""Titles of measurements by key; the others are named by :func:`measurement_title`."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Row of a table of verdicts.
+
+    Attributes:
+        title: first cell.
+        cells: further cells.
+        state: state of the verdict.
+        note: small text under the title.
+        count: number of figures that the row stands for.
+    """
+
+    title: str
+    cells: tuple[str, ...]
+    state: str
+    note: str = ""
+    count: int = 1
+
+
+GROUP_COLUMNS = ("hold", "unclear", "fail", "real", "simulated", "difference", "bound")
+"""Titles of the cells of :func:`group_rows`."""
+
+
+def group_rows(verdicts: Sequence[Verdict]) -> list[Row]:
+    """Return a row for each group: number of figures by state, and the figure that is worst."""
+    rows = []
+    for key, title in GROUPS.items():
+        of = [each for each in verdicts if each.group == key]
+        if not of:
+            continue
+        worst = max(of, key=_badness)
+        counts = [sum(each.state == state for each in of) for state in State]
+        cells = (*(str(count) for count in counts), *_numbers(worst))
+        note = "" if len(of) == 1 else f"worst: {_label(worst)}"
+        rows.append(Row(title, cells, worst.state.value, note, len(of)))
+    return rows
+
+
+def verdict_rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Row]]]:
+    """Yield the title of each group, and the rows of all of its figures."""
+    for key, title in GROUPS.items():
+        of = [each for each in verdicts if each.group == key]
+        if of:
+            yield title, [Row(_label(each), _numbers(each), each.state.value) for each in of]
+
+
+def _badness(verdict: Verdict) -> tuple[int, float]:
+    apart = abs(verdict.difference) if np.isfinite(verdict.difference) else -verdict.twin
+    return list(State).index(verdict.state), apart
+
+
+def _label(verdict: Verdict) -> str:
+    """Return the name of a figure within its group."""
+    _, _, rest = verdict.name.partition(".")
+    text = re.sub(r"\.(?!\d)|(?<!\d)\.(?=\d)|(?<=\d)\.(?=\D)", ", ", rest)
+    return text.replace("tree.", "") or verdict.name
+
+
+def _numbers(verdict: Verdict) -> tuple[str, str, str, str]:
+    """Return the cells real, simulated, difference and bound."""
+    digits, factor, unit = _FORMATS.get(verdict.group, (1, 1.0, ""))
+    after = f" {unit}" if unit else ""
+    if not np.isfinite(verdict.real):
+        return NOTHING, fixed(verdict.twin, digits), NOTHING, verdict.bound
+    real, twin = (fixed(factor * value, digits) + after for value in (verdict.real, verdict.twin))
+    bound = verdict.bound
+    if verdict.group in _PERCENT_BOUND:
+        bound = f"± {100 * float(bound.removeprefix('± ')):g} %"
+    return real, twin, signed(factor * verdict.difference, digits), bound
+
+
+@dataclass(frozen=True)
+class ComparedCells:
+    """Cells of a comparison: real, simulated, difference, each with its interval in small print."""
+
+    real: tuple[str, str]
+    twin: tuple[str, str]
+    difference: tuple[str, str]
+
+
+def cells(figure: Compared, digits: int, *, factor: float = 1.0) -> ComparedCells:
+    """Return the cells of a comparison, numbers times ``factor`` with so many decimals."""
+    down, up = figure.uncertainty
+    difference = figure.difference
+    ends = (difference - down, difference + up)
+    return ComparedCells(
+        _with_interval(figure.real, digits, factor),
+        _with_interval(figure.twin, digits, factor),
+        (
+            signed(factor * difference, digits) if np.isfinite(difference) else NOTHING,
+            _span(factor * ends[0], factor * ends[1], digits) if np.isfinite(figure.real.low) else "",
+        ),
+    )
+
+
+def _with_interval(value: Interval, digits: int, factor: float) -> tuple[str, str]:
+    if not np.isfinite(value.mean):
+        return NOTHING, ""
+    return fixed(factor * value.mean, digits), _span(factor * value.low, factor * value.high, digits)
+
+
+def _span(low: float, high: float, digits: int) -> str:
+    return f"{fixed(low, digits)} to {fixed(high, digits)}" if np.isfinite(low) and np.isfinite(high) else ""
+
+
+def variant_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
+    """Return a row for each variant: PCP by both head rules, and MPJPE."""
+    return [
+        (name, [*(cells(scores["pcp"][rule], 1) for rule in PUBLISHED), cells(scores["mpjpe_mm"][PUBLISHED[0]], 1)])
+        for name, scores in validation.variants.items()
+    ]
+
+
+def people_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
+    """Return a row for each variant: ghosts per frame, recall and precision."""
+    first = PUBLISHED[0]
+    return [
+        (
+            name,
+            [
+                cells(scores["ghosts_per_frame"][first], 2),
+                *(cells(scores[key][first], 1, factor=100.0) for key in ("recall", "precision")),
+            ],
+        )
+        for name, scores in validation.variants.items()
+    ]
+
+
+def contrast_rows(validation: Validation) -> list[tuple[str, list[ComparedCells]]]:
+    """Return a row for each pair of variants: the difference of PCP by every rule for the head."""
+    return [
+        (f"{one} − {other}", [cells(figures[rule], 1) for rule in _contrast_rules()])
+        for (one, other), figures in validation.contrasts.items()
+    ]
+
+
+def _contrast_rules() -> tuple[HeadRule, ...]:
+    return (*PUBLISHED, RULES[2])
+
+
+def subset_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str, ComparedCells]]]]:
+    """Yield the PCP of each variant, and ``full`` minus ``fast``, by number of cameras."""
+    subsets = validation.subsets
+    for name in validation.plan.variants:
+        yield name, [(f"{count} cameras", cells(curve[name], 1)) for count, curve in subsets.curves.items()]
+    if subsets.gains:
+        yield "full − fast", [(f"{count} cameras", cells(gain, 1)) for count, gain in subsets.gains.items()]
+
+
+def response_rows(validation: Validation) -> Iterator[tuple[str, list[tuple[str, ComparedCells]]]]:
+    """Yield the loss of PCP of each variant, by treatment and level."""
+    groups: dict[str, list[tuple[str, ComparedCells]]] = {}
+    for each in validation.responses:
+        title = f"{KINDS[each.kind].title}, {level_text(each.kind, each.level)}"
+        groups.setdefault(title, []).append((each.variant, cells(each.loss, 1)))
+    yield from groups.items()
+
+
+def level_text(kind: str, level: float) -> str:
+    """Return a level of a treatment with its unit."""
+    unit = KINDS[kind].unit
+    return f"{100 * level:g} %" if unit == "share" else f"{level:g} {unit}"
+
+
+def measurement_rows(validation: Validation) -> list[tuple[str, ComparedCells]]:
+    """Return a row for each measurement of the detections that the recording has."""
+    rows = []
+    for key, figure in validation.measured.items():
+        if np.isfinite(figure.real.mean):
+            title = measurement_title(key)
+            percent = title.endswith(", %")
+            digits = 2 if key.startswith(("score", "phantoms", "others")) else 1
+            rows.append((title, cells(figure, digits, factor=100.0 if percent else 1.0)))
+    return rows
+
+
+def measurement_title(key: str) -> str:
+    """Return the title of a measurement."""
+    if key in MEASUREMENTS:
+        return MEASUREMENTS[key]
+    group, _, name = key.partition(".")
+    if group == "tree":
+        child, _, parent = name.partition("|")
+        return f"{child} missing where the {parent} is, %"
+    return f"{name} not reported, %"

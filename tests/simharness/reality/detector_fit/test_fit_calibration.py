@@ -1,0 +1,42 @@
+"""Calibration of measured errors by simulation."""
+
+import numpy as np
+import pytest
+
+from simharness.reality.detector_fit.calibration import FACTORS, SHARES, calibrate
+from simharness.reality.detector_fit.measure import measure
+from simharness.reality.detector_fit.profile import settings
+from simharness.scenario.sections.detector import KINDS
+
+TRUE = {"keypoints.scatter": 0.4, "keypoints.miss": 0.06, "keypoints.jitter": 0.12}
+
+
+def mean(values, key):
+    return np.mean([values[f"{key}.{kind}"] for kind in KINDS[3:]])
+
+
+@pytest.mark.slow
+def test_calibrated_parameters_are_nearer_to_the_true_ones(filmed):
+    """Of a poor detector too few jitters and too many misses are measured, because other views err as well."""
+    errors = {key.split(".")[1]: value for key, value in TRUE.items()}
+    measured = measure(filmed.sample(kind="bottom-up", keypoints=errors), resamples=10)
+
+    def simulate(values):
+        return [filmed.sample(seed=5, **settings(measured.with_values(values), name="fitted"))]
+
+    real = {key: each.value for key, each in measured.values.items()}
+    calibrated = calibrate(real, simulate)
+    for key in ("keypoints.miss", "keypoints.jitter"):
+        before, after = (abs(mean(values, key) - TRUE[key]) for values in (real, calibrated))
+        assert after < 0.6 * before, key
+    assert mean(calibrated, "keypoints.scatter") == pytest.approx(0.4, rel=0.08)
+    untouched = [key for key in real if not key.startswith((*SHARES, *FACTORS))]
+    np.testing.assert_array_equal([calibrated[key] for key in untouched], [real[key] for key in untouched])
+
+
+def test_a_simulation_that_measures_alike_changes_nothing(filmed):
+    sample = filmed.sample(keypoints={"scatter": 0.3, "jitter": 0.05})
+    real = {key: each.value for key, each in measure(sample, resamples=10).values.items()}
+    calibrated = calibrate(real, lambda values: [sample], rounds=1)
+    for key, value in real.items():
+        assert calibrated[key] == pytest.approx(value, rel=1e-6, nan_ok=True), key

@@ -1,0 +1,201 @@
+"""Errors of a truth that people made: drawn, and fitted to a recording."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mvpose.skeleton import coco17_to_shelf14
+from simharness.detector.bias import SIDE, body_axes
+from simharness.reality.annotation import AnnotationModel, fit_annotation
+from simharness.reality.detector_fit.fit import fit
+from simharness.reality.detector_fit.joint_labels import label_joints
+from simharness.reality.detector_fit.sample import sample_of
+from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
+from simharness.scenario.sections.annotation import Annotation
+from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS
+
+LIMBS = slice(0, 12)  # of SHELF14
+STEP = 0.04
+SIDE_14 = np.empty(12)
+SIDE_14[SHELF14_OF_LIMBS] = SIDE[LIMB_JOINTS]
+NOISY = {
+    "keypoints": {"scatter": 0.3, "jitter": 0.03, "miss": 0.02, "drop": {"self_occluded": 0.1, "occluded": 0.3}},
+    "bias": {"hips": [0.0, 0.01, 0.04], "wrists": [0.01, 0.0, -0.01]},
+    "boxes": {"missed": 0.05},
+}
+
+
+def model(actors=3, *, shift=0.03, deviation=0.02, life=0.1, noise=0.2, seed=0):
+    """Return an annotation whose shifts are drawn."""
+    drawn = shift * np.random.default_rng(seed).standard_normal((actors, 14, 3))
+    return AnnotationModel(drawn, np.full((actors, 14), deviation), life, noise)
+
+
+def errors(annotation, joints, time, *, seed=0):
+    """Return the errors of an annotation of ``joints`` in the body's frame, (F, A, 14, 3)."""
+    away = annotation.annotate(joints, time, seed=seed) - coco17_to_shelf14(joints)
+    return np.einsum("fajc,fakc->fajk", away, body_axes(joints))
+
+
+@pytest.fixture(scope="module")
+def still(filmed):
+    """Poses of one frame, held for 4000 frames."""
+    return np.broadcast_to(filmed.sequence.joints[0], (4000, 3, 17, 3)), STEP * np.arange(4000)
+
+
+@pytest.fixture(scope="module")
+def known(filmed):
+    """Recording whose detector and annotation both err in known ways, and the annotation."""
+    annotation = model(deviation=0.02, life=0.2, noise=0.2)
+    truth = annotation.annotate(filmed.sequence.joints, filmed.sequence.time, seed=0)
+    return replace(filmed.recording(**NOISY), truth=truth), annotation
+
+
+@pytest.fixture(scope="module")
+def fitted(known):
+    return fitted_annotation(known[0])
+
+
+BIAS = np.zeros((9, 3))
+for _kind, _offset in NOISY["bias"].items():
+    BIAS[KINDS.index(_kind)] = _offset
+
+
+class TestDrawn:
+    def test_without_errors_it_is_the_truth(self, filmed):
+        joints, time = filmed.sequence.joints, filmed.sequence.time
+        exact = model(shift=0.0, deviation=0.0).annotate(joints, time, seed=0)
+        np.testing.assert_array_equal(exact, coco17_to_shelf14(joints))
+
+    def test_shifts_turn_with_the_body(self, filmed):
+        annotation = model(deviation=0.0)
+        away = errors(annotation, filmed.sequence.joints, filmed.sequence.time)
+        np.testing.assert_allclose(away, np.broadcast_to(annotation.shift, away.shape), atol=1e-9)
+
+    def test_mean_and_deviation(self, still):
+        annotation = model(life=0.1)
+        away = errors(annotation, *still)
+        # 4000 frames with a memory of 0.1 s are about 800 independent ones: the mean is known to 0.7 mm.
+        np.testing.assert_allclose(away.mean(axis=0), annotation.shift, atol=0.004)
+        np.testing.assert_allclose(away.std(axis=0), 0.02, rtol=0.15)
+        assert away.std(axis=0).mean() == pytest.approx(0.02, rel=0.02)
+        np.testing.assert_allclose(annotation.rms[0], np.sqrt((away[:, 0] ** 2).sum(axis=-1).mean(axis=0)), rtol=0.1)
+
+    def test_memory(self, still):
+        """The autocorrelation is (1 - noise) exp(-lag / life)."""
+        rest = errors(model(shift=0.0, life=0.4, noise=0.3), *still) / 0.02
+        for lag in (1, 5, 10, 25):
+            correlation = (rest[:-lag] * rest[lag:]).mean()
+            assert correlation == pytest.approx(0.7 * np.exp(-lag * STEP / 0.4), abs=0.02)
+
+    def test_gaps_between_frames_count_as_they_last(self, still):
+        joints = still[0][:1000]
+        time = STEP * (np.arange(1000) + 100 * (np.arange(1000) // 2))  # pairs of frames, 4 s apart
+        rest = errors(model(shift=0.0, life=0.4, noise=0.0), joints, time) / 0.02
+        assert (rest[0::2] * rest[1::2]).mean() == pytest.approx(np.exp(-STEP / 0.4), abs=0.03)
+        assert (rest[1:-1:2] * rest[2::2]).mean() == pytest.approx(0.0, abs=0.03)
+
+    def test_seeds_and_missing_people(self, filmed):
+        joints, time = filmed.sequence.joints.copy(), filmed.sequence.time
+        whole = model().annotate(joints, time, seed=3)
+        np.testing.assert_array_equal(model().annotate(joints, time, seed=3), whole)
+        assert np.abs(model().annotate(joints, time, seed=4) - whole).mean() > 0.005
+        joints[:50, 1] = np.nan
+        partly = model().annotate(joints, time, seed=3)
+        assert np.isnan(partly[:50, 1]).all()
+        np.testing.assert_array_equal(np.delete(partly, 1, axis=1), np.delete(whole, 1, axis=1))
+        np.testing.assert_array_equal(partly[50:], whole[50:])
+
+    def test_the_section_of_a_scenario_has_drawn_shifts(self):
+        config = Annotation(shift=0.03, random=0.01, life=0.5, noise=0.1)
+        drawn = AnnotationModel.drawn(config, 200, seed=1)
+        assert drawn.shift.std() == pytest.approx(0.03, rel=0.05)
+        assert (drawn.deviation == 0.01).all()
+        assert (drawn.life, drawn.noise) == (0.5, 0.1)
+        np.testing.assert_array_equal(AnnotationModel.drawn(config, 200, seed=1).shift, drawn.shift)
+        assert (AnnotationModel.drawn(config, 200, seed=2).shift != drawn.shift).all()
+
+
+def fitted_annotation(recording, *, scatter=0.3):
+    """Return the annotation fitted to a recording whose detector has a known scatter, units."""
+    people = track_people(recording)
+    consensus = label_joints(sample_of(recording, people)).consensus
+    return fit_annotation(recording.truth, people, consensus, recording.time, sigma=np.full(17, scatter))
+
+
+def offset_in_body(annotation, bias):
+    """Return the offset of the annotation from the detector's joints, (A, 12, 3): forward, left and up."""
+    per_joint = bias[np.array(KIND_OF_JOINT)] * np.stack([np.ones(17), SIDE, np.ones(17)], axis=1)
+    result = annotation.shift[:, LIMBS].copy()
+    result[:, SHELF14_OF_LIMBS] -= per_joint[LIMB_JOINTS]
+    return result
+
+
+class TestFitted:
+    def test_annotation_and_bias_together_are_recovered(self, known, fitted):
+        """What annotators and detector share cannot be split: their difference is known."""
+        _, annotation = known
+        found = offset_in_body(fitted.annotation, fitted.bias)
+        away = found - offset_in_body(annotation, BIAS)
+        # The random part, of 20 mm and 0.2 s, averages to 4.5 mm over 8 s.
+        assert np.sqrt((away**2).mean()) < 0.008
+        assert np.abs(away).max() < 0.025
+
+    def test_shifts_of_actors_are_recovered_up_to_what_they_share(self, known, fitted):
+        _, annotation = known
+        found, true = (each.shift[:, LIMBS] for each in (fitted.annotation, annotation))
+        apart, expected = (each[0] - each[1] for each in (found, true))
+        assert np.sqrt(((apart - expected) ** 2).mean()) < 0.011
+        # By definition nothing is left of a kind of joint in the mean over actors and sides.
+        outward = found * np.stack([np.ones(12), SIDE_14, np.ones(12)], axis=-1)
+        for kind in range(3, 9):
+            of_kind = SHELF14_OF_LIMBS[np.array(KIND_OF_JOINT)[LIMB_JOINTS] == kind]
+            np.testing.assert_allclose(outward[:, of_kind].mean(axis=(0, 1)), 0.0, atol=1e-9)
+
+    def test_the_random_part_is_recovered(self, fitted):
+        annotation = fitted.annotation
+        assert annotation.deviation[:, LIMBS].mean() == pytest.approx(0.02, rel=0.12)
+        np.testing.assert_allclose(annotation.deviation[:, LIMBS], 0.02, rtol=0.6)
+        assert annotation.life == pytest.approx(0.2, abs=0.08)
+        assert annotation.noise == pytest.approx(0.2, abs=0.15)
+
+    def test_an_exact_truth_has_small_errors(self, filmed):
+        fitted = fitted_annotation(filmed.recording(keypoints={"scatter": 0.3}))
+        assert np.abs(fitted.annotation.shift[:, LIMBS]).max() < 0.01
+        assert fitted.annotation.deviation[:, LIMBS].mean() < 0.008
+
+    def test_actors_who_are_never_annotated_have_the_usual_errors(self, known):
+        recording, _ = known
+        recording = recording.during(np.arange(80))
+        truth = np.concatenate([recording.truth, np.full((80, 1, 14, 3), np.nan)], axis=1)
+        fitted = fitted_annotation(replace(recording, truth=truth))
+        assert fitted.compared.shape == (4, 14)
+        assert (fitted.compared[3] == 0).all()
+        np.testing.assert_allclose(fitted.annotation.shift[3, 12:], 0.0)
+        assert np.isfinite(fitted.annotation.shift).all()
+        assert 0.01 < fitted.annotation.deviation[3].mean() < 0.03
+
+    def test_an_unannotated_recording_has_an_exact_annotation(self, filmed):
+        recording = filmed.recording().during(np.arange(60))
+        recording = replace(recording, truth=np.full(recording.truth.shape, np.nan))
+        fitted = fitted_annotation(recording)
+        assert (fitted.annotation.shift == 0).all()
+        assert (fitted.annotation.deviation == 0).all()
+        assert (fitted.bias == 0).all()
+
+
+@pytest.mark.slow
+def test_the_detector_is_not_blamed_for_the_annotation(known):
+    """A whole fit: scatter is that of the detector, although the truth is off by several centimetres."""
+    recording, annotation = known
+    fitted = fit(recording, name="fitted", resamples=20)
+    scatter = np.mean([fitted.real[f"keypoints.scatter.{kind}"].value for kind in KINDS[3:]])
+    assert scatter == pytest.approx(0.3, abs=0.03)
+    miss = np.mean([fitted.real[f"keypoints.miss.{kind}"].value for kind in KINDS[3:]])
+    assert miss == pytest.approx(0.02, abs=0.01)
+    assert (fitted.profile.name, fitted.profile.kind) == ("fitted", recording.kind)
+    away = offset_in_body(fitted.annotation.annotation, fitted.annotation.bias) - offset_in_body(annotation, BIAS)
+    assert np.sqrt((away**2).mean()) < 0.008
+    hips = fitted.annotation.bias[KINDS.index("hips")]
+    assert fitted.profile.bias.hips == pytest.approx(hips, abs=1e-4)

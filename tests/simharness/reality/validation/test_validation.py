@@ -1,0 +1,158 @@
+"""A whole validation: keys of the JSON, the page, exit codes of the command."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from turning_people import walkers
+from typer.testing import CliRunner
+
+from mvpose import COCO17, SHELF14
+from simharness.cli import app
+from simharness.formats.calibration.voxelpose import write_calibration
+from simharness.reality.validation import prediction
+from simharness.reality.validation import validation as validation_module
+from simharness.reality.validation.prediction import halves
+from simharness.reality.validation.summary import summarize_validation
+from simharness.reality.validation.treatments import KINDS
+from simharness.reality.validation.validation import Plan, validate
+from simharness.reality.validation.verdicts import State
+from simharness.report.validation.page import render_validation
+from simharness.report.validation.tables import group_rows
+from simharness.scenario.toml_files import dumps_keys
+from simharness.trial.provenance import provenance
+
+PLAN = Plan(twin_every=1, draws=2, detection_draws=1, variants=("full", "fast"))
+TWINS = 2
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return walkers(frames=6, cameras=3, noise=3.0)
+
+
+@pytest.fixture(scope="module")
+def validation(recorded):
+    twins = [walkers(frames=6, cameras=3, noise=3.0, seed=seed, name="twin") for seed in (1, 2)]
+    return validate(recorded, twins, plan=PLAN)
+
+
+@pytest.fixture(scope="module")
+def summary(validation):
+    return json.loads(json.dumps(summarize_validation(validation), allow_nan=False))
+
+
+def test_the_json_has_the_documented_keys(summary):
+    for name in PLAN.variants:
+        for side in ("real", "twin"):
+            scores = summary["variants"][name][side]
+            for key in ("pcp", "mpjpe_mm"):
+                assert set(scores[key]) == {"voxelpose", "2019", "voxelpose, filled", "2019, filled"}
+                assert all(isinstance(value, float) for value in scores[key].values())
+        for count in ("2", "3"):
+            assert set(summary["subsets"][count][name]) >= {"real", "twin", "real_interval", "twin_interval"}
+    assert set(summary["dose"]) == set(KINDS)
+    for key, kind in KINDS.items():
+        assert set(summary["dose"][key]) == {f"{level:g}" for level in kind.levels}
+        for of_level in summary["dose"][key].values():
+            assert set(of_level) == set(PLAN.variants)
+            assert all({"real", "twin", "difference", "ghosts_per_frame"} <= set(each) for each in of_level.values())
+    assert set(summary["contrasts"]) == {"full - fast"}
+    assert {"group", "name", "real", "twin", "difference", "bound", "state"} <= set(summary["verdicts"][0])
+    names = [each["name"] for each in summary["verdicts"]]
+    assert len(set(names)) == len(names)
+    assert {"bones.shank", "affinity.different", "behind", "ears"} <= set(summary["measurements"])
+    assert summary["passed"] == all(each["state"] != "fails" for each in summary["verdicts"])
+    assert sum(summary["counts"].values()) == len(names)
+
+
+def test_a_recording_is_its_own_twin(recorded):
+    own = validate(recorded, [recorded, recorded], plan=PLAN)
+    apart = [each for each in own.verdicts if np.isfinite(each.real) and each.difference != pytest.approx(0, abs=1e-9)]
+    assert [each.name for each in apart if each.group != "subsets"] == []
+    assert {each.state for each in own.verdicts} == {State.HOLDS}
+    assert own.joints.rank_correlation == pytest.approx(1.0)
+
+
+def test_twins_with_a_worse_detector_fail(recorded):
+    worse = [walkers(frames=6, cameras=3, noise=40.0, seed=seed, name="twin") for seed in (1, 2)]
+    failed = {each.group for each in validate(recorded, worse, plan=PLAN).failed}
+    assert {"pcp", "mpjpe", "bones", "subsets"} <= failed
+
+
+def test_without_twins_or_with_other_cameras_there_is_nothing_to_compare(recorded):
+    with pytest.raises(ValueError, match="expected one or more twins"):
+        validate(recorded, [], plan=PLAN)
+    with pytest.raises(ValueError, match="expected a twin with the 3 cameras of walkers, got 4"):
+        validate(recorded, [walkers(frames=6, cameras=4)], plan=PLAN)
+
+
+def test_every_verdict_is_in_the_tables_of_the_page(validation):
+    made = provenance(command="simharness validate", seeds=range(TWINS), variants=PLAN.variants, seconds=1.0)
+    page = render_validation(validation, provenance=made)
+    rows = group_rows(validation.verdicts)
+    assert sum(row.count for row in rows) == len(validation.verdicts)
+    assert page.count('class="verdict ') == len(rows) + len(validation.verdicts)
+    assert "nan" not in re.sub(r"<[^>]*>", " ", page).lower().split()
+    assert not re.search(r'(?:src|href)="https?://', page)
+
+
+def test_halves_share_no_frame(recorded):
+    first, second = halves(recorded)
+    assert [*first.frames, *second.frames] == list(recorded.frames)
+    assert len(first) == len(second)
+
+
+class TestCommand:
+    @pytest.fixture
+    def described(self, tmp_path, recorded):
+        """The files of the recording, with COCO results as detections."""
+        write_calibration(tmp_path / "cameras.json", recorded.rig)
+        (tmp_path / "detections").mkdir()
+        for view, camera in enumerate(recorded.rig):
+            results = [
+                {"image_id": int(frame), "category_id": 1, "score": 0.9, "keypoints": points.ravel().tolist()}
+                for frame, found in zip(recorded.frames, recorded.detections, strict=True)
+                for points in np.dstack([found.keypoints, found.scores])[found.view == view]
+            ]
+            (tmp_path / "detections" / f"{camera.name}.json").write_text(json.dumps(results))
+        np.savez(tmp_path / "truth.npz", joints=recorded.truth, names=np.array(SHELF14.joints), frames=recorded.frames)
+        keys = {
+            "name": "hall",
+            "rate": 25.0,
+            "frames": [[0, len(recorded) - 1]],
+            "calibration": {"file": "cameras.json", "size": [1032, 776]},
+            "detections": {"format": "coco", "path": "detections", "skeleton": COCO17.name, "kind": "bottom-up"},
+            "truth": {"format": "npz", "file": "truth.npz"},
+        }
+        (tmp_path / "hall.toml").write_text(dumps_keys(keys))
+        return tmp_path / "hall.toml"
+
+    @pytest.mark.parametrize(("noise", "code"), [(3.0, 0), (60.0, 1)])
+    def test_the_exit_code_is_the_verdict(self, described, tmp_path, monkeypatch, noise, code):
+        """Twins are given, because filming them takes longer than all the rest."""
+        given = [walkers(frames=6, cameras=3, noise=noise, name="twin")] * 2
+        monkeypatch.setattr(prediction, "simulate_predictions", lambda *_, **__: given)
+        monkeypatch.setattr(validation_module, "QUICK", PLAN)
+        arguments = ["validate", str(described), "--quick", "--out", str(tmp_path / "out"), "--workers", "1"]
+        result = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "all.json")], catch_exceptions=False)
+        assert result.exit_code == code, result.output
+        written = json.loads((tmp_path / "all.json").read_text())
+        assert written["passed"] == (code == 0)
+        assert written["name"] == written["fitted_on"] == "hall"
+        assert written == json.loads((tmp_path / "out" / "validation.json").read_text())
+        assert (tmp_path / "out" / "validation.html").read_text().startswith("<!doctype html>")
+        assert ("fails" in result.stdout) == (code == 1)
+
+    def test_a_missing_recording_is_bad_input(self, tmp_path):
+        result = CliRunner().invoke(app, ["validate", str(tmp_path / "none.toml")], catch_exceptions=False)
+        assert result.exit_code == 2
+        assert "none.toml" in result.output
+
+    def test_a_folder_that_cannot_be_made_is_bad_input(self, described, tmp_path):
+        (tmp_path / "file").write_text("")
+        arguments = ["validate", str(described), "--out", str(tmp_path / "file" / "out")]
+        result = CliRunner().invoke(app, arguments, catch_exceptions=False)
+        assert result.exit_code == 2
+        assert "--out" in result.output

@@ -1,0 +1,1 @@
+"""Distribution of people's poses in pictures, from the simulated motions."""
