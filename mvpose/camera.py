@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array, as_points
+from mvpose.kernels import njit
 from mvpose.lens import distort, undistort
 
 _ORTHONORMAL_TOLERANCE = 1e-3  # published calibrations carry about six digits

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 
 _BOX_SHARE = 0.53  # fraction of its box that a person fills (Ronchi & Perona, ICCV 2017)
 _FAR = 5.0  # times the median distance from the median keypoint; 2.3 for the feet of a standing person

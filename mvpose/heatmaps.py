@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import Sealed, as_array, as_points
+from mvpose.kernels import njit
 
 _HIGHEST = 2.0  # peaks of networks trained towards 1 exceed it, but not by a factor of 2
 _LEAST_SHARE = 0.05  # lower limit of neighbour over peak, because the logarithm of 0 is not finite

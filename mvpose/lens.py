@@ -6,7 +6,8 @@ The terms are k1, k2, p1, p2, k3. The kernels take one point, so other kernels c
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mvpose.kernels import njit
 
 _MOST_STEPS = 30
 _TOLERANCE2 = 1e-24  # squared residual, in squared focal lengths

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.heatmaps import Heatmaps
+from mvpose.kernels import njit
 from mvpose.lens import undistort
 
 _MODES = 3  # modes read per heat map: the joint, its left-right counterpart, and the joint of a neighbour

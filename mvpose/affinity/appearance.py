@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.affinity.base import FASTMATH, Floats, scalar_sigmoid
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.threads import one_thread
 

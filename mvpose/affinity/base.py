@@ -6,11 +6,11 @@ import math
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 
 LANES = 8  # joints are padded to full vector registers, so no loop has a scalar remainder

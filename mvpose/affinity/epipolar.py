@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mvpose.affinity.base import FASTMATH, Floats, group_by_view, pack_poses, scalar_sigmoid, shared_joints
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 from mvpose.rays import Rays, viewing_rays
 
 _WIDTH = 1000.0  # image width in pixels to which distances are normalised

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from mvpose.affinity.appearance import AppearanceAffinity, cosine_affinity, cosine_distance, cosines
 from mvpose.affinity.base import Floats
@@ -15,6 +14,7 @@ from mvpose.affinity.epipolar import EpipolarAffinity
 from mvpose.affinity.geometry import GeometricAffinity
 from mvpose.camera import Rig
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 
 Rule = Literal["evidence", "mean"]

@@ -10,13 +10,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.affinity.base import FASTMATH, Floats, group_by_view, pack_poses, scalar_sigmoid, shared_joints
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 
 _QUANTILE = 0.35  # more than a third of the mutual nearest pairs show one person, even with phantoms

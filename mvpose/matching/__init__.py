@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
 from mvpose.estimate import Matching
+from mvpose.kernels import njit
 from mvpose.matching import admm
 from mvpose.matching.assignment import match_view_pairs
 from mvpose.matching.clustering import cluster, contract

@@ -24,10 +24,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 from mvpose.matching.projection import block_starts, project_block
 from mvpose.threads import one_thread
 

@@ -6,8 +6,9 @@ SciPy's solver cannot be called from numba, and one call of it costs more than a
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mvpose.kernels import njit
 
 
 @njit(cache=True)

@@ -14,9 +14,9 @@ solved only for a view with a detection that would gain in another part.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.kernels import njit
 from mvpose.matching.assignment import best_assignment
 from mvpose.matching.rounding import rank_views, read_only
 

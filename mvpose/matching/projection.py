@@ -13,8 +13,9 @@ a round. The prices of the last call are an excellent start for the next.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from mvpose.kernels import njit
 
 TOLERANCE = 1e-10  # greatest change of a price in the last round
 MOST_ROUNDS = 10_000

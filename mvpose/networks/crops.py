@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 
 Pixels = NDArray[np.uint8]
 Images = Sequence[NDArray[np.uint8] | None]

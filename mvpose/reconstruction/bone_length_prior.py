@@ -18,9 +18,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 from mvpose.skeleton import Skeleton
 
 STATURE = 1.70  # metres

@@ -9,7 +9,8 @@ residuals of that joint.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mvpose.kernels import njit
 
 # Errors are weighted by the responsibility of the keypoint, which truncates the tail of even a perfect Gaussian: with
 # the floor at a hundredth of the peak, a tenth of the variance is lost (an integral over the two densities).

@@ -7,9 +7,9 @@ themselves decide which proposal is the likeliest.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mvpose.heatmaps import height
+from mvpose.kernels import njit
 from mvpose.lens import distort
 from mvpose.reconstruction.proposals import insert
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats, Integers
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.likelihood import Noise

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats
 from mvpose.checks import check_numbers, seal
+from mvpose.kernels import njit
 from mvpose.skeleton import Skeleton
 
 _FASTMATH = {"contract", "arcp", "nsz"}  # NaN and infinity keep their meaning

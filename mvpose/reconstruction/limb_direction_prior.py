@@ -12,10 +12,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 from mvpose.skeleton import Skeleton
 
 # Nine clips of recorded motion (subjects 02 and 03 of the CMU database: walk, run, jump, balance; dance and mime from

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_length_prior import personal_prior, published_bones
 from mvpose.reconstruction.heatmap_likelihood import rescore

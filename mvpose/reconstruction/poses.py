@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 
 MISSING_SCORE = 1e-9
 """Score at or below which no view supports a joint: it is reported as missing, even if a prior places it."""

@@ -8,8 +8,8 @@ bone length away from a neighbour in the tree.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from mvpose.kernels import njit
 from mvpose.reconstruction.error_scale import person_scale
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood

@@ -12,9 +12,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats, Integers
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import joint_scales, person_scale
 from mvpose.reconstruction.likelihood import ANCHOR, Noise, accumulate, anchor, log_likelihood, solve

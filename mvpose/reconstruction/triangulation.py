@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import joint_scales, person_scale
 from mvpose.reconstruction.likelihood import (

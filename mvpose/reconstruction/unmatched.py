@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats, Integers
 from mvpose.checks import check_numbers
+from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.hypotheses import hypothesize

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
+from mvpose.kernels import njit
 from mvpose.lens import distort
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.body import Body

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
+from mvpose.kernels import njit
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.mujoco_model import SKIN_GROUP
 

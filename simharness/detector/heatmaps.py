@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Bools, Floats
 from mvpose.checks import seal
 from mvpose.heatmaps import Heatmaps
+from mvpose.kernels import njit
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import HeatmapHead

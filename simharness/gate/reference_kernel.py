@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import time
 
-import numba
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 
 CALLS = 9  # a call takes as long as a frame, so a busy machine interrupts both equally
 _SIZE, _PRODUCTS = 40, 24  # size of the matrices, and number of products, as in a matching
@@ -33,7 +33,7 @@ def time_reference(calls: int = CALLS) -> Floats:
     return 1e3 * times
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _work(matrix: Floats, points: Floats, rays: Floats) -> float:
     """Do the work of one call; return a number that depends on all of it, so that no part is optimised away."""
     size = len(matrix)

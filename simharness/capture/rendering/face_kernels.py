@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from mvpose.kernels import njit
 
 _BOUND = 0.02  # metres: depth behind a face below which it cannot shade anything
 

@@ -17,7 +17,8 @@ So they pass through short branch-free loops that select, cover and fill; each l
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mvpose.kernels import njit
 
 # The kernels are typed by the arrays of the first call. Indices are unsigned or count from 0: an index that may be
 # negative would be checked at every use, and prevents vectorisation of loops.

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
+from mvpose.kernels import njit
 from simharness.world.humans.body import Body
 
 _POINTS = 4000  # points on the skin, spread evenly over its area

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from mvpose.arrays import Floats
+from mvpose.kernels import njit
 
 _ITERATIONS = 60
 _LARGEST_STEP = 0.3  # radians per iteration: keeps the solver in the basin of its start

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera, Rig
+from mvpose.kernels import njit
 from simharness.types.mesh import Mesh
 from simharness.world.scene.objects.solids import Solid
 
