@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import gammaincinv
 
 from mvpose.checks import Sealed, as_array
 from mvpose.skeleton import COCO17, Skeleton
@@ -130,6 +131,25 @@ class Estimate(Sealed):
             None if covariance is None else as_array(covariance, (*joints.shape, 3), "covariance"),
             dict(timings or {}),
         )
+
+    def ellipsoids(self, share: float) -> NDArray[np.float64] | None:
+        """Return the ellipsoid around each joint that should hold the true joint with a given probability.
+
+        Args:
+            share: the probability, above 0 and below 1.
+
+        Returns:
+            Matrices E of the ellipsoids ``d' inv(E) d <= 1`` of the differences d from the joint, (n, J, 3, 3), square
+            metres; NaN for a joint that could not be placed. None without covariances.
+
+        Raises:
+            ValueError: a share that is not between 0 and 1.
+        """
+        if not 0.0 < share < 1.0:
+            raise ValueError(f"share of the ellipsoids must be above 0 and below 1, got {share}")
+        if self.covariance is None:
+            return None
+        return self.covariance * (2.0 * gammaincinv(1.5, share))  # quantile of chi-square with 3 degrees
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -15,7 +15,7 @@ from mvpose.arrays import Floats
 from simharness.pairing.pairing import Pairing
 from simharness.scoring.average_precision import average_precision, nearest_people
 from simharness.scoring.catalogue import AP_MM, PCK_MM
-from simharness.scoring.frame import FrameScore, score_frame
+from simharness.scoring.frame import score_frame
 from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pck import pck, pck_area
@@ -77,14 +77,15 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
     summary = variant.summary()
     groups = _groups(recording, estimates)
     truth = np.stack([true.joints for true in recording.truth])
-    placed = _paired_joints(truth.shape, variant.frames, estimates)
+    partner = np.stack([frame.pairing.estimate for frame in variant.frames])
+    placed = _paired_joints(truth.shape, partner, estimates)
     errors = joint_errors(truth, placed)
     scores = (
         _people_scores(summary)
         | _joint_scores(errors)
         | _precision_scores(truth, estimates)
         | _pck_scores(errors)
-        | _registered_scores(ScoreInput(recording, tuple(estimates), truth, placed))
+        | _registered_scores(ScoreInput(recording, tuple(estimates), truth, placed, partner))
         | _picture_scores(recording, placed)
         | _matching_scores(summary, groups)
         | _time_scores(summary)
@@ -135,11 +136,10 @@ def _groups(recording: Recording, estimates: Sequence[Estimate]) -> tuple[list[G
     return list(map(count_groups, views, labels, people)), list(map(count_violations, views, labels))
 
 
-def _paired_joints(shape: tuple[int, ...], frames: Sequence[FrameScore], estimates: Sequence[Estimate]) -> Floats:
+def _paired_joints(shape: tuple[int, ...], partners: Labels, estimates: Sequence[Estimate]) -> Floats:
     """Return the joints of the estimate paired with each true person, (T, P, J, 3), metres; NaN where missed."""
     placed = np.full(shape, np.nan)
-    for row, frame, estimate in zip(placed, frames, estimates, strict=True):
-        partner = frame.pairing.estimate
+    for row, partner, estimate in zip(placed, partners, estimates, strict=True):
         row[partner >= 0] = estimate.joints[partner[partner >= 0]]
     return placed
 

@@ -24,6 +24,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from mvpose import Estimate
     from simharness.types.recording import Recording
 
-MODULES = ("joint_errors",)
+MODULES = ("joint_errors", "confidence")
 """Modules of ``simharness.scoring`` that register scores, in the order of the columns of tables."""
 
 Better = Literal["higher", "lower"]
@@ -48,6 +49,8 @@ class ScoreInfo:
         about: explanation in one line.
         better: direction of better values.
         digits: digits after the decimal point.
+        target: best value where neither the greatest nor the least is best: ``better`` is the direction towards it
+            from the usual side, and values beyond it are worse again.
     """
 
     key: str
@@ -56,6 +59,7 @@ class ScoreInfo:
     about: str
     better: Better
     digits: int
+    target: float | None = None
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,14 @@ class ScoreInput:
         truth: true joints, (T, P, 17, 3), metres.
         paired: joints of the estimate that is paired with each true person, (T, P, 17, 3), metres; NaN where the person
             is missed or the joint was not placed.
+        partner: index of that estimate, (T, P); -1 where the person is missed.
     """
 
     recording: Recording
     estimates: tuple[Estimate, ...]
     truth: Floats
     paired: Floats
+    partner: NDArray[np.int64]
 
 
 ScoreFunction = Callable[[ScoreInput], float | None]
