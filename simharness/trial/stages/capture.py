@@ -38,17 +38,27 @@ class CaptureFrames:
     def __call__(self, frames: range) -> Views:
         """Return the views of these frames."""
         from simharness.capture.film import film
-        from simharness.world.scene.playback import Playback
 
-        playback = Playback(self.scene)
         return film(
-            playback,
+            self._playback,
             self.exposures,
-            observer_of(self.scenario, playback),
+            self._observer,
             frames=frames,
-            picture_source=picture_source_of(self.scenario, playback) if self.previews else None,
+            picture_source=picture_source_of(self.scenario, self._playback) if self.previews else None,
             previews=self.previews,
         )
+
+    @functools.cached_property
+    def _playback(self) -> Playback:
+        """The playback of the scene in this process."""
+        from simharness.world.scene.playback import Playback
+
+        return Playback(self.scene)
+
+    @functools.cached_property
+    def _observer(self) -> Observer:
+        """The observer of this process. It is made once: the outlines of bodies take longer than some frames."""
+        return observer_of(self.scenario, self._playback)
 
 
 def observer_of(scenario: Scenario, playback: Playback) -> Observer:
