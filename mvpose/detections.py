@@ -13,6 +13,10 @@ from mvpose.checks import Sealed, as_array
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
 
+MOST_DETECTIONS = 2000
+"""Largest number of detections of a frame that is estimated: 64 cameras that see 31 people each. The time of matching
+grows with the cube of it, to about a minute."""
+
 _FARTHEST = 1e9  # pixels; larger than any image, and the squares are far from overflow
 _LEAST_SCORE = 1e-6  # below the resolution of any detector, and products of such scores are far from underflow
 

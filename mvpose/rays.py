@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from mvpose.detections import Detections
+from mvpose.detections import MOST_DETECTIONS, Detections
 from mvpose.heatmaps import Heatmaps
 from mvpose.kernels import njit
 from mvpose.lens import undistort
@@ -82,13 +82,19 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
     A keypoint at which the lens images no direction (far outside the picture of a distorting lens) is missing.
 
     Raises:
-        ValueError: an argument of another type, or a detection in a view that the rig does not have.
+        ValueError: an argument of another type, a detection in a view that the rig does not have, or more than
+            :data:`mvpose.detections.MOST_DETECTIONS` detections.
     """
     for value, kind in ((rig, Rig), (detections, Detections)):
         if not isinstance(value, kind):
             raise ValueError(
                 f"expected a mvpose.{kind.__name__}, got {type(value).__name__}: estimate(rig, detections)"
             )
+    if len(detections) > MOST_DETECTIONS:
+        raise ValueError(
+            f"a frame must have at most {MOST_DETECTIONS} detections, got {len(detections)}; pass one frame at a time, "
+            "or drop detections with low scores"
+        )
     origins, directions, weights, pixel, last = _viewing_rays(
         rig.packed, detections.view, detections.keypoints, detections.scores
     )

@@ -49,6 +49,8 @@ class UnmatchedPictorialStructure:
         apart: least mean distance between corresponding joints of two people, metres; a chest is 0.25 m deep
             (ANSUR II). A nearer pose is the same person found again, with left and right exchanged or not.
         most_states: greatest number of states that a keypoint proposes, the likeliest ones.
+        most_detections: greatest number of detections that are used; of more, the same number of each view, those with
+            the greatest sums of scores. It bounds the time, which grows with the cube of this number.
 
     Raises:
         ValueError: a parameter that is not above 0 (``apart``: below 0).
@@ -60,12 +62,13 @@ class UnmatchedPictorialStructure:
     least_joints: int = 6
     apart: float = 0.15
     most_states: int = 8
+    most_detections: int = 500
 
     def __post_init__(self) -> None:
         check_numbers(
             self,
             "the unmatched pictorial structure",
-            positive=("agreement", "reach", "least_joints", "most_states"),
+            positive=("agreement", "reach", "least_joints", "most_states", "most_detections"),
             not_negative=("apart",),
         )
 
@@ -82,9 +85,10 @@ class UnmatchedPictorialStructure:
             view.
         """
         order = np.argsort(rays.view, kind="stable")
+        order = order[_strongest(rays.select(order), self.most_detections)]
         by_view = rays.select(order)
         found = self._find(by_view, skeleton)
-        labels = np.empty(len(rays), np.int64)
+        labels = np.full(len(rays), -1)
         labels[order] = _label(found, by_view.view)
         # People are numbered by their first detection; a pose with a single detection is dropped.
         people = [pose for pose in dict.fromkeys(labels.tolist()) if pose >= 0 and (labels == pose).sum() > 1]
@@ -129,14 +133,32 @@ class _FoundPoses(NamedTuple):
     evidence: Floats  # evidence of each keypoint for its owner, (m, J)
 
 
+def _strongest(rays: Rays, most: int) -> Integers:
+    """Return the indices of the detections to use, in their order: all, or the strongest of each view.
+
+    Views take turns, so that a view full of false detections does not displace the detections of the others.
+    """
+    if len(rays) <= most:
+        return np.arange(len(rays))
+    strength = rays.weights.sum(axis=1)
+    order = np.lexsort([-strength, rays.view])
+    views, first = np.unique(rays.view[order], return_index=True)
+    rank = np.empty(len(rays), np.int64)
+    rank[order] = np.arange(len(rays)) - first[np.searchsorted(views, rays.view[order])]
+    return np.sort(np.lexsort([-strength, rank])[:most])
+
+
 def _same_person(joints: Floats, found: _FoundPoses, skeleton: Skeleton, apart: float) -> int:
     """Return the earlier pose that this one repeats, possibly with left and right exchanged, or else a new index."""
-    for index, other in enumerate(found.poses):
-        for same in (other, other[list(skeleton.mirror)]):
-            distance = np.linalg.norm(joints - same, axis=1)
-            if np.isfinite(distance).any() and np.nanmean(distance) < apart:
-                return found.person[index]
-    return len(found.poses)
+    if not found.poses:
+        return 0
+    earlier = np.stack(found.poses)
+    same = np.zeros(len(earlier), bool)
+    for poses in (earlier, earlier[:, list(skeleton.mirror)]):
+        distance = np.linalg.norm(joints - poses, axis=2)
+        shared = np.isfinite(distance).sum(axis=1)
+        same |= (shared > 0) & (np.nansum(distance, axis=1) < apart * shared)
+    return found.person[int(np.argmax(same))] if same.any() else len(earlier)
 
 
 def _label(found: _FoundPoses, view: Integers) -> Integers:

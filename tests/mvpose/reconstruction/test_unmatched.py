@@ -8,9 +8,9 @@ from people import STANDING, crowd, detect, ring
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
-from mvpose.rays import viewing_rays
+from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction.hypotheses import Hypotheses
-from mvpose.reconstruction.unmatched import UnmatchedPictorialStructure, _best_pose
+from mvpose.reconstruction.unmatched import UnmatchedPictorialStructure, _best_pose, _strongest
 
 MIRROR = list(COCO17.mirror)
 
@@ -250,3 +250,38 @@ def test_without_matching_a_limb_is_taken_from_a_neighbour(seed):
     astray = joints[labels[person == 0][0], 9]
     assert np.linalg.norm(astray - rear[9]) > 0.15
     assert np.linalg.norm(astray - front[9]) < 0.10
+
+
+def test_a_view_full_of_false_detections_displaces_nobody():
+    """Beyond most_detections, the strongest detections of every view are used, whatever the number in other views."""
+    rig, people = ring(5), crowd(4)
+    true, _ = detect(rig, people)
+    rng = np.random.default_rng(0)
+    false = 400
+    both = Detections.from_keypoints(
+        np.concatenate([np.full(false, 2), true.view]),
+        np.concatenate([rng.uniform(0, 960, (false, 17, 2)), true.keypoints]),
+        np.concatenate([np.full((false, 17), 0.5), true.scores]),
+    )
+    limited = UnmatchedPictorialStructure(most_detections=24)
+    poses, labels = limited(viewing_rays(rig, both), COCO17)
+    assert errors(poses.joints, people).max() < 0.04
+    assert len(poses.joints) == 4
+    assert (labels >= 0).sum() <= 24
+    assert (labels[:false] == -1).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_the_limit_takes_views_in_turn_and_the_strongest_of_each(seed, most):
+    rng = np.random.default_rng(seed)
+    view = np.sort(rng.integers(0, 4, 20))
+    weights = rng.uniform(0.1, 1, (20, 17))
+    rays = Rays(view, np.zeros((20, 3)), np.zeros((20, 17, 3)), weights, np.ones(20))
+    kept = _strongest(rays, most)
+    assert len(kept) == min(most, 20)
+    assert (np.diff(kept) > 0).all()
+    dropped = np.setdiff1d(np.arange(20), kept)
+    for one in dropped:  # no weaker one of its view is kept, and no view has two kept detections more than its own
+        own = kept[view[kept] == view[one]]
+        assert (weights[own].sum(axis=1) >= weights[one].sum()).all()
+        assert np.bincount(view[kept]).max() <= len(own) + 1
