@@ -21,6 +21,8 @@ from mvpose.lens import distort, undistort
 _ORTHONORMAL_TOLERANCE = 1e-3  # published calibrations carry about six digits
 _SINGLE_DIGITS = 1e-6  # rounding error of zeros and ones stored in single precision
 _SAME_POINT = 1e-6  # metres; below the accuracy of any calibration
+_GREATEST = 1e9  # pixels, metres; larger than any calibration, and products of such values are far from overflow
+_LEAST_FOCAL = 1e-6  # pixels; calibrations in units of the focal length have 1
 _FARTHEST = 1e6  # focal lengths from the principal point; beyond it the ray is parallel to the image plane
 
 
@@ -37,8 +39,8 @@ class Camera(Sealed):
         name: name of the camera in reports and messages.
 
     Raises:
-        ValueError: a wrong shape, a value that is not finite, an invalid intrinsic matrix K, an R that is not a
-            rotation, or an image size that is not two positive whole numbers.
+        ValueError: a wrong shape, a value that is not finite or exceeds 1e9, an invalid intrinsic matrix K, an R that
+            is not a rotation, or an image size that is not two positive whole numbers.
     """
 
     K: Floats
@@ -55,6 +57,10 @@ class Camera(Sealed):
             array = as_array(getattr(self, key), shape, f"{camera}: {key}{terms}")
             if not np.isfinite(array).all():
                 raise ValueError(f"{camera}: {key} has values that are not finite: {array.tolist()}")
+            if key != "R" and np.abs(array).max() > _GREATEST:
+                raise ValueError(
+                    f"{camera}: {key} must have values of at most {_GREATEST:g}, got {np.abs(array).max():g}"
+                )
             object.__setattr__(self, key, array)
         _check_intrinsics(self.K, camera)
         _check_rotation(self.R, camera)
@@ -140,6 +146,8 @@ def _check_intrinsics(K: Floats, camera: str) -> None:
             f"{camera}: focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}; "
             "put a flipped image axis into R (x right, y down, z forward), not into K"
         )
+    if min(K[0, 0], K[1, 1]) < _LEAST_FOCAL:
+        raise ValueError(f"{camera}: focal lengths must be at least {_LEAST_FOCAL:g} pixels, {got}; {form}")
 
 
 def _check_rotation(R: Floats, camera: str) -> None:

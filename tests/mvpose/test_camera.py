@@ -211,7 +211,9 @@ def test_invalid_rigs_are_refused():
     with pytest.raises(ValueError, match=r"stand up to 4004 apart, .* in millimetres"):
         Rig([GOOD, look_at([-4000, 0, 1000], [0, 0, 1000])])
     with pytest.raises(ValueError, match="cannot be metres"):
-        Rig([GOOD, Camera(GOOD.K, GOOD.R, [1.7e308, -1.7e308, 1.7e308], size=(640, 480))])
+        Rig([GOOD, Camera(GOOD.K, GOOD.R, [1e9, -1e9, 1e9], size=(640, 480))])
+    with pytest.raises(ValueError, match=r"t must have values of at most 1e\+09, got 1.7e\+308"):
+        Camera(GOOD.K, GOOD.R, [1.7e308, -1.7e308, 1.7e308], size=(640, 480))
     with pytest.raises(ValueError, match=r"entry 1 is ndarray; pass mvpose\.Camera"):
         Rig([GOOD, GOOD.P])
     with pytest.raises(ValueError, match="sequence of cameras, got Camera"):

