@@ -1,7 +1,158 @@
-"""Compiler of the kernels: all modules of both packages take ``njit`` from here."""
+"""Compiler of the kernels and its cache on disk: all modules of both packages take ``njit`` from here.
+
+Numba's own cache looks at the file that a kernel is in. But compiled code also holds the kernels that it calls and the
+constants that it refers to, and when those are edited in another file, it goes on with the old ones. Here the name of
+an entry says all that the code is compiled from (:mod:`mvpose.kernel_code`), for which arguments and which processor.
+An entry is one file, written whole: processes that compile at once at worst write the same file twice.
+"""
 
 from __future__ import annotations
 
-from numba import njit
+import errno
+import hashlib
+import pickle
+import sys
+import uuid
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+
+from mvpose.kernel_code import code_digest
 
 __all__ = ["njit"]
+
+_CHECKSUM = hashlib.sha256().digest_size  # bytes at the start of a file: the digest of the rest
+# Arguments whose types say all of them that is compiled. Others, such as functions, bring code that no key would see.
+_PLAIN = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.Omitted, types.Array)
+
+
+def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
+    """Compile a function by ``numba.njit``; also a decorator with options.
+
+    Args:
+        function: function to compile on its first call.
+        cache: keep compiled code on disk, where numba's own cache would: in ``NUMBA_CACHE_DIR``, in ``__pycache__``, or
+            in a folder of the user where the package cannot be written.
+        **options: options of ``numba.njit``.
+    """
+    if function is None:
+        return lambda decorated: njit(decorated, cache=cache, **options)
+    kernel = numba.njit(**options)(function)
+    if cache and hasattr(kernel, "_cache"):  # not with NUMBA_DISABLE_JIT, nor in a numba that keeps its cache elsewhere
+        kernel._cache = KernelCache(kernel)
+    return kernel
+
+
+class KernelCache:
+    """Compiled code of one kernel on disk; has the methods that numba's dispatcher calls.
+
+    Whatever goes wrong, the kernel is compiled: a wrong or damaged entry is never used. A warning says why a cache
+    cannot be used.
+    """
+
+    def __init__(self, kernel: Any) -> None:
+        self._kernel = kernel
+        self._storage: Any = None  # found on first use, so that importing costs nothing
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of the entries."""
+        return str(self._implementation().locator.get_cache_path())
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """Return the compiled code for the types of arguments, or None where it must be compiled."""
+        try:
+            target_context.refresh()  # numba's registries, without which loaded code cannot be linked
+            entry = self._entry(signature)
+            if entry is None:
+                return None
+            key, file = entry
+            content = file.read_bytes()
+            if hashlib.sha256(content[_CHECKSUM:]).digest() != content[:_CHECKSUM]:
+                return None
+            stored, code = pickle.loads(content[_CHECKSUM:])
+            return self._implementation().rebuild(target_context, code) if stored == key else None
+        except FileNotFoundError:
+            return None
+        except Exception as error:
+            _warn(error)
+            return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Write compiled code, and delete entries of earlier code of the kernel."""
+        try:
+            entry, implementation = self._entry(signature), self._implementation()
+            if entry is None or not implementation.check_cachable(compiled):
+                return
+            key, file = entry
+            content = numba.core.serialize.dumps((key, implementation.reduce(compiled)))
+            implementation.locator.ensure_cache_path()
+            part = file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.part")
+            try:
+                part.write_bytes(hashlib.sha256(content).digest() + content)
+                part.replace(file)
+            finally:
+                part.unlink(missing_ok=True)
+            self._prune(file)
+        except Exception as error:
+            _warn(error)
+
+    def flush(self) -> None:
+        """Delete all entries of the kernel (``Dispatcher.recompile``)."""
+        for each in Path(self.cache_path).glob(f"{self._prefix()}*"):
+            each.unlink(missing_ok=True)
+
+    def _entry(self, signature: Any) -> tuple[tuple[object, ...], Path] | None:
+        """Return the key and the file of the code for some types of arguments; None if it must not be kept."""
+        arguments = tuple(getattr(signature, "args", signature))
+        if not all(_plain(each) for each in arguments):
+            return None
+        versions = (code_digest(self._kernel), numba.__version__, np.__version__, sys.version, sys.platform)
+        processor = self._kernel.targetctx.codegen().magic_tuple()
+        name = f"{self._prefix()}{_short(versions)}-{_short(tuple(map(str, arguments)), processor)}.nbk"
+        return (versions, arguments, processor), Path(self.cache_path, name)
+
+    def _prefix(self) -> str:
+        """Return how the names of all entries of the kernel start, for the version of Python."""
+        function = self._kernel.py_func
+        name = f"{function.__module__.rpartition('.')[-1]}.{function.__qualname__}".replace("<", "").replace(">", "")
+        return f"{name}.{sys.implementation.cache_tag}-"
+
+    def _prune(self, kept: Path) -> None:
+        """Delete the entries of other code of the kernel than that of an entry."""
+        current = kept.name[: kept.name.rindex("-")]
+        for each in kept.parent.glob(f"{self._prefix()}*"):
+            if not each.name.startswith(current):
+                each.unlink(missing_ok=True)
+
+    def _implementation(self) -> Any:
+        """Return numba's choice of a folder, and its way to take compiled code apart and to put it together."""
+        if self._storage is None:
+            try:
+                self._storage = numba.core.caching.CompileResultCacheImpl(self._kernel.py_func)
+            except RuntimeError:
+                raise OSError(errno.EROFS, "no folder can be written; set NUMBA_CACHE_DIR to one that can") from None
+        return self._storage
+
+
+def _warn(error: Exception) -> None:
+    """Warn that kernels are compiled anew; the same text for all kernels, so that Python shows it once."""
+    why = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+    warnings.warn(f"compiled kernels are not kept on disk: {why}", stacklevel=1)
+
+
+def _plain(kind: Any) -> bool:
+    """Whether a numba type says all of an argument that code is compiled for."""
+    if isinstance(kind, types.BaseTuple):
+        return all(_plain(each) for each in kind)
+    return isinstance(kind, _PLAIN)
+
+
+def _short(*parts: object) -> str:
+    """Return a digest for the name of a file; the key in the file decides."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

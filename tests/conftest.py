@@ -8,11 +8,6 @@ from hypothesis import settings
 for _name in ("FORCE_COLOR", "CLICOLOR_FORCE", "PY_COLORS", "GITHUB_ACTIONS", "TERMINAL_WIDTH", "TTY_COMPATIBLE"):
     os.environ.pop(_name, None)
 
-# Numba gives two kernels the same file when two processes compile a function for different arguments at once: each of
-# pytest-xdist's workers, and whatever it starts, keeps its own. Numba reads this on import.
-if _worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "numba" / _worker))
-
 # Kernels compile on first use, and machines are noisy: a deadline would time those, not the code.
 settings.register_profile("simharness", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("simharness")

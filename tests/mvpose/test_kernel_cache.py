@@ -1,0 +1,357 @@
+"""Cache of compiled kernels: never stale, never damaged, shared by processes, and free of old entries."""
+
+import importlib
+import json
+import os
+import pkgutil
+import shutil
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.extending import is_jitted
+
+import mvpose
+import simharness
+from mvpose.kernel_code import UnknownDependencyError, code_digest
+
+ROOT = Path(__file__).parents[2]
+
+# outer -> middle -> inner, each in a file of its own, with constants of every kind from a fourth.
+TOY = {
+    "__init__.py": "",
+    "constants.py": """
+import enum
+import numpy as np
+GAIN = 2.0
+WEIGHTS = np.array([1.0, 10.0])
+SIZES = (3, 4)
+class Kind(enum.IntEnum):
+    NEAR = 100
+""",
+    "inner.py": """
+from mvpose.kernels import njit
+from toy import constants
+from toy.constants import GAIN, SIZES, WEIGHTS, Kind
+@njit(cache=True)
+def inner(x, offset=0.0):
+    return GAIN * x + WEIGHTS[1] + (SIZES[0] + Kind.NEAR) + constants.GAIN + offset
+@njit(cache=True)
+def neighbour(x):
+    return x + 7.0
+""",
+    "middle.py": """
+from mvpose.kernels import njit
+from toy.inner import inner
+@njit(cache=True)
+def middle(x):
+    return inner(x) + 1000.0
+""",
+    "outer.py": """
+from mvpose.kernels import njit
+from toy import middle
+@njit(cache=True, error_model="numpy")
+def outer(x):
+    return middle.middle(x) + 1.0 / (x - 1.0)
+""",
+}
+VALUE = 2.0 * 5.0 + 10.0 + 3 + 100 + 2.0 + 1000.0 + 0.25  # of outer(5.0)
+
+
+class Toy:
+    """Package in a folder; every start imports it anew, as a new process does."""
+
+    def __init__(self, folder):
+        self.folder = folder / "toy"
+        self.folder.mkdir()
+        for name, text in TOY.items():
+            (self.folder / name).write_text(text, encoding="utf-8")
+
+    def start(self):
+        for name in [each for each in sys.modules if each.partition(".")[0] == "toy"]:
+            del sys.modules[name]
+        importlib.invalidate_caches()
+        return importlib.import_module("toy.outer")
+
+    def edit(self, file, old, new):
+        path = self.folder / file
+        text = path.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        status = path.stat()
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))  # neither its time nor, mostly, its size tells
+
+    @property
+    def entries(self):
+        return sorted((self.folder / "__pycache__").glob("*.nbk"))
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")
+    monkeypatch.syspath_prepend(tmp_path)
+    yield Toy(tmp_path)
+    for name in [each for each in sys.modules if each.partition(".")[0] == "toy"]:
+        del sys.modules[name]
+
+
+def compiled(kernel):
+    """Whether a kernel was compiled in this start; False if it came from the cache."""
+    hits, misses = (sum(each.values()) for each in (kernel.stats.cache_hits, kernel.stats.cache_misses))
+    assert hits + misses == 1
+    return misses == 1
+
+
+def test_the_next_start_compiles_nothing(toy):
+    first = toy.start()
+    assert first.outer(5.0) == VALUE
+    assert compiled(first.outer)
+    assert len(toy.entries) == 3
+    second = toy.start()
+    assert second.outer is not first.outer
+    assert second.outer(5.0) == VALUE
+    assert not compiled(second.outer)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "difference"),
+    [
+        ("inner.py", "GAIN * x", "GAIN / x", 0.4 - 10.0),
+        ("inner.py", "GAIN * x", "x", -5.0),
+        ("inner.py", "offset=0.0", "offset=0.5", 0.5),
+        ("middle.py", "1000.0", "2000.0", 1000.0),
+        ("outer.py", "x - 1.0", "x + 3.0", -0.125),
+        ("constants.py", "GAIN = 2.0", "GAIN = 3.0", 6.0),
+        ("constants.py", "10.0]", "20.0]", 10.0),
+        ("constants.py", "(3, 4)", "(6, 4)", 3.0),
+        ("constants.py", "NEAR = 100", "NEAR = 200", 100.0),
+    ],
+)
+def test_an_edit_of_anything_the_code_is_made_of_is_seen(toy, file, old, new, difference):
+    assert toy.start().outer(5.0) == VALUE
+    count = len(toy.entries)
+    toy.edit(file, old, new)
+    assert toy.start().outer(5.0) == pytest.approx(VALUE + difference, rel=1e-15)
+    assert not compiled_again(toy)
+    assert len(toy.entries) == count  # those of the old code are gone
+
+
+def compiled_again(toy):
+    module = toy.start()
+    module.outer(5.0)
+    return compiled(module.outer)
+
+
+def test_options_of_a_callee_are_seen(toy):
+    toy.edit("inner.py", "GAIN * x", "GAIN / (x - 5.0)")
+    toy.edit("inner.py", "@njit(cache=True)\ndef inner", '@njit(cache=True, error_model="python")\ndef inner')
+    with pytest.raises(ZeroDivisionError):
+        toy.start().outer(5.0)
+    toy.edit("inner.py", '"python"', '"numpy"')
+    assert toy.start().outer(5.0) == np.inf
+
+
+def test_only_callers_of_edited_code_are_compiled(toy):
+    toy.start().outer(5.0)
+    toy.edit("inner.py", "x + 7.0", "x + 8.0")
+    toy.edit("inner.py", "@njit(cache=True)\ndef inner", "# moves the lines\n\n@njit(cache=True)\ndef inner")
+    assert not compiled_again(toy)
+    toy.edit("outer.py", "1.0 / (x", "2.0 / (x")
+    module = toy.start()
+    assert module.outer(5.0) == VALUE + 0.25
+    assert compiled(module.outer)
+    assert not compiled(module.middle.middle)
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "of another kernel"])
+def test_a_damaged_entry_is_compiled_again(toy, damage):
+    toy.start().outer(5.0)
+    (entry,) = (each for each in toy.entries if each.name.startswith("outer."))
+    (other,) = (each for each in toy.entries if each.name.startswith("inner."))
+    content = entry.read_bytes()
+    entry.write_bytes(
+        {
+            "empty": b"",
+            "cut": content[: len(content) // 2],
+            "flipped": content[:-1] + bytes([content[-1] ^ 1]),
+            "of another kernel": other.read_bytes(),
+        }[damage]
+    )
+    module = toy.start()
+    assert module.outer(5.0) == VALUE
+    assert compiled(module.outer)
+    assert not compiled_again(toy)
+
+
+def test_code_that_arrives_as_an_argument_is_not_kept(toy):
+    toy.edit("middle.py", "def middle(x):\n    return inner(x) + 1000.0", "def middle(f, x):\n    return f(x) + 1000.0")
+    module = toy.start()
+    inner = importlib.import_module("toy.inner")
+    assert module.middle.middle(inner.inner, 5.0) == VALUE - 0.25
+    assert module.middle.middle(inner.neighbour, 5.0) == 1012.0
+    assert not [each for each in toy.entries if each.name.startswith("middle.")]
+
+
+def test_an_unknown_dependency_is_compiled_each_time(toy):
+    toy.edit("inner.py", "from toy import constants", "from toy import constants\nfrom toy.plain import plain")
+    toy.edit("inner.py", "+ offset", "+ plain(offset)")
+    plain = toy.folder / "plain.py"
+    for value in (1.0, 2.0):
+        plain.write_text(
+            f"from numba.extending import register_jitable\n@register_jitable\ndef plain(x):\n    return x + {value}\n",
+            encoding="utf-8",
+        )
+        with pytest.warns(UserWarning, match="not kept on disk: UnknownDependencyError: .*plain: a builtins.function"):
+            assert toy.start().outer(5.0) == VALUE + value
+        assert toy.entries == []
+
+
+def test_a_package_that_cannot_be_written_uses_a_folder_of_the_user(toy, tmp_path, monkeypatch):
+    (toy.folder / "__pycache__").write_text("in the way of a folder: even root cannot write there")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    monkeypatch.setenv("HOME", str(tmp_path / "user"))
+    assert toy.start().outer(5.0) == VALUE
+    assert len(list((tmp_path / "user").rglob("*.nbk"))) == 3
+    assert not compiled_again(toy)
+
+
+def test_without_any_folder_kernels_are_compiled(toy, monkeypatch):
+    (toy.folder / "__pycache__").write_text("in the way")
+    for name in ("XDG_CACHE_HOME", "HOME"):
+        monkeypatch.setenv(name, os.devnull)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        assert toy.start().outer(5.0) == VALUE
+    (warning,) = {str(each.message) for each in caught}
+    assert (
+        warning
+        == "compiled kernels are not kept on disk: no folder can be written; set NUMBA_CACHE_DIR to one that can"
+    )
+
+
+def test_recompile_deletes_the_entries(toy):
+    module = toy.start()
+    module.outer(5.0)
+    module.outer.recompile()
+    assert module.outer(5.0) == VALUE
+    assert not compiled_again(toy)
+
+
+def processes(count, code, folder, **environment):
+    """Run code in some processes at once and return what each prints, as JSON."""
+    path = os.pathsep.join([str(folder), str(ROOT)])
+    environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        for _ in range(count)
+    ]
+    answers = []
+    for process in started:
+        out, errors = process.communicate(timeout=300)
+        assert process.returncode == 0, errors.decode()
+        assert not errors
+        answers.append(json.loads(out))
+    return answers
+
+
+def test_processes_may_start_at_once(tmp_path):
+    """In numba's own cache, two signatures may get one file, and a caller then runs the code of the other."""
+    Toy(tmp_path)
+    code = """
+import json, random
+from toy import outer, middle, inner
+calls = [(kind, value) for kind in ("f", "i", "b") for value in (2, 3, 5)]
+random.shuffle(calls)
+results = {}
+for kind, value in calls:
+    argument = {"f": float, "i": int, "b": lambda x: x > 4}[kind](value)
+    results[f"{kind}{value}"] = outer.outer(argument) if kind != "b" else middle.middle(argument)
+misses = sum(sum(each.stats.cache_misses.values()) for each in (outer.outer, middle.middle, inner.inner))
+print(json.dumps([dict(sorted(results.items())), misses]))
+"""
+    first = processes(4, code, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    results = [each for each, _ in first]
+    assert results == [results[0]] * 4
+    assert results[0]["f5"] == results[0]["i5"] == VALUE
+    assert results[0]["b2"] == VALUE - 0.25 - 10.0
+    assert processes(1, code, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")) == [[results[0], 0]]
+    assert {each.suffix for each in (tmp_path / "cache").rglob("*") if each.is_file()} == {".nbk"}
+
+
+def every_kernel():
+    for package in (mvpose, simharness):
+        for each in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if not each.name.endswith("__main__"):
+                for name, value in vars(importlib.import_module(each.name)).items():
+                    if is_jitted(value) and value.py_func.__module__ == each.name:
+                        yield f"{each.name}.{name}", value
+
+
+def test_all_kernels_can_be_kept():
+    kernels = dict(every_kernel())
+    assert {name.partition(".")[0] for name in kernels} == {"mvpose", "simharness"}
+    for name, kernel in kernels.items():
+        assert type(kernel._cache).__name__ == "KernelCache", name
+        try:
+            code_digest(kernel)
+        except UnknownDependencyError as error:
+            pytest.fail(f"{name}: {error}")
+    assert len({code_digest(kernel) for kernel in kernels.values()}) == len(kernels)
+
+
+def copy(folder):
+    """Copy the package, with the kernels that are compiled where they are in it."""
+    shutil.copytree(ROOT / "mvpose", folder / "mvpose", ignore=shutil.ignore_patterns("build", "*.egg-info"))
+
+
+def replace(file, old, new):
+    text = file.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    file.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_a_lens_with_another_sign_changes_the_camera(tmp_path):
+    copy(tmp_path)
+    code = """
+import json, numpy as np
+from mvpose import Camera
+K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+camera = Camera(K, np.eye(3), np.zeros(3), [-0.1, 0, 0, 0, 0], (640, 480))
+print(json.dumps(camera.project([[0.5, 0.0, 1.0]]).tolist()))
+"""
+    assert processes(1, code, tmp_path, NUMBA_CACHE_DIR="") == [[[320 + 250 * 0.975, 240.0]]]
+    lens = tmp_path / "mvpose" / "lens.py"
+    text = lens.read_text(encoding="utf-8")
+    lens.write_text(text.replace("r2 * (k1 + r2", "r2 * (-k1 + r2"), encoding="utf-8")
+    assert processes(1, code, tmp_path, NUMBA_CACHE_DIR="") == [[[320 + 250 * 1.025, 240.0]]]
+
+
+@pytest.mark.slow
+def test_zeroed_evidence_changes_full(tmp_path):
+    copy(tmp_path)
+    code = """
+import json, numpy as np
+from mvpose import Camera, Detections, Pipeline, Rig
+K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+rig = Rig([Camera(K, np.eye(3), [x, 0, 4], size=(640, 480)) for x in (-1, 0, 1)])
+rng = np.random.default_rng(0)
+joints = np.column_stack([np.linspace(-0.3, 0.3, 17), np.linspace(-0.8, 0.8, 17), rng.normal(0.0, 0.2, 17)])
+seen = Detections.from_keypoints([0, 1, 2], rig.project(joints) + rng.normal(0.0, 3.0, (3, 17, 2)), np.ones((3, 17)))
+print(json.dumps(Pipeline.preset("full").estimate(rig, seen).joints.tolist()))
+"""
+    (before,) = processes(1, code, tmp_path, NUMBA_CACHE_DIR="")
+    assert processes(1, code, tmp_path, NUMBA_CACHE_DIR="") == [before]
+    replace(
+        tmp_path / "mvpose" / "reconstruction" / "likelihood.py",
+        "responsibility = best / (best + floor)",
+        "responsibility = 0.0 * best / (best + floor)",
+    )
+    (after,) = processes(1, code, tmp_path, NUMBA_CACHE_DIR="")
+    assert len(before) == 1
+    assert np.shape(after) != np.shape(before) or not np.allclose(after, before, atol=1e-3)
