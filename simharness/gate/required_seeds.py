@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 from simharness.scenario.study_definition import Study
-from simharness.statistics.paired_tests import DRAWS
-
-
-def least_p(seeds: int) -> float:
-    """Return the smallest p-value of the one-sided sign-flip test: that of seeds which all change in one direction."""
-    return max(2.0**-seeds, 1 / (1 + DRAWS))
+from simharness.statistics.paired_tests import DRAWS, least_p
 
 
 def least_seeds(level: float) -> int | None:
