@@ -3,7 +3,9 @@
 Every headline score of every variant, and its time, is compared over the whole suite and over each case alone. A
 single case shows changes that the mean over the suite dilutes, for example a step that became quadratic in the number
 of people. A change counts if its mean is larger than the tolerance *and* it is significant: a paired, one-sided
-sign-flip test with Holm's correction over all tests that are made.
+sign-flip test with Holm's correction over all tests that are made. The test is exact for its hypothesis, that a change
+does no more than another draw of the noise: scores before and after have one distribution then, and their differences
+are symmetrical.
 
 The cases are conditions of the same scenes: a change that helps at a seed in one case tends to help at that seed in the
 other cases, so trials of one seed are not independent. The whole suite is therefore compared by seed: before and after
@@ -192,7 +194,7 @@ def _test(score: str, pairs: _Pairs, case: str | None, tolerance: float) -> _Tes
     bad = -1 if SCORES[score].better == "higher" else 1
     before, after = (np.array([each[at].mean() for at in pairs.seeds]) for each in (pairs.before, pairs.after))
     change = after - before
-    test = paired(before, after, alternative=_alternative(change.sum()))
+    test = paired(before, after, alternative=_alternative(change.sum()), symmetric=True)
     loss = bad * test.difference
     result = Change(
         score=score,
@@ -224,7 +226,7 @@ def _test_time(pairs: _Pairs, case: str | None, tolerance: float) -> _Tested | N
     change = after - before
     middle = _middle(np.argsort(change, kind="stable"))
     ratio = float(change[middle].mean())
-    test = paired(before, after, alternative=_alternative(ratio))
+    test = paired(before, after, alternative=_alternative(ratio), symmetric=True)
     low, high = _middle_ends(change)
     result = Change(
         score=TIME,

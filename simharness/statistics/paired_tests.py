@@ -46,16 +46,17 @@ def paired(
     after: Sequence[float | None] | ArrayLike,
     *,
     alternative: Alternative = "two-sided",
+    symmetric: bool = False,
     seed: int = 0,
 ) -> Paired:
     """Test whether the mean of a score changed between two measurements of the same scenes, (n,) each.
 
-    The p-value is the larger one of two tests, so that the level holds where either is valid:
+    Two tests are made, and the larger p-value counts, so that the level holds where either test is valid:
 
-    - A sign-flip permutation test of the mean difference, exact for differences of a symmetrical distribution. Flipping
-      the sign of a pair without difference changes nothing. With at most ``EXACT`` other pairs all signs are
+    - A sign-flip permutation test of the mean difference, exact for differences with a symmetrical distribution.
+      Flipping the sign of a pair without difference changes nothing. With at most ``EXACT`` other pairs all signs are
       enumerated; with more, ``DRAWS`` flips are drawn, and p is at least 1 / 20,001 (Phipson & Smyth, 2010).
-    - Student's t corrected for skewness (:mod:`simharness.statistics.studentized`), for skewed differences.
+    - Student's t corrected for skewness (:mod:`simharness.statistics.studentized`).
 
     The least p-value is :func:`least_p`. Pairs must be independent of each other.
 
@@ -63,6 +64,8 @@ def paired(
         before: score of each scene.
         after: score of each scene, in the same order.
         alternative: alternative hypothesis; "greater": after is greater than before.
+        symmetric: whether the hypothesis is that both measurements have one distribution, not only one mean. The
+            differences are symmetrical then, and sign flips alone are exact, with more power.
         seed: seed of the draws.
 
     Raises:
@@ -78,7 +81,9 @@ def paired(
     if not len(change):
         return Paired(np.nan, np.nan, np.nan, 1.0, 0)
     low, high = (float(end) for end in mean_ends(change))
-    p = max(_sign_flip_p(change, alternative, seed), _studentized_p(change, alternative))
+    p = _sign_flip_p(change, alternative, seed)
+    if not symmetric:
+        p = max(p, _studentized_p(change, alternative))
     return Paired(float(change.mean()), low, high, p, len(change))
 
 
