@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
-from mvpose.checks import Sealed, as_array
+from mvpose.checks import Sealed, as_array, seal
 from mvpose.heatmaps import Heatmaps
 from mvpose.skeleton import COCO17, SHELF14, Skeleton
 
@@ -88,6 +88,17 @@ class Detections(Sealed):
 
     def __len__(self) -> int:
         return len(self.view)
+
+    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
+        """Return some detections without their heat maps, given by a mask (m,) or by indices in a new order."""
+        selected = object.__new__(type(self))  # the arrays are checked already
+        for field in fields(self):
+            value = None if field.name == "likelihoods" else getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value = value[which]
+                seal(value)
+            object.__setattr__(selected, field.name, value)
+        return selected
 
     @property
     def detected(self) -> NDArray[np.bool_]:

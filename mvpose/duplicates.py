@@ -35,7 +35,8 @@ class Duplicates:
 
     Attributes:
         threshold: OKS above which two poses of one view show one person.
-        least_joints: least number of shared detected joints; poses that share fewer are not compared.
+        least_joints: least number of shared detected joints; poses that share fewer are not compared, unless one
+            repeats the other exactly.
 
     Raises:
         ValueError: ``threshold`` outside 0..1, or ``least_joints`` below 1.
@@ -128,9 +129,20 @@ def _similar(a, b, keypoints, scores, variances, box, area, threshold, least):
                 lost += 1.0 - np.exp(-d2 / scale)
             if lost >= (1.0 - threshold) * joints:
                 return False
-        if shared < least or lost >= (1.0 - threshold) * shared:
+        if shared < least and not (lost == 0.0 and shared == _detected(scores, a) == _detected(scores, b)):
+            return False
+        if lost >= (1.0 - threshold) * shared:
             return False
     return True
+
+
+@njit(cache=True)
+def _detected(scores, d):
+    """Return the number of detected joints."""
+    count = 0
+    for j in range(scores.shape[1]):
+        count += scores[d, j] > 0.0
+    return count
 
 
 @njit(cache=True)

@@ -17,6 +17,7 @@ from mvpose.detections import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Matcher
+from mvpose.ordering import canonical_order, number_views
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
@@ -50,9 +51,13 @@ class Estimator(Protocol):
 class Pipeline:
     """Multi-person 3D pose estimation from the detections of a few calibrated cameras (Dong et al., CVPR 2019).
 
+    Every stage gets the detections in the canonical order (:mod:`mvpose.ordering`), without blank ones and repeats, so
+    that the people and their order depend neither on the order of detections and cameras nor on the world frame.
+
     Attributes:
         affinity: affinity between detections, that is, the likelihood that two detections show one person.
-        matching: function from affinities (m, m) and views (m,) to people, over all views at once.
+        matching: function from affinities (m, m) and views (m,) to people, over all views at once. Views are numbered
+            in the order of their first detections.
         reconstruction: function from the rays of all detections, labels (m,) and the skeleton to 3D poses.
         duplicates: function that returns a mask (m,) of the detections to keep; the others repeat a more confident
             detection of their view.
@@ -105,16 +110,13 @@ class Pipeline:
                 appearance is the only affinity.
         """
         start = time.perf_counter()
-        rays = viewing_rays(rig, detections)
-        affinity = self.affinity(rig, detections, rays)
-        kept = self.duplicates(detections)
-        if not kept.all():
-            affinity[~kept] = affinity[:, ~kept] = 0.0
+        chosen, ordered, rays = _enter(rig, detections, self.duplicates)
+        affinity = self.affinity(rig, ordered, rays)
         compared = time.perf_counter()
-        matching = self.matching(affinity, detections.view)
+        matching = self.matching(affinity, number_views(ordered.view))
         matched = time.perf_counter()
         poses = self.reconstruction(rays, matching.labels, detections.skeleton)
-        return _estimate(poses, matching, start, compared, matched)
+        return _estimate(poses, _restored(matching, chosen, len(detections)), start, compared, matched)
 
 
 @dataclass(frozen=True)
@@ -132,11 +134,38 @@ class UnmatchedPipeline:
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame; see :meth:`Pipeline.estimate`. Only reconstruction takes time."""
         start = time.perf_counter()
-        rays = viewing_rays(rig, detections)
-        rays.weights[~self.duplicates(detections)] = 0.0  # a detection without keypoints is ignored
+        chosen, _, rays = _enter(rig, detections, self.duplicates)
         ready = time.perf_counter()
         poses, labels = self.reconstruction(rays, detections.skeleton)
-        return _estimate(poses, Matching(labels), start, ready, ready)
+        return _estimate(poses, _restored(Matching(labels), chosen, len(detections)), start, ready, ready)
+
+
+def _enter(
+    rig: Rig, detections: Detections, duplicates: Callable[[Detections], NDArray[np.bool_]]
+) -> tuple[NDArray[np.int64], Detections, Rays]:
+    """Return the indices of the detections that take part, in canonical order, and their detections and rays.
+
+    Blank and repeated detections are left out before any other stage, so that they cannot influence it.
+    """
+    rays = viewing_rays(rig, detections)
+    order = canonical_order(detections, rays.weights)
+    ordered = detections.select(order)
+    kept = duplicates(ordered)
+    if not kept.all():
+        order, ordered = order[kept], ordered.select(kept)
+    return order, ordered, rays.select(order)
+
+
+def _restored(matching: Matching, chosen: NDArray[np.int64], detections: int) -> Matching:
+    """Return a matching of the chosen detections as one of all detections, in their given order."""
+    labels = np.full(detections, -1)
+    labels[chosen] = matching.labels
+    seal(labels)
+    if matching.P is None:
+        return replace(matching, labels=labels)
+    P = np.eye(detections)
+    P[chosen[:, None], chosen] = matching.P
+    return replace(matching, labels=labels, P=P)
 
 
 def _estimate(poses: Poses, matching: Matching, start: float, compared: float, matched: float) -> Estimate:

@@ -6,13 +6,14 @@ a ray, are in metres for any resolution, focal length and lens, so one set of sc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
+from mvpose.checks import seal
 from mvpose.detections import MOST_DETECTIONS, Detections
 from mvpose.heatmaps import Heatmaps
 from mvpose.kernels import njit
@@ -28,13 +29,15 @@ class Modes:
     Attributes:
         directions: unit vectors to the modes of each map, strongest first, (m, J, K, 3); zeros where there are fewer.
         weights: heights of the modes, at most 1, (m, J, K); 0 where there are fewer.
-        values: heat maps, (m, J, h, w).
+        row: row of each detection in ``values``, (m,).
+        values: heat maps of all detections of the frame, (M, J, h, w).
         grid: origin and stride of the maps of each detection, x and y, pixels, (m, 4).
         cameras: camera of each detection, as :attr:`mvpose.camera.Rig.packed`, (m, 22).
     """
 
     directions: Floats
     weights: Floats
+    row: Integers
     values: NDArray[np.float32]
     grid: Floats
     cameras: Floats
@@ -65,9 +68,14 @@ class Rays:
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Rays:
         """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
-        modes = self.modes and Modes(*(getattr(self.modes, field.name)[which] for field in fields(self.modes)))
+        modes = self.modes
+        if modes is not None:  # all maps stay where they are, because copies would dominate the time
+            directions, weights, row = modes.directions[which], modes.weights[which], modes.row[which]
+            modes = Modes(directions, weights, row, modes.values, modes.grid[which], modes.cameras[which])
+        view = self.view[which]
+        seal(view)
         return Rays(
-            self.view[which],
+            view,
             self.origins[which],
             self.directions[which],
             self.weights[which],
@@ -117,6 +125,7 @@ def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
     return Modes(
         directions.reshape(m, joints, _MODES, 3),
         weights.reshape(m, joints, _MODES),
+        np.arange(m),
         maps.values,
         np.hstack([maps.origin, maps.stride]),
         rig.packed[view],

@@ -11,6 +11,7 @@ from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.kernels import njit
+from mvpose.ordering import rank_views
 from mvpose.rays import Rays
 
 LANES = 8  # joints are padded to full vector registers, so no loop has a scalar remainder
@@ -44,7 +45,11 @@ def scalar_sigmoid(distance, midpoint, slope):
 
 @njit(cache=True)
 def group_by_view(view):
-    """Return the detections ordered by view, (m,), the start of each view that has any, and the end of the last."""
+    """Return the detections grouped by view, (m,), the start of each view that has any, and the end of the last.
+
+    The views come in the order of their first detections, so that their numbers do not matter.
+    """
+    view, _ = rank_views(view)
     m = len(view)
     order = np.arange(m)
     for i in range(1, m):  # insertion sort, because detections are nearly always sorted already

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from mvpose.matching.assignment import best_assignment
-from mvpose.matching.rounding import rank_views, read_only
+from mvpose.matching.rounding import read_only
+from mvpose.ordering import rank_views
 
 _LEAST_GAIN = 1e-9  # a smaller gain is rounding error and could cause cycles
 _MOST_ROUNDS = 50

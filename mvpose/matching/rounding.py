@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import seal
 from mvpose.kernels import njit
+from mvpose.ordering import rank_views
 
 
 def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshold: float = 0.5) -> NDArray[np.int64]:
@@ -42,22 +43,6 @@ def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
         result = result.view()
         result.flags.writeable = False
     return result
-
-
-@njit(cache=True)
-def rank_views(view):
-    """Number the views 0, 1, ... by first detection; return the number for each detection, (m,), and the count."""
-    m = len(view)
-    rank, seen, views = np.empty(m, np.int64), np.empty(m, np.int64), 0
-    for i in range(m):
-        r = 0
-        while r < views and seen[r] != view[i]:
-            r += 1
-        if r == views:
-            seen[r] = view[i]
-            views += 1
-        rank[i] = r
-    return rank, views
 
 
 @njit(cache=True)

@@ -28,10 +28,10 @@ def rescore(states, unary, count, labels, person, weights, maps, floor):
         labels: person of each detection, (m,).
         person: label of the person to whom the proposals belong.
         weights: heights of the modes of the person's n detections, (J, n, K).
-        maps: values (m, J, h, w), grid (m, 4) and cameras (m, 22) of :class:`mvpose.rays.Modes`.
+        maps: values (M, J, h, w), row (m,), grid (m, 4) and cameras (m, 22) of :class:`mvpose.rays.Modes`.
         floor: likelihood of a joint at any place.
     """
-    values, grid, cameras = maps
+    values, row, grid, cameras = maps
     for j in range(len(count)):
         for s in range(count[j]):
             x, y, z = states[j, s, 0], states[j, s, 1], states[j, s, 2]
@@ -39,7 +39,7 @@ def rescore(states, unary, count, labels, person, weights, maps, floor):
             for d in range(len(labels)):
                 if labels[d] == person:
                     if weights[j, v, 0] > 0.0:
-                        total += np.log(floor + _height_at(x, y, z, d, j, values, grid[d], cameras[d]))
+                        total += np.log(floor + _height_at(x, y, z, row[d], j, values, grid[d], cameras[d]))
                     v += 1
             insert(states[j], unary[j], s, total, x, y, z)
 

@@ -59,7 +59,7 @@ class PictorialStructure:
         """Return the joints of all people; labels (m,) count from 0, -1 for a detection of no person."""
         length, definition = published_bones(skeleton)
         modes = rays.modes
-        maps = None if modes is None else (modes.values, modes.grid, modes.cameras)
+        maps = None if modes is None else (modes.values, modes.row, modes.grid, modes.cameras)
         poses = Poses.empty(labels, len(skeleton))
         _structures(
             poses,

@@ -17,7 +17,7 @@ is why the paper matches first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ import numpy as np
 from mvpose.arrays import Floats, Integers
 from mvpose.checks import check_numbers
 from mvpose.kernels import njit
+from mvpose.ordering import number_views
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.hypotheses import hypothesize
@@ -84,9 +85,11 @@ class UnmatchedPictorialStructure:
             explains most of its joints, at least three, or -1. A person has two or more detections, at most one per
             view.
         """
-        order = np.argsort(rays.view, kind="stable")
-        order = order[_strongest(rays.select(order), self.most_detections)]
-        by_view = rays.select(order)
+        view = number_views(rays.view)
+        order = np.argsort(view, kind="stable")
+        by_view = replace(rays.select(order), view=view[order])
+        used = _strongest(by_view, self.most_detections)
+        order, by_view = order[used], by_view.select(used)
         found = self._find(by_view, skeleton)
         labels = np.full(len(rays), -1)
         labels[order] = _label(found, by_view.view)

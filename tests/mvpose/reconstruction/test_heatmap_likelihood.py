@@ -70,7 +70,7 @@ def test_a_map_without_the_joint_has_the_likelihood_of_the_floor():
         np.zeros(4, int),
         0,
         modes.weights.transpose(1, 0, 2).copy(),
-        (modes.values, modes.grid, modes.cameras),
+        (modes.values, modes.row, modes.grid, modes.cameras),
         0.01,
     )
     assert unary[9, 0] == pytest.approx(3 * np.log(1.01) + np.log(0.01), abs=0.19)  # a bilinear peak is up to 6 % low
@@ -85,7 +85,7 @@ def test_proposals_are_sorted_by_the_heat_maps():
     away = np.array([0.4, 0.0, 0.1, 0.05])
     states = STANDING[:, None] + away[:, None] * [0.0, 1.0, 0.0]
     unary = np.zeros((17, 4))
-    weights, maps = modes.weights.transpose(1, 0, 2).copy(), (modes.values, modes.grid, modes.cameras)
+    weights, maps = modes.weights.transpose(1, 0, 2).copy(), (modes.values, modes.row, modes.grid, modes.cameras)
     rescore(states, unary, np.full(17, 4), np.zeros(3, int), 0, weights, maps, 0.01)
     np.testing.assert_allclose(states[:, 0], STANDING)
     assert (np.diff(unary, axis=1) <= 0).all()

@@ -1,0 +1,71 @@
+"""Canonical order of the detections of a frame, so that results do not depend on the order in which they are given.
+
+Ties, local optima and the last digits of sums depend on the order in which detections and views are visited. So the
+pipeline sorts the detections by what they show before any other stage, and visits the views in the order of their first
+detections. The order follows from pixels and scores alone. It is the same for any order of detections or cameras, for
+any world frame, and for a mirrored scene or skeleton, because it starts from the height in the picture.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.detections import Detections
+from mvpose.kernels import njit
+
+
+def canonical_order(detections: Detections, weights: Floats) -> Integers:
+    """Return the indices of the detections with a keypoint, from the top to the bottom of their pictures.
+
+    Detections of equal mean height are ordered by score, then by column. Those that agree in all of this are taken to
+    be copies of each other.
+
+    Args:
+        detections: m detections.
+        weights: scores of the keypoints that have a viewing ray, (m, J).
+    """
+    keys = _sort_keys(detections.keypoints, weights, detections.box_scores)
+    order = np.lexsort(keys[:-1])
+    return order[keys[-1, order] > 0.0]
+
+
+def number_views(view: Integers) -> Integers:
+    """Number views 0, 1, ... by first detection; return the number of the view of each detection, (m,)."""
+    rank, _ = rank_views(view)
+    return rank
+
+
+@njit(cache=True)
+def rank_views(view):
+    """Number the views 0, 1, ... by first detection; return the number for each detection, (m,), and the count."""
+    m = len(view)
+    rank, seen, views = np.empty(m, np.int64), np.empty(m, np.int64), 0
+    for i in range(m):
+        r = 0
+        while r < views and seen[r] != view[i]:
+            r += 1
+        if r == views:
+            seen[r] = view[i]
+            views += 1
+        rank[i] = r
+    return rank, views
+
+
+@njit(cache=True)
+def _sort_keys(keypoints, weights, box_scores):
+    """Return the keys of the order, the last one first, (4, m), and as the last row the number of keypoints."""
+    m, joints = weights.shape
+    keys = np.zeros((5, m))
+    for d in range(m):
+        column, row, score, count = 0.0, 0.0, 0.0, 0.0
+        for j in range(joints):
+            if weights[d, j] > 0.0:
+                column += keypoints[d, j, 0]
+                row += keypoints[d, j, 1]
+                score += weights[d, j]
+                count += 1.0
+        if count > 0.0:
+            keys[0, d], keys[1, d], keys[2, d] = column / count, -box_scores[d], -score
+            keys[3, d], keys[4, d] = row / count, count
+    return keys
