@@ -93,7 +93,10 @@ MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "m
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 SHELL = (". .venv/bin/activate",)
-MODULES = ("python -m benchmarks.method", "python -m benchmarks.simulator", "python -m tools.reid")
+MODULES = tuple(
+    f"python -m {name}"
+    for name in ("benchmarks.method", "benchmarks.simulator", "benchmarks.planted_bugs", "tools.reid")
+)
 BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
 KNOWN = {
     *ALONE,

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks.planted_bugs.catalogue import Bug
@@ -45,7 +45,7 @@ class Checkout:
 
     Attributes:
         root: its folder.
-        kernels: folder of compiled kernels, shared by all copies.
+        kernels: folder of its compiled kernels.
     """
 
     root: Path
@@ -66,16 +66,20 @@ class Checkout:
         return cls(root, kernels)
 
     @contextlib.contextmanager
-    def planted(self, bug: Bug | None) -> Iterator[None]:
-        """Plant a bug, None for none; then restore the file and its time of change."""
-        if bug is None:
-            yield
-            return
+    def planted(self, bug: Bug) -> Iterator[Checkout]:
+        """Plant a bug and yield the copy with it; then restore the file and its time of change.
+
+        The copy with the bug has a folder of kernels of its own, which starts with those of the code without bugs: what
+        a bug does not touch is not compiled again, and what is compiled with it is thrown away.
+        """
         path = self.root / bug.file
         before, times = path.read_bytes(), path.stat()
+        kernels = self.kernels.with_name(f"{self.kernels.name}-planted")
+        shutil.rmtree(kernels, ignore_errors=True)
+        shutil.copytree(self.kernels, kernels, copy_function=os.link)
         path.write_text(bug.planted(before.decode()), encoding="utf-8")
         try:
-            yield
+            yield replace(self, kernels=kernels)
         finally:
             path.write_bytes(before)
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))

@@ -61,8 +61,8 @@ class Gate:
 
     def check_bug(self, copy: Checkout, bug: Bug, *, limit: float) -> Outcome:
         """Return the outcome of :meth:`check` with a bug planted."""
-        with copy.planted(bug):
-            return self.check(copy, first=first_stage(bug.file), limit=limit)
+        with copy.planted(bug) as planted:
+            return self.check(planted, first=first_stage(bug.file), limit=limit)
 
     def _run(
         self, copy: Checkout, first: First, keep: bool, baseline: Path, options: list[str], limit: float

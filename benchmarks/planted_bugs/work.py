@@ -23,6 +23,8 @@ _LOCK = threading.Lock()
 _SLOWER = 12.0  # times the limit of a bug: the first run compiles all kernels and simulates everything
 _SIMULATED = 12  # most fresh seeds for a bug in the simulator, which must simulate everything again
 
+_WARM = ("tests/mvpose/test_pipeline.py", "tests/mvpose/reconstruction", "tests/simharness/capture/test_rays.py")
+
 NEUTRAL = Bug(
     id="neutral",
     file="simharness/detector/draws.py",
@@ -56,11 +58,11 @@ class Bench:
 
     def __init__(self, folder: Path, records: Records, *, workers: int, limit: float) -> None:
         self._folder, self._records, self._limit = folder.resolve(), records, limit
-        copies = [Checkout.make(self._folder / "copies" / str(k), self._folder / "kernels") for k in range(workers)]
         self._free: queue.SimpleQueue[Checkout] = queue.SimpleQueue()
-        for copy in copies:
-            self._free.put(copy)
         self._workers = workers
+        with ThreadPoolExecutor(workers) as pool:
+            for copy in pool.map(self._make_copy, range(workers)):
+                self._free.put(copy)
 
     def tests(self, bugs: Iterable[Bug]) -> dict[str, Outcome]:
         """Run the tests near each bug with the bug planted.
@@ -75,8 +77,8 @@ class Bench:
                 raise ValueError(
                     f"{clean.what} fails without any bug: mend it, or run on a checkout in which it passes"
                 )
-            with copy.planted(bug):
-                return run_tests(copy, bug.tests, limit=self._limit)
+            with copy.planted(bug) as planted:
+                return run_tests(planted, bug.tests, limit=self._limit)
 
         return self._outcomes("tests", bugs, run)
 
@@ -97,9 +99,9 @@ class Bench:
         def run(copy: Checkout, bug: Bug) -> dict[str, Any]:
             first = first_stage(bug.file)
             into = self._folder / "effects" / f"{bug.id}.json"
-            with copy.planted(bug):
+            with copy.planted(bug) as planted:
                 measured = replace(gate, suite=str(suite if first == "estimates" else few))
-                done = measured.measure(copy, first=first, into=into, limit=self._limit * seeds / _SIMULATED)
+                done = measured.measure(planted, first=first, into=into, limit=self._limit * seeds / _SIMULATED)
             if done.code != 0:
                 return {"text": f"trials fail: {done.output.strip().splitlines()[0]}", "seconds": done.seconds}
             found = effect(before, read_scores(into))
@@ -121,6 +123,15 @@ class Bench:
             for n in range(1, count + 1)
         ]
         return self._outcomes("clean", changes, lambda copy, bug: gate.check_bug(copy, bug, limit=self._limit))
+
+    def _make_copy(self, number: int) -> Checkout:
+        """Copy the checkout, and compile the kernels that tests and gate use most where they are not compiled yet."""
+        kernels = self._folder / "kernels" / str(number)
+        copy = Checkout.make(self._folder / "copies" / str(number), kernels)
+        if not any(kernels.iterdir()):
+            _say(f"copy {number}: compile kernels")
+            run_tests(copy, _WARM, limit=_SLOWER * self._limit)
+        return copy
 
     def _gate(self, suite: str) -> Gate:
         """Return the gate of a suite, with a baseline of this code; it is made where it is missing."""

@@ -53,14 +53,22 @@ class TestPlanting:
         with pytest.raises(ValueError, match="not valid Python"):
             dataclasses.replace(BUG, edits=(("a + b", "a +"),)).planted("x = a + b\n")
 
-    def test_the_copy_is_restored_with_its_time_of_change(self, tmp_path):
-        copy, file = Checkout(tmp_path, tmp_path / "kernels"), tmp_path / "sums.py"
+    def test_the_copy_is_restored_with_its_time_of_change_and_its_kernels(self, tmp_path):
+        root, kernels = tmp_path / "copy", tmp_path / "kernels"
+        root.mkdir()
+        kernels.mkdir()
+        file = root / "sums.py"
         file.write_text("x = a + b\n")
+        (kernels / "clean").write_text("compiled")
         before = file.stat().st_mtime_ns
-        with copy.planted(BUG):
+        with Checkout(root, kernels).planted(BUG) as planted:
             assert file.read_text() == "x = a - b\n"
             assert file.stat().st_mtime_ns != before
+            assert (planted.kernels / "clean").read_text() == "compiled"
+            (planted.kernels / "clean").unlink()
+            (planted.kernels / "of the bug").write_text("compiled")
         assert (file.read_text(), file.stat().st_mtime_ns) == ("x = a + b\n", before)
+        assert [each.name for each in kernels.iterdir()] == ["clean"]
 
 
 class TestNearTests:

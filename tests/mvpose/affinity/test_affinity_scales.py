@@ -80,3 +80,9 @@ def test_people_half_a_metre_apart_are_separated():
         detections, person = noisy(rig, people_in_a_room(8, half=1.2, gap=0.5, seed=seed), seed=seed, pixels=8.0)
         f1.append(pairwise_f1(labels(rig, detections), person, detections.view))
     assert np.mean(f1) > 0.97
+
+
+@pytest.mark.parametrize("scale", ["midpoint", "slope", "threshold", "saturation"])
+def test_both_geometric_cues_have_the_same_scales(scale):
+    """A person who fills 300 of 1000 pixels is seen at 175 pixels per metre."""
+    assert getattr(EpipolarAffinity(), scale) == pytest.approx(175 * getattr(GeometricAffinity(), scale), rel=0.02)

@@ -63,6 +63,13 @@ def test_rounding_is_consistent_whatever_p_is(case, threshold):
     assert consistent(round_to_people(affinity, view, threshold=threshold), view)
 
 
+@pytest.mark.parametrize(("p", "matched"), [(0.45, False), (0.55, True)])
+def test_a_match_needs_p_above_one_half(p, matched):
+    """The paper's threshold is the default."""
+    labels = round_to_people(np.array([[1.0, p], [p, 1.0]]), np.array([0, 1]))
+    assert labels.tolist() == ([0, 0] if matched else [-1, -1])
+
+
 def test_rounding_breaks_the_weakest_link_of_a_chain():
     """0-1 and 1-2 match, but 0 and 2 are of one view."""
     view = np.array([0, 1, 0])

@@ -10,6 +10,7 @@ from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.limb_direction_prior import (
     direction_concentrations,
     direction_log_likelihood,
@@ -18,6 +19,7 @@ from mvpose.reconstruction.limb_direction_prior import (
 from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
 from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb, leaves_first, refine, tree
+from mvpose.reconstruction.triangulation import consensus
 
 
 def reconstruct(rays, method=None):
@@ -268,6 +270,29 @@ def test_bone_lengths_are_symmetric_and_plausible(skeleton):
         real = [np.linalg.norm(STANDING[c] - STANDING[p]) for p, c in skeleton.edges]
         wrong = np.abs(np.array(real) - [mean[c] for _, c in skeleton.edges])
         assert (wrong < 3 * np.array([deviation[c] for _, c in skeleton.edges])).all()
+
+
+def test_bone_lengths_agree_with_another_survey():
+    """ANSUR II (Gordon et al. 2014), women and men averaged; the prior is from de Leva and NCD-RisC."""
+    upper_arm = (1 - 0.104 - 0.043) * (0.3352 + 0.3112) / 2  # acromion to radiale, between the joint centres
+    survey = {"elbow": upper_arm, "wrist": (0.2679 + 0.2413) / 2, "knee": (0.4093 + 0.3794) / 2}
+    mean, _ = bone_lengths(COCO17)
+    for joint, length in survey.items():
+        assert mean[COCO17.index(f"left_{joint}")] == pytest.approx(length, rel=0.04)
+
+
+def test_the_point_on_which_all_views_agree_is_proposed():
+    """With noise in all views it is likelier than the point of any pair."""
+    rig, rng = ring(6), np.random.default_rng(2)
+    pixels = rig.project(STANDING) + rng.normal(0, 6.0, (6, 17, 2))
+    rays = viewing_rays(rig, Detections.from_keypoints(np.arange(6), pixels, np.full((6, 17), 0.9)))
+    arrays = rays.directions.transpose(1, 0, 2)[:, :, None].copy(), rays.weights.T[:, :, None].copy()
+    sigmas = Noise().sigmas(COCO17)
+    _, unary, _, _ = propose_all(rays.origins, *arrays, rays.pixel, sigmas, 0.01, 64, 32)
+    for j in range(17):
+        view, point = (rays.origins, arrays[0][j], arrays[1][j], rays.pixel, sigmas[j], 0.01), np.empty(3)
+        consensus(point, view, np.empty((8, 3)))
+        assert unary[j, 0] >= log_likelihood(point, *view) - 1e-9
 
 
 def test_every_pair_of_views_proposes_and_near_proposals_are_merged():
