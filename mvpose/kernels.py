@@ -26,6 +26,7 @@ from mvpose.kernel_code import code_digest
 
 __all__ = ["njit"]
 
+_DEFAULTS = {"error_model": "numpy", "fastmath": False, "forceinline": False}  # all that numba inherits from callers
 _CHECKSUM = hashlib.sha256().digest_size  # bytes at the start of a file: the digest of the rest
 # Arguments whose types say all of them that is compiled. Others, such as functions, bring code that no key would see.
 _PLAIN = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.Omitted, types.Array)
@@ -33,6 +34,10 @@ _PLAIN = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.
 
 def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
     """Compile a function by ``numba.njit``; also a decorator with options.
+
+    Division by zero gives infinity or NaN, as in NumPy, and arithmetic is strict (``fastmath=False``) unless options
+    say otherwise. Numba's own defaults are those of the caller that happens to compile a kernel first, so that results
+    would depend on the order of calls.
 
     Args:
         function: function to compile on its first call.
@@ -42,7 +47,7 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
     """
     if function is None:
         return lambda decorated: njit(decorated, cache=cache, **options)
-    kernel = numba.njit(**options)(function)
+    kernel = numba.njit(**{**_DEFAULTS, **options})(function)
     if cache and hasattr(kernel, "_cache"):  # not with NUMBA_DISABLE_JIT, nor in a numba that keeps its cache elsewhere
         kernel._cache = KernelCache(kernel)
     return kernel

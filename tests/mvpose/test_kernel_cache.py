@@ -155,6 +155,18 @@ def test_options_of_a_callee_are_seen(toy):
     assert toy.start().outer(5.0) == np.inf
 
 
+@pytest.mark.parametrize("caller_first", [False, True])
+def test_a_kernel_does_not_inherit_the_options_of_who_compiles_it(toy, caller_first):
+    toy.edit("inner.py", "GAIN * x", "GAIN / (x - 5.0)")
+    toy.edit("outer.py", 'error_model="numpy"', 'error_model="python", fastmath=True')
+    module = toy.start()
+    inner = importlib.import_module("toy.inner").inner
+    for kernel in (module.outer, inner) if caller_first else (inner, module.outer):
+        assert kernel(5.0) == np.inf
+    (code,) = inner.inspect_llvm().values()
+    assert " fast " not in code
+
+
 def test_only_callers_of_edited_code_are_compiled(toy):
     toy.start().outer(5.0)
     toy.edit("inner.py", "x + 7.0", "x + 8.0")
