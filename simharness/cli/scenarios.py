@@ -57,6 +57,7 @@ def show(
     """Print a scenario as TOML with all its defaults; of a study its factors, its number of trials and its base."""
     with exit_on_error():
         from simharness.scenario.outline import outline
+        from simharness.scenario.size import MOST_TRIALS
         from simharness.scenario.study_definition import StudyTooLarge, load_study, read_plan
 
         plan = read_plan(scenario, overrides=overrides or (), seed=seed)
@@ -64,7 +65,11 @@ def show(
         try:
             load_study(scenario, overrides=overrides or ())
         except StudyTooLarge:
-            note = "simharness study needs --yes to run so many trials."
+            note = (
+                "simharness study needs --yes to run so many trials."
+                if plan.trials <= MOST_TRIALS
+                else f"simharness study runs at most {MOST_TRIALS:,} trials."
+            )
     typer.echo(outline(plan, note), nl=False)
 
 

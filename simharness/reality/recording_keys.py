@@ -12,9 +12,9 @@ from simharness.formats.detection_formats import FORMATS as DETECTION_FORMATS
 from simharness.formats.joint_names import KNOWN, JointNames, known_skeleton
 from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
 from simharness.reality.annotated_recording import DetectorKind
-from simharness.scenario.sections.section import Positive, Section
+from simharness.scenario.sections.section import Section
 
-Whole = Annotated[int, Field(ge=0)]
+Whole = Annotated[int, Field(ge=0, le=10**9)]
 Name = Annotated[str, Field(min_length=1)]
 
 
@@ -127,7 +127,7 @@ class RecordingKeys(Section):
     model_config = ConfigDict(title="a recording")
 
     name: str = Field("", description="name of the recording; by default that of the file")
-    rate: Positive = Field(description="frames per second, Hz")
+    rate: float = Field(gt=0.0, le=1000.0, description="frames per second, Hz")
     frames: Annotated[tuple[tuple[Whole, Whole], ...], BeforeValidator(_pairs)] = Field(
         min_length=1, description="ranges of frame numbers, [first, last], both included"
     )

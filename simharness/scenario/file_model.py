@@ -13,8 +13,9 @@ from simharness.scenario.sections.cameras import Cameras
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.gate import Gate
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.size import MOST_TRIALS
 
-Seed = Annotated[int, Field(ge=0)]
+Seed = Annotated[int, Field(ge=0, lt=2**53)]
 
 
 class CamerasSection(Cameras):
@@ -44,10 +45,11 @@ class ScenarioFile(Scenario):
         description="scenario with which the file begins: a file, relative to this one, or the name of a shipped "
         "scenario; keys of this file go over it",
     )
-    seeds: Annotated[int, Field(ge=1)] | Annotated[tuple[Seed, ...], Field(min_length=1)] = Field(
-        1, description="number of seeds, from the scenario's seed on, or a list of seeds"
-    )
-    variants: tuple[str, ...] = Field((), description="the same as method.variants")
+    seeds: (
+        Annotated[int, Field(ge=1, le=MOST_TRIALS)]
+        | Annotated[tuple[Seed, ...], Field(min_length=1, max_length=MOST_TRIALS)]
+    ) = Field(1, description="number of seeds, from the scenario's seed on, or a list of seeds")
+    variants: tuple[str, ...] = Field((), max_length=100, description="the same as method.variants")
     cameras: CamerasSection = CamerasSection()
     detector: DetectorSection = DetectorSection()
     sweep: dict[str, Any] = Field({}, description="keys of a scenario, each with a list or a range of values")

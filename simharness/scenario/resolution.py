@@ -21,6 +21,7 @@ from simharness.scenario.presets import KINDS, Presets, merge_with_presets
 from simharness.scenario.sections.gate import Gate
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.sections.section import Section
+from simharness.scenario.size import MOST_TRIALS, oversized
 from simharness.scenario.sweep import Sweep, SweepReader, Value
 from simharness.scenario.toml_files import ScenarioError
 from simharness.scenario.validation_messages import explain_all, origin_of
@@ -110,6 +111,9 @@ class Resolver:
         except ValidationError as error:
             self._mistakes += explain_all(error, origins, self._file)
             return None
+        self._mistakes += [
+            f"{origin_of(key.split('.'), origins, self._file)}: {message}" for key, message in oversized(scenario)
+        ]
         sections = {key: section for key, section in scenario if isinstance(section, Section)}
         shared = {
             # Sections are shared only with equal sets of given keys: some checks depend on which keys were given.
@@ -243,7 +247,7 @@ def _seeds(data: dict[str, Any], document: Document, mistakes: list[str]) -> Seq
     origins, file = document.origins, str(document.path)
     seeds = data.pop("seeds", 1)
     origin = origin_of(("seeds",), origins, file)
-    if isinstance(seeds, list) and seeds and all(isinstance(seed, int) and seed >= 0 for seed in seeds):
+    if isinstance(seeds, list) and seeds and all(isinstance(seed, int) and 0 <= seed < 2**53 for seed in seeds):
         if len(set(seeds)) < len(seeds):
             mistakes.append(f"{origin}: seeds: a seed is in the list twice; remove one of them")
         single = origin_of(("seed",), origins, file)
@@ -254,15 +258,16 @@ def _seeds(data: dict[str, Any], document: Document, mistakes: list[str]) -> Seq
             )
         data["seed"] = seeds[0]
         return tuple(seeds)
-    if isinstance(seeds, bool) or not isinstance(seeds, int) or seeds < 1:
+    if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= MOST_TRIALS:
         shown = json.dumps(seeds, default=str)
         mistakes.append(
-            f"{origin}: seeds: expected a number of seeds, 1 or more, or a list of seeds, e.g. [0, 1, 2], got {shown}"
+            f"{origin}: seeds: expected a number of seeds, 1 to {MOST_TRIALS:,}, or a list of seeds, e.g. [0, 1, 2], "
+            f"got {shown[:60]}"
         )
         seeds = 1
     first = data.get("seed", 0)
-    # A seed that is not a number is reported with the scenario.
-    return range(first, first + seeds) if isinstance(first, int) else range(seeds)
+    # A seed that is not a valid number is reported with the scenario.
+    return range(first, first + seeds) if isinstance(first, int) and first < 2**53 else range(seeds)
 
 
 def _check_presets(data: dict[str, Any], sweep: Sweep, reader: SweepReader, mistakes: list[str]) -> None:

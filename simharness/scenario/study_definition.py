@@ -39,6 +39,7 @@ from simharness.scenario.resolution import Plan, Resolver, read_plan, refuse, va
 from simharness.scenario.sections.gate import Gate
 from simharness.scenario.sections.method import wrong_variants
 from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.size import MOST_TRIALS
 from simharness.scenario.sweep import Value
 from simharness.scenario.toml_files import ScenarioError
 from simharness.scenario.validation_messages import origin_of
@@ -128,7 +129,7 @@ def load_study(
         overrides: as in :func:`simharness.scenario.load.load`; also ``"sweep.cameras.count=[2, 3]"``.
         seeds: replaces the file's seeds: their number, or a list of them.
         variants: replaces the file's variants.
-        limit: largest number of trials; None: no limit.
+        limit: largest number of trials; None: :data:`~simharness.scenario.size.MOST_TRIALS`.
         folder: folder to which files named in the scenario file are relative; by default that of the file.
 
     Raises:
@@ -137,6 +138,11 @@ def load_study(
     """
     plan = read_plan(path, overrides=overrides, seeds=seeds, variants=variants, folder=folder)
     _check_variants(plan)
+    if plan.trials > MOST_TRIALS:
+        raise StudyTooLarge(
+            f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "
+            f"than the {MOST_TRIALS:,} that a study may have: sweep over fewer values, or split it into several files"
+        )
     if limit is not None and plan.trials > limit:
         raise StudyTooLarge(
             f"{path}: makes {plan.trials:,} trials ({plan.settings:,} x {len(plan.seeds):,}, settings x seeds), more "

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from simharness.scenario.sections.section import Amount, Section, Share
+from simharness.scenario.sections.section import Section, Share, Span, Spread
 
 
 class Annotation(Section):
@@ -16,15 +16,15 @@ class Annotation(Section):
     that of ``simharness export`` and of ``simharness evaluate seeds``.
     """
 
-    shift: Amount = Field(
+    shift: Spread = Field(
         0.0,
         description="constant offset of each joint of each person from the true one: its standard deviation along each "
         "axis of the body, metres",
     )
-    random: Amount = Field(
+    random: Spread = Field(
         0.0, description="standard deviation along each axis of the error that changes over time, metres"
     )
-    life: Amount = Field(0.0, description="correlation time of that error, seconds; 0: drawn anew in every frame")
+    life: Span = Field(0.0, description="correlation time of that error, seconds; 0: drawn anew in every frame")
     noise: Share = Field(0.0, description="share of the variance of that error that is drawn anew in every frame")
     people: Literal["all", "whole"] = Field(
         "all",

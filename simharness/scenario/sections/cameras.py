@@ -6,7 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from simharness.scenario.sections.section import Amount, Elements, Point, Positive, Section, Share
+from simharness.scenario.sections.section import (
+    MOST_CAMERAS,
+    Coordinate,
+    Elements,
+    Length,
+    Point,
+    Section,
+    Share,
+    Span,
+    Spread,
+    Turn,
+)
 
 Layout = Literal["ring", "arc", "line", "corners", "dome", "pairs", "free", "preset", "file"]
 Preset = Literal[
@@ -24,46 +35,57 @@ Preset = Literal[
     "panoptic7",
 ]
 Pixels = Annotated[int, Field(ge=16, le=8192)]
-View = Annotated[int, Field(ge=0)]
+View = Annotated[int, Field(ge=0, lt=MOST_CAMERAS)]
+Term = Annotated[float, Field(ge=-1000.0, le=1000.0)]  # of a lens; those of fisheye lenses are about 10
 
 
 class Cameras(Section):
     """The rig."""
 
     layout: Layout = Field("ring", description="preset: a published rig; file: a calibration file of the user")
-    count: int = Field(5, ge=0, le=64, description="number of cameras of ring, arc, line, corners, dome and pairs")
-    radius: Positive = Field(
+    count: int = Field(
+        5, ge=0, le=MOST_CAMERAS, description="number of cameras of ring, arc, line, corners, dome and pairs"
+    )
+    radius: Length = Field(
         3.5,
         description="distance from the z axis, metres; corners: half the side of their square, where the room has no "
         "walls",
     )
-    height: float = Field(2.2, description="height above the floor, metres; dome: of the highest camera")
-    heights: tuple[float, ...] = Field(
-        (), description="heights that the cameras take in turn, instead of height; dome: at most height"
+    height: Coordinate = Field(2.2, description="height above the floor, metres; dome: of the highest camera")
+    heights: tuple[Coordinate, ...] = Field(
+        (),
+        max_length=MOST_CAMERAS,
+        description="heights that the cameras take in turn, instead of height; dome: at most height",
     )
     aim: Point = Field((0.0, 0.0, 0.9), description="point at which all cameras look: x, y, z in metres")
     start: float = Field(
         0.0,
+        ge=-360.0,
+        le=360.0,
         description="bearing of the first camera from the x axis, degrees; line: bearing of its middle; corners: no "
         "effect",
     )
     spread: Annotated[float, Field(gt=0.0, le=360.0)] = Field(120.0, description="arc: angle between its ends, degrees")
-    spacing: Positive = Field(
+    spacing: Length = Field(
         1.0, description="line: distance between neighbours, metres; pairs: between the two cameras of a pair"
     )
-    positions: tuple[Point, ...] = Field((), description="free: position of each camera, metres")
-    aims: tuple[Point, ...] = Field((), description="free: point at which each camera looks, instead of aim, metres")
+    positions: tuple[Point, ...] = Field(
+        (), max_length=MOST_CAMERAS, description="free: position of each camera, metres"
+    )
+    aims: tuple[Point, ...] = Field(
+        (), max_length=MOST_CAMERAS, description="free: point at which each camera looks, instead of aim, metres"
+    )
     fov: Annotated[float, Field(gt=1.0, lt=170.0)] = Field(75.0, description="horizontal field of view, degrees")
     size: Annotated[tuple[Pixels, Pixels], Elements(("width", "height"))] = Field(
         (800, 600), description="width, height in pixels; layout file: where the file does not hold them"
     )
-    distortion: Annotated[tuple[float, float, float, float, float], Elements(("k1", "k2", "p1", "p2", "k3"))] = Field(
+    distortion: Annotated[tuple[Term, Term, Term, Term, Term], Elements(("k1", "k2", "p1", "p2", "k3"))] = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0), description="lens distortion in OpenCV's order: k1, k2, p1, p2, k3"
     )
-    jitter: Amount = Field(
+    jitter: Spread = Field(
         0.0, description="standard deviation of camera positions along each axis, metres; not of preset and file"
     )
-    aim_jitter: Amount = Field(
+    aim_jitter: Spread = Field(
         0.0, description="standard deviation of the points looked at along each axis, metres; not of preset and file"
     )
     preset: Preset | None = Field(None, description="layout preset: the published rig")
@@ -72,7 +94,9 @@ class Cameras(Section):
         description="layout file: a calibration of VoxelPose, Panoptic, OpenCV, Pose2Sim or EasyMocap, relative to the "
         "scenario file",
     )
-    only: tuple[str, ...] = Field((), description="preset and file: names of the cameras to take; empty: all")
+    only: tuple[str, ...] = Field(
+        (), max_length=MOST_CAMERAS, description="preset and file: names of the cameras to take; empty: all"
+    )
 
 
 class Faults(Section):
@@ -82,28 +106,33 @@ class Faults(Section):
     """
 
     focal: Share = Field(0.0, description="standard deviation of the relative error of focal lengths")
-    center: Amount = Field(
-        0.0, description="standard deviation of the error of principal points along each axis, pixels"
+    center: float = Field(
+        0.0,
+        ge=0.0,
+        le=8192.0,
+        description="standard deviation of the error of principal points along each axis, pixels",
     )
-    rotation: Amount = Field(
-        0.0, description="standard deviation of the error of orientations about each axis, degrees"
-    )
-    translation: Amount = Field(0.0, description="standard deviation of the error of positions along each axis, metres")
-    rotation_drift: Amount = Field(
+    rotation: Turn = Field(0.0, description="standard deviation of the error of orientations about each axis, degrees")
+    translation: Spread = Field(0.0, description="standard deviation of the error of positions along each axis, metres")
+    rotation_drift: Turn = Field(
         0.0, description="standard deviation of the drift of orientations about each axis, degrees per minute"
     )
-    translation_drift: Amount = Field(
+    translation_drift: Spread = Field(
         0.0, description="standard deviation of the drift of positions along each axis, metres per minute"
     )
-    clock_offset: Amount = Field(0.0, description="standard deviation of the cameras' clocks, seconds; at most 0.9")
-    clock_jitter: Amount = Field(0.0, description="standard deviation of the time of each single picture, seconds")
+    clock_offset: Span = Field(0.0, description="standard deviation of the cameras' clocks, seconds; at most 0.9")
+    clock_jitter: Span = Field(0.0, description="standard deviation of the time of each single picture, seconds")
     dropped: Share = Field(0.0, description="probability that a picture never arrives")
     frozen: Share = Field(0.0, description="probability that a camera repeats its last picture")
-    dead: tuple[View, ...] = Field((), description="indices of the cameras that deliver nothing")
-    swapped: tuple[Annotated[tuple[View, View], Elements(("camera", "camera"))], ...] = Field(
-        (), description="pairs of indices of cameras that deliver each other's pictures"
+    dead: tuple[View, ...] = Field(
+        (), max_length=MOST_CAMERAS, description="indices of the cameras that deliver nothing"
     )
-    rolling_shutter: Amount = Field(0.0, description="readout time from the first row to the last, seconds")
+    swapped: tuple[Annotated[tuple[View, View], Elements(("camera", "camera"))], ...] = Field(
+        (), max_length=MOST_CAMERAS, description="pairs of indices of cameras that deliver each other's pictures"
+    )
+    rolling_shutter: float = Field(
+        0.0, ge=0.0, le=10.0, description="readout time from the first row to the last, seconds"
+    )
 
 
 class Sensor(Section):
@@ -111,7 +140,7 @@ class Sensor(Section):
 
     gain: Share = Field(0.0, description="relative spread of contrast")
     white_balance: Share = Field(0.0, description="relative spread of red and blue against green")
-    exposure: Amount = Field(0.0, description="spread of exposure, stops")
-    shutter: Amount = Field(0.0, description="exposure time, which blurs motion, seconds")
-    noise: Amount = Field(0.0, description="standard deviation of the noise of every pixel, of 255")
+    exposure: float = Field(0.0, ge=0.0, le=10.0, description="spread of exposure, stops")
+    shutter: float = Field(0.0, ge=0.0, le=10.0, description="exposure time, which blurs motion, seconds")
+    noise: float = Field(0.0, ge=0.0, le=255.0, description="standard deviation of the noise of every pixel, of 255")
     jpeg: int = Field(0, ge=0, le=100, description="quality of JPEG compression; 0: none")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from simharness.scenario.sections.section import Amount, Elements, Section, Share
+from simharness.scenario.sections.section import Elements, Factor, Logits, Section, Share, Span
 
 KINDS = ("nose", "eyes", "ears", "shoulders", "elbows", "wrists", "hips", "knees", "ankles")
 """Kinds of COCO-17 joints with separate parameters."""
@@ -27,7 +27,8 @@ BEARINGS = tuple(range(0, 360, 30))
 
 ByBearing = Annotated[tuple[Share, ...], Field(min_length=len(BEARINGS), max_length=len(BEARINGS))]
 ByHiddenShare = Annotated[tuple[Share, ...], Field(min_length=5, max_length=5)]
-Offset = Annotated[tuple[float, float, float], Elements(("forward", "outward", "up"))]
+Metres = Annotated[float, Field(ge=-1.0, le=1.0)]  # in the frame of a body
+Offset = Annotated[tuple[Metres, Metres, Metres], Elements(("forward", "outward", "up"))]
 
 
 def _expanded(given: Any, names: tuple[str, ...]) -> Any:
@@ -63,17 +64,17 @@ class Shares(_ByJoint):
 
 
 class Amounts(_ByJoint):
-    """Amount for each kind of joint."""
+    """Factor or multiple of a unit for each kind of joint."""
 
-    nose: Amount = 0.0
-    eyes: Amount = 0.0
-    ears: Amount = 0.0
-    shoulders: Amount = 0.0
-    elbows: Amount = 0.0
-    wrists: Amount = 0.0
-    hips: Amount = 0.0
-    knees: Amount = 0.0
-    ankles: Amount = 0.0
+    nose: Factor = 0.0
+    eyes: Factor = 0.0
+    ears: Factor = 0.0
+    shoulders: Factor = 0.0
+    elbows: Factor = 0.0
+    wrists: Factor = 0.0
+    hips: Factor = 0.0
+    knees: Factor = 0.0
+    ankles: Factor = 0.0
 
 
 class Bias(Section):
@@ -139,7 +140,7 @@ class Keypoints(Section):
     except that guesses follow from the joints that are localised.
     """
 
-    quality: Amount = Field(1.0, description="factor on the shares of jitter, miss, inversion and swap")
+    quality: Factor = Field(1.0, description="factor on the shares of jitter, miss, inversion and swap")
     scatter: Amounts = Amounts()  # standard deviation of good keypoints, in units; truncated at 1.14
     jitter: Shares = Shares()  # 1.14 to 2.35 units off
     miss: Shares = Shares()  # 2.35 to `reach` units off
@@ -151,32 +152,35 @@ class Keypoints(Section):
     drop: Drop = Drop()
     face: Face = Face()
     guess: Guess = Guess()
-    border: Amount = Field(
+    border: Factor = Field(
         0.0, description="joints up to this many units outside of the image are reported, at its border"
     )
     reach: float = Field(4.29, ge=2.35, le=20.0, description="largest distance of misses, units")
     stray: Shares = Shares()  # share of misses that lie anywhere in the person's box
-    self_occluded: Amount = Field(1.0, description="factor on jitter and miss of self-occluded joints")
-    occluded: Amount = Field(
+    self_occluded: Factor = Field(1.0, description="factor on jitter and miss of self-occluded joints")
+    occluded: Factor = Field(
         1.0, description="factor on jitter and miss of joints hidden by another person or an object"
     )
-    truncated: Amount = Field(1.0, description="factor on jitter and miss of people cut by the image border")
-    small: Amount = Field(
-        0.0, description="growth of jitter and miss for small people: (64 px / sqrt(area)) to this power"
+    truncated: Factor = Field(1.0, description="factor on jitter and miss of people cut by the image border")
+    small: float = Field(
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="growth of jitter and miss for small people: (64 px / sqrt(area)) to this power",
     )
-    scatter_hidden: Amount = Field(1.0, description="factor on scatter of joints that are not visible")
+    scatter_hidden: Factor = Field(1.0, description="factor on scatter of joints that are not visible")
 
 
 class Correlation(Section):
     """Correlation of errors over time, views and joints."""
 
-    life: Amount = Field(0.0, description="mean life of an error, seconds; 0: drawn anew in every frame")
+    life: Span = Field(0.0, description="mean life of an error, seconds; 0: drawn anew in every frame")
     views: Share = Field(0.0, description="correlation over the views of whether a joint is dropped or a jitter")
     gross_views: Share = Field(
         0.0, description="correlation over the views of whether a joint is a miss, swap, inversion or guess"
     )
     limb: Share = Field(0.0, description="correlation of whether a joint errs within the face, the arms and the legs")
-    scatter_life: Amount = Field(0.0, description="correlation time of scatter, seconds")
+    scatter_life: Span = Field(0.0, description="correlation time of scatter, seconds")
     scatter_views: Share = Field(
         0.0, description="share of the variance of scatter that is one displacement in space, the same for all views"
     )
@@ -216,7 +220,7 @@ class Scores(Section):
     hidden: HiddenScores = HiddenScores()  # factor on the median scores of joints that are not visible
     guess: Shares = Shares.model_validate(1.0)  # median score of guessed joints; hidden and joint do not apply
     outside: Share = Field(1.0, description="factor on the median score of joints that are guessed outside the image")
-    deviation: Amount = Field(0.0, description="standard deviation of scores, on the logit scale")
+    deviation: Logits = Field(0.0, description="standard deviation of scores, on the logit scale")
     overconfident: Share = Field(
         0.0, description="share of misses and guessed joints with the score of a good keypoint"
     )
@@ -234,7 +238,7 @@ class Boxes(Section):
         "joints, with linear interpolation; besides `missed`",
     )
     missed_views: Share = Field(0.0, description="correlation over the views of whether a person is missed")
-    life: Amount = Field(0.0, description="mean life of errors of boxes, seconds; 0: drawn anew in every frame")
+    life: Span = Field(0.0, description="mean life of errors of boxes, seconds; 0: drawn anew in every frame")
     least_visible: int = Field(
         0, ge=0, le=17, description="a person with fewer visible joints in a view is never detected there"
     )
@@ -246,14 +250,14 @@ class Boxes(Section):
         0.0, description="share of detected people whose upper and lower halves are detected separately"
     )
     score: Share = Field(1.0, description="median score of a box around a wholly visible person")
-    deviation: Amount = Field(0.0, description="standard deviation of box scores, on the logit scale")
+    deviation: Logits = Field(0.0, description="standard deviation of box scores, on the logit scale")
 
 
 class Phantoms(Section):
     """Phantoms: false-positive detections that show no person."""
 
     rate: float = Field(0.0, ge=0.0, le=20.0, description="mean number per view and frame")
-    life: Amount = Field(0.0, description="mean life, seconds; 0: one frame each")
+    life: Span = Field(0.0, description="mean life, seconds; 0: one frame each")
     views: Share = Field(0.0, description="share of phantoms that stand in the room and appear in all views")
     parts: Share = Field(
         0.0, description="share of the phantoms of a single view that are composed of parts of the real people in it"
@@ -264,21 +268,21 @@ class Phantoms(Section):
         "anywhere in the box",
     )
     score: Share = Field(0.45, description="median score of their keypoints")
-    deviation: Amount = Field(0.6, description="standard deviation of their scores, on the logit scale")
+    deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
 
 
 class DecoyHits(Section):
     """Detections of decoys: posters, mannequins, coat stands, mirror images."""
 
     share: Share = Field(0.0, description="share of the decoys in a view that are detected as people")
-    life: Amount = Field(0.0, description="mean life of such a detection, seconds; 0: drawn anew in every frame")
+    life: Span = Field(0.0, description="mean life of such a detection, seconds; 0: drawn anew in every frame")
     views: Share = Field(0.0, description="correlation over the views of whether a decoy is detected")
     consistent: Share = Field(
         1.0,
         description="share of these detections whose keypoints follow the object; the others get an independent pose",
     )
     score: Share = Field(0.7, description="median score of their keypoints")
-    deviation: Amount = Field(0.6, description="standard deviation of their scores, on the logit scale")
+    deviation: Logits = Field(0.6, description="standard deviation of their scores, on the logit scale")
 
 
 class HeatmapHead(Section):

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from simharness.scenario.sections.section import Amount, Section
+from simharness.scenario.sections.section import Percent, Section
 
 
 class Tolerance(Section):
     """Largest loss in the mean of a score that is not a regression, however significant it is."""
 
-    pcp: Amount = Field(1.0, description="percentage points")
-    recall: Amount = Field(1.0, description="percentage points")
-    precision: Amount = Field(1.0, description="percentage points")
-    mpjpe_mm: Amount = Field(2.0, description="millimetres")
-    match_f1: Amount = Field(1.0, description="percentage points")
-    ghosts: Amount = Field(0.05, description="ghosts per frame")
+    pcp: Percent = Field(1.0, description="percentage points")
+    recall: Percent = Field(1.0, description="percentage points")
+    precision: Percent = Field(1.0, description="percentage points")
+    mpjpe_mm: float = Field(2.0, ge=0.0, le=1000.0, description="millimetres")
+    match_f1: Percent = Field(1.0, description="percentage points")
+    ghosts: float = Field(0.05, ge=0.0, le=1000.0, description="ghosts per frame")
 
 
 class Gate(Section):
@@ -27,6 +27,7 @@ class Gate(Section):
     slowdown: float = Field(
         1.5,
         gt=1.0,
+        le=100.0,
         description="largest factor by which the time of a frame, relative to a reference kernel, may grow",
     )
     tolerance: Tolerance = Tolerance()

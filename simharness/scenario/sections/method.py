@@ -54,7 +54,10 @@ class Method(Section):
     """Variants of the method that run on the detections."""
 
     variants: tuple[str, ...] = Field(
-        ("full", "no-3dps"), min_length=1, description="presets of mvpose.Pipeline, and names of method.estimators"
+        ("full", "no-3dps"),
+        min_length=1,
+        max_length=100,
+        description="presets of mvpose.Pipeline, and names of method.estimators",
     )
     estimators: Estimators = Field(
         Estimators(), description='user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"'

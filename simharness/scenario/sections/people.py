@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from simharness.scenario.sections.section import Amount, Count, Positive, Section, Share
+from simharness.scenario.sections.section import Count, Length, Section, Share, Span, Spread
 
 ActivityName = Literal[
     "walk",
@@ -42,7 +42,7 @@ class Mocap(Section):
         "re-enact at the recorded places, person i track i; relative to the scenario file; empty: none",
     )
     skeleton: str = Field("", description="ASF file of an AMC file; empty: the only one in the same folder")
-    start: Amount = Field(0.0, description="start time in the recording, seconds")
+    start: Span = Field(0.0, description="start time in the recording, seconds")
 
     @property
     def tracks(self) -> bool:
@@ -57,18 +57,19 @@ class People(Section):
     activities: tuple[ActivityName, ...] = Field(
         ("walk", "wave"),
         min_length=1,
+        max_length=100,
         description="activities, assigned in turn: one to each person, those of pairs to two people at a time",
     )
-    area: Positive = Field(
+    area: Length = Field(
         2.0,
         description="half the side of the square around the origin in which people stay, metres; a recorded motion "
         "that does not fit into it may use the whole room",
     )
-    around: Amount = Field(
+    around: Spread = Field(
         0.0,
         description="radius around the origin that people keep free, metres; the first object of [clutter] is there",
     )
-    spacing: Positive = Field(0.8, description="smallest distance between the pelvises of two people, metres")
+    spacing: Length = Field(0.8, description="smallest distance between the pelvises of two people, metres")
     children: Share = Field(0.0, description="probability that a person is a child of 5 to 12 years")
     look_alike: Share = Field(
         0.0, description="similarity of clothes; 0: all people are dressed differently; 1: all wear one uniform"
@@ -79,8 +80,10 @@ class People(Section):
     playback: Literal["kinematic", "dynamic"] = Field(
         "kinematic", description="kinematic: as planned; dynamic: tracked by actuators under gravity and contact"
     )
-    assist: Positive = Field(
+    assist: float = Field(
         300.0,
+        gt=0.0,
+        le=100_000.0,
         description="dynamic playback: largest force that supports a pelvis, newtons; running needs about 1000",
     )
     motion: Mocap = Mocap()

@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from simharness.scenario.sections.section import Count, Elements, Positive, Section, Share
+from simharness.scenario.sections.section import Count, Elements, Length, Section, Share
 
 
 class Room(Section):
     """The room: a floor and four walls around the origin. A look of "any" is drawn from the seed."""
 
-    size: Annotated[tuple[Positive, Positive, Positive], Elements(("x", "y", "z"))] = Field(
+    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(
         (8.0, 8.0, 3.0), description="x, y, z in metres"
     )
     walls: bool = Field(True, description="false: an open floor, and cameras may stand anywhere above it")

@@ -18,7 +18,7 @@ from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.method import NAME, Estimators, Method
 from simharness.scenario.sections.people import People
 from simharness.scenario.sections.room import Clutter, Decoys, Room
-from simharness.scenario.sections.section import Positive, Section
+from simharness.scenario.sections.section import Section
 
 __all__ = [
     "FILE_KEYS",
@@ -63,11 +63,15 @@ class Rendering(Section):
 class Scenario(Section):
     """A scenario: one simulated scene, the cameras and the detector, and the variants under test."""
 
-    name: str = Field(pattern=NAME, description="lowercase letters, digits, - and _; result folders are named after it")
-    description: str = ""
-    seed: int = Field(0, ge=0, description="seed of every random draw; 0 is a seed like any other")
-    duration: Positive = Field(4.0, description="seconds")
-    rate: Positive = Field(10.0, description="frames per second")
+    name: str = Field(
+        pattern=NAME,
+        max_length=100,
+        description="lowercase letters, digits, - and _; result folders are named after it",
+    )
+    description: str = Field("", max_length=1000)
+    seed: int = Field(0, ge=0, lt=2**53, description="seed of every random draw; 0 is a seed like any other")
+    duration: float = Field(4.0, gt=0.0, le=36_000.0, description="seconds")
+    rate: float = Field(10.0, gt=0.0, le=1000.0, description="frames per second")
     room: Room = Room()
     people: People = People()
     clutter: Clutter = Clutter()

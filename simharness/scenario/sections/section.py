@@ -15,11 +15,25 @@ class Elements:
     names: tuple[str, ...]
 
 
+LARGEST_RIG = 200.0
+"""Greatest distance in a scene, metres: mvpose takes no larger rig."""
+
+MOST_CAMERAS = 64
+"""Greatest number of cameras of a rig."""
+
+# Every number has a lower and an upper bound, from physics or from cost, so that a typing error is found where
+# it is. What several keys cost together is bounded in simharness.scenario.size.
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0)]
-Amount = Annotated[float, Field(ge=0.0)]
+Factor = Annotated[float, Field(ge=0.0, le=100.0)]
+Length = Annotated[float, Field(gt=0.0, le=LARGEST_RIG)]  # metres
+Spread = Annotated[float, Field(ge=0.0, le=LARGEST_RIG)]  # metres
+Coordinate = Annotated[float, Field(ge=-LARGEST_RIG, le=LARGEST_RIG)]  # metres
+Span = Annotated[float, Field(ge=0.0, le=3600.0)]  # seconds
+Turn = Annotated[float, Field(ge=0.0, le=180.0)]  # degrees
+Logits = Annotated[float, Field(ge=0.0, le=20.0)]  # beyond, scores are 0 or 1
+Percent = Annotated[float, Field(ge=0.0, le=100.0)]
 Count = Annotated[int, Field(ge=0, le=50)]
-Point = Annotated[tuple[float, float, float], Elements(("x", "y", "z"))]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Elements(("x", "y", "z"))]
 
 
 class Section(BaseModel):

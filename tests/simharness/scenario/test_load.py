@@ -305,14 +305,14 @@ class TestFingerprint:
 
 SCENARIOS = st.builds(
     Scenario,
-    name=st.from_regex(r"[a-z0-9][a-z0-9_-]*", fullmatch=True),
-    description=st.text(),
-    seed=st.integers(0, 2**63),
+    name=st.from_regex(r"[a-z0-9][a-z0-9_-]{0,99}", fullmatch=True),
+    description=st.text(max_size=1000),
+    seed=st.integers(0, 2**53 - 1),
     people=st.builds(People, count=st.integers(0, 100)),
     cameras=st.builds(
         Cameras,
         fov=st.floats(1.0, 170.0, exclude_min=True, exclude_max=True),
-        start=st.floats(allow_nan=False, allow_infinity=False),
+        start=st.floats(-360.0, 360.0),
     ),
 )
 
