@@ -2,7 +2,7 @@
 
 A gate or a test that has never failed proves nothing. This benchmark plants known bugs (``catalogue.toml``), one at a
 time, in a copy of the checkout, runs the gate and the tests near the bug, and prints which of them noticed. FOLDER
-keeps the copies, compiled kernels, simulations and the results of finished bugs, so an interrupted run goes on.
+keeps a copy, simulations and the results of finished bugs, so an interrupted run goes on.
 
 - ``--list`` checks that each bug still applies to the code;
 - ``--by tests`` or ``--by gate`` runs one of the two only, ``--only ID ...`` some bugs only;

@@ -10,9 +10,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.planted_bugs.catalogue import Bug
@@ -21,6 +22,7 @@ ROOT = Path(__file__).parents[2]
 """The checkout that this module is in."""
 
 _COPIED = ("mvpose", "simharness", "benchmarks", "tools", "scenarios", "tests", "examples", "pyproject.toml")
+_UNFINISHED = shutil.ignore_patterns("*.part", ".hypothesis", ".pytest_cache")
 _LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.egg-info", "build", "*.pyc")
 
 
@@ -41,48 +43,51 @@ class Finished:
 
 @dataclass(frozen=True)
 class Checkout:
-    """Copy of the checkout.
+    """Copy of the checkout. Compiled kernels lie in it, beside the modules.
 
     Attributes:
         root: its folder.
-        kernels: folder of its compiled kernels.
     """
 
     root: Path
-    kernels: Path
 
     @classmethod
-    def make(cls, root: Path, kernels: Path) -> Checkout:
-        """Copy the checkout into a folder. Files keep their times of change, so that compiled kernels stay valid."""
-        shutil.rmtree(root, ignore_errors=True)
+    def make(cls, root: Path) -> Checkout:
+        """Copy the checkout into a folder, which may hold an earlier copy: its compiled kernels are kept.
+
+        The name of a compiled kernel says what it is compiled from, so kernels of an earlier copy are safe.
+        """
+        new = root.with_name(f"{root.name}-new")
+        shutil.rmtree(new, ignore_errors=True)
         for name in _COPIED:
-            source = ROOT / name
-            if source.is_dir():
-                shutil.copytree(source, root / name, ignore=_LEFT_OUT)
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, new / name, ignore=_LEFT_OUT)
             else:
-                shutil.copy2(source, root / name)
-        compileall.compile_dir(root, quiet=2)
-        kernels.mkdir(parents=True, exist_ok=True)
-        return cls(root, kernels)
+                shutil.copy2(ROOT / name, new / name)
+        compileall.compile_dir(new, quiet=2)
+        for kernel in root.rglob("__pycache__/*.nbk"):
+            kept = new / kernel.relative_to(root)
+            if kept.parent.is_dir():
+                os.link(kernel, kept)
+        shutil.rmtree(root, ignore_errors=True)
+        new.rename(root)
+        return cls(root)
 
     @contextlib.contextmanager
     def planted(self, bug: Bug) -> Iterator[Checkout]:
-        """Plant a bug and yield the copy with it; then restore the file and its time of change.
+        """Yield a copy with a bug, and delete it at the end.
 
-        The copy with the bug has a folder of kernels of its own, which starts with those of the code without bugs: what
-        a bug does not touch is not compiled again, and what is compiled with it is thrown away.
+        Its files are links to those of this copy, but for the one with the bug; so kernels that the bug does not touch
+        are not compiled again.
         """
-        path = self.root / bug.file
-        before, times = path.read_bytes(), path.stat()
-        kernels = self.kernels.with_name(f"{self.kernels.name}-planted")
-        shutil.rmtree(kernels, ignore_errors=True)
-        shutil.copytree(self.kernels, kernels, copy_function=os.link)
-        path.write_text(bug.planted(before.decode()), encoding="utf-8")
-        try:
-            yield replace(self, kernels=kernels)
-        finally:
-            path.write_bytes(before)
-            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+        with tempfile.TemporaryDirectory(prefix=f"{bug.id}-", dir=self.root.parent) as folder:
+            copy = Checkout(Path(folder) / "checkout")
+            shutil.copytree(self.root, copy.root, ignore=_UNFINISHED, copy_function=os.link)
+            path = copy.root / bug.file
+            text = bug.planted(path.read_text(encoding="utf-8"))
+            path.unlink()
+            path.write_text(text, encoding="utf-8")
+            yield copy
 
     def run(self, arguments: Sequence[str], *, limit: float) -> Finished:
         """Run Python in the copy.
@@ -93,7 +98,7 @@ class Checkout:
         """
         environment = os.environ | {
             "PYTHONPATH": str(self.root),
-            "NUMBA_CACHE_DIR": str(self.kernels),
+            "NUMBA_CACHE_DIR": "",  # beside the modules
             "OMP_NUM_THREADS": "1",
             "PYTHONDONTWRITEBYTECODE": "1",  # no compiled module of a planted file stays behind
             "COLUMNS": "500",

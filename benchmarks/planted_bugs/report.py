@@ -64,5 +64,5 @@ def _cell(outcome: Outcome | None) -> str:
     if outcome is None:
         return "not run"
     if not outcome.caught:
-        return "passed"
+        return outcome.what or "passed"
     return outcome.what if len(outcome.what) <= _LONGEST else outcome.what[: _LONGEST - 1] + "…"

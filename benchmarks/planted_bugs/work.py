@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import sys
 import threading
 from collections.abc import Callable, Iterable
@@ -47,37 +46,33 @@ NEUTRAL = Bug(
 
 
 class Bench:
-    """Folder with copies of the checkout, compiled kernels, simulations and finished results.
+    """Folder with a copy of the checkout, simulations and finished results.
 
     Args:
         folder: the folder.
         records: finished results.
-        workers: number of copies in which bugs are run at the same time.
+        workers: number of bugs that are run at the same time.
         limit: time limit of one run, seconds.
     """
 
     def __init__(self, folder: Path, records: Records, *, workers: int, limit: float) -> None:
-        self._folder, self._records, self._limit = folder.resolve(), records, limit
-        self._free: queue.SimpleQueue[Checkout] = queue.SimpleQueue()
-        self._workers = workers
-        with ThreadPoolExecutor(workers) as pool:
-            for copy in pool.map(self._make_copy, range(workers)):
-                self._free.put(copy)
+        self._folder, self._records, self._workers, self._limit = folder.resolve(), records, workers, limit
+        self._clean = Checkout.make(self._folder / "checkout")
+        if not any(self._clean.root.rglob("__pycache__/*.nbk")):
+            _say("compile kernels")
+            run_tests(self._clean, _WARM, limit=_SLOWER * limit)
 
     def tests(self, bugs: Iterable[Bug]) -> dict[str, Outcome]:
         """Run the tests near each bug with the bug planted.
 
-        Raises:
-            ValueError: the tests fail without any bug.
+        Tests that fail without any bug notice nothing.
         """
 
-        def run(copy: Checkout, bug: Bug) -> Outcome:
-            clean = self._clean_tests(copy, bug.tests)
+        def run(bug: Bug) -> Outcome:
+            clean = self._clean_tests(bug.tests)
             if clean.caught:
-                raise ValueError(
-                    f"{clean.what} fails without any bug: mend it, or run on a checkout in which it passes"
-                )
-            with copy.planted(bug) as planted:
+                return Outcome(False, f"fails without the bug: {clean.what}", clean.seconds)
+            with self._clean.planted(bug) as planted:
                 return run_tests(planted, bug.tests, limit=self._limit)
 
         return self._outcomes("tests", bugs, run)
@@ -85,7 +80,7 @@ class Bench:
     def gate(self, bugs: Iterable[Bug]) -> dict[str, Outcome]:
         """Run the gate with each bug planted, against a baseline without bugs."""
         gate = self._gate(SUITE)
-        return self._outcomes("gate", bugs, lambda copy, bug: gate.check_bug(copy, bug, limit=self._limit))
+        return self._outcomes("gate", bugs, lambda bug: gate.check_bug(self._clean, bug, limit=self._limit))
 
     def effects(self, bugs: Iterable[Bug], *, seeds: int) -> dict[str, str]:
         """Measure the effect of each bug on the scores of the suite with fresh seeds, as text."""
@@ -96,10 +91,10 @@ class Bench:
         gate = self._gate(str(suite))
         before = read_scores(gate.baseline)
 
-        def run(copy: Checkout, bug: Bug) -> dict[str, Any]:
+        def run(bug: Bug) -> dict[str, Any]:
             first = first_stage(bug.file)
             into = self._folder / "effects" / f"{bug.id}.json"
-            with copy.planted(bug) as planted:
+            with self._clean.planted(bug) as planted:
                 measured = replace(gate, suite=str(suite if first == "estimates" else few))
                 done = measured.measure(planted, first=first, into=into, limit=self._limit * seeds / _SIMULATED)
             if done.code != 0:
@@ -122,16 +117,7 @@ class Bench:
             )
             for n in range(1, count + 1)
         ]
-        return self._outcomes("clean", changes, lambda copy, bug: gate.check_bug(copy, bug, limit=self._limit))
-
-    def _make_copy(self, number: int) -> Checkout:
-        """Copy the checkout, and compile the kernels that tests and gate use most where they are not compiled yet."""
-        kernels = self._folder / "kernels" / str(number)
-        copy = Checkout.make(self._folder / "copies" / str(number), kernels)
-        if not any(kernels.iterdir()):
-            _say(f"copy {number}: compile kernels")
-            run_tests(copy, _WARM, limit=_SLOWER * self._limit)
-        return copy
+        return self._outcomes("clean", changes, lambda bug: gate.check_bug(self._clean, bug, limit=self._limit))
 
     def _gate(self, suite: str) -> Gate:
         """Return the gate of a suite, with a baseline of this code; it is made where it is missing."""
@@ -139,41 +125,33 @@ class Bench:
         gate = Gate(suite, self._folder / f"baseline-{name}.json", self._folder / "simulations")
         if self._records.value("baseline", name) is None or not gate.baseline.is_file():
             _say(f"baseline of {name}, without bugs")
-            copy = self._free.get()
-            try:
-                limit = _SLOWER * self._limit
-                done = gate.measure(copy, first="scenes", keep=True, into=gate.baseline, limit=limit)
-            finally:
-                self._free.put(copy)
+            limit = _SLOWER * self._limit
+            done = gate.measure(self._clean, first="scenes", keep=True, into=gate.baseline, limit=limit)
             if done.code != 0:
                 raise RuntimeError(f"the suite cannot be measured without bugs:\n{done.output}")
             self._records.add("baseline", name, value={"seconds": done.seconds})
         return gate
 
-    def _clean_tests(self, copy: Checkout, tests: tuple[str, ...]) -> Outcome:
+    def _clean_tests(self, tests: tuple[str, ...]) -> Outcome:
         """Return the outcome of tests without bugs; each set of tests is run once."""
         known = self._records.outcome("clean tests", *tests)
         if known is None:
-            known = run_tests(copy, tests, limit=_SLOWER * self._limit)
+            known = run_tests(self._clean, tests, limit=_SLOWER * self._limit)
             self._records.add("clean tests", *tests, value=known)
         return known
 
-    def _outcomes(self, what: str, bugs: Iterable[Bug], run: Callable[[Checkout, Bug], Outcome]) -> dict[str, Outcome]:
+    def _outcomes(self, what: str, bugs: Iterable[Bug], run: Callable[[Bug], Outcome]) -> dict[str, Outcome]:
         return {name: Outcome(**value) for name, value in self._each(what, bugs, run).items()}
 
     def _each(
-        self, what: str, bugs: Iterable[Bug], run: Callable[[Checkout, Bug], Outcome | dict[str, Any]]
+        self, what: str, bugs: Iterable[Bug], run: Callable[[Bug], Outcome | dict[str, Any]]
     ) -> dict[str, dict[str, Any]]:
         """Run a function on each bug that has no result yet; return all results by the name of the bug."""
         bugs = list(bugs)
         left = [bug for bug in bugs if self._records.value(what, bug.id, bug.digest) is None]
 
         def run_one(bug: Bug) -> Bug:
-            copy = self._free.get()
-            try:
-                self._records.add(what, bug.id, bug.digest, value=run(copy, bug))
-            finally:
-                self._free.put(copy)
+            self._records.add(what, bug.id, bug.digest, value=run(bug))
             return bug
 
         with ThreadPoolExecutor(self._workers) as pool:
@@ -189,7 +167,7 @@ class Bench:
                 if "text" in value:
                     shown = value["text"]
                 else:
-                    shown = f"caught: {value['what']}" if value["caught"] else "passed"
+                    shown = f"caught: {value['what']}" if value["caught"] else value["what"] or "passed"
                 _say(f"{what} {done}/{len(left)} {bug.id}: {shown} ({value['seconds']:.0f} s)")
         results = {bug.id: self._records.value(what, bug.id, bug.digest) for bug in bugs}
         return {name: value for name, value in results.items() if value is not None}

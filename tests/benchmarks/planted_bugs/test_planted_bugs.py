@@ -53,22 +53,28 @@ class TestPlanting:
         with pytest.raises(ValueError, match="not valid Python"):
             dataclasses.replace(BUG, edits=(("a + b", "a +"),)).planted("x = a + b\n")
 
-    def test_the_copy_is_restored_with_its_time_of_change_and_its_kernels(self, tmp_path):
-        root, kernels = tmp_path / "copy", tmp_path / "kernels"
-        root.mkdir()
-        kernels.mkdir()
-        file = root / "sums.py"
-        file.write_text("x = a + b\n")
-        (kernels / "clean").write_text("compiled")
-        before = file.stat().st_mtime_ns
-        with Checkout(root, kernels).planted(BUG) as planted:
-            assert file.read_text() == "x = a - b\n"
-            assert file.stat().st_mtime_ns != before
-            assert (planted.kernels / "clean").read_text() == "compiled"
-            (planted.kernels / "clean").unlink()
-            (planted.kernels / "of the bug").write_text("compiled")
-        assert (file.read_text(), file.stat().st_mtime_ns) == ("x = a + b\n", before)
-        assert [each.name for each in kernels.iterdir()] == ["clean"]
+    def test_a_copy_with_a_bug_leaves_the_copy_without_it_as_it_is(self, tmp_path):
+        root = tmp_path / "checkout"
+        (root / "__pycache__").mkdir(parents=True)
+        (root / "sums.py").write_text("x = a + b\n")
+        kernel = root / "__pycache__" / "clean.nbk"
+        kernel.write_text("compiled")
+        with Checkout(root).planted(BUG) as planted:
+            assert (planted.root / "sums.py").read_text() == "x = a - b\n"
+            assert (root / "sums.py").read_text() == "x = a + b\n"
+            seen = planted.root / "__pycache__" / "clean.nbk"
+            assert seen.read_text() == "compiled"
+            seen.unlink()
+        assert not planted.root.exists()
+        assert kernel.read_text() == "compiled"
+        assert sorted(tmp_path.iterdir()) == [root]
+
+    def test_programs_run_on_the_copy(self, tmp_path):
+        package = tmp_path / "checkout" / "mvpose"
+        package.mkdir(parents=True)
+        (package / "__init__.py").write_text("")
+        done = Checkout(tmp_path / "checkout").run(["-c", "import mvpose; print(mvpose.__file__)"], limit=60.0)
+        assert (done.code, done.output.strip()) == (0, str(package / "__init__.py"))
 
 
 class TestNearTests:
@@ -76,7 +82,7 @@ class TestNearTests:
         (tmp_path / "test_it.py").write_text(
             f"import pytest\n\ndef test_first():\n    pass\n\ndef test_it():\n    {body}\n"
         )
-        return Checkout(tmp_path, tmp_path / "kernels")
+        return Checkout(tmp_path)
 
     @pytest.mark.parametrize(
         ("body", "limit", "caught", "what"),
@@ -95,7 +101,7 @@ class TestNearTests:
     def test_no_test_is_no_pass(self, tmp_path):
         (tmp_path / "test_none.py").write_text("")
         with pytest.raises(ValueError, match="no tests were run"):
-            run_tests(Checkout(tmp_path, tmp_path / "kernels"), ["test_none.py"], limit=60.0)
+            run_tests(Checkout(tmp_path), ["test_none.py"], limit=60.0)
 
 
 class TestRecords:
