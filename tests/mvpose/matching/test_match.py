@@ -124,6 +124,15 @@ def test_two_views_are_matched_as_the_hungarian_algorithm_would(method):
     assert match(affinity, view, method=method).labels.tolist() == [0, 1, 1, 0]
 
 
+@pytest.mark.parametrize("method", ["admm", "clustering", "hungarian"])
+@pytest.mark.parametrize(("affinity", "matched"), [(0.45, False), (0.55, True)])
+def test_by_default_two_detections_match_if_one_person_is_likelier_than_two(method, affinity, matched):
+    matrix, view = np.array([[0.0, affinity], [affinity, 0.0]]), np.array([0, 1])
+    expected = [0, 0] if matched else [-1, -1]
+    assert Matcher(method=method)(matrix, view).labels.tolist() == expected
+    assert match(matrix, view, method=method).labels.tolist() == expected
+
+
 def test_a_match_needs_an_affinity_above_alpha():
     affinity = np.array([[0, 0.6], [0.6, 0]])
     assert match(affinity, [0, 1], alpha=0.5).labels.tolist() == [0, 0]
