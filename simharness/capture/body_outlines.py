@@ -16,10 +16,10 @@ from scipy.spatial import ConvexHull
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera
 from mvpose.kernels import njit
-from mvpose.lens import distort
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.body import Body
 from simharness.world.humans.skinning import skin
+from simharness.world.rigs.projection import bend, fold_radius2, is_imaged
 
 _DIRECTIONS = 24  # in which the extreme vertices of a part are taken
 _MIN_WEIGHT = 0.2  # least skinning weight of a vertex in a part: neighbouring parts overlap, which avoids gaps
@@ -117,18 +117,8 @@ def packed(camera: Camera) -> Floats:
     K = camera.K
     bent = float(camera.distortion.any())
     intrinsics = (K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2])
-    lens = (_fold_radius(camera), bent)
+    lens = (fold_radius2(camera.distortion), bent)
     return np.array([*intrinsics, *camera.R.ravel(), *camera.t, *camera.distortion, *camera.size, *lens])
-
-
-def _fold_radius(camera: Camera) -> float:
-    """Return the squared distance from the axis, at unit depth, at which the radial polynomial folds over."""
-    k1, k2, _, _, k3 = camera.distortion
-    if k1 == k2 == k3 == 0:
-        return np.inf
-    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
-    ends = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
-    return float(ends.min(initial=np.inf))
 
 
 @njit(cache=True)
@@ -182,10 +172,10 @@ def _project(x, y, z, c):
     if z < NEAR:
         return _BEHIND, 0.0, 0.0
     x, y = x / z, y / z
-    if x * x + y * y >= c[24]:
-        return _BEYOND, 0.0, 0.0
     if c[25] != 0.0:
-        x, y = distort(x, y, c[17:22])
+        if not is_imaged(x, y, c[17:22], c[24]):
+            return _BEYOND, 0.0, 0.0
+        x, y = bend(x, y, c[17:22])
     return _IN_FRONT, c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
 
 

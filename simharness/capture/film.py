@@ -21,10 +21,10 @@ from mvpose.camera import Camera
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.joint_visibility import label_joints
 from simharness.capture.picture import PictureSource, meshes_at, stack_bands
-from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.capture.shutter import band_cameras, band_times, joints_at_exposure
 from simharness.types.views import LookalikeViews, Views, Visibility
+from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:

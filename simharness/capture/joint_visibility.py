@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera
-from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import Image
 from simharness.types.views import Visibility
+from simharness.world.rigs.projection import project_to_image
 
 _MARGIN = 0.04  # metres
 

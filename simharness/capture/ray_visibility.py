@@ -17,9 +17,9 @@ from simharness.capture.body_outlines import Outline, boxes
 from simharness.capture.film import Observation
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
-from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.shutter import joints_at_exposure
 from simharness.types.views import Visibility
+from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:

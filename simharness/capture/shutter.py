@@ -13,7 +13,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from simharness.capture.rendering.lens import project_to_image
+from simharness.world.rigs.projection import project_to_image
 
 BANDS = 8
 _ITERATIONS = 6  # a joint moves a fraction of a band per iteration: this converges quickly

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
 from simharness.scenario.sections.detector import Bias
+from simharness.world.rigs.projection import project_to_image
 
 _LEFT_SHOULDER, _RIGHT_SHOULDER, _LEFT_HIP, _RIGHT_HIP = 5, 6, 11, 12
 SIDE = np.array([1, *[1, -1] * 8])
@@ -40,7 +41,7 @@ def pixel_offsets(joints: Floats, bias: Bias, rig: Rig) -> Floats:
     The cameras are those of the first frame. Where cameras drift, this is a small error of a small offset.
     """
     moved = joints + world_offsets(joints, bias)
-    return np.stack([camera.project(moved) - camera.project(joints) for camera in rig], axis=1)
+    return np.stack([project_to_image(camera, moved) - project_to_image(camera, joints) for camera in rig], axis=1)
 
 
 def _unit(vector: Floats) -> Floats:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
-from simharness.capture.rendering.lens import project_to_image
 from simharness.detector.birth_death import BirthDeathProcess, assign_slots, frame_noise, frames_alive
 from simharness.detector.detection_block import DetectionBlock, Origin
 from simharness.detector.draws import KeyedDraws
@@ -21,6 +20,7 @@ from simharness.detector.phantom_poses import NORMALS, postures, project_upright
 from simharness.detector.steps import Context, StepStage, step
 from simharness.scenario.sections.detector import Phantoms
 from simharness.types.views import Views, Visibility
+from simharness.world.rigs.projection import project_to_image
 
 _JITTER, _JITTER_SPACE = 0.004, 0.004  # motion of phantoms: as a share of the pose's height, and in metres
 _HEIGHTS = 0.25, 0.75  # heights of poses, as shares of the image's height

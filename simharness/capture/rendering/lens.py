@@ -1,4 +1,4 @@
-"""Lens distortion: pictures of a pinhole camera with the same field of view, warped to the lens; and projection.
+"""Lens distortion: pictures of a pinhole camera with the same field of view, warped to the lens.
 
 The pinhole picture covers every direction that the lens images and has at least the resolution of the distorted one
 everywhere. Colours are interpolated; depth, ids and parts are those of the nearest pixel, less than 0.75 pixels of the
@@ -13,17 +13,17 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import Image
+from simharness.world.rigs.projection import project_to_image, undistorted
 
 _MAX_PIXEL_RATIO = 16.0  # pixels of the pinhole picture per pixel of the distorted one
 _MARGIN = 1  # pixels around the pinhole picture, for interpolation
 _LONGEST_SIDE = 16384  # pixels, limit of OpenGL
 _SAMPLES = 64  # samples of the magnification along each side; it changes smoothly
 _KEPT = 64  # cached lenses: as many as a rig has cameras
-_ROUND_TRIP = 0.5  # pixels: beyond the fold of a lens, undistort does not invert project
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
     camera = Camera(K, np.eye(3), np.zeros(3), distortion=distortion, size=size)
     width, height = size
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
-    straight = camera.undistort(pixels)
+    straight = undistorted(camera, pixels)
     imaged = np.isfinite(straight[..., 0] + straight[..., 1])
     low, high = straight[imaged].min(axis=0), straight[imaged].max(axis=0)
     few = straight[:: max(1, height // _SAMPLES), :: max(1, width // _SAMPLES)].reshape(-1, 2)
@@ -135,31 +135,11 @@ def _magnification(camera: Camera, straight: NDArray[np.float64]) -> float:
     step = 1e-3  # pixels
 
     def bent(pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-        return camera.project(np.concatenate([pixels, np.ones((len(pixels), 1))], axis=1) @ np.linalg.inv(camera.K).T)
+        directions = np.concatenate([pixels, np.ones((len(pixels), 1))], axis=1) @ np.linalg.inv(camera.K).T
+        return project_to_image(camera, directions)
 
     a, c = ((bent(straight + [step, 0.0]) - bent(straight - [step, 0.0])) / (2 * step)).T
     b, d = ((bent(straight + [0.0, step]) - bent(straight - [0.0, step])) / (2 * step)).T
     squares, determinant = a * a + b * b + c * c + d * d, a * d - b * c
     largest = (squares + np.sqrt(np.maximum(squares**2 - 4 * determinant**2, 0.0))) / 2
-    return float(np.sqrt(largest.max()))
-
-
-def project_to_image(camera: Camera, points: ArrayLike, *, near: float = 0.0) -> NDArray[np.float64]:
-    """Project world points (..., 3) to pixels (..., 2); NaN where ``camera`` does not image the point.
-
-    A point is not imaged where it is less than ``near`` metres in front of the camera centre, or beyond the angle at
-    which the polynomial of the lens folds over: :meth:`mvpose.Camera.project` gives such directions a second, wrong
-    position inside the picture.
-    """
-    # Row by row rather than by a matrix product: BLAS may round differently from one process to the next.
-    x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
-    u, v, depth = (row[0] * x + row[1] * y + row[2] * z + row[3] for row in camera.P)
-    front = depth > near
-    depth = np.where(front, depth, np.nan)
-    straight = np.stack([u / depth, v / depth], axis=-1)
-    if not camera.distortion.any():
-        return straight
-    bent = camera.project(np.where(front[..., None], points, np.nan))
-    with np.errstate(invalid="ignore"):
-        imaged = np.linalg.norm(camera.undistort(bent) - straight, axis=-1) < _ROUND_TRIP
-    return np.where(imaged[..., None], bent, np.nan)
+    return float(np.sqrt(np.nanmax(largest)))  # NaN where the step leads over the fold

@@ -19,6 +19,7 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.renderer import Image, Renderer
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
+from simharness.world.rigs.projection import viewing_rays
 
 _NEAR_GLASS = 0.004  # metres: accuracy of depth from a picture; frames stand out farther
 _REFLECTANCE = (0.87, 0.90, 0.89)  # glass is a little green; sRGB
@@ -67,7 +68,7 @@ def _glass(camera: Camera, image: Image, index: int, mirror: Mirror) -> NDArray[
     if not seen.any() or mirror.in_front(camera.center) <= 0:
         return np.zeros_like(seen)
     row, column = np.nonzero(seen)
-    rays = camera.rays(np.column_stack([column, row]))
+    rays = viewing_rays(camera, np.column_stack([column, row]))
     points = camera.center + rays * (image.depth[row, column] / (rays @ camera.R[2]))[:, None]
     seen[row, column] = mirror.on_glass(points) & (np.abs(mirror.in_front(points)) < _NEAR_GLASS)
     return seen

@@ -19,6 +19,7 @@ from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
+from simharness.world.rigs.projection import projection_matrix
 
 _MOST_MESHES = np.iinfo(np.int16).max
 
@@ -47,7 +48,8 @@ class RasterRenderer:
     def _picture(self, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
         geometry, shape = self._geometry, camera.size[::-1]
         inverse_depth, triangle = self._buffers(shape)
-        q = rasterise(geometry.vertices, geometry.topology.faces, camera.P, NEAR, inverse_depth, triangle)
+        projection = projection_matrix(camera)
+        q = rasterise(geometry.vertices, geometry.topology.faces, projection, NEAR, inverse_depth, triangle)
         depth, ids = resolve(inverse_depth, triangle, geometry.topology.mesh)
         return Image(
             rgb=_shaded(geometry, camera, lighting, inverse_depth, triangle, q)
@@ -91,7 +93,7 @@ def _shaded(
         topology.uv,
         *topology.pyramids,
         camera.center,
-        np.ascontiguousarray(np.linalg.inv(camera.P[:, :3])),
+        np.ascontiguousarray(np.linalg.inv(projection_matrix(camera)[:, :3])),
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
         255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
 from simharness.capture.picture import PictureSource
-from simharness.capture.rendering.lens import project_to_image
 from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic
 from simharness.report.figures.overlay import COCO17_BODY, Overlay
@@ -24,6 +23,7 @@ from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.types.truth import Truth
 from simharness.world.motion.choreography import roles
+from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.build import Scene
 from simharness.world.scene.playback import Playback
 

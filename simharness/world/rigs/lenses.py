@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
+from simharness.world.rigs.projection import undistorted
 
 _SAMPLES = 33  # samples of a picture in each direction, edges included
 
@@ -38,7 +39,7 @@ def check_lens(camera: Camera) -> None:
     width, height = camera.size
     u, v = np.meshgrid(np.linspace(-0.5, width - 0.5, _SAMPLES), np.linspace(-0.5, height - 0.5, _SAMPLES))
     pixels = np.stack([u.ravel(), v.ravel()], axis=1)
-    folded = ~np.isfinite(camera.undistort(pixels)).all(axis=1)
+    folded = ~np.isfinite(undistorted(camera, pixels)).all(axis=1)
     if folded.any():
         radius = np.linalg.norm(pixels - camera.K[:2, 2], axis=1)
         terms = ", ".join(f"{term:g}" for term in camera.distortion)

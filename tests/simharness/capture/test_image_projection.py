@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simharness.capture.rendering.lens import project_to_image
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import intrinsics, look_at
+from simharness.world.rigs.projection import project_to_image
 
 SIZE = (640, 480)
 

@@ -10,7 +10,6 @@ import pytest
 from test_renderers import camera_at
 
 from simharness.capture.body_outlines import Outline, bounding_box, packed
-from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import NEAR
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import make_body
@@ -21,6 +20,7 @@ from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import draw_looks
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.rigs.projection import project_to_image
 
 BARREL = np.array([-0.37, 0.15, 0.001, -0.001, 0.0])
 

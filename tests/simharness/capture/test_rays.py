@@ -12,11 +12,11 @@ from mvpose.camera import Rig
 from simharness.capture.film import PictureObserver
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.ray_visibility import RayObserver
-from simharness.capture.rendering.lens import project_to_image
 from simharness.capture.rendering.renderer import make_renderer
 from simharness.scenario.sections.scenario import Scenario
 from simharness.types.views import Visibility
 from simharness.world.rigs.layouts import build_rig
+from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.build import build
 from simharness.world.scene.playback import Playback
 

@@ -12,6 +12,7 @@ from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera, Rig
 from mvpose.kernels import njit
 from simharness.types.mesh import Mesh
+from simharness.world.rigs.projection import project_to_image, viewing_rays
 from simharness.world.scene.objects.solids import Solid
 
 _COLUMNS, _ROWS = 20, 15  # grid of rays that samples a picture
@@ -113,7 +114,7 @@ def lines_of_sight(rig: Rig, time: Floats, joints: Floats) -> SightLines:
     """
     points = joints.reshape(-1, 3)
     when = np.repeat(time, joints.shape[1] * joints.shape[2])
-    on_image = [camera.inside(camera.project(points)) for camera in rig]
+    on_image = [camera.inside(project_to_image(camera, points)) for camera in rig]
     return SightLines(
         np.concatenate([np.tile(camera.center, (seen.sum(), 1)) for camera, seen in zip(rig, on_image, strict=True)]),
         np.concatenate([points[seen] for seen in on_image]),
@@ -149,7 +150,7 @@ def _grid(camera: Camera) -> tuple[Floats, Floats]:
     """Return starts and ends of rays through points spread evenly over the picture."""
     width, height = camera.size
     u, v = np.meshgrid((np.arange(_COLUMNS) + 0.5) / _COLUMNS, (np.arange(_ROWS) + 0.5) / _ROWS)
-    rays = camera.rays(np.column_stack([u.ravel() * width, v.ravel() * height]) - 0.5)
+    rays = viewing_rays(camera, np.column_stack([u.ravel() * width, v.ravel() * height]) - 0.5)
     rays = np.where(np.isfinite(rays), rays, 0.0)  # not imaged by the lens: a line of length 0, which hits nothing
     starts = np.tile(camera.center, (len(rays), 1))
     return starts, starts + _FAR * rays
