@@ -111,6 +111,7 @@ COCO17 = Skeleton(
     ),
     # The root is the left shoulder, because the torso is seen best and every edge is then a bone of nearly constant
     # length. The face is attached through the nose, whose distance from the shoulder changes little with nodding.
+    # Priors on bones are mirrored, so that neither shoulder counts more.
     parents=(5, 0, 0, 1, 2, -1, 5, 5, 6, 7, 8, 5, 6, 11, 12, 13, 14),
     mirror=(0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15),
     sigmas=(.026, .025, .025, .035, .035, .079, .079, .072, .072, .062, .062, .107, .107, .087, .087, .089, .089),

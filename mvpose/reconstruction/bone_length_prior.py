@@ -21,6 +21,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
+from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.skeleton import Skeleton
 
 STATURE = 1.70  # metres
@@ -51,12 +52,12 @@ _BONES: dict[frozenset[str], tuple[float, float]] = {
 
 
 class Bones(NamedTuple):
-    """Published length of the bone from every joint to its parent.
+    """Published lengths of the bones of :func:`mvpose.reconstruction.bone_graph.bone_graph`.
 
     Attributes:
-        length: mean over adults, (J,), metres; 0 where no length is published, and at the root.
-        definition: standard deviation of the length due to the detectors' definition of the joints, (J,), metres;
-            infinite where no length is published, and at the root.
+        length: mean over adults, (B,), metres; 0 where no length is published, and for the bone of the root.
+        definition: standard deviation of the length due to the detectors' definition of the joints, (B,), metres;
+            infinite where no length is published, and for the bone of the root.
     """
 
     length: Floats
@@ -66,28 +67,30 @@ class Bones(NamedTuple):
 @cache
 def published_bones(skeleton: Skeleton) -> Bones:
     """Return the published bone lengths of a skeleton."""
-    length, definition = np.zeros(len(skeleton)), np.full(len(skeleton), np.inf)
-    for parent, child in skeleton.edges:
+    graph = bone_graph(skeleton)
+    length, definition = np.zeros(len(graph.share)), np.full(len(graph.share), np.inf)
+    for bone, (parent, child) in enumerate(zip(graph.parents, graph.children, strict=True)):
         ends = frozenset((skeleton.parts[parent], skeleton.parts[child]))
-        if ends in _BONES:
-            length[child], definition[child] = _BONES[ends]
+        if parent >= 0 and ends in _BONES:
+            length[bone], definition[bone] = _BONES[ends]
     return Bones(length, definition)
 
 
 def bone_lengths(skeleton: Skeleton) -> tuple[Floats, Floats]:
-    """Return mean and standard deviation, over adults, of the length of the bone from every joint to its parent.
+    """Return means and standard deviations, over adults, of the bone lengths.
 
     Returns:
-        Means (J,) and standard deviations (J,), metres. A bone without a published length, and the root, has an
-        infinite deviation: it is not constrained.
+        Means (B,) and standard deviations (B,), metres, of the bones of
+        :func:`mvpose.reconstruction.bone_graph.bone_graph`. A bone without a published length, and that of the root,
+        has an infinite deviation: it is not constrained.
     """
     length, definition = published_bones(skeleton)
     return length, np.hypot(np.hypot(STATURE_DEVIATION, PROPORTION_DEVIATION) * length, definition)
 
 
 @njit(cache=True)
-def personal_prior(states, count, weights, sigmas, parents, length, definition, personal):
-    """Return mean bone lengths (J,), metres, and their precisions (J,), 1/m^2, for one person.
+def personal_prior(states, count, weights, sigmas, graph, length, definition, personal):
+    """Return mean bone lengths (B,), metres, and the precisions of their priors (B,), 1/m^2, for one person.
 
     Stature is a scale that all bones of a person share. Its posterior is Gaussian, with the population as prior and
     the distances between the likeliest proposals as measurements. Long bones seen by many views weigh most, outliers
@@ -99,12 +102,13 @@ def personal_prior(states, count, weights, sigmas, parents, length, definition, 
         count: number of valid proposals per joint, (J,).
         weights: scores in every view, (J, n, K).
         sigmas: standard deviation of each joint across a ray, (J,), metres.
-        parents: parent of each joint, (J,), -1 for the root.
-        length: mean bone lengths of the population, (J,), metres.
-        definition: standard deviation due to the definition of the joints, (J,), metres; infinite for no prior.
+        graph: bones of the skeleton, :class:`mvpose.reconstruction.bone_graph.BoneGraph`.
+        length: mean bone lengths of the population, (B,), metres.
+        definition: standard deviation due to the definition of the joints, (B,), metres; infinite for no prior.
         personal: whether to scale to the person; if not, the prior of the population is returned.
     """
     joints, n, _ = weights.shape
+    bones = len(length)
     scale, deviation = 1.0, STATURE_DEVIATION
     if personal:
         views = np.zeros(joints)
@@ -114,22 +118,23 @@ def personal_prior(states, count, weights, sigmas, parents, length, definition, 
                     views[j] += weights[j, v, 0] > 0.0
         for _ in range(_ROUNDS):
             weighted_sum, information = 1.0 / STATURE_DEVIATION**2, 1.0 / STATURE_DEVIATION**2
-            for j in range(joints):
-                parent = parents[j]
-                if parent < 0 or length[j] == 0.0 or views[j] < 2 or views[parent] < 2:
+            for bone in range(bones):
+                j, parent = graph.children[bone], graph.parents[bone]
+                if parent < 0 or length[bone] == 0.0 or views[j] < 2 or views[parent] < 2:
                     continue
                 d2 = 0.0
                 for r in range(3):
                     d2 += (states[j, 0, r] - states[parent, 0, r]) ** 2
                 measured = sigmas[j] ** 2 / (views[j] - 1) + sigmas[parent] ** 2 / (views[parent] - 1)
-                variance = (PROPORTION_DEVIATION * length[j]) ** 2 + definition[j] ** 2 + measured
-                residual = np.sqrt(d2) - scale * length[j]
-                weight = 1.0 / (1.0 + residual * residual / (_OUTLIER * variance))
-                weighted_sum += weight * length[j] * np.sqrt(d2) / variance
-                information += weight * length[j] ** 2 / variance
+                variance = (PROPORTION_DEVIATION * length[bone]) ** 2 + definition[bone] ** 2 + measured
+                residual = np.sqrt(d2) - scale * length[bone]
+                weight = graph.share[bone] / (1.0 + residual * residual / (_OUTLIER * variance))
+                weighted_sum += weight * length[bone] * np.sqrt(d2) / variance
+                information += weight * length[bone] ** 2 / variance
             scale, deviation = weighted_sum / information, 1.0 / np.sqrt(information)
-    scaled, precision = np.empty(joints), np.empty(joints)
-    for j in range(joints):
-        scaled[j] = scale * length[j]
-        precision[j] = 1.0 / ((deviation**2 + PROPORTION_DEVIATION**2) * length[j] ** 2 + definition[j] ** 2)
+    scaled, precision = np.empty(bones), np.empty(bones)
+    for bone in range(bones):
+        scaled[bone] = scale * length[bone]
+        variance = (deviation**2 + PROPORTION_DEVIATION**2) * length[bone] ** 2 + definition[bone] ** 2
+        precision[bone] = graph.share[bone] / variance
     return scaled, precision

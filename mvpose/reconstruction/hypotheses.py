@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.kernels import njit
 from mvpose.rays import Rays
+from mvpose.reconstruction.bone_graph import mirror_images
 from mvpose.reconstruction.bone_length_prior import bone_lengths
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.triangulation import pair_point
@@ -22,7 +23,7 @@ from mvpose.skeleton import Skeleton
 
 
 class Hypotheses(NamedTuple):
-    """States of all joints (S in total), the keypoints that support them, and links between states a bone apart.
+    """States of all joints (S in total), and the keypoints that support them.
 
     Attributes:
         start: first state of each joint, and S, (J + 1,).
@@ -30,9 +31,6 @@ class Hypotheses(NamedTuple):
         support_start: first supporting keypoint of each state, and their total number, (S + 1,).
         support: detections whose keypoints support each state, in the order of their views.
         evidence: log-likelihood ratio of each supporting keypoint with the joint at the state against without it.
-        link_start: first link of each state, and their total number, (S + 1,).
-        link: states of the parent joint at the distance of a bone.
-        cost: negative log-prior of the bone length of each link.
     """
 
     start: Integers
@@ -40,14 +38,29 @@ class Hypotheses(NamedTuple):
     support_start: Integers
     support: Integers
     evidence: Floats
-    link_start: Integers
-    link: Integers
+
+
+class Links(NamedTuple):
+    """Kinematic tree, and links between states at the distance of its bones.
+
+    Attributes:
+        parents: parent of each joint, (J,), -1 for the root.
+        order: joints from the root outwards, (J,).
+        known: whether the length of the bone from each joint to its parent has a prior, (J,).
+        start: first link of each state, and their total number, (S + 1,).
+        state: states of the parent joint at the distance of a bone.
+        cost: negative log-prior of the bone length of each link.
+    """
+
+    parents: Integers
+    order: Integers
+    known: Bools
+    start: Integers
+    state: Integers
     cost: Floats
 
 
-def hypothesize(
-    rays: Rays, skeleton: Skeleton, *, noise: Noise, agreement: float, reach: float, most: int
-) -> Hypotheses:
+def hypothesize(rays: Rays, skeleton: Skeleton, *, noise: Noise, agreement: float, most: int) -> Hypotheses:
     """Return the states of the joints of all people.
 
     Args:
@@ -56,7 +69,6 @@ def hypothesize(
         noise: error model of keypoints.
         agreement: greatest distance between two rays that meet, in standard deviations; they must meet in front of
             both cameras.
-        reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
         most: greatest number of states that a keypoint proposes, the likeliest ones; states within one standard
             deviation of each other are merged.
     """
@@ -66,18 +78,44 @@ def hypothesize(
     points = [_propose(rays.view[seen[j]], rows[j], sigmas[j], agreement, most) for j in joints]
     supports = [_supporting_rays(rows[j], points[j], sigmas[j]) for j in joints]
     start = np.cumsum([0, *map(len, points)])
-    length, deviation = bone_lengths(skeleton)
-    parents = np.array(skeleton.parents, np.int64)
-    # The likeliest of several pairs is about as accurate as the mean of four keypoints.
-    spread = np.sqrt(deviation**2 + (sigmas**2 + sigmas[parents] ** 2) / 4)
     return Hypotheses(
         start,
         np.concatenate(points),
         np.cumsum(np.concatenate([[0], *(count for count, _, _ in supports)])),
         np.concatenate([seen[j][which] for j, (_, which, _) in enumerate(supports)]),
         np.concatenate([evidence for _, _, evidence in supports]),
-        *_link(start, np.concatenate(points), parents, length, spread, reach),
     )
+
+
+def link(space: Hypotheses, skeleton: Skeleton, *, noise: Noise, reach: float) -> tuple[Links, ...]:
+    """Link states along the bones of the tree and, if that is another one, of its mirror image.
+
+    Args:
+        space: states of all joints.
+        skeleton: the J joints.
+        noise: error model of keypoints.
+        reach: greatest error of a bone length, in standard deviations of the length and of the states at its ends.
+    """
+    sigmas, mirror = noise.sigmas(skeleton), np.array(skeleton.mirror)
+    length, deviation = (each[: len(skeleton)] for each in bone_lengths(skeleton))
+    parents = np.array(skeleton.parents, np.int64)
+    trees = [(parents, length, deviation)]
+    if mirror_images(skeleton):
+        image = np.where(parents >= 0, mirror[parents], -1)[mirror]
+        trees.append((image, length[mirror], deviation[mirror]))
+    return tuple(_tree_links(space, *tree, sigmas, reach) for tree in trees)
+
+
+def _tree_links(
+    space: Hypotheses, parents: Integers, length: Floats, deviation: Floats, sigmas: Floats, reach: float
+) -> Links:
+    order = np.flatnonzero(parents < 0).tolist()
+    for joint in order:
+        order += np.flatnonzero(parents == joint).tolist()
+    # The likeliest of several pairs is about as accurate as the mean of four keypoints.
+    spread = np.sqrt(deviation**2 + (sigmas**2 + sigmas[parents] ** 2) / 4)
+    links = _link(space.start, space.points, parents, length, spread, reach)
+    return Links(parents, np.array(order), np.isfinite(deviation), *links)
 
 
 def _ray_rows(rays: Rays, joint: int, seen: Integers, noise: Noise) -> Floats:
@@ -183,7 +221,7 @@ def _supporting_rays(rows, points, sigma):
 
 @njit(cache=True)
 def _link(start, points, parents, length, deviation, reach):
-    """Return links and costs of :class:`Hypotheses`; a bone of unknown length (infinite deviation) has no links."""
+    """Return the last three fields of :class:`Links`; a bone of unknown length (infinite deviation) has no links."""
     link_start = np.zeros(len(points) + 1, np.int64)
     link, cost = np.empty(0, np.int64), np.empty(0)
     for filling in (False, True):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
+from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.skeleton import Skeleton
 
 # Nine clips of recorded motion (subjects 02 and 03 of the CMU database: walk, run, jump, balance; dance and mime from
@@ -35,11 +36,18 @@ _SEGMENTS = {"shoulder": 1, "hip": 2, "nose": 3, "eye": 3, "ear": 3, "head_top":
 
 @cache
 def direction_concentrations(skeleton: Skeleton) -> Floats:
-    """Return the von Mises-Fisher concentration of every joint's direction from its parent, (J,); 0 is uniform."""
-    concentration = np.zeros(len(skeleton))
-    for parent, child in skeleton.edges:
-        concentration[child] = _CONCENTRATION.get((skeleton.parts[parent], skeleton.parts[child]), 0.0)
-    return concentration
+    """Return the von Mises-Fisher concentration of the direction of every bone, (B,); 0 is uniform.
+
+    The direction is from the inner to the outer end; for the bones see
+    :func:`mvpose.reconstruction.bone_graph.bone_graph`.
+    """
+    graph = bone_graph(skeleton)
+    ends = zip(graph.parents, graph.children, strict=True)
+    known = (
+        _CONCENTRATION.get((skeleton.parts[parent], skeleton.parts[child]), 0.0) if parent >= 0 else 0.0
+        for parent, child in ends
+    )
+    return np.array(list(known))
 
 
 @cache

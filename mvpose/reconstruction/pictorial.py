@@ -1,8 +1,10 @@
 """3D pictorial structures on the proposals of one matched person (paper, section 3.3).
 
 The posterior of a pose is the product of every joint's likelihood in all views and of a Gaussian on every bone
-length. Its logarithm is a sum over a tree, so max-product (here max-sum) finds the best combination of proposals
-exactly, in time linear in the number of bones and quadratic in the number of proposals per joint.
+length. Its logarithm is a sum over the bones, which form a tree or, with the mirror images of bones
+(:mod:`mvpose.reconstruction.bone_graph`), nearly so. So max-product (here max-sum) finds the best combination of
+proposals exactly, in time linear in the number of bones and quadratic in the number of proposals per joint, cubic for a
+joint that both sides hold.
 """
 
 from __future__ import annotations
@@ -14,13 +16,15 @@ from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from mvpose.rays import Rays
+from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.reconstruction.bone_length_prior import personal_prior, published_bones
 from mvpose.reconstruction.heatmap_likelihood import rescore
+from mvpose.reconstruction.inference import max_product
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.limb_direction_prior import direction_concentrations, trunk_direction, trunk_segments
 from mvpose.reconstruction.poses import Poses, clear, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
-from mvpose.reconstruction.refinement import climb, fit_scale, tree, write_uncertainty
+from mvpose.reconstruction.refinement import climb, fit_scale, write_uncertainty
 from mvpose.skeleton import Skeleton
 
 
@@ -71,7 +75,7 @@ class PictorialStructure:
             maps,
             self.noise.sigmas(skeleton),
             self.noise.floor,
-            *tree(skeleton),
+            bone_graph(skeleton),
             length,
             definition,
             direction_concentrations(skeleton),
@@ -86,7 +90,7 @@ class PictorialStructure:
 @njit(cache=True)
 def _structures(
     poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
-    parents, order, neighbours, bones, length, definition, concentrations, segments, personal, most_pairs, most_states,
+    graph, length, definition, concentrations, segments, personal, most_pairs, most_states,
 ):  # fmt: skip
     trunk = np.empty(3)
     for person in range(len(poses.joints)):
@@ -98,83 +102,24 @@ def _structures(
         )  # fmt: skip
         if maps is not None:
             rescore(states, unary, count, labels, person, scores_2d, maps, floor)
-        lengths, precision = personal_prior(states, count, scores_2d, sigmas, parents, length, definition, personal)
+        lengths, precision = personal_prior(states, count, scores_2d, sigmas, graph, length, definition, personal)
         trunk_direction(states, count, segments, trunk)
         propose_single_views(
-            states, unary, count, centers, rays, scores_2d, floor, neighbours, bones, lengths, precision,
-            concentrations, trunk,
-        )  # fmt: skip
-        chosen = max_product(states, unary, count, parents, order, lengths, precision)
+            states, unary, count, centers, rays, scores_2d, floor, graph, lengths, precision, concentrations, trunk
+        )
+        chosen = max_product(states, unary, count, graph, lengths, precision)
         deviations = np.empty(len(sigmas))
         for j in range(len(sigmas)):
             deviations[j] = scale * sigmas[j]
             if count[j] > 0:
                 for r in range(3):
                     joints[j, r] = states[j, chosen[j], r]
-        climb(
-            joints, centers, rays, scores_2d, angles, deviations, floor,
-            parents, order, neighbours, bones, lengths, precision,
-        )  # fmt: skip
+        climb(joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, precision)
         # The prior is weakened where the keypoints agree to a pixel, so that it does not move joints by millimetres
         # (empirical Bayes).
         weakened = precision * fit_scale(joints, centers, rays, scores_2d, angles, deviations, floor)
-        climb(
-            joints, centers, rays, scores_2d, angles, deviations, floor,
-            parents, order, neighbours, bones, lengths, weakened,
-        )  # fmt: skip
+        climb(joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, weakened)
         write_uncertainty(
-            scores, covariance, joints, centers, rays, scores_2d, angles, deviations, floor,
-            parents, order, neighbours, bones, lengths, precision, concentrations, trunk,
+            scores, covariance, joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, precision,
+            concentrations, trunk,
         )  # fmt: skip
-
-
-@njit(cache=True)
-def max_product(states, unary, count, parents, order, length, precision):
-    """Find the combination of states with the greatest sum of unaries and log-Gaussian pairwise terms of bone length.
-
-    Args:
-        states: candidate positions, (J, S, 3), metres.
-        unary: log-likelihoods of the states, (J, S).
-        count: number of valid states for each joint, (J,). A joint without any is skipped: it does not constrain its
-            neighbours.
-        parents: parent of each joint, (J,), -1 for the root.
-        order: joints in an order with leaves first, (J,).
-        length: mean bone length to the parent, (J,), metres.
-        precision: inverse variance of the length, (J,), 1/m^2; 0 for no constraint.
-
-    Returns:
-        Index of the chosen state of every joint, (J,); 0 for a joint without states.
-    """
-    joints = len(parents)
-    belief = np.empty(unary.shape)
-    choice = np.zeros(unary.shape, np.int64)  # best state of a joint for each state of its parent
-    for joint in range(joints):
-        for s in range(count[joint]):
-            belief[joint, s] = unary[joint, s]
-    for child in order:
-        parent = parents[child]
-        if parent < 0 or count[child] == 0:
-            continue
-        for p in range(count[parent]):
-            best, argument = -np.inf, 0
-            for c in range(count[child]):
-                value = belief[child, c]
-                if precision[child] > 0.0:
-                    x = states[child, c, 0] - states[parent, p, 0]
-                    y = states[child, c, 1] - states[parent, p, 1]
-                    z = states[child, c, 2] - states[parent, p, 2]
-                    value -= 0.5 * precision[child] * (np.sqrt(x * x + y * y + z * z) - length[child]) ** 2
-                if value > best:
-                    best, argument = value, c
-            belief[parent, p] += best
-            choice[child, p] = argument
-    chosen = np.zeros(joints, np.int64)
-    for joint in order[::-1]:
-        parent = parents[joint]
-        if parent >= 0 and count[parent] > 0:
-            chosen[joint] = choice[joint, chosen[parent]]
-        else:
-            for s in range(1, count[joint]):
-                if belief[joint, s] > belief[joint, chosen[joint]]:
-                    chosen[joint] = s
-    return chosen

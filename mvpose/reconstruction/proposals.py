@@ -2,7 +2,7 @@
 
 If a joint is right in two views, its position is among the proposals; the point on which all views agree is added
 because it is more accurate where more views are right. A joint that only one view sees is proposed where its ray is a
-bone length away from a neighbour in the tree.
+bone length away from a neighbour.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
 _SINGLE_VIEW_STATES = 16  # room for two depths per neighbour
+_NEARER = 1e-9  # likelihood per metre; decides ties only
 _SAME = 0.25  # squared distance, in variances of the joint, below which refinement moves two proposals to one point
 
 
@@ -133,8 +134,7 @@ def propose_single_views(
     directions,
     weights,
     floor,
-    neighbours,
-    bones,
+    graph,
     length,
     precision,
     concentrations,
@@ -143,8 +143,9 @@ def propose_single_views(
     """Add, in place, proposals for joints that a single view sees: where the ray is a bone length from a neighbour.
 
     Such a joint has no pair of views, but its ray is known, and the bone length leaves two depths on it. The prior on
-    limb directions (:mod:`mvpose.reconstruction.limb_direction_prior`) ranks the two. The nearer one is inserted first
-    and wins a tie, because a body hides its far side. Joints placed in one round serve their neighbours in the next.
+    limb directions (:mod:`mvpose.reconstruction.limb_direction_prior`) ranks the two. Of equally likely ones the
+    nearest to the camera comes first, because a body hides its far side. Joints placed in one round serve their
+    neighbours in the next.
     """
     joints, n, _ = weights.shape
     only = np.empty(joints, np.int64)
@@ -164,8 +165,8 @@ def propose_single_views(
             if only[j] < 0 or placed[j] > 0:
                 continue
             v = only[j]
-            for slot in range(neighbours.shape[1]):
-                other, bone = neighbours[j, slot], bones[j, slot]
+            for slot in range(graph.neighbours.shape[1]):
+                other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
                 if other < 0 or count[other] == 0 or precision[bone] == 0.0:
                     continue
                 along, square = 0.0, 0.0
@@ -180,8 +181,9 @@ def propose_single_views(
                             point[r] = origins[v, r] + depth * directions[j, v, 0, r]
                         value = np.log(weights[j, v, 0] + floor)
                         value += direction_log_likelihood(
-                            point, states[other, 0], bone == j, concentrations[bone], trunk
+                            point, states[other, 0], graph.children[bone] == j, concentrations[bone], trunk
                         )
+                        value -= _NEARER * depth
                         insert(states[j], unary[j], placed[j], value, point[0], point[1], point[2])
                         placed[j] += 1
             any_placed = any_placed or placed[j] > 0

@@ -1,69 +1,26 @@
 """Local refinement of one person's pose, and the covariance of every joint.
 
 Expectation maximisation alternates between the responsibilities of the keypoints given the joints, and the joints
-given the responsibilities; each joint is a 3 x 3 solve with the bones to its neighbours linearised. No step lowers the
-posterior. The covariances are the marginals of the Gaussian at the maximum, by belief propagation along the tree, with
-the error scale estimated from the person's residuals.
+given the responsibilities; each joint is a 3 x 3 solve with the bones to its neighbours linearised. Two joints that are
+mirror images and joined by a bone, such as the shoulders, are solved together, so that neither side comes first. No
+step lowers the posterior. The covariances are the marginals of the Gaussian at the maximum, with the error scale
+estimated from the person's residuals.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from typing import NamedTuple
-
 import numpy as np
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Floats
 from mvpose.kernels import njit
 from mvpose.rays import Rays
+from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.reconstruction.error_scale import joint_scales, person_scale
+from mvpose.reconstruction.inference import marginalize
 from mvpose.reconstruction.likelihood import ANCHOR, Noise, accumulate, anchor, log_likelihood, solve
 from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
 from mvpose.reconstruction.poses import MISSING_SCORE, gather
 from mvpose.skeleton import Skeleton
-
-
-class Tree(NamedTuple):
-    """Kinematic tree of a skeleton as arrays for the kernels.
-
-    Attributes:
-        parents: parent of each joint, (J,), -1 for the root.
-        order: joints in an order with leaves first, (J,).
-        neighbours: joints at the other ends of each joint's bones, (J, D), -1 where there are fewer.
-        bones: child joint of each of these bones, which identifies the bone, (J, D).
-    """
-
-    parents: Integers
-    order: Integers
-    neighbours: Integers
-    bones: Integers
-
-
-@cache
-def tree(skeleton: Skeleton) -> Tree:
-    """Return the kinematic tree of a skeleton."""
-    ends: list[list[tuple[int, int]]] = [[] for _ in skeleton.joints]
-    for parent, child in skeleton.edges:
-        ends[child].insert(0, (parent, child))  # the parent first
-        ends[parent].append((child, child))
-    shape = len(ends), max(map(len, ends))
-    neighbours, bones = np.full(shape, -1), np.full(shape, -1)
-    for joint, joint_ends in enumerate(ends):
-        for slot, (other, child) in enumerate(joint_ends):
-            neighbours[joint, slot], bones[joint, slot] = other, child
-    parents = np.array(skeleton.parents, np.int64)
-    return Tree(parents, leaves_first(parents), neighbours, bones)
-
-
-def leaves_first(parents: Integers) -> Integers:
-    """Return an order of the joints, (J,), in which every child comes before its parent."""
-    depth = np.zeros(len(parents), np.int64)
-    for joint in range(len(parents)):
-        ancestor = parents[joint]
-        while ancestor >= 0:
-            depth[joint] += 1
-            ancestor = parents[ancestor]
-    return np.argsort(-depth, kind="stable")
 
 
 def refine(
@@ -76,8 +33,8 @@ def refine(
         rays: rays of the person's n detections.
         skeleton: the J joints.
         noise: error model of keypoints.
-        length: mean length of the bone to the parent, (J,), metres.
-        deviation: standard deviation of that length, (J,), metres; infinite for no constraint.
+        length: mean bone lengths, (B,), metres, of :func:`mvpose.reconstruction.bone_graph.bone_graph`.
+        deviation: standard deviations of the lengths, (B,), metres; infinite for no constraint.
 
     Returns:
         Joints (J, 3), scores (J,) and covariances (J, 3, 3), as :class:`mvpose.reconstruction.poses.Poses`.
@@ -92,7 +49,8 @@ def refine(
     )
     refined, scores = np.array(joints, float), np.zeros(len(joints))
     covariance = np.full((len(joints), 3, 3), np.nan)
-    skeletal = (*tree(skeleton), length, 1.0 / deviation**2)
+    graph = bone_graph(skeleton)
+    skeletal = (graph, length, graph.share / deviation**2)
     climb(refined, *views, noise.sigmas(skeleton), noise.floor, *skeletal)
     write_uncertainty(
         scores,
@@ -102,7 +60,7 @@ def refine(
         noise.sigmas(skeleton),
         noise.floor,
         *skeletal,
-        np.zeros(len(joints)),
+        np.zeros(len(length)),
         np.zeros(3),
     )
     return refined, scores, covariance
@@ -115,37 +73,55 @@ _LONG = 4e-4  # m^2; a step below 2 cm turns no bone by much, so it cannot overs
 
 
 @njit(cache=True)
-def climb(
-    joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones, length, precision
-):
+def climb(joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision):
     """Move the joints (J, 3) to a maximum of the posterior, in place; joints that are NaN are skipped."""
-    A, b, inverse = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-    target, trial = np.empty(3), np.empty(3)
+    A, b, inverse = np.empty((3, 3)), np.empty(3), np.empty((2, 3, 3))
+    target, trial = np.empty((2, 3)), np.empty((2, 3))
     for _ in range(_SWEEPS):
         furthest = 0.0
-        for j in order:
+        for j in graph.visits:
+            mate = graph.mate[j]
+            if mate < j and not np.isnan(joints[mate, 0]):
+                continue  # moved together with its mate
+            if np.isnan(joints[mate, 0]):
+                mate = j
             if np.isnan(joints[j, 0]):
                 continue
-            anchor(joints[j], A, b)
-            accumulate(joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, A, b)
-            _add_bones(A, b, j, joints, neighbours, bones, length, precision)
-            if not solve(A, b, inverse, target):
-                continue
-            moved = 0.0
-            for r in range(3):
-                moved += (target[r] - joints[j, r]) ** 2
+            members = (j, mate)
+            size, shared, moved = (1 if mate == j else 2), -1, 0.0
+            for k in range(size):
+                joint = members[k]
+                anchor(joints[joint], A, b)
+                accumulate(
+                    joints[joint], origins, directions[joint], weights[joint], pixel, sigmas[joint], floor, 1.0, A, b
+                )
+                between = _add_bones(A, b, joint, members[1 - k], joints, graph, length, precision)
+                shared = max(shared, between)
+                if not solve(A, b, inverse[k], target[k]):
+                    target[k] = joints[joint]
+                    inverse[k] = 0.0
+            if shared >= 0:
+                _join(target, inverse, joints[j], joints[mate], length[shared], precision[shared])
+            for k in range(size):
+                step2 = 0.0
+                for r in range(3):
+                    step2 += (target[k, r] - joints[members[k], r]) ** 2
+                moved = max(moved, step2)
             if moved > _LONG:
                 # The bones are linearised, so a long step can overshoot: it is taken only if the posterior rises.
+                for k in range(size):
+                    trial[k] = joints[members[k]]
                 current = _local_posterior(
-                    joints[j], j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones,
+                    trial, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph,
                     length, precision,
                 )  # fmt: skip
                 step, climbs = 1.0, False
                 for _ in range(_HALVINGS):
-                    for r in range(3):
-                        trial[r] = joints[j, r] + step * (target[r] - joints[j, r])
+                    for k in range(size):
+                        for r in range(3):
+                            trial[k, r] = joints[members[k], r] + step * (target[k, r] - joints[members[k], r])
                     proposed = _local_posterior(
-                        trial, j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones,
+                        trial, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph,
                         length, precision,
                     )  # fmt: skip
                     climbs = proposed >= current
@@ -154,13 +130,33 @@ def climb(
                     step *= 0.5
                 if not climbs:
                     continue
+                target[:] = trial
+            for k in range(size):
                 for r in range(3):
-                    target[r] = trial[r]
-            for r in range(3):
-                joints[j, r] = target[r]
+                    joints[members[k], r] = target[k, r]
             furthest = max(furthest, moved)
         if furthest < _CONVERGED:
             break
+
+
+@njit(cache=True)
+def _join(target, inverse, here, there, length, precision):
+    """Add the bone between two joints to their solutions (2, 3) without it, exactly for the linearised bone.
+
+    The bone measures one length, so it changes both solutions by one force along it (Sherman-Morrison).
+    """
+    reach, softness, error = max(_distance(here, there), 1e-9), 1.0 / precision, -length
+    for r in range(3):
+        along = (here[r] - there[r]) / reach
+        error += along * (target[0, r] - target[1, r])
+        for c in range(3):
+            softness += along * (inverse[0, r, c] + inverse[1, r, c]) * (here[c] - there[c]) / reach
+    force = error / softness
+    for r in range(3):
+        for c in range(3):
+            along = (here[c] - there[c]) / reach
+            target[0, r] -= force * inverse[0, r, c] * along
+            target[1, r] += force * inverse[1, r, c] * along
 
 
 @njit(cache=True)
@@ -184,11 +180,18 @@ def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
 
 
 @njit(cache=True)
-def _add_bones(A, b, j, joints, neighbours, bones, length, precision):
-    """Add the bones that end in joint j to its normal equations, linearised along their current directions."""
-    for slot in range(neighbours.shape[1]):
-        other, bone = neighbours[j, slot], bones[j, slot]
+def _add_bones(A, b, j, mate, joints, graph, length, precision):
+    """Add the bones that end in joint j to its normal equations, linearised along their current directions.
+
+    The bone to the mate is left out; its index is returned, or -1 where there is none.
+    """
+    shared = -1
+    for slot in range(graph.neighbours.shape[1]):
+        other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
         if other < 0 or precision[bone] == 0.0 or np.isnan(joints[other, 0]):
+            continue
+        if other == mate:
+            shared = bone
             continue
         x, y, z = joints[j, 0] - joints[other, 0], joints[j, 1] - joints[other, 1], joints[j, 2] - joints[other, 2]
         current = max(np.sqrt(x * x + y * y + z * z), 1e-9)
@@ -207,18 +210,24 @@ def _add_bones(A, b, j, joints, neighbours, bones, length, precision):
         b[0] += weight * x * along
         b[1] += weight * y * along
         b[2] += weight * z * along
+    return shared
 
 
 @njit(cache=True)
 def _local_posterior(
-    point, j, joints, origins, directions, weights, pixel, sigmas, floor, neighbours, bones, length, precision
+    points, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision
 ):
-    """Return the terms of the log-posterior that change when joint j moves to ``point``."""
-    value = log_likelihood(point, origins, directions[j], weights[j], pixel, sigmas[j], floor)
-    for slot in range(neighbours.shape[1]):
-        other, bone = neighbours[j, slot], bones[j, slot]
-        if other >= 0 and precision[bone] > 0.0 and not np.isnan(joints[other, 0]):
-            value -= 0.5 * precision[bone] * (_distance(point, joints[other]) - length[bone]) ** 2
+    """Return the terms of the log-posterior that change when one or two joints move to ``points``, (2, 3)."""
+    value = 0.0
+    for k in range(size):
+        j, mate = members[k], members[1 - k]
+        value += log_likelihood(points[k], origins, directions[j], weights[j], pixel, sigmas[j], floor)
+        for slot in range(graph.neighbours.shape[1]):
+            other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
+            if other >= 0 and other != mate and precision[bone] > 0.0 and not np.isnan(joints[other, 0]):
+                value -= 0.5 * precision[bone] * (_distance(points[k], joints[other]) - length[bone]) ** 2
+    if shared >= 0:
+        value -= 0.5 * precision[shared] * (_distance(points[0], points[1]) - length[shared]) ** 2
     return value
 
 
@@ -229,8 +238,8 @@ def _distance(a, b):
 
 @njit(cache=True)
 def write_uncertainty(
-    scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, parents, order, neighbours, bones,
-    length, precision, concentrations, trunk,
+    scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision,
+    concentrations, trunk,
 ):  # fmt: skip
     """Write scores (J,) and covariances (J, 3, 3) of a pose at the maximum of its posterior.
 
@@ -255,55 +264,8 @@ def write_uncertainty(
             for c in range(3):
                 information[j, r, c] /= scale[j]
             information[j, r, r] += ANCHOR
-    _marginalize(joints, information, covariance, parents, order, precision)
-    _add_ambiguity(
-        covariance, joints, origins, directions, weights, parents, order, neighbours, precision, concentrations, trunk
-    )
-
-
-@njit(cache=True)
-def _marginalize(joints, information, covariance, parents, order, precision):
-    """Gaussian belief propagation from the information of each joint (J, 3, 3) to the marginal covariances.
-
-    A bone measures one length, so its message has rank one: along the bone, with the variance of the bone plus that of
-    the joint at its other end. Messages go up from the leaves, then down; each leaves out the message that the
-    receiver sent.
-    """
-    count = len(joints)
-    along, upward = np.zeros((count, 3)), np.zeros(count)  # of the bone to the parent
-    inverse, b, unused = np.empty((3, 3)), np.zeros(3), np.empty(3)
-    for j in order:
-        parent = parents[j]
-        if parent < 0 or precision[j] == 0.0 or np.isnan(joints[j, 0]) or np.isnan(joints[parent, 0]):
-            continue
-        reach = max(_distance(joints[j], joints[parent]), 1e-9)
-        for r in range(3):
-            along[j, r] = (joints[j, r] - joints[parent, r]) / reach
-        upward[j] = _message(information[j], along[j], precision[j], inverse, b, unused)
-        _add_outer(information[parent], along[j], upward[j])
-    for j in order[::-1]:
-        if upward[j] > 0.0:
-            parent = parents[j]
-            _add_outer(information[parent], along[j], -upward[j])
-            downward = _message(information[parent], along[j], precision[j], inverse, b, unused)
-            _add_outer(information[parent], along[j], upward[j])
-            _add_outer(information[j], along[j], downward)
-        if not np.isnan(joints[j, 0]) and solve(information[j], b, inverse, unused):
-            for r in range(3):
-                for c in range(3):
-                    covariance[j, r, c] = inverse[r, c]
-
-
-@njit(cache=True)
-def _message(information, along, precision, inverse, b, unused):
-    """Return the information along a bone about the joint at one end, from everything beyond the other end."""
-    if not solve(information, b, inverse, unused):
-        return 0.0
-    variance = 1.0 / precision
-    for r in range(3):
-        for c in range(3):
-            variance += along[r] * inverse[r, c] * along[c]
-    return 1.0 / variance
+    marginalize(joints, information, covariance, graph, precision)
+    _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk)
 
 
 @njit(cache=True)
@@ -314,14 +276,13 @@ def _add_outer(matrix, vector, weight):
 
 
 @njit(cache=True)
-def _add_ambiguity(
-    covariance, joints, origins, directions, weights, parents, order, neighbours, precision, concentrations, trunk
-):
-    """Add the depth ambiguity of joints that only one view sees, whose bone also fits at a second depth.
+def _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk):
+    """Add the depth ambiguity of joints that only one view sees, whose bones also fit at a second depth.
 
     The second moment around the chosen depth grows by the squared distance between the two depths times the
     probability of the other one (:mod:`mvpose.reconstruction.limb_direction_prior`). Single-view children of such a
-    joint inherit its ambiguity. A joint whose child is seen by several views has none.
+    joint inherit its ambiguity. A joint whose child is seen by several views has none. With two parents, one of them a
+    mirror image, the second depth and the inherited ambiguity are means.
     """
     count = len(joints)
     mirrored = np.empty(3)
@@ -333,27 +294,38 @@ def _add_ambiguity(
                 views, view[j] = views + 1, v
         if views != 1 or np.isnan(joints[j, 0]):
             view[j] = -1
-    for j in order[::-1]:
-        parent, only = parents[j], view[j]
-        if only < 0 or parent < 0 or precision[j] == 0.0 or np.isnan(joints[parent, 0]):
+    for j in graph.visits[::-1]:
+        only, held, parents = view[j], False, 0
+        if only < 0:
             continue
-        held = False
-        for slot in range(neighbours.shape[1]):
-            other = neighbours[j, slot]
-            held = held or (other >= 0 and other != parent and view[other] < 0 and not np.isnan(joints[other, 0]))
-        if held:
-            continue
-        depth, parent_depth = 0.0, 0.0
+        depth, parent_depth, inherited = 0.0, 0.0, 0.0
         for r in range(3):
             depth += (joints[j, r] - origins[only, r]) * directions[j, only, 0, r]
-            parent_depth += (joints[parent, r] - origins[only, r]) * directions[j, only, 0, r]
-        ambiguity[j] = ambiguity[parent]
+        for slot in range(graph.neighbours.shape[1]):
+            other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
+            if other < 0 or np.isnan(joints[other, 0]):
+                continue
+            if other != graph.inner[j, 0] and other != graph.inner[j, 1]:
+                held = held or view[other] < 0
+            elif precision[bone] > 0.0:
+                parents += 1
+                if other != graph.mate[j]:  # neither of two mates is the parent of the other
+                    inherited += ambiguity[other]
+                for r in range(3):
+                    parent_depth += (joints[other, r] - origins[only, r]) * directions[j, only, 0, r]
+        if held or parents == 0:
+            continue
+        parent_depth /= parents
+        ambiguity[j] = inherited / parents
         if 2.0 * parent_depth - depth > 0.0:  # the other depth, in front of the camera
             for r in range(3):
                 mirrored[r] = joints[j, r] + 2.0 * (parent_depth - depth) * directions[j, only, 0, r]
-            odds = np.exp(
-                direction_log_likelihood(joints[j], joints[parent], True, concentrations[j], trunk)
-                - direction_log_likelihood(mirrored, joints[parent], True, concentrations[j], trunk)
-            )
-            ambiguity[j] += 4.0 * (parent_depth - depth) ** 2 / (1.0 + odds)
+            log_odds = 0.0
+            for slot in range(graph.neighbours.shape[1]):
+                other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
+                if other >= 0 and graph.children[bone] == j and not np.isnan(joints[other, 0]):
+                    concentration = graph.share[bone] * concentrations[bone]
+                    log_odds += direction_log_likelihood(joints[j], joints[other], True, concentration, trunk)
+                    log_odds -= direction_log_likelihood(mirrored, joints[other], True, concentration, trunk)
+            ambiguity[j] += 4.0 * (parent_depth - depth) ** 2 / (1.0 + np.exp(log_odds))
         _add_outer(covariance[j], directions[j, only, 0], ambiguity[j])

@@ -6,7 +6,8 @@ itself decides which keypoints of different views belong together, for all peopl
 1. The states of a joint are the points where the rays of any two views meet (:mod:`mvpose.reconstruction.hypotheses`).
    The unary of a state is the sum over views of ``log(1 + score * exp(-e^2 / (2 sigma^2)) / floor)`` of the best
    keypoint that supports it: its log-likelihood ratio against a joint that is not there.
-2. Max-product over the tree, with the log-Gaussian prior on bone lengths, finds the best pose; it may lack joints.
+2. Max-product over the tree, with the log-Gaussian prior on bone lengths, finds the best pose; it may lack joints. The
+   tree is used as it is and in the mirror, and the better pose counts, so that neither side is preferred.
 3. The keypoints that support a pose, one per view and joint, are explained and serve no other pose. Step 2 is repeated
    with the remaining keypoints until no pose has enough joints.
 
@@ -18,6 +19,7 @@ is why the paper matches first.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -27,8 +29,9 @@ from mvpose.checks import check_numbers
 from mvpose.kernels import njit
 from mvpose.ordering import number_views
 from mvpose.rays import Rays
+from mvpose.reconstruction.bone_graph import bone_graph
 from mvpose.reconstruction.bone_length_prior import bone_lengths
-from mvpose.reconstruction.hypotheses import hypothesize
+from mvpose.reconstruction.hypotheses import hypothesize, link
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses
 from mvpose.reconstruction.refinement import refine
@@ -100,23 +103,18 @@ class UnmatchedPictorialStructure:
         return Poses(*_polish(by_view, skeleton, found, people, self.noise)), number[labels]
 
     def _find(self, rays: Rays, skeleton: Skeleton) -> _FoundPoses:
-        space = hypothesize(
-            rays, skeleton, noise=self.noise, agreement=self.agreement, reach=self.reach, most=self.most_states
-        )
-        parents = np.array(skeleton.parents, np.int64)
-        outwards = [skeleton.parents.index(-1)]
-        for joint in outwards:
-            outwards += np.flatnonzero(parents == joint).tolist()
-        order = np.array(outwards)
-        known = np.isfinite(bone_lengths(skeleton)[1])  # a bone of unknown length is no constraint
+        space = hypothesize(rays, skeleton, noise=self.noise, agreement=self.agreement, most=self.most_states)
+        trees = link(space, skeleton, noise=self.noise, reach=self.reach)
+        graph = bone_graph(skeleton)
         found = _FoundPoses([], [], np.full(rays.weights.shape, -1), np.zeros(rays.weights.shape))
         unary = np.ones(len(space.points))
         _weigh(unary, rays.view, found.owner, space)
         while True:
-            core, bound = _best_pose(order, parents, unary, space)
-            if bound < _SHARED:
+            best = [_best_pose(unary, space, tree) for tree in trees]
+            if max(bound for _, _, bound in best) < _SHARED:
                 return found
-            pose = _attach(core, order, parents, unary, rays.view, found.owner, known, space)
+            core, _, _ = max(best, key=itemgetter(1))
+            pose = _attach(core, unary, rays.view, found.owner, space, trees[0], trees[-1], graph)
             if (pose >= 0).sum() < self.least_joints:
                 unary[core[core >= 0]] = 0.0
                 continue
@@ -227,12 +225,14 @@ def _weigh(unary, view, owner, space):
 
 
 @njit(cache=True)
-def _best_pose(order, parents, unary, space):
-    """Find the connected part of the tree, and its states, with the greatest sum of unaries minus bone costs.
+def _best_pose(unary, space, tree):
+    """Find the connected part of a tree, and its states, with the greatest sum of unaries minus bone costs.
 
     Returns:
-        State of every joint, (J,), -1 where the pose lacks it; and an upper bound on the number of joints of a pose.
+        State of every joint, (J,), -1 where the pose lacks it; that sum; and an upper bound on the number of joints of
+        a pose.
     """
+    order, parents = tree.order, tree.parents
     joints, most = len(parents), 0
     for joint in range(joints):
         most = max(most, space.start[joint + 1] - space.start[joint])
@@ -250,11 +250,11 @@ def _best_pose(order, parents, unary, space):
             bound = max(bound, size[state])
             if value[state] > best:
                 best, root, top = value[state], joint, state
-            for k in range(space.link_start[state], space.link_start[state + 1]):
-                slot = space.link[k] - space.start[parent]
+            for k in range(tree.start[state], tree.start[state + 1]):
+                slot = tree.state[k] - space.start[parent]
                 larger[slot] = max(larger[slot], size[state])
-                if value[state] - space.cost[k] > message[slot]:
-                    message[slot] = value[state] - space.cost[k]
+                if value[state] - tree.cost[k] > message[slot]:
+                    message[slot] = value[state] - tree.cost[k]
                     choice[joint, slot] = state
         if parent >= 0:
             for slot in range(space.start[parent + 1] - space.start[parent]):
@@ -265,18 +265,28 @@ def _best_pose(order, parents, unary, space):
         for joint in order:
             if parents[joint] >= 0 and chosen[parents[joint]] >= 0:
                 chosen[joint] = choice[joint, chosen[parents[joint]] - space.start[parents[joint]]]
-    return chosen, bound
+    return chosen, best, bound
 
 
 @njit(cache=True)
-def _attach(core, order, parents, unary, view, owner, known, space):
+def _attach(core, unary, view, owner, space, tree, image, graph):
     """Add joints that a missing joint disconnects from the pose, where two detections of the person agree on them.
 
     The detection of the person in a view is the one that supports most joints of the pose, at least three.
+
+    Args:
+        core: state of every joint, (J,), -1 where the pose lacks it.
+        unary: unaries of the states, (S,).
+        view: camera of each detection, (m,).
+        owner: pose that explains each keypoint, (m, J), -1 for none.
+        space: states of all joints.
+        tree: links along the kinematic tree.
+        image: links along its mirror image.
+        graph: bones of the skeleton.
     """
     pose = core.copy()
     votes = np.zeros(len(view))
-    for joint in range(len(parents)):
+    for joint in range(len(pose)):
         if pose[joint] >= 0:
             for k in range(space.support_start[pose[joint]], space.support_start[pose[joint] + 1]):
                 if owner[space.support[k], joint] < 0:
@@ -286,37 +296,63 @@ def _attach(core, order, parents, unary, view, owner, known, space):
         for other in range(len(view)):
             if view[other] == view[d] and votes[other] > votes[d]:
                 of_person[d] = False
-    for joint in order:
-        if pose[joint] >= 0:
-            continue
-        best = 0.0
-        for state in range(space.start[joint], space.start[joint + 1]):
-            if unary[state] == 0.0:
-                continue
-            total, views = 0.0, 0
-            for k in range(space.support_start[state], space.support_start[state + 1]):
-                if of_person[space.support[k]] and owner[space.support[k], joint] < 0:
-                    total += space.evidence[k]
-                    views += 1
-            if views < 2 or total <= best:
-                continue
-            fits = True  # with the neighbours that are present
-            for other in range(len(parents)):
-                if pose[other] >= 0 and parents[joint] == other:
-                    fits = fits and (not known[joint] or _linked(state, pose[other], space))
-                elif pose[other] >= 0 and parents[other] == joint:
-                    fits = fits and (not known[other] or _linked(pose[other], state, space))
-            if fits:
-                best = total
-                pose[joint] = state
+    for joint in graph.visits[::-1]:
+        mate = graph.mate[joint]
+        if mate > joint:
+            continue  # chosen together with its mate, so that neither side comes first
+        state, total = _fitting_state(joint, pose, unary, of_person, owner, space, tree, image)
+        other, other_total = _fitting_state(mate, pose, unary, of_person, owner, space, tree, image)
+        if mate != joint and state >= 0 and other >= 0:
+            pose[joint] = state
+            if _fits(mate, other, pose, tree) and _fits(mate, other, pose, image):
+                pose[mate] = other
+            elif other_total > total:
+                pose[joint], pose[mate] = -1, other
+        elif state >= 0:
+            pose[joint] = state
+        elif other >= 0:
+            pose[mate] = other
     return pose
 
 
 @njit(cache=True)
-def _linked(child, parent, space):
+def _fitting_state(joint, pose, unary, of_person, owner, space, tree, image):
+    """Return the state of a missing joint that fits the pose with the greatest evidence, and that; -1 if none does."""
+    best, chosen = 0.0, -1
+    if pose[joint] >= 0:
+        return chosen, best
+    for state in range(space.start[joint], space.start[joint + 1]):
+        if unary[state] == 0.0:
+            continue
+        total, views = 0.0, 0
+        for k in range(space.support_start[state], space.support_start[state + 1]):
+            if of_person[space.support[k]] and owner[space.support[k], joint] < 0:
+                total += space.evidence[k]
+                views += 1
+        if views < 2 or total <= best:
+            continue
+        if _fits(joint, state, pose, tree) and _fits(joint, state, pose, image):
+            best, chosen = total, state
+    return chosen, best
+
+
+@njit(cache=True)
+def _fits(joint, state, pose, tree):
+    """Return whether a state of a joint is a bone length away from those of its neighbours that the pose has."""
+    fits = True
+    for other in range(len(pose)):
+        if pose[other] >= 0 and tree.parents[joint] == other:
+            fits = fits and (not tree.known[joint] or _linked(state, pose[other], tree))
+        elif pose[other] >= 0 and tree.parents[other] == joint:
+            fits = fits and (not tree.known[other] or _linked(pose[other], state, tree))
+    return fits
+
+
+@njit(cache=True)
+def _linked(child, parent, tree):
     found = False
-    for k in range(space.link_start[child], space.link_start[child + 1]):
-        found = found or space.link[k] == parent
+    for k in range(tree.start[child], tree.start[child + 1]):
+        found = found or tree.state[k] == parent
     return found
 
 

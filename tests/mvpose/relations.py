@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from people import STANDING, look_at
 
-from mvpose import COCO17, Camera, Detections, Rig
+from mvpose import COCO17, PANOPTIC19, SHELF14, Camera, Detections, Rig, Skeleton
+from mvpose.skeleton import coco17_to_shelf14
 
 
 class Frame(NamedTuple):
@@ -33,9 +34,8 @@ def frame(seed: int) -> Frame:
     """
     rng = np.random.default_rng([seed, 17])
     views = int(rng.choice([2, 3, 4, 5, 6], p=[0.25, 0.2, 0.2, 0.2, 0.15]))
-    people = _people(int(rng.integers(1, 6)), rng)
-    rig = _rig(views, rng)
-    keypoints = rig.project(people)
+    bodies, cameras = people(int(rng.integers(1, 6)), rng), rig(views, rng)
+    keypoints = cameras.project(bodies)
     view, person = (index.ravel() for index in np.indices(keypoints.shape[:2]))
     order = rng.permutation(len(view))[: max(2, round(len(view) * rng.choice([1.0, 0.9])))]
     view, person = view[order], person[order]
@@ -55,22 +55,44 @@ def frame(seed: int) -> Frame:
     scores[rng.random(scores.shape) < rng.choice([0.0, 0.1, 0.3])] = 0.0
     detections = Detections.from_keypoints(view, keypoints, scores)
     if rng.random() < 1 / 3:
-        looks = rng.standard_normal((len(people), 32))
+        looks = rng.standard_normal((len(bodies), 32))
         seen = np.concatenate([looks[person], rng.standard_normal((phantoms, 32))])
         detections = replace(detections, descriptors=seen + 0.5 * rng.standard_normal(seen.shape))
-    return Frame(rig, detections)
+    return Frame(cameras, detections)
 
 
-def _people(count: int, rng: np.random.Generator) -> np.ndarray:
-    people = []
+def people(count: int, rng: np.random.Generator) -> np.ndarray:
+    """People in a row, in poses, headings and sizes of their own, (count, 17, 3)."""
+    bodies = []
     for k in range(count):
         body = STANDING * rng.uniform(0.85, 1.1)
         for joint, parts in ((7, [9]), (8, [10]), (5, [7, 9]), (6, [8, 10]), (13, [15]), (14, [16]), (11, [13, 15])):
             body[parts] = (body[parts] - body[joint]) @ _rotation(rng.normal(0, 0.5, 3)).T + body[joint]
         body[:5] = (body[:5] - [0, 0, body[5, 2]]) @ _rotation([0, 0, rng.normal(0, 0.5)]).T + [0, 0, body[5, 2]]
         body = body @ _rotation([0, 0, rng.uniform(0, 2 * np.pi)]).T
-        people.append(body + [0.8 * (k - (count - 1) / 2), rng.uniform(-0.6, 0.6), 0])
-    return np.array(people)
+        bodies.append(body + [0.8 * (k - (count - 1) / 2), rng.uniform(-0.6, 0.6), 0])
+    return np.array(bodies)
+
+
+def skeletons() -> dict[str, tuple[Skeleton, Callable[[np.ndarray], np.ndarray]]]:
+    """Skeletons by name, each with the function from the joints of COCO-17, (..., 17, 3), to its own."""
+    # Every bone of this tree is on the left side or crosses over from it.
+    parents = list(COCO17.parents)
+    parents[COCO17.index("right_hip")] = COCO17.index("left_hip")
+    one_sided = replace(COCO17, name="hung on one side", parents=tuple(parents))
+    coco = [COCO17.index(joint) if joint in COCO17.joints else -1 for joint in PANOPTIC19.joints]
+
+    def panoptic19(joints: np.ndarray) -> np.ndarray:
+        result = joints[..., coco, :]
+        result[..., PANOPTIC19.index("neck"), :] = joints[..., [5, 6], :].mean(axis=-2)
+        result[..., PANOPTIC19.index("mid_hip"), :] = joints[..., [11, 12], :].mean(axis=-2)
+        return result
+
+    return {
+        "shelf14": (SHELF14, coco17_to_shelf14),
+        "panoptic19": (PANOPTIC19, panoptic19),
+        one_sided.name: (one_sided, _same),
+    }
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:
@@ -82,7 +104,8 @@ def _rotation(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def _rig(views: int, rng: np.random.Generator) -> Rig:
+def rig(views: int, rng: np.random.Generator) -> Rig:
+    """Cameras around the origin, a third of the rigs with distorting lenses."""
     bearings = rng.uniform(0, 2 * np.pi) + (np.arange(views) + rng.uniform(-0.2, 0.2, views)) * 5.2 / (views + 1)
     places = [
         [r * np.cos(a), r * np.sin(a), rng.uniform(1.2, 3.0)]

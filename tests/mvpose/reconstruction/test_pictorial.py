@@ -6,19 +6,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from people import STANDING, detect, ring
 
-from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig
+from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig, Skeleton
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
+from mvpose.reconstruction.bone_graph import bone_graph, mirror_images
 from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.inference import marginalize, max_product
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.limb_direction_prior import (
     direction_concentrations,
     direction_log_likelihood,
     trunk_segments,
 )
-from mvpose.reconstruction.pictorial import max_product
 from mvpose.reconstruction.proposals import propose_all
-from mvpose.reconstruction.refinement import _add_ambiguity, _marginalize, climb, leaves_first, refine, tree
+from mvpose.reconstruction.refinement import _add_ambiguity, climb, refine
 from mvpose.reconstruction.triangulation import consensus
 
 
@@ -27,16 +28,31 @@ def reconstruct(rays, method=None):
     return (each[0] for each in (method or PictorialStructure())(rays, np.zeros(len(rays), int), COCO17))
 
 
-def total(states, unary, chosen, parents, length, deviation, count):
+def bones_of(graph):
+    """Ends of the bones as (bone, parent, child)."""
+    ends = zip(range(len(graph.share)), graph.parents, graph.children, strict=True)
+    return [(bone, parent, child) for bone, parent, child in ends if parent >= 0]
+
+
+def some_skeleton(joints, rng):
+    """A skeleton with a random tree, in which parents may come after their children, and random mirror pairs."""
+    parents = np.array([-1] + [rng.integers(0, k) for k in range(1, joints)])
+    order = rng.permutation(joints)
+    parents = np.array([-1 if parents[k] < 0 else np.argmax(order == parents[k]) for k in order])
+    mirror = np.arange(joints)
+    for one, other in rng.permutation(joints).reshape(-1, 2)[: rng.integers(0, joints // 2 + 1)]:
+        mirror[one], mirror[other] = other, one
+    # Skeletons are looked up by name.
+    return Skeleton(f"{parents} {mirror}", tuple(map(str, range(joints))), parents, mirror, (0.1,) * joints)
+
+
+def total(states, unary, chosen, graph, length, deviation, count):
     """Log-posterior of a choice, written out; joints without states are left out."""
-    value = 0.0
-    for joint, parent in enumerate(parents):
-        if count[joint] == 0:
-            continue
-        value += unary[joint, chosen[joint]]
-        if parent >= 0 and count[parent] > 0:
-            bone = np.linalg.norm(states[joint, chosen[joint]] - states[parent, chosen[parent]])
-            value -= 0.5 * ((bone - length[joint]) / deviation[joint]) ** 2
+    value = sum(unary[joint, chosen[joint]] for joint in np.flatnonzero(count))
+    for bone, parent, child in bones_of(graph):
+        if count[child] and count[parent]:
+            reach = np.linalg.norm(states[child, chosen[child]] - states[parent, chosen[parent]])
+            value -= 0.5 * ((reach - length[bone]) / deviation[bone]) ** 2
     return value
 
 
@@ -44,14 +60,12 @@ def total(states, unary, chosen, parents, length, deviation, count):
 def test_max_product_finds_the_best_combination(seed):
     rng = np.random.default_rng(seed)
     joints, most = 6, 4
-    parents = np.array([-1] + [rng.integers(0, k) for k in range(1, joints)])
-    order = rng.permutation(joints)  # parents may come after their children
-    parents = np.array([-1 if parents[k] < 0 else np.argmax(order == parents[k]) for k in order])
+    graph = bone_graph(some_skeleton(joints, rng))
     count = rng.integers(0, most + 1, joints)
     states, unary = rng.standard_normal((joints, most, 3)), 3 * rng.standard_normal((joints, most))
-    length, deviation = rng.uniform(0.5, 2, joints), rng.choice([0.2, 0.5, np.inf], joints)
-    problem = (parents, length, deviation, count)
-    chosen = max_product(states, unary, count, parents, leaves_first(parents), length, 1 / deviation**2)
+    length, deviation = rng.uniform(0.5, 2, len(graph.share)), rng.choice([0.2, 0.5, np.inf], len(graph.share))
+    problem = (graph, length, deviation, count)
+    chosen = max_product(states, unary, count, graph, length, 1 / deviation**2)
     best = max(
         total(states, unary, choice, *problem) for choice in itertools.product(*(range(max(c, 1)) for c in count))
     )
@@ -146,8 +160,8 @@ def test_limbs_have_a_direction_prior_in_every_skeleton(skeleton):
     limbs = {joint for joint in skeleton.joints if joint.split("_")[-1] in ("elbow", "wrist", "knee", "ankle")}
     hanging = {
         joint
-        for joint, concentration in zip(skeleton.joints, direction_concentrations(skeleton), strict=True)
-        if concentration
+        for joint, concentration in zip(skeleton.joints, direction_concentrations(skeleton), strict=False)
+        if concentration  # of the bones of the tree; mirror images follow
     }
     assert limbs <= hanging <= limbs | {"left_hip", "right_hip"}
     segments = dict(zip(skeleton.joints, trunk_segments(skeleton), strict=True))
@@ -197,8 +211,8 @@ def test_depth_ambiguity_is_squared_distance_times_probability(concentration):
     weights = np.array([[[0.0]], [[1.0]]])
     covariance, down = np.zeros((2, 3, 3)), np.array([0.0, 0.6, -0.8])
     prior = np.array([1.0, 1.0]), np.array([0.0, concentration]), down
-    parents, order, neighbours = np.array([-1, 0]), np.array([1, 0]), np.array([[1], [0]])
-    _add_ambiguity(covariance, joints, origin, directions, weights, parents, order, neighbours, *prior)
+    graph = bone_graph(Skeleton("shoulder and elbow", ("shoulder", "elbow"), (-1, 0), (0, 1), (0.1, 0.1)))
+    _add_ambiguity(covariance, joints, origin, directions, weights, graph, *prior)
     here, there = (np.array([0, y, -0.2]) @ down / np.hypot(0.2, 0.2) for y in (0.2, -0.2))
     likely = np.exp(concentration * there) / (np.exp(concentration * here) + np.exp(concentration * there))
     assert covariance[1] == pytest.approx(0.4**2 * likely * np.outer(sight, sight))
@@ -215,9 +229,12 @@ def log_posterior(joints, rays):
         variance = (noise.sigmas(COCO17) ** 2 + (rays.pixel[:, None] * along) ** 2) / rays.weights**2
     right = rays.weights * np.exp(-0.5 * e2 / variance) * (along > 0)
     unary = np.where(rays.weights > 0, np.log(noise.floor + right), 0.0).sum()
-    bones = np.array([np.linalg.norm(joints[c] - joints[p]) for p, c in COCO17.edges])
-    children = [c for _, c in COCO17.edges]
-    return unary - 0.5 * (((bones - length[children]) / deviation[children]) ** 2).sum()
+    share = np.array([0.5 if joint == "nose" else 1.0 for joint in COCO17.joints] + [0.5])  # of both shoulders
+    known = [(bone, p, c) for bone, p, c in bones_of(bone_graph(COCO17))]
+    return unary - 0.5 * sum(
+        share[bone] * ((np.linalg.norm(joints[c] - joints[p]) - length[bone]) / deviation[bone]) ** 2
+        for bone, p, c in known
+    )
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -233,7 +250,7 @@ def test_refinement_raises_the_posterior_and_does_not_diverge(seed):
     start = STANDING + rng.normal(0, 0.2, (17, 3))
     joints, noise = start.copy(), Noise()
     alone = rays.directions.transpose(1, 0, 2)[:, :, None].copy(), rays.weights.T[:, :, None].copy()
-    skeletal = (*tree(COCO17), length, 1 / deviation**2)
+    skeletal = (bone_graph(COCO17), length, bone_graph(COCO17).share / deviation**2)
     climb(joints, rays.origins, *alone, noise.pixels * rays.pixel, noise.sigmas(COCO17), noise.floor, *skeletal)
     assert log_posterior(joints, rays) > log_posterior(start, rays)
     refined, scores, _ = refine(start, rays, COCO17, noise=noise, length=length, deviation=deviation)
@@ -260,11 +277,12 @@ def test_with_many_views_the_likeliest_states_are_kept():
 @pytest.mark.parametrize("skeleton", [COCO17, SHELF14])
 def test_bone_lengths_are_symmetric_and_plausible(skeleton):
     mean, deviation = bone_lengths(skeleton)
-    for joint, mirrored in enumerate(skeleton.mirror):
-        if skeleton.mirror[skeleton.parents[joint]] == skeleton.parents[mirrored]:
-            assert mean[joint] == mean[mirrored]
+    known = {frozenset(ends): bone for bone, *ends in bones_of(bone_graph(skeleton))}
+    for ends, bone in known.items():
+        mirrored = known[frozenset(skeleton.mirror[joint] for joint in ends)]
+        assert (mean[bone], deviation[bone]) == (mean[mirrored], deviation[mirrored])
     bones = np.flatnonzero(np.isfinite(deviation))
-    assert len(bones) == len(skeleton) - 1
+    assert len(bones) == len(skeleton) - 1 + len(mirror_images(skeleton))
     assert (deviation[bones] < 0.35 * mean[bones]).all()
     if skeleton is COCO17:  # the standing figure is 1.75 m tall: every bone within three deviations
         real = [np.linalg.norm(STANDING[c] - STANDING[p]) for p, c in skeleton.edges]
@@ -312,28 +330,29 @@ def test_every_pair_of_views_proposes_and_near_proposals_are_merged():
 
 @given(st.integers(0, 100_000))
 def test_marginals_equal_those_of_the_joint_gaussian(seed):
-    """Belief propagation on the tree against the inverse of the whole 3J x 3J information matrix."""
+    """Elimination on the graph of bones against the inverse of the whole 3J x 3J information matrix."""
     rng = np.random.default_rng(seed)
-    skeletal = tree(COCO17)
-    joints = rng.standard_normal((17, 3))
-    joints[rng.random(17) < 0.15] = np.nan
-    roots = rng.standard_normal((17, 3, 3))
+    graph = bone_graph(COCO17 if rng.random() < 0.5 else some_skeleton(8, rng))
+    count = len(graph.mate)
+    joints = rng.standard_normal((count, 3))
+    joints[rng.random(count) < 0.15] = np.nan
+    roots = rng.standard_normal((count, 3, 3))
     information = roots @ roots.transpose(0, 2, 1) + 0.1 * np.eye(3)
-    precision = rng.choice([0.0, 1.0, 30.0], 17)
-    whole = np.zeros((17, 3, 17, 3))
-    for j in range(17):
+    precision = rng.choice([0.0, 1.0, 30.0], len(graph.share))
+    whole = np.zeros((count, 3, count, 3))
+    for j in range(count):
         whole[j, :, j] = information[j]
-    for parent, child in COCO17.edges:
+    for index, parent, child in bones_of(graph):
         bone = joints[child] - joints[parent]
         if np.isfinite(bone).all():
-            outer = precision[child] * np.outer(bone, bone) / (bone @ bone)
+            outer = precision[index] * np.outer(bone, bone) / (bone @ bone)
             whole[child, :, child] += outer
             whole[parent, :, parent] += outer
             whole[child, :, parent] -= outer
             whole[parent, :, child] -= outer
-    expected = np.linalg.inv(whole.reshape(51, 51)).reshape(17, 3, 17, 3)
-    covariance = np.full((17, 3, 3), np.nan)
-    _marginalize(joints, information.copy(), covariance, skeletal.parents, skeletal.order, precision)
+    expected = np.linalg.inv(whole.reshape(3 * count, 3 * count)).reshape(count, 3, count, 3)
+    covariance = np.full((count, 3, 3), np.nan)
+    marginalize(joints, information.copy(), covariance, graph, precision)
     for j in np.flatnonzero(np.isfinite(joints[:, 0])):
         np.testing.assert_allclose(covariance[j], expected[j, :, j], rtol=1e-6, atol=1e-9)
 

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
 from mvpose.rays import Rays, viewing_rays
-from mvpose.reconstruction.hypotheses import Hypotheses
+from mvpose.reconstruction.hypotheses import Hypotheses, Links
 from mvpose.reconstruction.unmatched import UnmatchedPictorialStructure, _best_pose, _strongest
 
 MIRROR = list(COCO17.mirror)
@@ -205,7 +205,8 @@ def test_best_pose_is_the_best_connected_choice(seed):
     link_start = np.cumsum([0, *map(len, links)])
     link, cost = np.array(list(itertools.chain(*links)), int), rng.uniform(0, 4, link_start[-1])
     nothing = np.zeros(0, int)
-    space = Hypotheses(start, np.zeros((len(owner), 3)), nothing, nothing, np.zeros(0), link_start, link, cost)
+    space = Hypotheses(start, np.zeros((len(owner), 3)), nothing, nothing, np.zeros(0))
+    tree = Links(parents, np.arange(joints), np.ones(joints, bool), link_start, link, cost)
 
     def worth(choice):
         """Value of a choice of states; -inf for one that is not connected."""
@@ -222,10 +223,11 @@ def test_best_pose_is_the_best_connected_choice(seed):
             total -= min((cost[k] for k in links if link[k] == parent), default=np.inf)
         return total if tops <= 1 else -np.inf
 
-    chosen, bound = _best_pose(np.arange(joints), parents, unary, space)
+    chosen, value, bound = _best_pose(unary, space, tree)
     options = [[-1, *range(start[j], start[j + 1])] for j in range(joints)]
     worths = {choice: worth(choice) for choice in itertools.product(*options)}
     assert worth(chosen) == pytest.approx(max(worths.values()))
+    assert value == pytest.approx(max(worths.values()))
     assert bound >= max(sum(s >= 0 for s in choice) for choice, value in worths.items() if value > -np.inf)
 
 

@@ -1,0 +1,163 @@
+"""Exact inference on the bones of a person: the best combination of states, and the covariances of the joints.
+
+Both eliminate the joints in the order of :class:`mvpose.reconstruction.bone_graph.BoneGraph`: what a joint says is
+passed on to the one or two joints that it is still joined to. A second pass in the opposite order completes the result.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.kernels import njit
+from mvpose.reconstruction.likelihood import solve
+
+
+@njit(cache=True)
+def max_product(states, unary, count, graph, length, precision):
+    """Find the combination of states with the greatest sum of unaries and log-Gaussian pairwise terms of bone length.
+
+    Args:
+        states: candidate positions, (J, S, 3), metres.
+        unary: log-likelihoods of the states, (J, S).
+        count: number of valid states for each joint, (J,). A joint without any is skipped: it does not constrain its
+            neighbours.
+        graph: bones of the skeleton, :class:`mvpose.reconstruction.bone_graph.BoneGraph`.
+        length: mean bone lengths, (B,), metres.
+        precision: inverse variances of the lengths, (B,), 1/m^2; 0 for no constraint.
+
+    Returns:
+        Index of the chosen state of every joint, (J,); 0 for a joint without states.
+    """
+    joints, most = len(count), max(count.max(), 1)
+    belief, choice = np.zeros((joints, most)), np.zeros((joints, most, most), np.int64)
+    pairs = np.zeros((joints, 2, most, most))  # terms of each joint with the joints that it is eliminated before
+    for joint in range(joints):
+        for s in range(count[joint]):
+            belief[joint, s] = unary[joint, s]
+        for slot in range(2):
+            bone, other = graph.joint_bones[joint, slot], graph.later[joint, slot]
+            if bone < 0 or precision[bone] == 0.0:
+                continue
+            for s in range(count[joint]):
+                for o in range(count[other]):
+                    x = states[joint, s, 0] - states[other, o, 0]
+                    y = states[joint, s, 1] - states[other, o, 1]
+                    z = states[joint, s, 2] - states[other, o, 2]
+                    error = np.sqrt(x * x + y * y + z * z) - length[bone]
+                    pairs[joint, slot, s, o] = -0.5 * precision[bone] * error * error
+    chosen = np.zeros(joints, np.int64)
+    for joint in graph.order:  # a joint without states takes part with one state that says nothing
+        first, second = graph.later[joint]
+        firsts, seconds = max(count[first], 1) if first >= 0 else 1, max(count[second], 1) if second >= 0 else 1
+        for a in range(firsts):
+            for b in range(seconds):
+                best, argument = -np.inf, 0
+                for s in range(max(count[joint], 1)):
+                    value = belief[joint, s] + pairs[joint, 0, s, a] + pairs[joint, 1, s, b]
+                    if value > best:
+                        best, argument = value, s
+                choice[joint, a, b] = argument
+                if second >= 0:
+                    pairs[first, _slot(graph, first, second), a, b] += best
+                elif first >= 0:
+                    belief[first, a] += best
+    for joint in graph.order[::-1]:
+        first, second = graph.later[joint]
+        chosen[joint] = choice[joint, chosen[first] if first >= 0 else 0, chosen[second] if second >= 0 else 0]
+    return chosen
+
+
+@njit(cache=True)
+def _slot(graph, joint, other):
+    """Return the place of another joint among the two that a joint is eliminated before."""
+    return 0 if graph.later[joint, 0] == other else 1
+
+
+@njit(cache=True)
+def marginalize(joints, information, covariance, graph, precision):
+    """Compute the marginal covariances of a Gaussian with bones that each measure one length.
+
+    Args:
+        joints: positions, (J, 3), metres; NaN for a joint to leave out.
+        information: information of each joint without bones, (J, 3, 3), 1/m^2; overwritten.
+        covariance: output, (J, 3, 3), square metres; unchanged for a joint that is left out.
+        graph: bones of the skeleton, :class:`mvpose.reconstruction.bone_graph.BoneGraph`.
+        precision: inverse variances of the bone lengths, (B,), 1/m^2.
+    """
+    count = len(joints)
+    coupling = np.zeros((count, 2, 3, 3))  # blocks of the information matrix with the joints eliminated later
+    gain, cross = np.zeros((count, 2, 3, 3)), np.zeros((count, 2, 3, 3))
+    inverse, known = np.zeros((count, 3, 3)), np.zeros(count, np.bool_)
+    b, unused, along = np.zeros(3), np.empty(3), np.empty(3)
+    for j in range(count):
+        for slot in range(2):
+            bone, other = graph.joint_bones[j, slot], graph.later[j, slot]
+            if bone < 0 or precision[bone] == 0.0 or np.isnan(joints[j, 0]) or np.isnan(joints[other, 0]):
+                continue
+            reach = 0.0
+            for r in range(3):
+                along[r] = joints[j, r] - joints[other, r]
+                reach += along[r] * along[r]
+            weight = precision[bone] / max(reach, 1e-18)
+            for r in range(3):
+                for c in range(3):
+                    value = weight * along[r] * along[c]
+                    information[j, r, c] += value
+                    information[other, r, c] += value
+                    coupling[j, slot, r, c] -= value
+    for j in graph.order:
+        known[j] = not np.isnan(joints[j, 0]) and solve(information[j], b, inverse[j], unused)
+        if not known[j]:
+            continue
+        for slot in range(2):
+            if graph.later[j, slot] >= 0:
+                _multiply(inverse[j], coupling[j, slot], gain[j, slot])
+        first, second = graph.later[j]
+        for slot in range(2):
+            if graph.later[j, slot] >= 0:
+                _subtract(coupling[j, slot], gain[j, slot], information[graph.later[j, slot]])
+        if second >= 0:
+            _subtract(coupling[j, 0], gain[j, 1], coupling[first, _slot(graph, first, second)])
+    # With x the joint, y those eliminated later and G the gain: cov(x, y) = -G cov(y), cov(x) = inverse - cov(x, y) G'.
+    for j in graph.order[::-1]:
+        if not known[j]:
+            continue
+        first, second = graph.later[j]
+        for slot in range(2):
+            one, other = graph.later[j, slot], graph.later[j, 1 - slot]
+            if one < 0:
+                continue
+            for r in range(3):
+                for c in range(3):
+                    value = 0.0
+                    for k in range(3):
+                        if known[one]:
+                            value -= gain[j, slot, r, k] * covariance[one, k, c]
+                        if other >= 0:  # the two are joined, so the block between them is known
+                            between = _slot(graph, first, second)
+                            value -= gain[j, 1 - slot, r, k] * (
+                                cross[first, between, k, c] if slot == 1 else cross[first, between, c, k]
+                            )
+                    cross[j, slot, r, c] = value
+        for r in range(3):
+            for c in range(3):
+                value = inverse[j, r, c]
+                for slot in range(2):
+                    for k in range(3):
+                        value -= cross[j, slot, r, k] * gain[j, slot, c, k]
+                covariance[j, r, c] = value
+
+
+@njit(cache=True)
+def _multiply(a, b, result):
+    for r in range(3):
+        for c in range(3):
+            result[r, c] = a[r, 0] * b[0, c] + a[r, 1] * b[1, c] + a[r, 2] * b[2, c]
+
+
+@njit(cache=True)
+def _subtract(a, b, result):
+    """Subtract ``a.T @ b`` in place."""
+    for r in range(3):
+        for c in range(3):
+            result[r, c] -= a[0, r] * b[0, c] + a[1, r] * b[1, c] + a[2, r] * b[2, c]
