@@ -106,6 +106,15 @@ def test_the_dual_variable_proves_the_optimum(views, people, noise):
     assert -1e-6 * worth < result.objective - low < 0.005 * worth
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_default_lambda_makes_inconsistency_too_dear(seed):
+    """The optimum has no negative eigenvalue, hence is cycle-consistent, although the affinities are not."""
+    affinity, view, _ = instance(seed, views=6, people=6, noise=0.6)
+    result = admm.solve(affinity, view)
+    assert np.linalg.eigvalsh(np.where(view[:, None] == view, np.eye(len(view)), affinity))[0] < -1.0
+    assert np.linalg.eigvalsh(result.P)[0] > -0.05
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_optimum_does_not_depend_on_the_start(seed):
     affinity, view = sort_by_view(*filmed(seed, views=5, people=4)[:2])
