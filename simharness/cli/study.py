@@ -162,7 +162,10 @@ def _headline(results: Results) -> Table:
         table.add_column(f"{info.title}\n{info.unit}", justify="right", no_wrap=True)
     for group in results.trials.select(keys).unique(maintain_order=True).iter_rows():
         rows = results.trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
-        cells = [_cell(mean_interval(list(by_seed(rows, score).values())), SCORES[score].digits) for score in HEADLINE]
+        cells = [
+            _cell(mean_interval(list(by_seed(rows, score).values()), unit=SCORES[score].unit), SCORES[score].digits)
+            for score in HEADLINE
+        ]
         table.add_row(*(Text("–" if value is None else str(value)) for value in group), *cells)
     return table
 
@@ -170,8 +173,8 @@ def _headline(results: Results) -> Table:
 def _cell(interval: Any, digits: int) -> str:
     if not interval.n:
         return "–"
-    half = (interval.high - interval.low) / 2
-    return f"{interval.mean:.{digits}f}" + (f"\n±{half:.{digits}f}" if interval.n > 1 else "")
+    ends = f"\n{interval.low:.{digits}f}–{interval.high:.{digits}f}" if interval.n > 1 else ""
+    return f"{interval.mean:.{digits}f}{ends}"
 
 
 def _counts(info: dict[str, Any], what: str) -> str:

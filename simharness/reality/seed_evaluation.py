@@ -18,7 +18,9 @@ from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.pcp import Part
 from simharness.scoring.summary import VariantScores
-from simharness.statistics.bootstrap import block_weights, interval, resampled
+from simharness.statistics.bootstrap import block_weights, blocks, interval, resampled
+from simharness.statistics.intervals import mean_interval
+from simharness.statistics.jackknife import pseudo_values
 from simharness.trial.run_trial import TrialResult, run_trial
 
 _ATTEMPTS = 3  # seeds tried for each one requested, because randomly drawn people may not fit beside clutter
@@ -79,11 +81,9 @@ class SeedEvaluation:
     def difference(self, name: str, other: str, people: Sequence[int] | None = None) -> PcpInterval:
         """Return the PCP of a variant minus that of another on the same detections, points."""
         counts, other_counts = (_counts(self.variant_scores(each), self._people(people)) for each in (name, other))
-        weights = block_weights(np.arange(len(counts)), block=1.0, resamples=_RESAMPLES)
-        low, high = interval(
-            _pcp(resampled(counts, weights)) - _pcp(resampled(other_counts, weights)), blocks=len(counts)
-        )
-        return PcpInterval(float(_pcp(counts.sum(axis=0)) - _pcp(other_counts.sum(axis=0))), float(low), float(high))
+        difference = _pcp(counts.sum(axis=0)) - _pcp(other_counts.sum(axis=0))
+        over = mean_interval(pseudo_values(_pcp, counts) - pseudo_values(_pcp, other_counts))
+        return PcpInterval(float(difference), over.low, over.high)
 
     def _people(self, people: Sequence[int] | None) -> Sequence[int]:
         return range(self.scenario.people.count) if people is None else people
@@ -169,8 +169,8 @@ def annotate(result: TrialResult) -> AnnotatedRecording:
 def pcp_interval(recordings: Sequence[VariantScores], people: Sequence[int], *, rate: float) -> PcpInterval:
     """Return the PCP of a variant, mean over people, with its interval.
 
-    The interval of one recording comes from resampling blocks of its frames; that of several recordings from resampling
-    the recordings, because the frames of a recording share their scene.
+    The interval of one recording comes from resampling blocks of its frames. That of several recordings is over the
+    recordings, because the frames of a recording share their scene: the interval of the mean of their pseudo-values.
 
     Args:
         recordings: scores of the variant in each recording.
@@ -179,12 +179,15 @@ def pcp_interval(recordings: Sequence[VariantScores], people: Sequence[int], *, 
     """
     if len(recordings) == 1:
         counts = _counts_by_frame(recordings[0], people)
-        weights, blocks = block_weights(np.arange(len(counts)) / rate, resamples=_RESAMPLES), None
+        time = np.arange(len(counts)) / rate
+        drawn = _pcp(resampled(counts, block_weights(time, resamples=_RESAMPLES)))
+        low, high = (float(end) for end in interval(drawn, blocks=blocks(time)))
     else:
         counts = _counts(recordings, people)
-        weights, blocks = block_weights(np.arange(len(counts)), block=1.0, resamples=_RESAMPLES), len(counts)
-    low, high = interval(_pcp(resampled(counts, weights)), blocks=blocks)
-    return PcpInterval(float(_pcp(counts.sum(axis=0))), float(low), float(high))
+        over = mean_interval(pseudo_values(_pcp, counts), unit="%")
+        low, high = over.low, over.high
+    pcp = float(_pcp(counts.sum(axis=0)))
+    return PcpInterval(pcp, min(low, pcp), max(high, pcp))
 
 
 def _counts(recordings: Sequence[VariantScores], people: Sequence[int]) -> Floats:

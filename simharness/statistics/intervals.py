@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import gammainccinv, gammaincinv, ndtr, stdtrit
 
 from mvpose.arrays import Floats
-from simharness.statistics.bootstrap import block_weights, interval, resampled
+from simharness.statistics.studentized import mean_ends
+
+LEVEL = 0.95
+"""Coverage probability of all intervals."""
+
+RARE = 5
+"""Largest number of scenes with an event for which events are rare, if other scenes have none."""
 
 
 @dataclass(frozen=True)
@@ -28,22 +36,70 @@ class Interval:
     n: int
 
 
-def mean_interval(values: Sequence[float | None] | ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Interval:
-    """Return the mean of a score (n,) over scenes with its 95 % interval, by resampling scenes.
+@dataclass(frozen=True)
+class Scale:
+    """Possible values of a score of one scene.
 
-    Percentiles are expanded because scenes are few (:func:`simharness.statistics.bootstrap.interval`).
+    Attributes:
+        low, high: bounds.
+        event: distance from a bound that one event makes in a scene if it lasts for the whole scene; None for a score
+            that does not count events. It limits the mean where no scene has an event.
+    """
+
+    low: float = -np.inf
+    high: float = np.inf
+    event: float | None = None
+
+
+SCALES: Mapping[str, Scale] = MappingProxyType(
+    {
+        "per frame": Scale(low=0.0, event=1.0),
+        "%": Scale(low=0.0, high=100.0, event=25.0),
+        "mm": Scale(low=0.0),
+        "px": Scale(low=0.0),
+        "ms": Scale(low=0.0),
+    }
+)
+"""Scales by unit; scores of other units have no bounds.
+
+The event of rates is one ghost in every frame of one scene, as a coat on a stand makes it; that of percentages is one
+person of four, the default number of people.
+"""
+
+
+def mean_interval(values: Sequence[float | None] | ArrayLike, *, unit: str = "") -> Interval:
+    """Return the mean of a score (n,) over scenes with its 95 % interval.
+
+    The interval is that of Student's t corrected for skewness (:mod:`simharness.statistics.studentized`), within the
+    bounds of the score. Scores that most scenes have at a bound, such as ghosts of 0 or a recall of 100 %, say little
+    about the rare scenes that decide the mean. With at most :data:`RARE` such scenes the end at the bound
+    is that of rare events, and the other one is where that of rare events or of t is, whichever is farther: a gamma
+    interval for sums of weighted Poisson counts (Fay & Feuer, Statistics in Medicine 1997; for single events it is that
+    of Garwood, Biometrika 1936), in which the events of a scene are one event of that weight, because they come
+    together. Where all scenes are at the bound, the weight is the event of :data:`SCALES`.
 
     Args:
         values: score of each scene.
-        seed: seed of the resampling.
-        resamples: number of resamples.
+        unit: unit of the score, for its bounds and events.
     """
     values = scene_scores(values)
     values = values[np.isfinite(values)]
-    if not len(values):
+    n = len(values)
+    if not n:
         return Interval(np.nan, np.nan, np.nan, 0)
-    low, high = mean_ends(values, seed, resamples)
-    return Interval(float(values.mean()), low, high, len(values))
+    mean = float(values.mean())
+    if n < 2:
+        return Interval(mean, np.nan, np.nan, n)
+    scale = SCALES.get(unit, Scale())
+    low, high = (float(end) for end in mean_ends(values, level=LEVEL))
+    if scale.event is not None:
+        # Events count from the nearer bound: missed people from 100 % of recall.
+        mirrored = scale.high - mean < mean - scale.low
+        events = scale.high - values if mirrored else values - scale.low
+        if (rare := _rare_ends(events, scale.event)) is not None:
+            few, many = rare
+            low, high = (min(low, scale.high - many), scale.high - few) if mirrored else (few, max(high, many))
+    return Interval(mean, min(max(low, scale.low), mean), max(min(high, scale.high), mean), n)
 
 
 def scene_scores(values: Sequence[float | None] | ArrayLike) -> Floats:
@@ -58,10 +114,20 @@ def scene_scores(values: Sequence[float | None] | ArrayLike) -> Floats:
     return scores
 
 
-def mean_ends(values: Floats, seed: int, resamples: int) -> tuple[float, float]:
-    """Return the ends of the 95 % interval of a mean over finite values (n,); NaN for fewer than two."""
-    if len(values) < 2:
-        return np.nan, np.nan
-    weights = block_weights(np.arange(len(values)), resamples=resamples, seed=seed)
-    low, high = interval(resampled(values, weights) / len(values), blocks=len(values))
-    return float(low), float(high)
+def _rare_ends(events: Floats, event: float) -> tuple[float, float] | None:
+    """Return the ends of the interval of the mean of rare events (n,); None where they are not rare.
+
+    The variance of the mean comes from few scenes, so tails are expanded in the ratio of Student's t to the normal
+    distribution (Hesterberg, The American Statistician 2015). The upper end allows for one more event, of the largest
+    weight (Fay & Feuer) times 1 + 3 / k, because the largest of k weights is not the largest possible one.
+    """
+    n = len(events)
+    hit = int((events > 1e-9 * event).sum())
+    if hit > RARE or hit == n:
+        return None
+    tail = float(ndtr(-np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2)))
+    mean, variance = (float(events.mean()), float(events.var(ddof=1)) / n) if hit else (0.0, 0.0)
+    weight = float(events.max()) * (1 + 3 / hit) / n if hit else event / n
+    low = variance / mean * float(gammaincinv(mean**2 / variance, tail)) if hit else 0.0
+    mean, variance = mean + weight, variance + weight**2
+    return low, variance / mean * float(gammainccinv(mean**2 / variance, tail))

@@ -51,7 +51,7 @@ class Factor:
 
     def line(self, variant: str, score: str) -> list[Interval]:
         """Return the mean score of a variant at each value, with its interval over seeds."""
-        return [mean_interval(column) for column in self.table(variant, score).T]
+        return [mean_interval(column, unit=SCORES[score].unit) for column in self.table(variant, score).T]
 
 
 def cases_of(results: Results) -> tuple[str, ...]:

@@ -168,7 +168,12 @@ def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[st
 def _means(trials: pl.DataFrame, names: Sequence[str]) -> dict[str, dict[str, Any]]:
     return {
         name: {
-            score: _ends(mean_interval(list(tables.by_seed(trials.filter(pl.col("variant") == name), score).values())))
+            score: _ends(
+                mean_interval(
+                    list(tables.by_seed(trials.filter(pl.col("variant") == name), score).values()),
+                    unit=SCORES[score].unit,
+                )
+            )
             for score in SCORED
         }
         for name in names

@@ -8,15 +8,14 @@ import numpy as np
 import polars as pl
 
 from mvpose.arrays import Floats
-from simharness.statistics.bootstrap import block_weights, interval, resampled
+from simharness.statistics.intervals import mean_interval
+from simharness.statistics.jackknife import pseudo_values
 from simharness.study.result_folder import Results
 
 NOT_BLAMED = "not determined"
 """Stage of a failure whose stage to blame was not determined."""
 
 Ends = list[float | None]
-
-_RESAMPLES = 2000
 
 
 def failure_rates(results: Results, variant: str) -> dict[str, Any]:
@@ -45,7 +44,7 @@ def failure_rates(results: Results, variant: str) -> dict[str, Any]:
     blamed = failures.filter(pl.col("matching_alone").is_not_null())
     known, repaired = _by_seed(blamed, seeds), _by_seed(blamed.filter(pl.col("matching_alone")), seeds)
     rates["matching_alone"] = round(100 * float(repaired.sum()) / float(known.sum()), 1) if known.any() else None
-    ends["matching_alone"] = _ends(repaired, known) if known.any() else None
+    ends["matching_alone"] = _ends(repaired, known, share=True) if known.any() else None
     return {**rates, "intervals": ends}
 
 
@@ -55,11 +54,20 @@ def _by_seed(rows: pl.DataFrame, seeds: list[int]) -> Floats:
     return np.array([counts.get(seed, 0) for seed in seeds], float)
 
 
-def _ends(count: Floats, of: Floats) -> Ends:
-    """Return the interval of 100 count / of, both (n,) over seeds, from resampled seeds with of > 0."""
+def _ends(count: Floats, of: Floats, *, share: bool = False) -> Ends:
+    """Return the interval of 100 count / of, both (n,) over seeds, from the seeds with of > 0.
+
+    Args:
+        count: number of failures.
+        of: number of frames, or of failures among which ``count`` are counted.
+        share: whether the ratio is at most 1.
+    """
+    count, of = count[of > 0], of[of > 0]
     if len(count) < 2:
         return [None, None]
-    weights = block_weights(np.arange(len(count)), resamples=_RESAMPLES)
-    counts, whole = resampled(count, weights), resampled(of, weights)
-    rates = np.divide(100 * counts, whole, out=np.full_like(counts, np.nan), where=whole > 0)
-    return [round(float(end), 3) for end in interval(rates, blocks=len(count))]
+    ratios = pseudo_values(lambda sums: sums[..., 0] / sums[..., 1], np.stack([count, of], axis=1))
+    interval = mean_interval(100 * ratios, unit="%") if share else mean_interval(ratios, unit="per frame")
+    factor = 1 if share else 100
+    # The mean of pseudo-values differs from the ratio by its estimated bias.
+    ratio = 100 / factor * count.sum() / of.sum()
+    return [round(factor * float(end), 3) for end in (min(interval.low, ratio), max(interval.high, ratio))]

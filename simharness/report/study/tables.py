@@ -82,7 +82,8 @@ def headline(trials: pl.DataFrame, variants: Sequence[str]) -> dict[str, list[Ce
     for variant in variants:
         trials_of_variant = trials.filter(pl.col("variant") == variant)
         rows[variant] = [
-            cell(mean_interval(list(by_seed(trials_of_variant, info.key).values())), info) for info in COLUMNS
+            cell(mean_interval(list(by_seed(trials_of_variant, info.key).values()), unit=info.unit), info)
+            for info in COLUMNS
         ]
     return rows
 
@@ -95,7 +96,7 @@ def all_scores(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[Scor
     rows = []
     for info in SCORES.values():
         means = [
-            mean_interval(list(by_seed(trials.filter(pl.col("variant") == variant), info.key).values()))
+            mean_interval(list(by_seed(trials.filter(pl.col("variant") == variant), info.key).values()), unit=info.unit)
             for variant in variants
         ]
         if any(mean.n for mean in means):

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from simharness.statistics.breaking_points import breaking_point
+from simharness.statistics.intervals import mean_interval
 
 
 def test_a_line_breaks_where_it_meets_the_threshold():
@@ -17,9 +19,9 @@ def test_a_line_breaks_where_it_meets_the_threshold():
     assert rising.value == pytest.approx(2.5)
 
 
-def test_the_first_crossing_counts():
+def test_means_that_rise_again_are_pooled():
     point = breaking_point([1, 2, 3, 4], [[90, 70, 95, 60]], 80, better="higher")
-    assert point.value == pytest.approx(1.5)
+    assert point.value == pytest.approx(3 + 2.5 / 22.5)  # 70 and 95 are 82.5 in the monotone fit
     assert (point.low, point.high) == (None, None)  # one seed has no interval
 
 
@@ -39,7 +41,7 @@ def test_the_interval_is_open_where_some_seeds_never_cross():
     scores = [[100, 100, 60]] * 4 + [[100, 100, 100]] * 4
     point = breaking_point([1, 2, 3], scores, 85, better="higher")
     assert point.value == pytest.approx(2.75)
-    assert point.low == pytest.approx(2.375, abs=0.2)  # all four falling seeds drawn: 2 + 15/40
+    assert 2.375 <= point.low < 2.75  # if all seeds fell as four of them do: 2 + 15/40
     assert point.high is None
 
 
@@ -55,11 +57,43 @@ def test_intervals_of_breaking_points_have_their_nominal_coverage():
     rng = np.random.default_rng(5)
     values = np.arange(7.0)
     covered = []
-    for trial in range(300):
+    for _ in range(300):
         offset = rng.normal(0, 5, (12, 1))
-        point = breaking_point(values, 100 - 10 * values + offset, 80, better="higher", seed=trial, resamples=400)
+        point = breaking_point(values, 100 - 10 * values + offset, 80, better="higher")
         covered.append(point.low <= 2.0 <= point.high)
     assert 0.90 < np.mean(covered) < 0.985
+
+
+@pytest.mark.parametrize(
+    ("scenes", "plateau", "offset", "noise"),
+    [(5, 95.0, 5.0, 5.0), (12, 92.0, 0.0, 6.0), (12, 92.0, 3.0, 3.0), (20, 91.0, 0.0, 6.0)],
+)
+def test_a_plateau_near_the_threshold_does_not_break_early(scenes, plateau, offset, noise):
+    """The mean stays on a plateau up to 8 and passes 90 at 8.3; the first low mean would break at 3.5 to 7.4."""
+    rng = np.random.default_rng(scenes)
+    values = np.arange(1.0, 13.0)
+    mean = plateau - np.maximum(values - 8, 0) * (plateau - 90) / 0.3
+    broken, covered = [], []
+    for _ in range(150):
+        scores = mean + rng.normal(0, offset, (scenes, 1)) + rng.normal(0, noise, (scenes, 12))
+        point = breaking_point(values, scores, 90, better="higher")
+        broken.append({"at once": 1.0, "never": 12.0}.get(point.why, point.value))
+        covered.append((point.low is None or point.low <= 8.3) and (point.high is None or point.high >= 8.3))
+    assert np.mean(broken) == pytest.approx(8.3, abs=0.8)
+    assert np.median(broken) == pytest.approx(8.3, abs=0.25)
+    assert binomtest(int(np.sum(covered)), 150, 0.95, alternative="less").pvalue > 0.01
+
+
+def test_the_interval_holds_the_values_whose_mean_may_be_the_threshold():
+    """At one tested value the interval of a mean meets the threshold where the interval of the break ends."""
+    rng = np.random.default_rng(3)
+    values, base = np.array([0.0, 10.0]), rng.normal(0, 2, (12, 1))
+    scores = 100 - 2 * values + base
+    point = breaking_point(values, scores, 90, better="higher")
+    means = mean_interval(base[:, 0])
+    assert (point.low, point.value, point.high) == pytest.approx(
+        tuple(5 + each / 2 for each in (means.low, means.mean, means.high)), abs=1e-6
+    )
 
 
 def test_bad_curves_are_refused():
