@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -90,14 +90,15 @@ class Detections(Sealed):
         return len(self.view)
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
-        """Return some detections without their heat maps, given by a mask (m,) or by indices in a new order."""
-        selected = object.__new__(type(self))  # the arrays are checked already
-        for field in fields(self):
-            value = None if field.name == "likelihoods" else getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                value = value[which]
-                seal(value)
-            object.__setattr__(selected, field.name, value)
+        """Return some detections without heat maps, given by a mask (m,) or by indices in a new order."""
+        if which.dtype == np.bool_:
+            which = np.flatnonzero(which)
+        selected = object.__new__(type(self))  # without the constructor: the arrays are checked already
+        names = ("view", "keypoints", "scores", "boxes", "box_scores", "descriptors")
+        arrays = {name: value.take(which, axis=0) for name in names if (value := getattr(self, name)) is not None}
+        seal(*arrays.values())
+        selected.__dict__.update(descriptors=None, skeleton=self.skeleton, likelihoods=None)
+        selected.__dict__.update(arrays)
         return selected
 
     @property

@@ -32,8 +32,17 @@ def canonical_order(detections: Detections, weights: Floats) -> Integers:
 
 def number_views(view: Integers) -> Integers:
     """Number views 0, 1, ... by first detection; return the number of the view of each detection, (m,)."""
-    rank, _ = rank_views(view)
-    return rank
+    return rank_views(view)[0]
+
+
+@njit(cache=True)
+def restored_pairs(pairs, chosen, count):
+    """Return a matrix of chosen detections (k, k) as one of all detections (count, count), 1 on the diagonal."""
+    result = np.eye(count)
+    for i in range(len(chosen)):
+        for j in range(len(chosen)):
+            result[chosen[i], chosen[j]] = pairs[i, j]
+    return result
 
 
 @njit(cache=True)

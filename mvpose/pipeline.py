@@ -17,7 +17,7 @@ from mvpose.detections import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Matcher
-from mvpose.ordering import canonical_order, number_views
+from mvpose.ordering import canonical_order, number_views, restored_pairs
 from mvpose.rays import Rays, viewing_rays
 from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
@@ -161,11 +161,8 @@ def _restored(matching: Matching, chosen: NDArray[np.int64], detections: int) ->
     labels = np.full(detections, -1)
     labels[chosen] = matching.labels
     seal(labels)
-    if matching.P is None:
-        return replace(matching, labels=labels)
-    P = np.eye(detections)
-    P[chosen[:, None], chosen] = matching.P
-    return replace(matching, labels=labels, P=P)
+    P = None if matching.P is None else restored_pairs(matching.P, chosen, detections)
+    return Matching(labels, P, matching.iterations, matching.residuals, matching.objective, matching.converged)
 
 
 def _estimate(poses: Poses, matching: Matching, start: float, compared: float, matched: float) -> Estimate:

@@ -68,20 +68,22 @@ class Rays:
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Rays:
         """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
+        if which.dtype == np.bool_:
+            which = np.flatnonzero(which)
         modes = self.modes
         if modes is not None:  # all maps stay where they are, because copies would dominate the time
             directions, weights, row = modes.directions[which], modes.weights[which], modes.row[which]
             modes = Modes(directions, weights, row, modes.values, modes.grid[which], modes.cameras[which])
-        view = self.view[which]
+        view = self.view.take(which)
         seal(view)
-        return Rays(
-            view,
-            self.origins[which],
-            self.directions[which],
-            self.weights[which],
-            self.pixel[which],
-            modes,
-        )
+        origins, directions, weights = _select(self.origins, self.directions, self.weights, which)
+        return Rays(view, origins, directions, weights, self.pixel.take(which), modes)
+
+
+@njit(cache=True)
+def _select(origins, directions, weights, which):
+    """Return rows of three arrays, faster than by NumPy for few rows."""
+    return origins[which], directions[which], weights[which]
 
 
 def viewing_rays(rig: Rig, detections: Detections) -> Rays:
