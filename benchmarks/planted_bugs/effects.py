@@ -13,8 +13,7 @@ import numpy as np
 from simharness.gate.baseline import TIME, read_baseline
 from simharness.statistics.paired_tests import holm, paired
 
-FIRST_SEED = 1000
-"""First of the fresh seeds; the suite has smaller ones."""
+_FIRST_SEED = 1000  # of the fresh seeds; those of the suite are smaller
 
 WHOLE = "suite"
 """Name of the whole suite beside those of its cases."""
@@ -44,17 +43,9 @@ class Effect:
     seeds: int
 
 
-def write_suite(path: Path, *, suite: str, seeds: int) -> None:
-    """Write a suite with fresh seeds.
-
-    Args:
-        path: the file.
-        suite: name of the suite that it extends.
-        seeds: number of seeds.
-    """
-    numbers = list(range(FIRST_SEED, FIRST_SEED + seeds))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f'extends = "{suite}"\nname = "{path.stem}"\nseeds = {numbers}\n', encoding="utf-8")
+def fresh_seeds(count: int) -> list[int]:
+    """Return seeds that the suite does not have."""
+    return list(range(_FIRST_SEED, _FIRST_SEED + count))
 
 
 def read_scores(path: Path) -> dict[tuple[str, int, str, str], float]:

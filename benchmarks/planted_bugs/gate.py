@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +14,22 @@ from benchmarks.planted_bugs.records import Outcome
 from benchmarks.planted_bugs.simulations import First, first_stage
 
 SUITE = "ci"
+"""Name of the shipped suite."""
+
 _PASSED, _REGRESSION = 0, 1
 _VERDICT = re.compile(r"^(?:worse|failed|better|changed)\b.*", re.MULTILINE)
+
+
+def write_suite(path: Path, *, suite: str, seeds: Sequence[int]) -> None:
+    """Write a suite that is another suite at other seeds.
+
+    Args:
+        path: the file.
+        suite: the other suite, a name or a file.
+        seeds: the seeds.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"extends = {json.dumps(suite)}\nname = {json.dumps(path.stem)}\nseeds = {list(seeds)}\n", "utf-8")
 
 
 @dataclass(frozen=True)
