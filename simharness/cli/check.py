@@ -44,7 +44,7 @@ def check(
     update: Annotated[
         bool, typer.Option("--update-baseline", help="Write a new baseline instead of comparing with it.")
     ] = False,
-    workers: Annotated[int, typer.Option(metavar="N", min=1, help="Processes that share the trials.")] = 1,
+    workers: Annotated[int, typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials.")] = 1,
 ) -> None:
     r"""Run a suite and exit with code 1 where the method is worse than the baseline.
 

@@ -28,7 +28,7 @@ def run(
     seed: Seed = None,
     workers: Annotated[
         int,
-        typer.Option(metavar="N", min=1, help="Processes that share the frames; the results stay the same."),
+        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the frames; the results stay the same."),
     ] = 1,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
         "results/runs"

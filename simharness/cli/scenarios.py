@@ -15,6 +15,8 @@ from simharness.cli.options import Overrides, ScenarioFile, Seed
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from simharness.scenario.resolution import Plan
+
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands."""
@@ -70,7 +72,19 @@ def show(
                 if plan.trials <= MOST_TRIALS
                 else f"simharness study runs at most {MOST_TRIALS:,} trials."
             )
-    typer.echo(outline(plan, note), nl=False)
+        needs = _needs(plan)
+    typer.echo(outline(plan, note) + needs, nl=False)
+
+
+def _needs(plan: Plan) -> str:
+    """Return the needs of the base as comments, with which the scenario can still be read; "" for an impossible rig."""
+    from simharness.trial.needs import describe, needs_of
+
+    try:
+        needs = needs_of(plan.base)
+    except ValueError:
+        return ""
+    return "".join(f"# {line}".rstrip() + "\n" for line in ("", *describe(needs, trials=plan.trials)))
 
 
 def schema(

@@ -42,7 +42,7 @@ def study(
     ] = None,
     workers: Annotated[
         int,
-        typer.Option(metavar="N", min=1, help="Processes that share the trials; the results stay the same."),
+        typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials; the results stay the same."),
     ] = 1,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: [cyan]tcp://host:8786[/].")

@@ -11,6 +11,7 @@ from typing import Any
 
 from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
+from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, Value
 from simharness.study.measure import StoredTrial
 from simharness.study.measure import measure as measure_trial
@@ -22,6 +23,7 @@ from simharness.study.tables import tables
 from simharness.study.trial_store import Entry, EntryState, Store, StoreError
 from simharness.trial.archive import TrialArchive
 from simharness.trial.identity import code
+from simharness.trial.needs import require_memory
 from simharness.trial.provenance import provenance
 from simharness.trial.stages.estimators import estimators_of
 
@@ -177,6 +179,8 @@ def _run(
     unique = {each.trial: each for each in _unique(planned)}
     units = [unit for each in unique.values() if (unit := _unit(store, each)).variants]
     damaged = tuple(sorted(store.damaged))
+    if scheduler is None:
+        require_memory(_distinct(units), workers=min(workers, len(units)))
     kept, run, failed = len(unique) - len(units), 0, dict[str, TrialFailure]()
     try:
         with (
@@ -223,6 +227,13 @@ def _unit(store: Store, planned: PlannedTrial) -> Unit:
             {name: entry.result.failures for name, entry in known.items() if entry.failures_code == code().failures},
         )
     return Unit(planned.trial, planned.scenario, missing, stored)
+
+
+def _distinct(units: Sequence[Unit]) -> list[Scenario]:
+    """Return one scenario for each setting of the units: seeds change no needs."""
+    return list(
+        {unit.scenario.model_copy(update={"seed": 0}).model_dump_json(): unit.scenario for unit in units}.values()
+    )
 
 
 def _keep(store: Store, planned: PlannedTrial, success: TrialSuccess) -> None:

@@ -26,6 +26,7 @@ from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation
+from simharness.trial.needs import require_memory
 from simharness.trial.stages.build_trial import Trial, build_trial, build_variants
 from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.estimation import EstimateFrames, estimate_variants
@@ -130,7 +131,8 @@ def run_trial(
         reporter: receiver of progress.
 
     Raises:
-        ValueError: the scenario cannot be built at this seed, or the goal is unknown.
+        ValueError: the scenario cannot be built at this seed or needs more memory than the machine has, or the goal is
+            unknown.
         RunError: any error after that, with the stage in front; :class:`simharness.trial.audit.AuditError` where the
             trial is not what the scenario describes.
     """
@@ -143,6 +145,7 @@ def run_trial(
     goal = _GOALS.index(until)
     with threadpoolctl.threadpool_limits(1):  # matrices are small: threads would only compete
         if known.detected is None:
+            require_memory([scenario])
             simulation, detected, pipelines = _simulate(
                 scenario, stages, workers, previews, compile_ahead and goal >= _GOALS.index("estimate")
             )

@@ -16,6 +16,7 @@ from simharness.runtime.stages import Stages
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.summary import VariantScores, summarize
+from simharness.trial.needs import require_memory
 from simharness.trial.run_folder import Record, write_run
 from simharness.trial.run_trial import TrialResult, run_trial
 
@@ -42,10 +43,11 @@ def run(
         The result folder; :func:`simharness.trial.run_folder.read_run` reads it.
 
     Raises:
-        ValueError: the scenario cannot be built, or the folder cannot be made.
+        ValueError: the scenario cannot be built, the folder cannot be made, or there is too little memory.
         RunError: any error after that.
     """
     reporter = reporter or Silence()
+    require_memory([scenario], workers=min(workers, scenario.frames))
     _make_folder(out)
     shown = scenario.rendering.color and scenario.rendering.renderer != "rays"
     result = run_trial(
