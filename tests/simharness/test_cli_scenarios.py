@@ -98,10 +98,10 @@ class TestShow:
         assert simharness("show", str(SCENARIOS / "quickstart.toml")).stdout.startswith('name = "quickstart" ')
 
     def test_a_study_that_is_too_large_is_shown_with_its_number(self, simharness, study):
-        steps = "sweep.people.spacing={from=0.5, to=1, steps=1000}"
+        steps = "sweep.people.spacing={from=0.5, to=1, steps=500}"
         result = simharness("show", str(study), "--set", steps)
         assert result.exit_code == 0
-        assert "80,000 settings x 20 seeds = 1,600,000 trials" in result.stdout
+        assert "40,000 settings x 20 seeds = 800,000 trials" in result.stdout
         assert "--yes" in result.stdout.splitlines()[1]
         assert max(len(line) for line in result.stdout.splitlines() if line.startswith("#")) <= 100
         assert tomllib.loads(result.stdout)["name"] == "trying"
