@@ -33,7 +33,7 @@ def as_array(
         # Always a copy, so that later writes by the caller do not change a frozen object.
         array = given.astype(dtype, order="C") if given.dtype == dtype else _converted(given, np.dtype(dtype))
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name} must be numbers of shape {_shape_text(shape)}: {error}") from None
+        raise ValueError(f"{name} must be numbers of shape {_shape_text(shape)}: {_short(error)}") from None
     fits = array.ndim == len(shape) and all(
         isinstance(wanted, str) or got == wanted for wanted, got in zip(shape, array.shape, strict=True)
     )
@@ -41,6 +41,12 @@ def as_array(
         raise ValueError(f"{name} must be {_shape_text(shape)}, got {_shape_text(array.shape)}")
     array.flags.writeable = False
     return array
+
+
+def _short(error: Exception, most: int = 100) -> str:
+    """Return the message of an error of NumPy, which may repeat a text of any length."""
+    text = str(error)
+    return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 def seal(*arrays: NDArray) -> None:
@@ -112,7 +118,7 @@ def as_points(value: ArrayLike, size: int, name: str) -> NDArray[np.float64]:
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name} must be numbers of shape (..., {size}): {error}") from None
+        raise ValueError(f"{name} must be numbers of shape (..., {size}): {_short(error)}") from None
     if not array.ndim or array.shape[-1] != size:
         raise ValueError(f"{name} must be (..., {size}), got {_shape_text(array.shape)}")
     return array

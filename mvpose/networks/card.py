@@ -95,12 +95,13 @@ class Card:
             key = entry.removeprefix(PREFIX)
             if key not in known:
                 raise ValueError(
-                    f"card: unknown field {key!r} (metadata entry {entry!r}); expected one of {', '.join(known)}"
+                    f"card: unknown field {key[:60]!r} (metadata entry {entry[:60]!r}); expected one of "
+                    f"{', '.join(known)}"
                 )
             try:
                 value = json.loads(text)
-            except json.JSONDecodeError as error:
-                raise ValueError(f"card: metadata entry {entry!r} must be JSON, got {text!r}: {error}") from None
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"card: metadata entry {entry!r} must be JSON, got {text[:60]!r}: {error}") from None
             values[key] = tuple(value) if isinstance(value, list) else value
         return cls(**values)
 

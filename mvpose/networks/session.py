@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.networks.card import Card
+from mvpose.networks.card_file import read_card_file
 from mvpose.networks.crops import Pixels
 
 Values = NDArray[np.float32]
@@ -21,6 +21,7 @@ Provider = Literal["cpu", "cuda", "auto"]
 
 _TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _CUDA = "CUDAExecutionProvider"
+_LONGEST_MESSAGE = 400  # characters
 _GREY = 128  # value of the test crops
 
 
@@ -39,17 +40,19 @@ def check_content(path: Path) -> None:
         path: ONNX file; its card is the .json file of the same name, with an entry ``sha256``.
 
     Raises:
-        ValueError: another digest than that of the card.
+        ValueError: another digest than that of the card, or a card that cannot be read.
     """
-    card = path.with_suffix(".json")
-    expected = _card_digest(card)
+    expected = (read_card_file(path) or {}).get("sha256")
     if expected is None:
         return
+    card = path.with_suffix(".json")
+    if not isinstance(expected, str):
+        raise ValueError(f"{card}: sha256 must be text, got a {type(expected).__name__}; copy the card again")
     with path.open("rb") as opened:
         got = hashlib.file_digest(opened, "sha256").hexdigest()
     if got != expected.lower():
         raise ValueError(
-            f"network {path}: is not the file of this card: {card} has sha256 {expected}, the file has {got} "
+            f"network {path}: is not the file of this card: {card} has sha256 {expected[:64]}, the file has {got} "
             f"({path.stat().st_size} bytes). The file is damaged or is another network: copy both again from their "
             "source, or remove the card if this network is intended"
         )
@@ -159,7 +162,9 @@ class Session:
         options.inter_op_num_threads = 1
         options.log_severity_level = 4  # errors are raised as exceptions; other messages would clutter the terminal
         try:
-            session = onnxruntime.InferenceSession(str(self.path), options, providers=providers)
+            session = onnxruntime.InferenceSession(
+                str(self.path), options, providers=providers, enable_fallback=int(provider == "auto")
+            )
         except Exception as error:  # onnxruntime's exceptions share no base class
             why = _reason(str(error).replace(str(self.path), ""), onnxruntime.__version__)
             self._refuse(f"cannot be loaded: {why}. Message of onnxruntime: {error}", error)
@@ -271,7 +276,10 @@ class Session:
         return feed.astype(self._dtype, copy=False)
 
     def _refuse(self, what: str, cause: Exception | None = None) -> NoReturn:
-        raise ValueError(f"network {self.path}: {what}") from cause
+        text = " ".join(what.split())  # messages of onnxruntime have lines, and names from the file of any length
+        if len(text) > _LONGEST_MESSAGE:
+            text = f"{text[: _LONGEST_MESSAGE - 150]} … {text[-147:]}"
+        raise ValueError(f"network {self.path}: {text}") from cause
 
 
 def _providers(requested: Provider, available: list[str]) -> list[str]:
@@ -302,13 +310,3 @@ def _reason(text: str, version: str) -> str:
         f"it is truncated, is not an ONNX file, or needs operations that onnxruntime {version} does not have. Copy or "
         "export it again"
     )
-
-
-def _card_digest(card: Path) -> str | None:
-    """Return the SHA-256 in the model card beside a network; None if there is no card, or no such entry."""
-    try:
-        content = json.loads(card.read_bytes())
-    except (OSError, ValueError):
-        return None
-    digest = content.get("sha256") if isinstance(content, dict) else None
-    return digest if isinstance(digest, str) else None

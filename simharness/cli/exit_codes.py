@@ -29,7 +29,9 @@ def exit_on_error() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        console.print(Text.assemble(("error: ", "bold red"), str(error)), soft_wrap=True)
+        from simharness.runtime.message_text import one_line
+
+        console.print(Text.assemble(("error: ", "bold red"), one_line(str(error))), soft_wrap=True)
         raise typer.Exit(BAD_INPUT) from None
     except (typer.Exit, typer.Abort):
         raise

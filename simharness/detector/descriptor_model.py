@@ -15,7 +15,6 @@ two crops, by the share of hidden joints, and by the parameter ``look_alike``.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -27,7 +26,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from mvpose.arrays import Floats
+from mvpose.networks.card_file import read_card_file
 from mvpose.networks.session import check_content
+from simharness.runtime.message_text import one_line
 from simharness.types.random_streams import stream
 
 _FEWEST, _MOST = 6, 256  # dimensions
@@ -87,12 +88,16 @@ class DescriptorModel:
         path = model.with_suffix(".json")
         if model.is_file():  # the file may be missing, but the card must not be another network's
             check_content(model)
+        card = read_card_file(model)
         try:
-            card = json.loads(path.read_text(encoding="utf-8"))
-            return cls.fitted(card["distances"])
-        except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
+            if card is None:
+                raise ValueError("no such file")
+            with np.errstate(invalid="raise"):
+                return cls.fitted(card["distances"])
+        except Exception as error:  # of another form, in any of many ways
+            why = one_line(f"{type(error).__name__}: {error}", 160)
             raise ValueError(
-                f"{path}: expected a card with the distances of {model.name}, got none ({error}); measure them with "
+                f"{path}: expected a card with the distances of {model.name}, got none ({why}); measure them with "
                 'python -m tools.reid, or set appearance.source = "pictures"'
             ) from None
 

@@ -12,11 +12,12 @@ toolbox's layout (https://github.com/CMU-Perceptual-Computing-Lab/panoptic-toolb
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+
+from simharness.runtime.input_files import TABLE, read_json
 
 FORMAT = "simharness export"
 """Value of ``format`` in the manifest of an export."""
@@ -107,7 +108,7 @@ def check_place(folder: Path) -> None:
 
 def _is_export(folder: Path) -> bool:
     try:
-        content = json.loads((folder / "manifest.json").read_bytes())
-    except (OSError, ValueError):
+        content = read_json(folder / "manifest.json", what="the manifest of an export", most=TABLE)
+    except ValueError:
         return False
     return isinstance(content, dict) and content.get("format") == FORMAT

@@ -13,7 +13,8 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.formats.joint_tracks import METRES, UP, JointTracks, TrackFiles, joined
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.input_files import read_bytes
+from simharness.runtime.message_text import one_line, shown
 
 _WHAT = "a C3D file of motion capture"
 
@@ -46,9 +47,9 @@ def _read_person(path: Path, axes: Floats) -> JointTracks:
             stated = reader.get("POINT:UNITS")
             unit = "" if stated is None else str(stated.string_value).strip("\0 ").lower()
     except Exception as error:  # the package raises many types of errors on damaged files
+        why = one_line(f"{type(error).__name__}: {error}", 160)
         raise ValueError(
-            f"{path}: cannot be read as C3D ({type(error).__name__}: {error}; it has {len(content)} bytes); expected "
-            f"{_WHAT}"
+            f"{path}: cannot be read as C3D ({why}; it has {len(content)} bytes); expected {_WHAT}"
         ) from None
     if len(frames) != reader.last_frame - reader.first_frame + 1:
         raise ValueError(
@@ -56,7 +57,7 @@ def _read_person(path: Path, axes: Floats) -> JointTracks:
             "probably cut off: copy it again"
         )
     if unit not in METRES:
-        raise ValueError(f"{path}: POINT:UNITS must be one of {', '.join(METRES)}, got {unit!r}")
+        raise ValueError(f"{path}: POINT:UNITS must be one of {', '.join(METRES)}, got {shown(unit)}")
     if not labels:
         raise ValueError(f"{path}: has no points; expected labelled markers (POINT:LABELS)")
     points = np.stack([each for _, each in frames]).astype(float)[:, : len(labels)]

@@ -6,7 +6,7 @@ and ``bbox``, which is optional, x, y, width, height in pixels. People of all fr
 
 from __future__ import annotations
 
-import json
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +18,8 @@ from mvpose import COCO17, Detections
 from mvpose.arrays import Floats
 from simharness.formats.detection_files import DetectionFiles
 from simharness.formats.joint_names import KNOWN, JointNames, to_coco17
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.input_files import read_json
+from simharness.runtime.message_text import shown
 
 _WHAT = "COCO keypoint results: a list of {image_id, keypoints: [x, y, score, ...], score, bbox}"
 
@@ -42,6 +43,7 @@ def read_detections(files: DetectionFiles) -> tuple[Detections, ...]:
             frame = _frame(path, index, entry)
             found.add(frame)
             if frame in wanted:
+                _check_box(path, index, entry)
                 frames[frame].append((view, entry, _keypoints(path, index, entry, skeleton)))
         if found and not found & wanted:
             raise ValueError(
@@ -52,13 +54,7 @@ def read_detections(files: DetectionFiles) -> tuple[Detections, ...]:
 
 
 def _entries(path: Path) -> list[Mapping[str, Any]]:
-    content = read_bytes(path, what=_WHAT)
-    try:
-        entries = json.loads(content)
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(
-            f"{path}: broken or truncated JSON ({error}; the file has {len(content)} bytes); expected {_WHAT}"
-        ) from None
+    entries = read_json(path, what=_WHAT)
     if not isinstance(entries, list) or not all(isinstance(each, dict) for each in entries):
         raise ValueError(f"{path}: expected {_WHAT}, got a {type(entries).__name__}")
     return entries
@@ -67,10 +63,27 @@ def _entries(path: Path) -> list[Mapping[str, Any]]:
 def _frame(path: Path, index: int, entry: Mapping[str, Any]) -> int:
     try:
         return int(entry["image_id"])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(
-            f"{path}: entry {index}: expected image_id, the number of the frame, got {entry.get('image_id')!r}"
+            f"{path}: entry {index}: expected image_id, the number of the frame, got {shown(entry.get('image_id'))}"
         ) from None
+
+
+def _check_box(path: Path, index: int, entry: Mapping[str, Any]) -> None:
+    """Check the box and the score of an entry, both optional.
+
+    Raises:
+        ValueError: a box that is not four numbers, or a score that is no number.
+    """
+    box, score = entry.get("bbox"), entry.get("score")
+    if box is not None and not (isinstance(box, list) and len(box) == 4 and all(map(_is_number, box))):
+        raise ValueError(f"{path}: entry {index}: bbox must be x, y, width, height in pixels, got {shown(box)}")
+    if score is not None and not _is_number(score):
+        raise ValueError(f"{path}: entry {index}: score must be a number, got {shown(score)}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _keypoints(path: Path, index: int, entry: Mapping[str, Any], skeleton: JointNames) -> Floats:
@@ -98,5 +111,5 @@ def _detections(people: Sequence[tuple[int, Mapping[str, Any], Floats]], skeleto
         if entry.get("bbox") is not None:
             boxes[row] = entry["bbox"]
         if entry.get("score") is not None:
-            box_scores[row] = min(max(float(entry["score"]), 0.0), 1.0)
+            box_scores[row] = min(max(entry["score"], 0.0), 1.0)
     return Detections(spanned.view, keypoints, scores, boxes, box_scores)

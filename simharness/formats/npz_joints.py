@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simharness.formats.joint_tracks import UP, JointTracks, TrackFiles
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.archives import arrays_of
+from simharness.runtime.input_files import read_bytes
 
 _WHAT = "a NumPy archive with joints (T, P, J, 3) in metres, names (J,) and frames (T,)"
 
@@ -25,11 +25,10 @@ def read_tracks(files: TrackFiles) -> JointTracks:
         ValueError: the file is missing or no such archive, or its arrays do not fit.
     """
     path = files.single()
-    read_bytes(path, what=_WHAT)
+    content = read_bytes(path, what=_WHAT)
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {key: archive[key] for key in ("joints", "names", "frames") if key in archive}
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+        arrays = arrays_of(content, only=("joints", "names", "frames"))
+    except ValueError as error:
         raise ValueError(f"{path}: cannot be read ({error}); expected {_WHAT}") from None
     if "joints" not in arrays:
         raise ValueError(f"{path}: has no array joints; expected {_WHAT}")

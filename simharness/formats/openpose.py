@@ -21,7 +21,7 @@ from mvpose import COCO17, Detections
 from mvpose.arrays import Floats
 from simharness.formats.detection_files import DetectionFiles
 from simharness.formats.joint_names import BODY_25, KNOWN, JointNames, to_coco17
-from simharness.formats.read_errors import read_json
+from simharness.runtime.input_files import read_json_object
 
 _WHAT = "OpenPose output of one image: {'people': [{'pose_keypoints_2d': [25 x (x, y, score)]}, ...]}"
 _BODY25 = KNOWN["body25"]
@@ -48,7 +48,7 @@ def read_people(path: str | Path, *, skeleton: JointNames = _BODY25) -> tuple[Fl
         ValueError: the file does not exist, is truncated, or does not hold keypoints of the skeleton.
     """
     path = Path(path)
-    people = read_json(path, what=_WHAT).get("people")
+    people = read_json_object(path, what=_WHAT).get("people")
     if not isinstance(people, list):
         raise ValueError(f"{path}: no list 'people'; expected {_WHAT}")
     body = np.array([_keypoints(path, index, person, skeleton) for index, person in enumerate(people)])

@@ -19,7 +19,7 @@ from mvpose import COCO17
 from mvpose.skeleton import PANOPTIC19
 from simharness.formats.joint_names import KNOWN
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
-from simharness.formats.read_errors import read_json
+from simharness.runtime.input_files import read_json_object
 from simharness.types.views import Visibility
 
 VERSION = 0.7  # of the dataset's files
@@ -75,7 +75,7 @@ def _bodies(path: Path, count: int) -> dict[int, NDArray[np.float64]]:
     key = f"joints{count}"
     result = {}
     try:
-        for body in read_json(path, what=_WHAT)["bodies"]:
+        for body in read_json_object(path, what=_WHAT)["bodies"]:
             if int(body["id"]) < 0:  # the dataset's mark of a person that was not tracked
                 continue
             values = np.asarray(body[key], float)

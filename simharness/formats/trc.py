@@ -13,7 +13,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.formats.joint_tracks import METRES, UP, JointTracks, TrackFiles, joined
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.input_files import read_bytes
 
 _WHAT = "a TRC file: a header with Units, a line 'Frame# Time MARKER ...', and a line for each frame"
 

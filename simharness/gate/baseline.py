@@ -12,6 +12,8 @@ from typing import Any
 
 from simharness.gate.trial_command import TrialKey
 from simharness.runtime.atomic_files import write_atomic
+from simharness.runtime.input_files import MIB, parse_json, read_bytes
+from simharness.runtime.message_text import one_line, shown
 from simharness.scoring.catalogue import HEADLINE
 
 TIME = "time_ratio"
@@ -19,6 +21,7 @@ TIME = "time_ratio"
 
 KEPT = (*HEADLINE, TIME)
 
+_LARGEST = 64 * MIB  # bytes of a baseline; 200,000 trials
 _DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff
 _HEAD = ("suite", "fingerprint", "code")
 
@@ -107,22 +110,22 @@ def read_baseline(path: Path) -> Measurement:
         ValueError: the file is missing, incomplete or no baseline.
     """
     mend = "write one with --update-baseline"
+    if not path.exists():
+        raise ValueError(f"--baseline {path}: no such file; {mend}")
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ValueError(f"--baseline {path}: no such file; {mend}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"--baseline {path}: cannot be read: {error}; {mend}") from None
+        content = read_bytes(path, what="the baseline of a suite", most=_LARGEST)
+    except ValueError as error:
+        raise ValueError(f"--baseline {error}; {mend}") from None
     try:
-        data = json.loads(text)
+        data = parse_json(content)
         head = {key: _text(data, key) for key in _HEAD}
         return Measurement(**head, scores=dict(map(_row, data["trials"])))
     except json.JSONDecodeError as error:
         raise ValueError(
-            f"--baseline {path}, line {error.lineno}: not valid JSON: {error.msg}; restore it, or {mend}"
+            f"--baseline {path}, line {error.lineno}: not valid JSON: {one_line(error.msg, 160)}; restore it, or {mend}"
         ) from None
     except (KeyError, TypeError, ValueError) as error:
-        problem = f"the key {error} is missing" if isinstance(error, KeyError) else str(error)
+        problem = f"the key {error} is missing" if isinstance(error, KeyError) else one_line(str(error), 200)
         raise ValueError(f"--baseline {path}: not a baseline: {problem}; restore it, or {mend}") from None
 
 
@@ -130,7 +133,7 @@ def _text(data: Any, key: str) -> str:
     if not isinstance(data, dict):
         raise TypeError(f"expected an object with {', '.join(_HEAD)} and trials, got {type(data).__name__}")
     if not isinstance(data[key], str):
-        raise TypeError(f"{key}: expected text, got {json.dumps(data[key])}")
+        raise TypeError(f"{key}: expected text, got {shown(data[key])}")
     return str(data[key])
 
 
@@ -141,15 +144,15 @@ def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
         TypeError, KeyError: the row is not valid.
     """
     if not isinstance(row, dict):
-        raise TypeError(f"trials: expected objects, got {json.dumps(row)}")
+        raise TypeError(f"trials: expected objects, got {shown(row)}")
     trial = TrialKey(row["case"], row["seed"], row["variant"])
     if not (isinstance(trial.case, str) and isinstance(trial.seed, int) and isinstance(trial.variant, str)):
-        raise TypeError(f"trials: expected case, seed and variant, got {json.dumps(list(trial))}")
+        raise TypeError(f"trials: expected case, seed and variant, got {shown(list(trial))}")
     scores = {key: row[key] for key in KEPT}
     for key, value in scores.items():
         number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
         if value is not None and not number:
-            raise TypeError(f"{trial}: {key}: expected a number or null, got {json.dumps(value)}")
+            raise TypeError(f"{trial}: {key}: expected a number or null, got {shown(value)}")
     return trial, scores
 
 

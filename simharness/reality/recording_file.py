@@ -27,6 +27,7 @@ from simharness.formats.joint_tracks import JointTracks, TrackFiles
 from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.recording_keys import CalibrationKeys, DeclaredSkeleton, RecordingKeys, TruthKeys
+from simharness.runtime.message_text import all_in_one_line, one_line
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import read_toml
 from simharness.scenario.validation_messages import explain_all
@@ -97,7 +98,7 @@ def read_keys(file: Path) -> RecordingKeys:
         return RecordingKeys.model_validate_json(json.dumps(settings, default=str), strict=True)
     except ValidationError as error:
         lines = explain_all(error, {}, str(file), root=RecordingKeys)
-        raise ValueError("\n".join(dict.fromkeys(lines))) from None
+        raise ValueError(all_in_one_line(list(dict.fromkeys(lines)))) from None
 
 
 def find_recording(path: str | Path) -> Path:
@@ -133,7 +134,7 @@ def _key(file: Path, key: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise ValueError(f"{file}: {key}: {error}") from None
+        raise ValueError(one_line(f"{file}: {key}: {error}")) from None
 
 
 def _place(file: Path, keys: RecordingKeys, folder: Path | None) -> Path:

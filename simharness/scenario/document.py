@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
-import json
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simharness.runtime.input_files import parse_toml
+from simharness.runtime.message_text import one_line, shown
 from simharness.scenario.layers import Key, Origins, leaves, set_origin
 from simharness.scenario.named_files import locate_files
 from simharness.scenario.presets import KINDS, merge_with_presets
@@ -107,7 +108,7 @@ def _read_chain(path: Path) -> list[tuple[Path, dict[str, Any]]]:
         chain.append((file, keys))
         base = keys.pop("extends", "")
         if not isinstance(base, str):
-            got = json.dumps(base, default=str)
+            got = shown(base)
             raise ScenarioError(f"{file}: extends: expected a scenario file or the name of a shipped one, got {got}")
         try:
             file = find_scenario(base, folder=file.parent, extended_by=file) if base else None
@@ -170,13 +171,15 @@ def _parse_override(override: str) -> tuple[Key, Any]:
 def _parse_value(override: str, written: str) -> Any:
     """Return a TOML value, or a bare word as text."""
     try:
-        parsed = tomllib.loads(f"value = {written}")
+        parsed = parse_toml(f"value = {written}")
     except tomllib.TOMLDecodeError as error:
         if not written or written[0] in "[{\"'":  # meant as TOML: a message is better than a strange text
             what = toml_place(str(error), "")[0]
             raise ScenarioError(
-                f"--set {override}: {written or 'nothing'} is not a TOML value ({what}); "
+                f"--set {one_line(override, 100)}: {one_line(written, 60) or 'nothing'} is not a TOML value ({what}); "
                 """write 6, 0.5, true, word, "some words" or '["walk", "wave"]'"""
             ) from None
         return written
+    except ValueError as error:
+        raise ScenarioError(f"--set {one_line(override, 100)}: {error}") from None
     return parsed["value"] if len(parsed) == 1 else written

@@ -17,6 +17,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from simharness.runtime.input_files import SETTINGS, read_bytes
+from simharness.runtime.message_text import all_in_one_line, listed, shown
 from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
 from simharness.scenario.sections.cameras import Cameras
@@ -90,8 +92,8 @@ def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path
     near_names = difflib.get_close_matches(name, known, n=1)
     hint = f" Did you mean {near_names[0]}?" if near_names else ""
     raise ScenarioError(
-        f"{kind.section}.{kind.key} = {_shown(name)}: no such {kind.key}; expected one of "
-        f"{', '.join(known) or 'none'}, or a file that ends in .toml.{hint}"
+        f"{kind.section}.{kind.key} = {shown(name)}: no such {kind.key}; expected one of "
+        f"{listed(known, 20) or 'none'}, or a file that ends in .toml.{hint}"
     )
 
 
@@ -114,7 +116,7 @@ def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict
     begins = settings.pop(kind.key, "")
     locate_files({kind.section: settings}, path.parent)
     if not isinstance(begins, str):
-        raise ScenarioError(f"{path}: {kind.key}: expected the name of a {kind.title}, got {_shown(begins)}")
+        raise ScenarioError(f"{path}: {kind.key}: expected the name of a {kind.title}, got {shown(begins)}")
     if begins:
         base = read_preset(kind, file_of(kind, begins, [path.parent], near=path.parent), above=(*above, path))
         settings = merge(base, settings)
@@ -122,7 +124,7 @@ def read_preset(kind: Kind, path: Path, *, above: tuple[Path, ...] = ()) -> dict
         kind.model.model_validate_json(json.dumps(settings, default=str), strict=True)
     except ValidationError as error:
         lines = explain_all(error, {}, str(path), section=(kind.section,))
-        raise ScenarioError("\n".join(dict.fromkeys(lines))) from None
+        raise ScenarioError(all_in_one_line(list(dict.fromkeys(lines)))) from None
     return settings
 
 
@@ -144,7 +146,7 @@ def read_profile(name: str, *, folder: Path | None = None) -> Detector:
 def summary_of(path: Path) -> str:
     """Return one line about a preset: the first sentence of the comment at the top of its file."""
     words: list[str] = []
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in read_bytes(path, what="settings (TOML)", most=SETTINGS).decode(errors="replace").splitlines():
         if not line.removeprefix("#").strip() or not line.startswith("#"):
             break
         words += line.removeprefix("#").split()
@@ -188,7 +190,7 @@ class Presets:
         where = f"{origin}: " if origin else ""
         if not isinstance(name, str):
             raise ScenarioError(
-                f"{where}{kind.section}.{kind.key}: expected the name of a {kind.title}, got {_shown(name)}"
+                f"{where}{kind.section}.{kind.key}: expected the name of a {kind.title}, got {shown(name)}"
             )
         if (kind.key, name) not in self._read:
             try:
@@ -206,7 +208,3 @@ def merge_with_presets(base: dict[str, Any], changes: Mapping[str, Any]) -> dict
         if isinstance(chosen, Mapping) and chosen.get(kind.key) and not kind.name_in(base):
             base = {name: section for name, section in base.items() if name != kind.section}
     return merge(base, changes)
-
-
-def _shown(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, default=str)

@@ -15,6 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from simharness.runtime.message_text import all_in_one_line, shown
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
 from simharness.scenario.presets import KINDS, Presets, merge_with_presets
@@ -136,7 +137,7 @@ def refuse(mistakes: Sequence[str]) -> None:
     if mistakes:
         # All values of a range may be wrong in the same way: the message about the first is enough.
         messages = {re.split(", (?:e.g.|got) ", mistake)[0]: mistake for mistake in reversed(mistakes)}
-        raise ScenarioError("\n".join(reversed(messages.values())))
+        raise ScenarioError(all_in_one_line(list(reversed(messages.values()))))
 
 
 def read_plan(
@@ -253,16 +254,15 @@ def _seeds(data: dict[str, Any], document: Document, mistakes: list[str]) -> Seq
         single = origin_of(("seed",), origins, file)
         if single.startswith("--"):
             mistakes.append(
-                f"{single}: the study has a list of seeds, seeds = {seeds}, which replaces seed; set seeds instead, "
-                "seeds = 1 for a single one"
+                f"{single}: the study has a list of seeds, seeds = {shown(seeds)}, which replaces seed; set seeds "
+                "instead, seeds = 1 for a single one"
             )
         data["seed"] = seeds[0]
         return tuple(seeds)
     if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= MOST_TRIALS:
-        shown = json.dumps(seeds, default=str)
         mistakes.append(
             f"{origin}: seeds: expected a number of seeds, 1 to {MOST_TRIALS:,}, or a list of seeds, e.g. [0, 1, 2], "
-            f"got {shown[:60]}"
+            f"got {shown(seeds)}"
         )
         seeds = 1
     first = data.get("seed", 0)

@@ -13,6 +13,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from simharness.runtime.input_files import SETTINGS, parse_toml, read_bytes
+from simharness.runtime.message_text import listed, one_line
 from simharness.scenario.layers import is_range
 from simharness.scenario.sections.scenario import Scenario
 
@@ -23,7 +25,13 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class ScenarioError(ValueError):
-    """Scenario that cannot be read. Every message names the file or option, the key, and how to mend it."""
+    """Scenario that cannot be read.
+
+    Every message is one line of bounded length that names the file or option, the key, and how to mend it.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -33,20 +41,25 @@ def read_toml(path: Path) -> dict[str, Any]:
         ScenarioError: the file does not exist or is not TOML; the message lists the files beside it, or names the line.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")  # some Windows editors begin a file with a byte order mark
-    except FileNotFoundError:
-        raise ScenarioError(f"{path}: no such file; {_similar_files(path)}") from None
-    except IsADirectoryError:
-        raise ScenarioError(f"{path}: is a folder, not a scenario file; {_list_files(path, title='it')}") from None
+        if path.is_dir():
+            raise ScenarioError(f"{path}: is a folder, not a scenario file; {_list_files(path, title='it')}")
+        if not path.exists():
+            raise ScenarioError(f"{path}: no such file; {_similar_files(path)}")
+        content = read_bytes(path, what="settings (TOML)", most=SETTINGS)
+        text = content.decode("utf-8-sig")  # some Windows editors begin a file with a byte order mark
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{path}: not a text file in UTF-8 ({error.reason} at byte {error.start})") from None
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise ScenarioError(str(error)) from None
     try:
-        return tomllib.loads(text)
+        return parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         what, line, column = toml_place(str(error), text)
-        raise ScenarioError(f"{path}, line {line}, column {column}: not valid TOML: {what}") from None
+        raise ScenarioError(f"{path}, line {line}, column {column}: not valid TOML: {one_line(what, 160)}") from None
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from None
 
 
 def toml_place(message: str, text: str) -> tuple[str, int, int]:
@@ -156,7 +169,7 @@ def _list_files(folder: Path, *, title: str, like: str = "") -> str:
     if len(names) > _LISTED:
         shown = difflib.get_close_matches(like, names, n=_LISTED, cutoff=0.0) if like else names[:_LISTED]
     more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
-    return f"{title} has {', '.join(shown)}{more}"
+    return f"{title} has {listed(shown)}{more}"
 
 
 def _file_names(folder: Path) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 import re
 import types
 import typing
@@ -14,11 +13,12 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from simharness.runtime.message_text import shown
 from simharness.scenario.file_model import ScenarioFile
 from simharness.scenario.sections.section import Elements
 
+_EXPLAINED = 20  # mistakes; a message lists fewer, and to find the nearest key takes time
 _VARIANTS = ("method", "variants")  # a file may also write it as variants
-_SHOWN = 60  # characters of a refused value that a message repeats
 
 
 def explain_all(
@@ -41,11 +41,12 @@ def explain_all(
     mistakes: list[dict[str, Any]] = [{**mistake, "loc": (*section, *mistake["loc"])} for mistake in error.errors()]
     wrong = [mistake["loc"] for mistake in mistakes]
     # A list whose elements are wrong counts as too short as well, because only valid elements are counted.
-    return [
+    messages = [
         explain(mistake, origins, file, root=root)
-        for mistake in mistakes
-        if mistake["type"] != "too_short" or not any(each[:-1] == mistake["loc"] for each in wrong if each)
+        for mistake in mistakes[:_EXPLAINED]
+        if mistake["type"] != "too_short" or not any(_is_within(each, mistake["loc"]) for each in wrong)
     ]
+    return messages + [f"{file}: {_dotted(location)}: not valid" for location in wrong[_EXPLAINED:]]
 
 
 def explain(
@@ -75,7 +76,12 @@ def explain(
     expected, hint = _expected(mistake, location, key, root), _nearest(mistake, location, root)
     field = _field(location, root)
     about = f" ({field.description})" if field is not None and field.description else ""
-    return f"{origin}: {key}{about}: expected {expected}, got {_shown(mistake['input'])}{hint}"
+    return f"{origin}: {key}{about}: expected {expected}, got {shown(mistake['input'])}{hint}"
+
+
+def _is_within(location: Sequence[str | int], outer: Sequence[str | int]) -> bool:
+    """Return whether a location is one within another."""
+    return len(location) > len(outer) and tuple(location[: len(outer)]) == tuple(outer)
 
 
 def origin_of(location: Sequence[str | int], origins: dict[tuple[str, ...], str], file: str) -> str:
@@ -124,7 +130,7 @@ class _List:
         if not self.fixed:
             number = _plain(self.elements[0]) in (int, float)
             single = not isinstance(given, bool) and isinstance(given, (int, float) if number else str)
-            return _shown([given] if single else list(self.default or ()))
+            return shown([given] if single else list(self.default or ()))
         if isinstance(given, str):
             numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", given)]
             given = numbers if len(numbers) == len(self.elements) else []
@@ -168,7 +174,7 @@ def _wrong_length(
     about = (field.description if whole and field is not None else None) or ", ".join(kind.names)
     return (
         f"{_written(location, origins)}: expected {len(kind.elements)} numbers{f' ({about})' if about else ''}, "
-        f"got {len(given)}: {_shown(given)}; e.g. {kind.example(given)}"
+        f"got {len(given)}: {shown(given)}; e.g. {kind.example(given)}"
     )
 
 
@@ -178,7 +184,7 @@ def _nearest(mistake: Mapping[str, Any], location: Sequence[str | int], root: ty
         return ""
     values = [str(value) for value in typing.get_args(_type_at(location, root)[0])]
     near = difflib.get_close_matches(mistake["input"], values, n=1, cutoff=0.5)
-    return f"; did you mean {_shown(near[0])}?" if near else ""
+    return f"; did you mean {shown(near[0])}?" if near else ""
 
 
 def _type_at(location: Sequence[str | int], root: type[BaseModel]) -> tuple[Any, tuple[str, ...], Any]:
@@ -223,11 +229,6 @@ def _plain(kind: Any) -> Any:
         present = [each for each in typing.get_args(kind) if each is not type(None)]
         return _plain(present[0]) if len(present) == 1 else kind
     return kind
-
-
-def _shown(value: Any) -> str:
-    text = json.dumps(value, ensure_ascii=False, default=str)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 
 def _dotted(location: Sequence[str | int]) -> str:

@@ -30,9 +30,13 @@ from typing import Any
 
 import polars as pl
 
+from simharness.runtime.input_files import read_bytes, read_json_object
+from simharness.runtime.message_text import one_line
+from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.trial_store import parquet
 
+_LARGEST = 2**32  # bytes of a table
 TABLES = ("trials", "frames", "people", "failures")
 
 
@@ -70,12 +74,16 @@ class Results:
         """Return the resolved scenario of a trial, with its seed.
 
         Raises:
-            ValueError: the study has no such trial.
+            ValueError: the study has no such trial, or its scenario is damaged.
         """
         rows = self.trials.filter(pl.col("trial") == trial)
         if rows.is_empty():
             raise ValueError(f"{self.folder}: this study has no trial {trial}")
-        return Scenario.model_validate_json(rows["scenario"][0])
+        try:
+            return Scenario.model_validate_json(rows["scenario"][0])
+        except ValueError as error:
+            why = one_line(str(error), 200)
+            raise ValueError(f"{self.folder}: the scenario of trial {trial} cannot be read: {why}") from None
 
 
 def write_study(folder: Path, info: Mapping[str, Any], tables: Tables, document: str) -> None:
@@ -109,7 +117,7 @@ def read_study(folder: Path | str) -> Results:
             "study wrote"
         )
     try:
-        info = json.loads(files[0].read_text(encoding="utf-8"))
+        info = read_json_object(files[0], what="the description of a study")
         tables = dict(zip(TABLES, map(_read_table, files[1:]), strict=True))
     except ValueError as error:
         raise ValueError(f"{folder}: cannot be read: {error}; run the study again to write the folder again") from None
@@ -117,7 +125,8 @@ def read_study(folder: Path | str) -> Results:
 
 
 def _read_table(file: Path) -> pl.DataFrame:
+    content = read_bytes(file, what="a table of a study", most=_LARGEST)
     try:
-        return pl.read_parquet(file)
-    except pl.exceptions.PolarsError as error:
+        return table_of(content)
+    except ValueError as error:
         raise ValueError(f"{file.name}: {error}") from None

@@ -31,8 +31,12 @@ from typing import Any
 
 import polars as pl
 
+from simharness.runtime.archives import members_of
 from simharness.runtime.atomic_files import write_atomic
 from simharness.runtime.errors import RunError
+from simharness.runtime.input_files import parse_json, read_bytes, read_json
+from simharness.runtime.message_text import shown
+from simharness.runtime.parquet_tables import table_of
 from simharness.trial.identity import code
 from simharness.trial.variant_result import VariantResult
 
@@ -40,6 +44,7 @@ FORMAT = 2
 _TABLES = ("frames", "people", "failures")
 _ESTIMATES, _DETECTIONS = "estimates.npz", "detected.npz"
 _PARTS = ("trial.json", *(f"{name}.parquet" for name in _TABLES), _ESTIMATES)
+_WHAT = "a store of finished trials"
 _STALE = 24 * 3600.0  # seconds after which a temporary file is regarded as abandoned
 _ENTRY = re.compile(r"[0-9a-f]{16,}")
 
@@ -129,17 +134,16 @@ class Store:
             return None
         try:
             return _unpacked(content)
-        except Exception:
+        except (ValueError, LookupError, TypeError):
             self.damaged.add(identity)
             return None
 
     def read_detections(self, trial: str) -> bytes:
         """Return the archive of a trial's detections; empty where it is missing or damaged."""
         try:
-            with zipfile.ZipFile(self._detections_path(trial)) as archive:
-                named = json.loads(archive.read("trial.json"))["trial"] == trial
-                return archive.read(_DETECTIONS) if named else b""
-        except Exception:  # missing, or damaged in any way: detections are simulated again
+            parts = members_of(read_bytes(self._detections_path(trial), what=_WHAT), only=("trial.json", _DETECTIONS))
+            return parts[_DETECTIONS] if parse_json(parts["trial.json"])["trial"] == trial else b""
+        except (ValueError, LookupError, TypeError):  # missing, or damaged in any way: detections are simulated again
             return b""
 
     def write_detections(self, trial: str, content: bytes) -> None:
@@ -176,8 +180,8 @@ class Store:
     def failure(self, identity: str) -> dict[str, Any] | None:
         """Return the stored error of an entry; None where there is none or it cannot be read."""
         try:
-            failure = json.loads(self._failure_path(identity).read_bytes())
-        except (OSError, ValueError):
+            failure = read_json(self._failure_path(identity), what="the error of an entry")
+        except ValueError:
             return None
         return failure if isinstance(failure, dict) else None
 
@@ -213,19 +217,15 @@ class Store:
 
     def _valid_content(self, identity: str) -> bytes | None:
         """Return the bytes of an entry if all checksums are right and the identity matches; else None."""
+        file = self.file_of(identity)
         try:
-            content = self.file_of(identity).read_bytes()
-        except FileNotFoundError:
-            return None
-        except OSError:
-            self.damaged.add(identity)
-            return None
-        try:
-            with zipfile.ZipFile(io.BytesIO(content)) as archive:
-                parts = {name: archive.read(name) for name in _PARTS}
-            if json.loads(parts["trial.json"])["entry"] != identity:
+            content = read_bytes(file, what=_WHAT)
+            parts = members_of(content, only=_PARTS)
+            if parts.keys() != set(_PARTS) or parse_json(parts["trial.json"])["entry"] != identity:
                 raise ValueError("another entry")
-        except Exception:  # parsers may raise any error on damaged bytes
+        except (ValueError, LookupError, TypeError):
+            if not file.exists():
+                return None
             self.damaged.add(identity)
             return None
         return content
@@ -243,20 +243,20 @@ class Store:
     def _check_format(self) -> None:
         file = self.folder / "store.json"
         try:
-            version = json.loads(file.read_bytes())["format"]
-        except FileNotFoundError:
+            version = read_json(file, what=_WHAT)["format"] if file.exists() else None
+        except (ValueError, LookupError, TypeError):
+            version = None
+        if version is None and not file.exists():
             if strange := sorted(path.name for path in self.folder.iterdir() if not path.name.startswith(".")):
                 if file.exists():  # another process has just created the store
                     return self._check_format()
                 raise ValueError(
                     f"store {self.folder}: the folder is not empty and not a store of trials (it has {strange[0]} and "
                     "no store.json): choose another folder"
-                ) from None
+                )
             return write_atomic(file, json.dumps({"what": "simharness trials", "format": FORMAT}).encode())
-        except (ValueError, KeyError, TypeError):
-            version = None
         if version != FORMAT:
-            problem = "its store.json cannot be read" if version is None else f"it has format {version}"
+            problem = "its store.json cannot be read" if version is None else f"it has format {shown(version)}"
             raise ValueError(
                 f"store {self.folder}: {problem}, but this version of simharness reads format {FORMAT}: choose another "
                 "folder with --store, or delete this one to run everything again"
@@ -304,16 +304,15 @@ def _packed(identity: str, entry: Entry) -> bytes:
 
 
 def _unpacked(content: bytes) -> Entry:
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        about = json.loads(archive.read("trial.json"))
-        tables = {name: pl.read_parquet(archive.read(f"{name}.parquet")) for name in _TABLES}
-        estimates = archive.read(_ESTIMATES)
+    parts = members_of(content, only=_PARTS)
+    about = parse_json(parts["trial.json"])
+    tables = {name: table_of(parts[f"{name}.parquet"]) for name in _TABLES}
     return Entry(
         about["trial"],
         about["variant"],
         VariantResult(scores=about["scores"], **tables),
         about["seconds"],
-        estimates,
+        parts[_ESTIMATES],
         about["scores_code"],
         about["failures_code"],
     )

@@ -14,6 +14,7 @@ import numpy as np
 from mvpose import Estimate
 from simharness.detector.detect import Detected
 from simharness.detector.heatmaps import Peaks
+from simharness.runtime.archives import arrays_of
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.arrays import (
     Arrays,
@@ -117,8 +118,7 @@ def _packed(arrays: Arrays) -> bytes:
 
 
 def _unpacked(content: bytes) -> Arrays:
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        return dict(file)
+    return arrays_of(content)
 
 
 def _prefixed(name: str, arrays: Arrays) -> Arrays:

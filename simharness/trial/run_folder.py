@@ -48,6 +48,10 @@ from numpy.typing import NDArray
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
+from simharness.runtime.archives import arrays_of
+from simharness.runtime.input_files import read_bytes, read_json_object
+from simharness.runtime.message_text import one_line
+from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.toml_files import dumps
@@ -63,6 +67,8 @@ from simharness.trial.arrays import (
     truth_of,
 )
 from simharness.types.truth import Truth
+
+_WHAT = "a file of a run"
 
 
 @dataclass(frozen=True)
@@ -118,25 +124,32 @@ def read_run(folder: Path | str) -> Record:
     """Read a result folder.
 
     Raises:
-        ValueError: the folder is not a result folder, or a file of it is missing.
+        ValueError: the folder is not a result folder, or a file of it is missing or damaged.
     """
     folder = Path(folder)
     names = ("scenario.toml", "rig.npz", "detections.npz", "truth.npz", "estimates.npz", "scores.parquet")
     missing = [name for name in (*names, "timings.parquet", "summary.json") if not (folder / name).is_file()]
     if missing:
         raise ValueError(f"{folder}: not the result folder of a run: missing {', '.join(missing)}")
-    rig, detected, true, estimated = (dict(np.load(folder / name)) for name in names[1:5])
-    detections = detections_of(detected)
-    return Record(
-        scenario=load(folder / "scenario.toml", folder=Path()),
-        rig=rig_of_arrays(rig),
-        time=true["time"],
-        detections=detections,
-        truth=truth_of(true, detected["frame"]),
-        estimates=_estimates(estimated, detected["frame"], pl.read_parquet(folder / "timings.parquet")),
-        scores=pl.read_parquet(folder / "scores.parquet"),
-        summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")),
-    )
+    scenario = load(folder / "scenario.toml", folder=Path())
+    summary = read_json_object(folder / "summary.json", what="the summary of a run")
+    contents = {name: read_bytes(folder / name, what=_WHAT) for name in (*names[1:], "timings.parquet")}
+    try:
+        rig, detected, true, estimated = (arrays_of(contents[name]) for name in names[1:5])
+        scores, timings = table_of(contents["scores.parquet"]), table_of(contents["timings.parquet"])
+        return Record(
+            scenario=scenario,
+            rig=rig_of_arrays(rig),
+            time=true["time"],
+            detections=detections_of(detected),
+            truth=truth_of(true, detected["frame"]),
+            estimates=_estimates(estimated, detected["frame"], timings),
+            scores=scores,
+            summary=summary,
+        )
+    except Exception as error:  # arrays and columns that are missing, or of another shape or type
+        why = one_line(f"{type(error).__name__}: {error}", 200)
+        raise ValueError(f"{folder}: a file of this run is damaged ({why}); run it again") from None
 
 
 def is_run(folder: Path) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +10,8 @@ from typing import Any, Protocol
 
 from mvpose import Rig
 from simharness.formats.calibration.file_storage import read_storage
-from simharness.formats.read_errors import read_bytes, read_json
+from simharness.runtime.input_files import CALIBRATION, parse_toml, read_bytes, read_json_object
+from simharness.runtime.message_text import shown
 
 _WHAT = "a camera calibration"
 
@@ -36,7 +35,7 @@ class CalibrationFile:
         Raises:
             ValueError: the file does not exist or cannot be read.
         """
-        return read_bytes(self.path, what=self.expected)
+        return read_bytes(self.path, what=self.expected, most=CALIBRATION)
 
     @cached_property
     def json(self) -> dict[str, Any] | None:
@@ -45,14 +44,16 @@ class CalibrationFile:
         Raises:
             ValueError: the content begins with a brace and is not valid JSON.
         """
-        return read_json(self.path, what=self.expected) if self._start[:1] == b"{" else None
+        if self._start[:1] != b"{":
+            return None
+        return read_json_object(self.path, what=self.expected, most=CALIBRATION)
 
     @cached_property
     def storage(self) -> dict[str, Any] | None:
         """Values of an OpenCV FileStorage (YAML or XML); None where the content does not begin as one.
 
         Raises:
-            ValueError: OpenCV cannot read it.
+            ValueError: it cannot be parsed.
         """
         return read_storage(self.path, what=self.expected) if self._start in (b"%YAML", b"<?xml") else None
 
@@ -60,8 +61,8 @@ class CalibrationFile:
     def toml(self) -> dict[str, Any] | None:
         """Sections of a TOML file; None where the content is not TOML or is empty."""
         try:
-            return tomllib.loads(self.content.decode()) or None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+            return parse_toml(self.content.decode("utf-8-sig")) or None
+        except ValueError:
             return None
 
     @property
@@ -75,7 +76,7 @@ class CalibrationFile:
 
     @property
     def _start(self) -> bytes:
-        return self.content.lstrip(b"\xef\xbb\xbf \t\r\n")[:5]
+        return self.content[:1024].lstrip(b"\xef\xbb\xbf \t\r\n")[:5]
 
 
 class Recognise(Protocol):
@@ -132,5 +133,5 @@ class CalibrationFormat:
 
 
 def _keys(entries: dict[str, Any]) -> str:
-    names = ", ".join(json.dumps(name) for name in list(entries)[:6])
+    names = ", ".join(shown(name) for name in list(entries)[:6])
     return f"the keys {names}{', ...' if len(entries) > 6 else ''}" if entries else "no keys"

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
 from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from simharness.formats.calibration.entries import camera, check_names
+from simharness.formats.calibration.entries import camera, check_names, image_size
 from simharness.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
 
 _EXPECTS = "a list names, and for each name K_, dist_, R_ or Rot_, and T_"
@@ -102,5 +102,7 @@ def _camera(name: str, values: dict[str, Any], size: tuple[int, int], path: Path
         R=turn,
         t=values[f"T_{name}"],
         terms=values.get(f"dist_{name}", []),
-        size=(int(values.get(f"W_{name}", size[0])), int(values.get(f"H_{name}", size[1]))),
+        size=image_size(
+            (values.get(f"W_{name}", size[0]), values.get(f"H_{name}", size[1])), f"camera {name!r}: W and H"
+        ),
     )

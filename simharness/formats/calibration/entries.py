@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from mvpose import Camera, Rig
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
+from simharness.runtime.message_text import shown
 
 
 def rotation(value: Any, name: str) -> Floats:
@@ -19,7 +20,9 @@ def rotation(value: Any, name: str) -> Floats:
         ValueError: the value is neither.
     """
     given = as_array(np.asarray(value, dtype=object).ravel(), ("n",), name)
-    if given.size == 3 and np.isfinite(given).all():
+    if given.size in (3, 9) and not np.isfinite(given).all():
+        raise ValueError(f"{name} must be finite, got {shown(given.tolist())}")
+    if given.size == 3:
         return Rotation.from_rotvec(given.copy()).as_matrix()  # SciPy refuses read-only arrays
     if given.size == 9:
         return given.reshape(3, 3)
@@ -37,7 +40,8 @@ def distortion(value: Any, name: str) -> Floats:
     if terms.size not in (0, 4, 5, 8, 12, 14):
         raise ValueError(f"{name} must be 4 or 5 numbers (k1 k2 p1 p2 k3), got {terms.size}")
     if terms[5:].any():
-        raise ValueError(f"{name} has terms of the rational model, {terms[5:].tolist()}: calibrate with k1 k2 p1 p2 k3")
+        rational = shown(terms[5:].tolist())
+        raise ValueError(f"{name} has terms of the rational model, {rational}: calibrate with k1 k2 p1 p2 k3")
     return np.resize(np.append(terms[:5], np.zeros(5 - min(terms.size, 5))), 5)
 
 

@@ -1,4 +1,8 @@
-"""Reader and writer of OpenCV's FileStorage (YAML or XML), in plain Python values."""
+"""OpenCV's FileStorage (YAML or XML) in plain Python values: reader and writer.
+
+OpenCV's own reader crashes the process on some damaged files, so files are parsed by LibYAML and Expat, as events, and
+scalars are interpreted by OpenCV's rules (:mod:`.storage_values`).
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.formats.read_errors import read_bytes
-
-_MATRIX = {"dt", "data"}  # beside rows and cols, or sizes where the dimensions are not two
+from simharness.formats.calibration.storage_xml import parse_xml
+from simharness.formats.calibration.storage_yaml import parse_yaml
+from simharness.runtime.input_files import CALIBRATION, read_bytes
+from simharness.runtime.message_text import one_line
 
 
 def read_storage(path: Path, *, what: str) -> dict[str, Any]:
@@ -22,17 +27,16 @@ def read_storage(path: Path, *, what: str) -> dict[str, Any]:
         what: the expected content, for the message.
 
     Raises:
-        ValueError: the file does not exist, is truncated, cannot be read by FileStorage, or has no names.
+        ValueError: the file does not exist, is truncated, is no valid YAML or XML of FileStorage, or has no names.
     """
-    content = read_bytes(path, what=what)
+    content = read_bytes(path, what=what, most=CALIBRATION)
     try:
-        storage = cv2.FileStorage(content.decode(), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        value = _value(storage.root())
-    except (cv2.error, SystemError, UnicodeDecodeError) as error:  # the constructor fails with a SystemError
-        reason = str(error.__cause__ or error).strip().split(" error: ")[-1]
+        text = content.decode("utf-8-sig")
+        value = parse_xml(text) if text.lstrip().startswith("<") else parse_yaml(text)
+    except ValueError as error:
         raise ValueError(
-            f"{path}: OpenCV's FileStorage cannot read it ({reason}; the file has {len(content)} bytes); expected "
-            f"{what}. It may be cut off, or lack %YAML:1.0 in its first line"
+            f"{path}: cannot be read as OpenCV's FileStorage ({one_line(str(error), 160)}; the file has {len(content)} "
+            f"bytes); expected {what}. It may be cut off, or lack %YAML:1.0 in its first line"
         ) from None
     if not isinstance(value, dict):
         raise ValueError(f"{path}: expected {what}, got a file without named values")
@@ -47,7 +51,7 @@ def read_beside(path: Path, *, what: str) -> dict[str, Any]:
     """
     values = read_storage(path, what=what)
     other = _other(path)
-    if other is not None and other.is_file():
+    if other is not None and other.exists():
         values = {**read_storage(other, what=what), **values}
     return values
 
@@ -101,14 +105,3 @@ def _write(storage: cv2.FileStorage, key: str, value: Any) -> None:
         raise ValueError(
             f"OpenCV's FileStorage refuses the name {key!r}: expected a letter, then letters, digits, spaces, - and _"
         ) from None
-
-
-def _value(node: cv2.FileNode) -> Any:
-    if node.isMap():
-        keys = node.keys()
-        return node.mat().astype(float) if set(keys) >= _MATRIX else {key: _value(node.getNode(key)) for key in keys}
-    if node.isSeq():
-        return [_value(node.at(index)) for index in range(node.size())]
-    if node.isString():
-        return node.string()
-    return int(node.real()) if node.isInt() else node.real()

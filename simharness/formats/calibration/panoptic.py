@@ -17,7 +17,7 @@ from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import camera, check_names, image_size
-from simharness.formats.read_errors import read_json
+from simharness.runtime.input_files import CALIBRATION, read_json_object
 
 _KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
 _EXPECTS = "{'cameras': [{" + ", ".join(_KEYS) + "}, ...]}"
@@ -41,7 +41,7 @@ def read_calibration(path: str | Path, *, types: Collection[str] = ("hd",)) -> R
             fewer than two cameras are of these types.
     """
     path = Path(path)
-    entries = read_json(path, what=_WHAT).get("cameras")
+    entries = read_json_object(path, what=_WHAT, most=CALIBRATION).get("cameras")
     if not isinstance(entries, list):
         raise ValueError(f"{path}: no list 'cameras'; expected {_WHAT}")
     try:

@@ -8,7 +8,6 @@ k3; files with five terms are read, too.
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,8 @@ from scipy.spatial.transform import Rotation
 from mvpose import Camera, Rig
 from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import camera, check_names, image_size
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.input_files import CALIBRATION, parse_toml, read_bytes
+from simharness.runtime.message_text import one_line, shown
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 _METADATA = "metadata"
@@ -38,11 +38,11 @@ def read_calibration(path: str | Path) -> Rig:
             fisheye lens, or the cameras make no rig.
     """
     path = Path(path)
-    content = read_bytes(path, what=_WHAT)
+    content = read_bytes(path, what=_WHAT, most=CALIBRATION)
     try:
-        sections = tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not TOML ({error}); expected {_WHAT}") from None
+        sections = parse_toml(content.decode("utf-8-sig"))
+    except ValueError as error:
+        raise ValueError(f"{path}: not TOML ({one_line(str(error), 160)}); expected {_WHAT}") from None
     try:
         return Rig([_camera(name, entry) for name, entry in sections.items() if name != _METADATA])
     except ValueError as error:
@@ -96,7 +96,7 @@ def _quoted(text: str) -> str:
 
 def _camera(section: str, entry: Any) -> Camera:
     if not isinstance(entry, dict):
-        raise ValueError(f"{section!r} must be a section with {', '.join(_KEYS)}, got {json.dumps(entry, default=str)}")
+        raise ValueError(f"{section!r} must be a section with {', '.join(_KEYS)}, got {shown(entry)}")
     missing = [key for key in _KEYS if key not in entry]
     if missing:
         raise ValueError(f"camera {section!r} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")

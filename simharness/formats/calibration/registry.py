@@ -18,10 +18,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from mvpose import Rig
 from simharness.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.selection import select
+from simharness.runtime.message_text import one_line
 
 FORMATS: list[CalibrationFormat] = [
     panoptic.FORMAT,
@@ -57,10 +60,14 @@ def read_calibration(
     file = CalibrationFile(Path(path), f"a camera calibration: {', '.join(each.name for each in FORMATS)}")
     chosen = next((each for each in FORMATS if each.recognises(file)), None)
     if chosen is None:
-        known = "; ".join(f"{each.name}: {each.expects}" for each in FORMATS)
-        raise ValueError(f"{path}: not a known calibration: found {file.summary}; expected one of {known}")
-    rig = chosen.read(file.path, size=size, only=only)
+        known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
+        raise ValueError(one_line(f"{path}: not a known calibration: found {file.summary}; expected one of {known}"))
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # of values that the cameras refuse
+            rig = chosen.read(file.path, size=size, only=only)
+    except ValueError as error:
+        raise ValueError(one_line(str(error))) from None
     try:
         return select(rig, only, key=key)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise ValueError(one_line(f"{path}: {error}")) from None

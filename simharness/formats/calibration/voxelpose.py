@@ -17,7 +17,7 @@ from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from simharness.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
 from simharness.formats.calibration.entries import check_names
-from simharness.formats.read_errors import read_json
+from simharness.runtime.input_files import CALIBRATION, read_json_object
 
 _KEYS = ("fx", "fy", "cx", "cy", "R", "T", "k", "p")
 _EXPECTS = "an object of cameras, each with " + ", ".join(_KEYS)
@@ -40,7 +40,7 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
             centres cannot be in millimetres, or the cameras make no rig.
     """
     path = Path(path)
-    cameras = read_json(path, what=_WHAT)
+    cameras = read_json_object(path, what=_WHAT, most=CALIBRATION)
     try:
         centers = np.array([_center(name, entry) for name, entry in cameras.items()]).reshape(-1, 3)
         if len(centers) and np.abs(centers).max() < _METRES:

@@ -1,5 +1,6 @@
 import hashlib
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -371,10 +372,25 @@ def test_the_shipped_network_truncated_in_its_metadata_is_refused(tmp_path):
             Session(path)
 
 
-@pytest.mark.parametrize(
-    "beside", ["", "[1]", "5", "not JSON", "{}", '{"sha256": null}', '{"sha256": 7}', '{"task": "pose"}', "\xff"]
-)
-def test_json_without_a_digest_is_ignored(tmp_path, beside):
+@pytest.mark.parametrize("beside", ["{}", '{"sha256": null}', '{"task": "pose"}'])
+def test_a_card_without_a_digest_is_ignored(tmp_path, beside):
+    path = mean_color(tmp_path / "net.onnx")
+    path.with_suffix(".json").write_text(beside)
+    np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)
+
+
+@pytest.mark.parametrize("beside", ["", "[1]", "5", "not JSON", '{"sha256": 7}', "\xff", "[" * 100_000, "9" * 5000])
+def test_a_card_that_cannot_be_read_is_refused(tmp_path, beside):
     path = mean_color(tmp_path / "net.onnx")
     path.with_suffix(".json").write_bytes(beside.encode("latin-1"))
-    np.testing.assert_allclose(Session(path)(crops())[0], mean(crops()), atol=1e-5)
+    with pytest.raises(ValueError, match=r"net\.json: "):
+        Session(path)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device"])
+def test_a_card_that_is_no_regular_file_is_refused(tmp_path, kind):
+    path = mean_color(tmp_path / "net.onnx")
+    card = path.with_suffix(".json")
+    {"pipe": os.mkfifo, "folder": os.mkdir, "device": lambda card: card.symlink_to("/dev/zero")}[kind](card)
+    with pytest.raises(ValueError, match=r"net\.json: cannot be read as the card of net\.onnx: it is no regular file"):
+        Session(path)

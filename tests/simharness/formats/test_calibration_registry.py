@@ -52,7 +52,7 @@ def test_the_message_about_an_unknown_file_lists_what_is_registered(toy_file):
     with pytest.raises(ValueError, match="expected one of Panoptic") as before:
         read_calibration(toy_file, size=(640, 480))
     register(TOY)
-    with pytest.raises(ValueError, match=r"expected one of Toy \(text\): lines of name, focal length") as after:
+    with pytest.raises(ValueError, match=r"expected one of Toy \(text\): lines of name, foc") as after:
         read_calibration(toy_file, size=(640, 480))
     for name in (each.name for each in registry.FORMATS[1:]):
         assert name in str(before.value)

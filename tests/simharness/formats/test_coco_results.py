@@ -72,8 +72,8 @@ def test_other_skeletons_are_converted_by_name(tmp_path):
     ("left", "message"),
     [
         ([entry(5, person(0, 25))], r"left\.json: entry 0: keypoints must be 51 numbers, .* coco17, got 75"),
-        ([{"keypoints": [0.0] * 51}], r"left\.json: entry 0: expected image_id, .* got None"),
-        ([{"image_id": "a.jpg", "keypoints": []}], r"left\.json: entry 0: expected image_id, .* got 'a\.jpg'"),
+        ([{"keypoints": [0.0] * 51}], r"left\.json: entry 0: expected image_id, .* got null"),
+        ([{"image_id": "a.jpg", "keypoints": []}], r'left\.json: entry 0: expected image_id, .* got "a\.jpg"'),
         ([{"image_id": 5}], r"left\.json: entry 0: no numbers 'keypoints'"),
         ({"annotations": []}, r"left\.json: expected COCO keypoint results: a list .*, got a dict"),
         ([entry(100, person(0))], r"left\.json: has image_id 100 to 100, none of the requested frames 5 to 9"),

@@ -220,7 +220,7 @@ class TestMarkers:
         )
         with pytest.raises(ValueError, match=rf"1\.{kind}: expected the markers of 0\.{kind}, LHip, RHip, Nose"):
             read(kind, one, other)
-        with pytest.raises(ValueError, match=rf"2\.{kind}: .* must be one of m, .*, got 'furlong'"):
+        with pytest.raises(ValueError, match=rf"2\.{kind}: .* must be one of m, .*, got .furlong."):
             read(kind, WRITERS[kind](tmp_path / f"2.{kind}", tracks()[:, 0], unit="furlong"))
         with pytest.raises(ValueError, match=rf"none\.{kind}: no such file"):
             read(kind, tmp_path / f"none.{kind}")

@@ -97,7 +97,7 @@ def test_missing_truncated_and_other_files_are_named(tmp_path):
     path.write_text("[1, 2]")
     with pytest.raises(ValueError, match=r"calibration\.json: .*got a list"):
         read_calibration(path, size=SIZE)
-    with pytest.raises(ValueError, match=r"cannot be read"):
+    with pytest.raises(ValueError, match=r"is a folder, not a regular file"):
         read_calibration(tmp_path, size=SIZE)
 
 

@@ -78,3 +78,17 @@ def test_a_store_of_another_format_is_refused_before_anything_is_copied(tmp_path
     with pytest.raises(ValueError, match="format 0"):
         merge(stores, tmp_path / "all")
     assert list(tmp_path.glob("all/??")) == []
+
+
+def test_a_store_is_not_merged_into_itself_or_within(tmp_path, shards):
+    _, (one, other, _) = shards
+    before = sorted(tmp_path.rglob("*"))
+    (tmp_path / "link").symlink_to(one)
+    for into in (one, one / "sub", one / "sub" / "deep", tmp_path / "link" / "sub", other / ".." / one.name):
+        with pytest.raises(ValueError, match=r"--into .*(is the store .* itself|lies in .*)"):
+            merge([other, one], into)
+    with pytest.raises(ValueError, match=r"shard1: lies in --into"):
+        merge([one], tmp_path)
+    (tmp_path / "link").unlink()
+    assert sorted(tmp_path.rglob("*")) == before
+    assert merge([one, other], tmp_path / f"{one.name}b").copied  # a name that begins with that of a source

@@ -6,7 +6,6 @@ second. ``names`` (17,), the names of the joints, is optional and allows another
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
-from simharness.formats.read_errors import read_bytes
+from simharness.runtime.archives import arrays_of
+from simharness.runtime.input_files import read_bytes
 from simharness.scenario.sections.people import People
 from simharness.world.humans.body_size import body_lengths
 
@@ -110,11 +110,10 @@ def read_joint_tracks(path: Path) -> PeopleTracks:
     Raises:
         ValueError: the file is missing, is no such archive, or its content is not valid.
     """
-    read_bytes(path, what=_EXPECTED)
+    archive = read_bytes(path, what=_EXPECTED)
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            content = {key: archive[key] for key in ("joints", "rate", "names") if key in archive}
-    except (OSError, ValueError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
+        content = arrays_of(archive, only=("joints", "rate", "names"))
+    except ValueError as error:
         raise ValueError(f"{path}: cannot be read ({error}); expected {_EXPECTED}: write it again") from None
     for key in ("joints", "rate"):
         if key not in content:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
+from simharness.runtime.input_files import MIB, read_bytes
+
+_MOST = 64 * MIB  # bytes of a file: an hour of motion at 120 frames per second
 _LARGEST = 1e6  # larger than any length in any unit or angle of a person
 
 
@@ -63,10 +66,7 @@ class Reader:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            text = path.read_text(encoding="utf-8", errors="replace")
-        except OSError as error:
-            raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
+        text = read_bytes(path, what="a text file of motion", most=_MOST).decode("utf-8", errors="replace")
         rows = text.splitlines() or [""]
         self.file = path.name
         self._lines = [
