@@ -27,6 +27,7 @@ def test_no_file_of_many_mutations_gets_past_a_reader(tmp_path):
     run(range(3 * len(KINDS), 20 * len(KINDS)), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_dead_worker_counts_as_a_failure_and_the_next_one_answers(tmp_path):
     worker = Worker(tmp_path)
     try:
