@@ -137,7 +137,9 @@ def add_sums(sums, A, b):
 
 @njit(cache=True, fastmath=_FASTMATH)
 def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):
-    """Add the rays of all views to the normal equations A (3, 3) and b (3,) of a joint near the point.
+    """Add the rays of all views to the normal equations A (3, 3) and b (3,) of the step from the point to the joint.
+
+    Steps instead of positions keep rounding errors small where the rays hardly determine the joint.
 
     Every keypoint is weighted by its responsibility over its variance. ``temper`` scales the variances in the
     responsibilities only: above 1, distant keypoints keep some weight.
@@ -168,7 +170,7 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
         support += weights[v, mode] * responsibility
         responsibilities += responsibility
         misfit += weight * error
-        sums = add_ray(sums, weight, directions[v, mode], origins[v])
+        sums = add_ray(sums, weight, directions[v, mode], (-x, -y, -z))
     add_sums(sums, A, b)
     return support, responsibilities, misfit
 
@@ -200,13 +202,13 @@ ANCHOR = 1.0
 
 
 @njit(cache=True)
-def anchor(point, A, b):
-    """Start normal equations with weak information that the joint is at the point."""
+def anchor(A, b):
+    """Start normal equations of a step with weak information that the step is zero."""
     for r in range(3):
         for c in range(3):
             A[r, c] = 0.0
         A[r, r] = ANCHOR
-        b[r] = ANCHOR * point[r]
+        b[r] = 0.0
 
 
 @njit(cache=True)

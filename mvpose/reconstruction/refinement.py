@@ -91,15 +91,17 @@ def climb(joints, origins, directions, weights, pixel, sigmas, floor, graph, len
             size, shared, moved = (1 if mate == j else 2), -1, 0.0
             for k in range(size):
                 joint = members[k]
-                anchor(joints[joint], A, b)
+                anchor(A, b)
                 accumulate(
                     joints[joint], origins, directions[joint], weights[joint], pixel, sigmas[joint], floor, 1.0, A, b
                 )
                 between = _add_bones(A, b, joint, members[1 - k], joints, graph, length, precision)
                 shared = max(shared, between)
                 if not solve(A, b, inverse[k], target[k]):
-                    target[k] = joints[joint]
+                    target[k] = 0.0
                     inverse[k] = 0.0
+                for r in range(3):
+                    target[k, r] += joints[joint, r]
             if shared >= 0:
                 _join(target, inverse, joints[j], joints[mate], length[shared], precision[shared])
             for k in range(size):
@@ -181,7 +183,7 @@ def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
 
 @njit(cache=True)
 def _add_bones(A, b, j, mate, joints, graph, length, precision):
-    """Add the bones that end in joint j to its normal equations, linearised along their current directions.
+    """Add the bones that end in joint j to the normal equations of its step, linearised along their current directions.
 
     The bone to the mate is left out; its index is returned, or -1 where there is none.
     """
@@ -196,7 +198,7 @@ def _add_bones(A, b, j, mate, joints, graph, length, precision):
         x, y, z = joints[j, 0] - joints[other, 0], joints[j, 1] - joints[other, 1], joints[j, 2] - joints[other, 2]
         current = max(np.sqrt(x * x + y * y + z * z), 1e-9)
         x, y, z = x / current, y / current, z / current
-        along = x * joints[other, 0] + y * joints[other, 1] + z * joints[other, 2] + length[bone]
+        along = length[bone] - current
         weight = precision[bone]
         A[0, 0] += weight * x * x
         A[1, 1] += weight * y * y

@@ -186,17 +186,17 @@ def settle(point, view, scratch, temper, steps):
         The first three rows of ``scratch`` hold the covariance there.
     """
     origins, directions, weights, pixel, sigma, floor = view
-    inverse, A, b, target = scratch[:3], scratch[3:6], scratch[6], scratch[7]
+    inverse, A, b, move = scratch[:3], scratch[3:6], scratch[6], scratch[7]
     for step in range(max(steps, 1)):
-        anchor(point, A, b)
+        anchor(A, b)
         sums = accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b)
-        solve(A, b, inverse, target)
+        solve(A, b, inverse, move)
         if step == steps:  # zero steps requested: evaluate only
             break
         moved = 0.0
         for r in range(3):
-            moved += (target[r] - point[r]) ** 2
-            point[r] = target[r]
+            moved += move[r] ** 2
+            point[r] += move[r]
         if temper == 1.0 and moved < _CONVERGED:
             break
         temper = max(temper / _COOLING, 1.0)

@@ -11,6 +11,9 @@ from mvpose.rays import viewing_rays
 
 PRESETS = ("full", "fast", "no-3dps", "no-matching", "hungarian", "geometry")
 FEW, MANY = 10, 170  # scenes per preset
+# Two views nearly in line can leave the depth of a joint open. Refinement then moves it, and what hangs on it, for as long
+# as it runs, and amplifies rounding.
+OPEN, DRIFT = 0.2, 1e-3  # standard deviation of such a joint, and the greatest movement of it, metres
 
 
 def changes(preset, seeds):
@@ -18,12 +21,18 @@ def changes(preset, seeds):
     pipeline, found, people = Pipeline.preset(preset), [], 0
     for seed in seeds:
         given = frame(seed)
-        original = pipeline.estimate(*given).joints
+        estimate = pipeline.estimate(*given)
+        original = estimate.joints
         people += len(original)
+        spread = np.linalg.eigvalsh(np.nan_to_num(estimate.covariance)).max(axis=(1, 2), initial=0.0)
+        determined = np.where(spread < OPEN**2, 1.0, np.nan)[:, None, None]  # of people, whose bones join their joints
         for name, (relation, bound) in RELATIONS.items():
             changed, back = relation(given, np.random.default_rng(seed))
-            moved = movement(original, back(pipeline.estimate(*changed).joints))
-            if not moved <= bound:
+            joints = back(pipeline.estimate(*changed).joints)
+            moved = movement(original, joints)
+            if not (
+                moved <= bound or (moved <= DRIFT and movement(original * determined, joints * determined) <= bound)
+            ):
                 found.append((seed, name, moved))
     assert people > len(seeds)
     return found
