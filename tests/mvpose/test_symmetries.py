@@ -11,14 +11,14 @@ from mvpose.rays import viewing_rays
 
 PRESETS = ("full", "fast", "no-3dps", "no-matching", "hungarian", "geometry")
 FEW, MANY = 10, 170  # scenes per preset
-# Two views nearly in line can leave the depth of a joint open. Refinement then moves it, and what hangs on it, for as long
-# as it runs, and amplifies rounding.
+# Two views nearly in line can leave the depth of a joint open. Refinement then moves it, and what hangs on it, for as
+# long as it runs, and amplifies rounding. This is rare.
 OPEN, DRIFT = 0.2, 1e-3  # standard deviation of such a joint, and the greatest movement of it, metres
 
 
 def changes(preset, seeds):
     """Return the scenes and relations by which people move further than rounding explains."""
-    pipeline, found, people = Pipeline.preset(preset), [], 0
+    pipeline, found, people, drifted = Pipeline.preset(preset), [], 0, 0
     for seed in seeds:
         given = frame(seed)
         estimate = pipeline.estimate(*given)
@@ -30,10 +30,13 @@ def changes(preset, seeds):
             changed, back = relation(given, np.random.default_rng(seed))
             joints = back(pipeline.estimate(*changed).joints)
             moved = movement(original, joints)
-            if not (
-                moved <= bound or (moved <= DRIFT and movement(original * determined, joints * determined) <= bound)
-            ):
+            if moved <= bound:
+                continue
+            if moved <= DRIFT and movement(original * determined, joints * determined) <= bound:
+                drifted += 1
+            else:
                 found.append((seed, name, moved))
+    assert drifted <= 0.01 * len(seeds) * len(RELATIONS)
     assert people > len(seeds)
     return found
 
