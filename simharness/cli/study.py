@@ -173,7 +173,8 @@ def _headline(results: Results) -> Table:
 def _cell(interval: Any, digits: int) -> str:
     if not interval.n:
         return "–"
-    ends = f"\n{interval.low:.{digits}f}–{interval.high:.{digits}f}" if interval.n > 1 else ""
+    # The ends stand on two lines, because six scores with intervals on one line do not fit 80 columns.
+    ends = f"\n{interval.low:.{digits}f}–\n{interval.high:.{digits}f}" if interval.n > 1 else ""
     return f"{interval.mean:.{digits}f}{ends}"
 
 

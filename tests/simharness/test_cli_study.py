@@ -94,8 +94,9 @@ def test_a_study_in_shards_and_then_complete(simharness, reports):
         (place,) = [place for place, words in enumerate(lines) if words[:2] == [f"{count}", "fast"]]
         assert lines[place][2] == f"{rows['pcp'].mean():.1f}"
         assert len(lines[place + 1]) == 6
-        low, high = (float(end) for end in lines[place + 1][0].split("–"))
-        assert low <= rows["pcp"].mean() <= high
+        assert len(lines[place + 2]) == 6
+        assert all(word.endswith("–") for word in lines[place + 1])
+        assert float(lines[place + 1][0].rstrip("–")) <= rows["pcp"].mean() <= float(lines[place + 2][0])
 
 
 class TestFailures:
