@@ -147,11 +147,15 @@ def is_imaged(x, y, lens, fold):
 def straighten(u, v, lens, fold):
     """Return the direction that :func:`bend` images at (u, v); NaN if there is none before the fold.
 
-    The radial terms alone grow up to the fold, so that bisection inverts them; Newton's method adds the others.
+    Newton's method starts at the pinhole's direction. Where that leads astray it starts anew, where the radial terms
+    alone image (u, v): they grow up to the fold, so that bisection inverts them.
     """
     radius = np.sqrt(u**2 + v**2)
     if not radius < _WIDEST:
         return np.nan, np.nan
+    x, y = _descend(u, v, u, v, lens, fold)
+    if np.isfinite(x):
+        return x, y
     low, high = 0.0, min(np.sqrt(fold), _WIDEST)
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2.0
