@@ -6,25 +6,18 @@
 
 from __future__ import annotations
 
-import io
-import math
-import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
 
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
+from simharness.formats.matlab5 import read_variable
 from simharness.runtime.archives import MOST
-from simharness.runtime.input_files import megabytes, read_bytes
-from simharness.runtime.message_text import one_line, shown
+from simharness.runtime.input_files import read_bytes
+from simharness.runtime.message_text import one_line
 
 _JOINTS = 14
-_HEADER, _TAG = 128, 8  # bytes
-_EXTENTS, _ARRAY, _COMPRESSED = 5, 14, 15
-"""Types of elements: the extents of an array (its second element), an array, and another element deflated."""
 _WHAT = "the truth of Shelf or Campus: a MATLAB 5 file with actor3D, for each actor a cell of frames of joints x 3"
 
 
@@ -58,9 +51,8 @@ def _read_actors(path: Path) -> list[np.ndarray]:
     """Return an array of cells of frames for each actor."""
     content = read_bytes(path, what=_WHAT)
     try:
-        # All variables are read, so that truncation after actor3D is detected too.
-        cells = loadmat(io.BytesIO(_inflated(content))).get("actor3D")
-    except Exception as error:  # a truncated file raises many types of errors, for example zlib.error
+        cells = read_variable(content, "actor3D")
+    except ValueError as error:
         raise ValueError(
             f"{path}: cannot be read as a MATLAB file ({one_line(str(error), 160)}; it has {len(content)} bytes); "
             f"expected {_WHAT}. It was probably cut off: copy or download it again"
@@ -73,64 +65,6 @@ def _read_actors(path: Path) -> list[np.ndarray]:
     if all(_unwrap(each).dtype != object for each in actors):
         actors = _one_actor(actors)
     return [track.ravel() for track in map(_unwrap, actors)]
-
-
-def _inflated(content: bytes) -> bytes:
-    """Return a MATLAB 5 file without compression, which bounds what reading it takes.
-
-    Raises:
-        ValueError: no MATLAB 5 file, a truncated one, or one that unpacks to more than ``MOST`` bytes.
-    """
-    order = {b"IM": "<", b"MI": ">"}.get(content[_HEADER - 2 : _HEADER])
-    if not content.startswith(b"MATLAB 5.0") or order is None:
-        raise ValueError("it does not begin as a MATLAB 5 file")
-    parts, start, size = [content[:_HEADER]], _HEADER, _HEADER
-    while start < len(content):
-        if len(content) < start + _TAG:
-            raise ValueError("its last element is cut off")
-        kind, length = struct.unpack(f"{order}II", content[start : start + _TAG])
-        end = start + _TAG + length
-        if end > len(content):
-            raise ValueError("its last element is cut off")
-        if kind == _COMPRESSED:
-            inflater = zlib.decompressobj()
-            parts.append(inflater.decompress(content[start + _TAG : end], MOST - size + 1))
-            if not inflater.eof and len(parts[-1]) <= MOST - size:
-                raise ValueError("an element is damaged")
-        else:
-            parts.append(content[start:end])
-        size += len(parts[-1])
-        if size > MOST:
-            raise ValueError(f"it unpacks to more than {megabytes(MOST)}")
-        start = end
-    inflated = b"".join(parts)
-    _check_extents(inflated, order)
-    return inflated
-
-
-def _check_extents(content: bytes, order: str) -> None:
-    """Check that no array declares more elements than it has bytes: memory for them is taken before they are read.
-
-    Raises:
-        ValueError: one does.
-    """
-    areas = [(_HEADER, len(content))]  # of elements beside each other: those of the file, and those of each array
-    while areas:
-        start, end = areas.pop()
-        length, place = end - start, 0
-        while start + _TAG <= end:
-            kind, size = struct.unpack_from(f"{order}II", content, start)
-            small = kind >> 16  # size of an element whose values are in the tag
-            first = start + (4 if small else _TAG)
-            kind, size = (kind & 0xFFFF, small) if small else (kind, size)
-            if kind == _ARRAY:
-                areas.append((first, min(first + size, end)))
-            elif kind == _EXTENTS and place == 1:
-                extents = struct.unpack_from(f"{order}{min(size, end - first) // 4}i", content, first)
-                if math.prod(map(abs, extents)) > length:
-                    raise ValueError(f"an array of {shown(extents)} has {length} bytes")
-            start = start + _TAG if small else first + -(-size // 8) * 8
-            place += 1
 
 
 def _one_actor(frames: np.ndarray) -> np.ndarray:

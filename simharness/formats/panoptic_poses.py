@@ -20,6 +20,7 @@ from mvpose.skeleton import PANOPTIC19
 from simharness.formats.joint_names import KNOWN
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
 from simharness.runtime.input_files import read_json_object
+from simharness.runtime.message_text import one_line
 from simharness.types.views import Visibility
 
 VERSION = 0.7  # of the dataset's files
@@ -85,9 +86,9 @@ def _bodies(path: Path, count: int) -> dict[int, NDArray[np.float64]]:
             defined = confidence >= _LEAST_CONFIDENCE
             result[int(body["id"])] = np.where(defined[:, None], np.stack([x, z, -y], axis=-1) / 100.0, np.nan)
     except (KeyError, TypeError) as error:
-        raise ValueError(f"{path}: lacks {error}; expected {_WHAT}") from None
-    except ValueError as error:
-        raise ValueError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+        raise ValueError(one_line(f"{path}: lacks {error}; expected {_WHAT}")) from None
+    except (ValueError, OverflowError) as error:
+        raise ValueError(one_line(str(error) if str(error).startswith(str(path)) else f"{path}: {error}")) from None
     return result
 
 

@@ -107,7 +107,7 @@ AROUND = {
     "simharness/runtime/archives.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
     "simharness/runtime/code_digest.py": "code",
-    "simharness/formats/actors_mat.py": "bytes that were read",
+    "simharness/runtime/machine.py": "what the kernel says of the machine",
     "simharness/trial/identity.py": "digests of regular files, read in blocks",
     "simharness/trial/stages/estimators.py": "code",
     "simharness/scenario/load.py": "digests of regular files",
