@@ -23,9 +23,9 @@ def body_axes(joints: ArrayLike) -> Floats:
     """
     joints = np.asarray(joints, float)
     shoulders, hips = joints[..., [_LEFT_SHOULDER, _RIGHT_SHOULDER], :], joints[..., [_LEFT_HIP, _RIGHT_HIP], :]
-    up = _unit(shoulders.mean(axis=-2) - hips.mean(axis=-2))
+    up = unit(shoulders.mean(axis=-2) - hips.mean(axis=-2))
     across = shoulders[..., 0, :] - shoulders[..., 1, :] + hips[..., 0, :] - hips[..., 1, :]
-    left = _unit(across - (across * up).sum(axis=-1, keepdims=True) * up)
+    left = unit(across - (across * up).sum(axis=-1, keepdims=True) * up)
     return np.stack([np.cross(left, up), left, up], axis=-2)
 
 
@@ -44,5 +44,7 @@ def pixel_offsets(joints: Floats, bias: Bias, rig: Rig) -> Floats:
     return np.stack([project_to_image(camera, moved) - project_to_image(camera, joints) for camera in rig], axis=1)
 
 
-def _unit(vector: Floats) -> Floats:
-    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+def unit(vector: Floats) -> Floats:
+    """Return vectors (..., 3) at length 1; NaN for vectors without length."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.detector.bias import body_axes
+from simharness.detector.bias import body_axes, unit
 from simharness.types.views import Visibility
 
 _HIDDEN = (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
@@ -62,13 +62,8 @@ def head_bearings(joints: ArrayLike, rig: Rig) -> Floats:
     joints = np.asarray(joints, float)
     nose, left_ear, right_ear = joints[..., 0, :], joints[..., 3, :], joints[..., 4, :]
     center = (left_ear + right_ear) / 2
-    left = _unit(left_ear - right_ear)
+    left = unit(left_ear - right_ear)
     ahead = nose - center
-    ahead = _unit(ahead - (ahead * left).sum(axis=-1, keepdims=True) * left)
+    ahead = unit(ahead - (ahead * left).sum(axis=-1, keepdims=True) * left)
     toward = np.stack([camera.center - center for camera in rig], axis=1)
     return np.arctan2((toward * left[:, None]).sum(axis=-1), (toward * ahead[:, None]).sum(axis=-1))
-
-
-def _unit(vector: Floats) -> Floats:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return vector / np.linalg.norm(vector, axis=-1, keepdims=True)

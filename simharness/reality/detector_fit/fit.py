@@ -13,7 +13,7 @@ from simharness.reality.annotation import AnnotationFit, fit_annotation
 from simharness.reality.detector_fit.calibration import calibrate
 from simharness.reality.detector_fit.face_bias import face_bias
 from simharness.reality.detector_fit.joint_labels import label_joints
-from simharness.reality.detector_fit.measure import RESAMPLES, Measurement, measure
+from simharness.reality.detector_fit.measure import RESAMPLES, MeasuredDetector, measure
 from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
 from simharness.reality.people_tracks import TrackedPeople, track_people
@@ -38,7 +38,7 @@ class Fit:
         text: the profile as a file.
     """
 
-    real: Measurement
+    real: MeasuredDetector
     annotation: AnnotationFit
     people: TrackedPeople
     film: Film

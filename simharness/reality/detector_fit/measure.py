@@ -67,7 +67,7 @@ class MeasuredValue:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class MeasuredDetector:
     """Measured parameters of a detector.
 
     Attributes:
@@ -84,7 +84,7 @@ class Measurement:
     kind: DetectorKind
     values: Mapping[str, MeasuredValue]
 
-    def with_values(self, values: Mapping[str, float]) -> Measurement:
+    def with_values(self, values: Mapping[str, float]) -> MeasuredDetector:
         """Return the measurement with calibrated values; intervals keep their distances from them as ratios."""
 
         def moved(measured: MeasuredValue, value: float) -> MeasuredValue:
@@ -120,7 +120,7 @@ class Measurement:
 
 def measure(
     sample: Sample, *, labels: LabelledJoints | None = None, resamples: int = RESAMPLES, seed: int = 0
-) -> Measurement:
+) -> MeasuredDetector:
     """Measure a detector.
 
     Intervals come from a block bootstrap over time (:mod:`simharness.statistics.bootstrap`). They cover other
@@ -161,7 +161,7 @@ def measure(
             high = np.fmax(high, min(1.0, _RULE_OF_THREE * design / max(n, 1)))
         # A percentile interval need not contain the value itself near a bound such as zero.
         result[key] = MeasuredValue(float(value[0]), float(np.fmin(low, value[0])), float(np.fmax(high, value[0])), n)
-    return Measurement(sample.name, len(sample), float(sample.known.sum() / len(sample)), sample.kind, result)
+    return MeasuredDetector(sample.name, len(sample), float(sample.known.sum() / len(sample)), sample.kind, result)
 
 
 def point_estimates(sample: Sample) -> dict[str, float]:
@@ -177,7 +177,7 @@ FITTED_SECTIONS = ("keypoints", "correlation", "scores", "boxes", "phantoms")
 """Sections of measured values that describe the detector. The others (share, size) also depend on the scene."""
 
 
-def agreement(real: Measurement, simulated: Measurement) -> tuple[list[str], int]:
+def agreement(real: MeasuredDetector, simulated: MeasuredDetector) -> tuple[list[str], int]:
     """Return the parameters that differ by more than their intervals allow, and the number of parameters compared.
 
     About 5 % of equal parameters differ by more.

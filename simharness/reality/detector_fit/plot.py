@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from simharness.reality.detector_fit.measure import Measurement
+from simharness.reality.detector_fit.measure import MeasuredDetector
 from simharness.scenario.sections.detector import BEARINGS, KINDS
 
 _COLORS = ("#3b82c4", "#d9643a")
@@ -64,7 +64,7 @@ _REST: tuple[tuple[str, str], ...] = (
 )
 
 
-def plot_comparison(measurements: Sequence[Measurement], path: str | Path) -> None:
+def plot_comparison(measurements: Sequence[MeasuredDetector], path: str | Path) -> None:
     """Write a PNG with up to two measurements side by side, every value with its 95 % interval.
 
     Raises:
@@ -93,7 +93,7 @@ def plot_comparison(measurements: Sequence[Measurement], path: str | Path) -> No
             raise ValueError(f"--figure {path}: cannot be written: {error.strerror}") from None
 
 
-def _draw(ax: Axes, measurements: Sequence[Measurement], keys: Sequence[str], *, scale: float = 1) -> None:
+def _draw(ax: Axes, measurements: Sequence[MeasuredDetector], keys: Sequence[str], *, scale: float = 1) -> None:
     """Draw the values of some keys, with their intervals, times ``scale``."""
     ax.set_axisbelow(True)
     ax.grid(axis="y")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.reality.detector_fit.measure import MeasuredValue, Measurement
+from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue
 from simharness.scenario.sections.detector import KINDS, Detector
 
 _FACE_DROPS = ("keypoints.drop.visible", "keypoints.drop.self_occluded")
@@ -44,7 +44,7 @@ _NOTES: Mapping[str, str] = {
 }
 
 
-def settings(measurement: Measurement, *, name: str, bias: Floats | None = None) -> dict[str, Any]:
+def settings(measurement: MeasuredDetector, *, name: str, bias: Floats | None = None) -> dict[str, Any]:
     """Return the [detector] section as nested plain values that pass ``Detector.model_validate``.
 
     Parameters that could not be measured keep their default, which is no error.
@@ -72,7 +72,7 @@ def settings(measurement: Measurement, *, name: str, bias: Floats | None = None)
     return Detector.model_validate(result).model_dump(mode="json", exclude_unset=True)
 
 
-def as_toml(measurement: Measurement, *, name: str, bias: Floats | None = None, command: str = "") -> str:
+def as_toml(measurement: MeasuredDetector, *, name: str, bias: Floats | None = None, command: str = "") -> str:
     """Return the profile as a file: every value with its interval and count, and notes on what was not measured."""
     tree = settings(measurement, name=name, bias=bias)
     joints = sum(measured.count for key, measured in measurement.values.items() if key.startswith("share.drop."))
@@ -90,7 +90,7 @@ def as_toml(measurement: Measurement, *, name: str, bias: Floats | None = None, 
     return "\n".join(lines) + "\n"
 
 
-def _section(path: str, values: Mapping[str, Any], measurement: Measurement) -> Iterator[str]:
+def _section(path: str, values: Mapping[str, Any], measurement: MeasuredDetector) -> Iterator[str]:
     """Yield the lines of a section and of the sections in it."""
     yield ""
     if path in _NOTES:
@@ -105,7 +105,7 @@ def _section(path: str, values: Mapping[str, Any], measurement: Measurement) -> 
             yield from _section(f"{path}.{key}", value, measurement)
 
 
-def _comment(key: str, measurement: Measurement) -> str:
+def _comment(key: str, measurement: MeasuredDetector) -> str:
     """Return the comment behind a value: its interval and count, or that it was not measured."""
     measured = measurement.values.get(key)
     if measured is None or not measured.known:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from simharness.reality.annotation import AnnotationFit
 from simharness.reality.detector_fit.frame_sums import TERCILES
-from simharness.reality.detector_fit.measure import MeasuredValue, Measurement, agreement
+from simharness.reality.detector_fit.measure import MeasuredDetector, MeasuredValue, agreement
 from simharness.scenario.sections.detector import BEARINGS, KINDS
 
 _WIDE = 130  # columns of a terminal that has room for all intervals
@@ -59,7 +59,7 @@ _OTHERS = {
 }
 
 
-def print_measurement(measurement: Measurement, console: Console) -> None:
+def print_measurement(measurement: MeasuredDetector, console: Console) -> None:
     """Print a measurement: classes and bias by kind of joint, drops by occlusion, sizes, and the other parameters."""
     headline = Text.assemble(
         (measurement.name, "bold"),
@@ -102,7 +102,7 @@ def print_annotation(fitted: AnnotationFit, console: Console) -> None:
     )
 
 
-def print_agreement(real: Measurement, simulated: Measurement, console: Console) -> None:
+def print_agreement(real: MeasuredDetector, simulated: MeasuredDetector, console: Console) -> None:
     """Print how many of the detector's parameters its simulated twin reproduces, and the others."""
     different, compared = agreement(real, simulated)
     table = _table(
@@ -116,7 +116,7 @@ def print_agreement(real: Measurement, simulated: Measurement, console: Console)
     console.print(table if different else table.title)
 
 
-def _classes(measurement: Measurement, *, intervals: bool) -> Table:
+def _classes(measurement: MeasuredDetector, *, intervals: bool) -> Table:
     """Return the table of error classes; in narrow terminals without intervals, which are in the JSON."""
     classes = ("drop", "swap", "inversion", "miss", "jitter")
     table = _table("Classes of errors, %, and scatter of good keypoints, units", "joint", "n", *classes, "scatter")
@@ -128,7 +128,7 @@ def _classes(measurement: Measurement, *, intervals: bool) -> Table:
     return table
 
 
-def _drops(measurement: Measurement) -> Table:
+def _drops(measurement: MeasuredDetector) -> Table:
     table = _table("Not reported, % of joints by occlusion", "joint", *(each.replace("_", "-") for each in _OCCLUSIONS))
     for kind in KINDS:
         table.add_row(
@@ -137,7 +137,7 @@ def _drops(measurement: Measurement) -> Table:
     return table
 
 
-def _face(measurement: Measurement) -> Table:
+def _face(measurement: MeasuredDetector) -> Table:
     degrees = list(map(str, BEARINGS))
     title = "Joints of the face not reported, %, by bearing of the camera to their side, degrees"
     table = _table(title, "joint", *degrees)
@@ -147,14 +147,14 @@ def _face(measurement: Measurement) -> Table:
     return table
 
 
-def _sizes(measurement: Measurement) -> Table:
+def _sizes(measurement: MeasuredDetector) -> Table:
     table = _table("Limb joints by size of the person, %", "third", "not reported", "reported, not good")
     for third in TERCILES:
         table.add_row(third, *(_cell(measurement[f"size.{third}.{key}"], 1, scale=100) for key in ("drop", "wrong")))
     return table
 
 
-def _list(title: str, rows: tuple[tuple[str, str], ...], measurement: Measurement) -> Table:
+def _list(title: str, rows: tuple[tuple[str, str], ...], measurement: MeasuredDetector) -> Table:
     table = _table(title, "", "measured")
     for key, label in rows:
         if key in measurement.values:  # parameters differ with the kind of the detector
