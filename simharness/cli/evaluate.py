@@ -81,7 +81,9 @@ def evaluate_recording(
 def twin(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    twins: Annotated[int, typer.Option(metavar="N", min=2, help="Number of twins, of different seeds.")] = 10,
+    twins: Annotated[
+        int, typer.Option(metavar="N", min=2, max=10_000, help="Number of twins, of different seeds.")
+    ] = 10,
     json_file: JsonFile = None,
 ) -> None:
     """A recording and its simulated twin: PCP of variants in reality and in simulation, with intervals."""
@@ -108,7 +110,7 @@ def twin(
 def evaluate_seeds(
     scenario: ScenarioFile,
     overrides: Overrides = None,
-    seeds: Annotated[int, typer.Option(metavar="N", min=2, help="Number of seeds.")] = 10,
+    seeds: Annotated[int, typer.Option(metavar="N", min=2, max=10_000, help="Number of seeds.")] = 10,
     json_file: JsonFile = None,
 ) -> None:
     """A scenario at many seeds: PCP of its variants, of all people and of each person, with intervals."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import traceback
 from collections.abc import Iterator
@@ -35,10 +36,21 @@ def exit_on_error() -> Iterator[None]:
         raise typer.Exit(BAD_INPUT) from None
     except (typer.Exit, typer.Abort):
         raise
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            _report_failure(console, error)
+            raise typer.Exit(FAILED) from None
+        shown = f"{str(error.filename)[:60]}…: this path is too long for the file system"
+        console.print(Text.assemble(("error: ", "bold red"), shown), soft_wrap=True)
+        raise typer.Exit(BAD_INPUT) from None
     except Exception as error:
-        traceback.print_exc()
-        console.print(Text.assemble(("the run failed: ", "bold red"), str(error)), soft_wrap=True)
+        _report_failure(console, error)
         raise typer.Exit(FAILED) from None
+
+
+def _report_failure(console: Console, error: Exception) -> None:
+    traceback.print_exc()
+    console.print(Text.assemble(("the run failed: ", "bold red"), str(error)), soft_wrap=True)
 
 
 @contextlib.contextmanager
