@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammaincinv
+from scipy.special import fdtri, gammaincinv
 
 from mvpose.checks import Sealed, as_array
 from mvpose.skeleton import COCO17, Skeleton
@@ -65,9 +65,12 @@ class Estimate(Sealed):
     Attributes:
         joints: positions in metres, (n, J, 3); NaN for a joint that could not be placed.
         scores: confidence, 0 to 1, (n, J); 0 for a joint that could not be placed.
-        covariance: covariance of each joint, (n, J, 3, 3), square metres, or None.
+        covariance: covariance of the error of each joint, (n, J, 3, 3), square metres, or None.
         matching: groups of detections from which the people come; person i has label i.
         timings: time in seconds by stage ("affinity", "matching", "reconstruction", "total").
+        freedom: degrees of freedom of the error of each joint, (n, J), above 2; NaN for a joint that could not be
+            placed. The error is a multivariate t with this covariance, because its scale is itself estimated: its tail
+            is heavier than that of a Gaussian. None: the error is Gaussian. See :meth:`ellipsoids`.
     """
 
     joints: NDArray[np.float64]
@@ -75,6 +78,7 @@ class Estimate(Sealed):
     matching: Matching
     covariance: NDArray[np.float64] | None = None
     timings: dict[str, float] = field(default_factory=dict)
+    freedom: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         joints = as_array(self.joints, ("n", "J", 3), "joints")
@@ -82,6 +86,13 @@ class Estimate(Sealed):
         object.__setattr__(self, "scores", as_array(self.scores, joints.shape[:2], "scores"))
         if self.covariance is not None:
             object.__setattr__(self, "covariance", as_array(self.covariance, (*joints.shape, 3), "covariance"))
+        if self.freedom is not None:
+            freedom = as_array(self.freedom, joints.shape[:2], "freedom")
+            if (freedom <= 2.0).any():
+                raise ValueError(
+                    f"degrees of freedom must be above 2, else there is no covariance; got {np.nanmin(freedom):.6g}"
+                )
+            object.__setattr__(self, "freedom", freedom)
 
     @classmethod
     def of_joints(
@@ -135,6 +146,10 @@ class Estimate(Sealed):
     def ellipsoids(self, share: float) -> NDArray[np.float64] | None:
         """Return the ellipsoid around each joint that should hold the true joint with a given probability.
 
+        The squared Mahalanobis distance of a multivariate t with n degrees of freedom is 3 (n - 2) / n times an F
+        variable with 3 and n degrees (Kotz & Nadarajah, Multivariate t Distributions, 2004); for a Gaussian it is
+        chi-square with 3 degrees. The two 90 % ellipsoids are of nearly the same size; further ones differ.
+
         Args:
             share: the probability, above 0 and below 1.
 
@@ -149,7 +164,10 @@ class Estimate(Sealed):
             raise ValueError(f"share of the ellipsoids must be above 0 and below 1, got {share}")
         if self.covariance is None:
             return None
-        return self.covariance * (2.0 * gammaincinv(1.5, share))  # quantile of chi-square with 3 degrees
+        if self.freedom is None:
+            return self.covariance * (2.0 * gammaincinv(1.5, share))  # the quantile of chi-square
+        quantile = fdtri(3.0, self.freedom, share)
+        return self.covariance * (3.0 * (1.0 - 2.0 / self.freedom) * quantile)[..., None, None]
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -174,4 +174,4 @@ def _estimate(poses: Poses, matching: Matching, start: float, compared: float, m
         "reconstruction": end - matched,
         "total": end - start,
     }
-    return Estimate(poses.joints, poses.scores, matching, poses.covariance, timings)
+    return Estimate(poses.joints, poses.scores, matching, poses.covariance, timings, poses.freedom)

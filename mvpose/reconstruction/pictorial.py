@@ -94,8 +94,9 @@ def _structures(
 ):  # fmt: skip
     trunk = np.empty(3)
     for person in range(len(poses.joints)):
-        joints, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
-        clear(joints, scores, covariance)
+        joints, scores = poses.joints[person], poses.scores[person]
+        covariance, freedom = poses.covariance[person], poses.freedom[person]
+        clear(joints, scores, covariance, freedom)
         centers, rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
         states, unary, count, scale = propose_all(
             centers, rays, scores_2d, angles, sigmas, floor, most_pairs, most_states
@@ -120,6 +121,6 @@ def _structures(
         weakened = precision * fit_scale(joints, centers, rays, scores_2d, angles, deviations, floor)
         climb(joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, weakened)
         write_uncertainty(
-            scores, covariance, joints, centers, rays, scores_2d, angles, deviations, floor, graph, lengths, precision,
-            concentrations, trunk,
+            scores, covariance, freedom, joints, centers, rays, scores_2d, angles, sigmas, deviations, floor, graph,
+            lengths, precision, concentrations, trunk,
         )  # fmt: skip

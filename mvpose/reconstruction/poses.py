@@ -22,24 +22,29 @@ class Poses(NamedTuple):
         scores: mean over the person's views of the keypoint score times the posterior probability that the keypoint
             is right, (n, J); 0 where a joint could not be placed.
         covariance: covariance of each position, (n, J, 3, 3), square metres; NaN where a joint could not be placed.
+        freedom: degrees of freedom of the multivariate t distribution of its error, (n, J), above 2; NaN where a joint
+            could not be placed.
     """
 
     joints: Floats
     scores: Floats
     covariance: Floats
+    freedom: Floats
 
     @classmethod
     def empty(cls, labels: NDArray[np.int64], joints: int) -> Poses:
         """Return uninitialised arrays for the people in labels (m,)."""
         people = int(labels.max()) + 1 if len(labels) else 0
-        return cls(np.empty((people, joints, 3)), np.empty((people, joints)), np.empty((people, joints, 3, 3)))
+        shape = people, joints
+        return cls(np.empty((*shape, 3)), np.empty(shape), np.empty((*shape, 3, 3)), np.empty(shape))
 
 
 @njit(cache=True)
-def clear(joints, scores, covariance):
+def clear(joints, scores, covariance, freedom):
     """Mark all joints of one person as missing."""
     for j in range(len(scores)):
         scores[j] = 0.0
+        freedom[j] = np.nan
         for r in range(3):
             joints[j, r] = np.nan
             for c in range(3):

@@ -15,9 +15,9 @@ from mvpose.arrays import Floats
 from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_graph import bone_graph
-from mvpose.reconstruction.error_scale import joint_scales, person_scale
+from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale, rescale
 from mvpose.reconstruction.inference import marginalize
-from mvpose.reconstruction.likelihood import ANCHOR, Noise, accumulate, anchor, log_likelihood, solve
+from mvpose.reconstruction.likelihood import Noise, accumulate, anchor, log_likelihood, solve
 from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
 from mvpose.reconstruction.poses import MISSING_SCORE, gather
 from mvpose.skeleton import Skeleton
@@ -25,7 +25,7 @@ from mvpose.skeleton import Skeleton
 
 def refine(
     joints: Floats, rays: Rays, skeleton: Skeleton, *, noise: Noise, length: Floats, deviation: Floats
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Move a pose of one person to the nearby maximum of likelihood times bone-length prior.
 
     Args:
@@ -37,7 +37,8 @@ def refine(
         deviation: standard deviations of the lengths, (B,), metres; infinite for no constraint.
 
     Returns:
-        Joints (J, 3), scores (J,) and covariances (J, 3, 3), as :class:`mvpose.reconstruction.poses.Poses`.
+        Joints (J, 3), scores (J,), covariances (J, 3, 3) and degrees of freedom (J,), as
+        :class:`mvpose.reconstruction.poses.Poses`.
     """
     views = gather(
         np.zeros(len(rays), np.int64),
@@ -48,22 +49,24 @@ def refine(
         noise.pixels * rays.pixel,
     )
     refined, scores = np.array(joints, float), np.zeros(len(joints))
-    covariance = np.full((len(joints), 3, 3), np.nan)
+    covariance, freedom = np.full((len(joints), 3, 3), np.nan), np.full(len(joints), np.nan)
     graph = bone_graph(skeleton)
     skeletal = (graph, length, graph.share / deviation**2)
     climb(refined, *views, noise.sigmas(skeleton), noise.floor, *skeletal)
     write_uncertainty(
         scores,
         covariance,
+        freedom,
         refined,
         *views,
+        noise.sigmas(skeleton),
         noise.sigmas(skeleton),
         noise.floor,
         *skeletal,
         np.zeros(len(length)),
         np.zeros(3),
     )
-    return refined, scores, covariance
+    return refined, scores, covariance, freedom
 
 
 _SWEEPS = 8
@@ -238,35 +241,55 @@ def _distance(a, b):
     return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
+_MOST_ALIKE = 0.95  # of the variances; the keypoints of a detector never agree perfectly
+
+
 @njit(cache=True)
 def write_uncertainty(
-    scores, covariance, joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision,
-    concentrations, trunk,
+    scores, covariance, freedom, joints, origins, directions, weights, pixel, sigmas, deviations, floor, graph, length,
+    precision, concentrations, trunk,
 ):  # fmt: skip
-    """Write scores (J,) and covariances (J, 3, 3) of a pose at the maximum of its posterior.
+    """Write scores (J,), covariances (J, 3, 3) and degrees of freedom (J,) of a pose at the maximum of its posterior.
 
-    A joint that is NaN is skipped, and one that no view supports becomes NaN.
+    The pose was found with the standard deviations ``deviations``; those of the error model are ``sigmas``, (J,),
+    metres. See :mod:`mvpose.reconstruction.error_scale`. A joint that is NaN is skipped, and one that no view supports
+    becomes NaN.
     """
     n, count = len(pixel), len(joints)
-    misfit, responsibilities = np.zeros(count), np.zeros(count)
+    misfit, responsibilities, supports = np.zeros(count), np.zeros(count), np.zeros(count)
     information, b = np.zeros((count, 3, 3)), np.empty(3)
     for j in range(count):
         if not np.isnan(joints[j, 0]):
-            support, responsibilities[j], misfit[j] = accumulate(
-                joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, information[j], b
+            support, _, _ = accumulate(
+                joints[j], origins, directions[j], weights[j], pixel, deviations[j], floor, 1.0, information[j], b
             )
             if support / n > MISSING_SCORE:
                 scores[j] = support / n
+                supports[j], responsibilities[j], misfit[j] = accumulate(
+                    joints[j], origins, directions[j], weights[j], pixel, sigmas[j], floor, 1.0, information[j], b
+                )
             else:  # no view supports it: placed by the prior alone
                 for r in range(3):
                     joints[j, r] = np.nan
-    scale = joint_scales(misfit, responsibilities)
+    relative, absolute = fit_variances(misfit, responsibilities, supports, sigmas)
+    # Errors of calibration move all joints of a person alike, so that no bone shows or reduces them: their share of the
+    # covariance from the keypoints bypasses the bones.
+    alike, unused = np.zeros((count, 3, 3)), np.empty(3)
     for j in range(count):
-        for r in range(3):
-            for c in range(3):
-                information[j, r, c] /= scale[j]
-            information[j, r, r] += ANCHOR
+        if not np.isnan(joints[j, 0]):
+            view = origins, directions[j], weights[j], pixel, sigmas[j], floor
+            scale, freedom[j], share = observe(joints[j], view, relative, absolute, information[j])
+            rescale(information[j], scale)
+            if share > 0.0:
+                share = min(share, _MOST_ALIKE)
+                b[:] = 0.0
+                solve(information[j], b, alike[j], unused)
+                alike[j] *= share
+                information[j] /= 1.0 - share
     marginalize(joints, information, covariance, graph, precision)
+    for j in range(count):
+        covariance[j] += alike[j]
+        add_shared(covariance[j], sigmas[j])
     _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk)
 
 

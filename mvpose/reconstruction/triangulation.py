@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from mvpose.rays import Rays
-from mvpose.reconstruction.error_scale import joint_scales, person_scale
+from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale, rescale
 from mvpose.reconstruction.likelihood import (
     NO_RAYS,
     Noise,
@@ -78,46 +78,49 @@ class Triangulation:
 @njit(cache=True)
 def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, floor, method):
     joints = len(sigmas)
-    misfit, responsibilities = np.empty(joints), np.empty(joints)
+    misfit, responsibilities, supports = np.empty(joints), np.empty(joints), np.empty(joints)
     scratch = np.empty((8, 3))
     for person in range(len(poses.joints)):
         centers, person_rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
-        point, scores, covariance = poses.joints[person], poses.scores[person], poses.covariance[person]
-        clear(point, scores, covariance)
+        point, scores = poses.joints[person], poses.scores[person]
+        covariance, freedom = poses.covariance[person], poses.freedom[person]
+        clear(point, scores, covariance, freedom)
         error_scale, steps = 1.0, 0
         for j in range(joints):
-            responsibilities[j] = misfit[j] = 0.0
             view = centers, person_rays[j], scores_2d[j], angles, sigmas[j], floor
             if method == 0:
-                _, responsibilities[j], misfit[j] = consensus(point[j], view, scratch)
-            elif method == 1:
-                _all_views(point[j], view, scratch)
+                sums = consensus(point[j], view, scratch)
             else:
-                _best_pair(point[j], view)
+                found = _all_views(point[j], view, scratch) if method == 1 else _best_pair(point[j], view)
+                sums = settle(point[j], view, scratch, 1.0, 0) if found else (0.0, 0.0, 0.0)
+            supports[j], responsibilities[j], misfit[j] = sums
         if method == 0:  # which keypoints are wrong is decided by the error scale of this person, not of the model
             error_scale, steps = np.sqrt(person_scale(misfit, responsibilities)), _MOST_STEPS
+        relative, absolute = fit_variances(misfit, responsibilities, supports, sigmas)
         for j in range(joints):
-            support = 0.0
-            if not np.isnan(point[j, 0]):
-                view = centers, person_rays[j], scores_2d[j], angles, error_scale * sigmas[j], floor
-                support, responsibilities[j], misfit[j] = settle(point[j], view, scratch, 1.0, steps)
-            _store(point[j], support / len(angles), scratch, j, scores, covariance)
-        scale = joint_scales(misfit, responsibilities)
-        for j in range(joints):
-            for r in range(3):
-                for c in range(3):
-                    covariance[j, r, c] *= scale[j]
+            if np.isnan(point[j, 0]):
+                continue
+            view = centers, person_rays[j], scores_2d[j], angles, error_scale * sigmas[j], floor
+            if steps > 0:
+                supports[j], _, _ = settle(point[j], view, scratch, 1.0, steps)
+            if supports[j] / len(angles) > MISSING_SCORE:
+                scores[j] = supports[j] / len(angles)
+                view = centers, person_rays[j], scores_2d[j], angles, sigmas[j], floor
+                freedom[j] = _write_covariance(covariance[j], point[j], view, relative, absolute, scratch)
+            else:
+                for r in range(3):
+                    point[j, r] = np.nan
 
 
 @njit(cache=True)
-def _store(point, score, scratch, j, scores, covariance):
-    """Store the score and covariance of a joint; mark it as missing if no view supports it."""
-    scores[j] = score if score > MISSING_SCORE else 0.0
-    for r in range(3):
-        if score <= MISSING_SCORE:
-            point[r] = np.nan
-        for c in range(3):
-            covariance[j, r, c] = scratch[r, c] if score > MISSING_SCORE else np.nan
+def _write_covariance(covariance, point, view, relative, absolute, scratch):
+    """Write the covariance of one joint (3, 3), and return the degrees of freedom of its error."""
+    information, b, unused = scratch[:3], scratch[6], scratch[7]
+    scale, freedom, _ = observe(point, view, relative, absolute, information)
+    rescale(information, scale)
+    solve(information, b, covariance, unused)
+    add_shared(covariance, view[4])
+    return freedom
 
 
 _MOST_STEPS = 12

@@ -181,10 +181,11 @@ def _label(found: _FoundPoses, view: Integers) -> Integers:
 
 def _polish(
     rays: Rays, skeleton: Skeleton, found: _FoundPoses, people: list[int], noise: Noise
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Refine poses on the keypoints that they explain, with the keypoints of a view taken as one detection."""
     shape = (len(people), len(skeleton))
-    joints, scores, covariance = np.zeros((*shape, 3)), np.zeros(shape), np.zeros((*shape, 3, 3))
+    joints, scores = np.zeros((*shape, 3)), np.zeros(shape)
+    covariance, freedom = np.zeros((*shape, 3, 3)), np.zeros(shape)
     length, deviation = bone_lengths(skeleton)
     for k, pose in enumerate(people):
         detection, joint = np.nonzero(found.owner == pose)
@@ -193,7 +194,7 @@ def _polish(
         directions[row, joint] = rays.directions[detection, joint]
         weights[row, joint] = rays.weights[detection, joint]
         representative = detection[first]
-        joints[k], scores[k], covariance[k] = refine(
+        joints[k], scores[k], covariance[k], freedom[k] = refine(
             found.poses[pose],
             Rays(views, rays.origins[representative], directions, weights, rays.pixel[representative]),
             skeleton,
@@ -201,7 +202,7 @@ def _polish(
             length=length,
             deviation=deviation,
         )
-    return joints, scores, covariance
+    return joints, scores, covariance, freedom
 
 
 @njit(cache=True)

@@ -98,11 +98,12 @@ def truth_of(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
 
 def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
     """Return the estimates of one variant over T frames: ``frame`` (k,), ``joints``, ``scores`` and, where all frames
-    have it, ``covariance`` of the k estimated people; ``labels`` (n,) of the detections; ``iterations``, ``residuals``,
-    ``objective`` and ``converged`` of the matching of each frame.
+    have them, ``covariance`` and ``freedom`` of the k estimated people; ``labels`` (n,) of the detections;
+    ``iterations``, ``residuals``, ``objective`` and ``converged`` of the matching of each frame.
     """
-    has_covariance = all(estimate.covariance is not None for estimate in estimates)
-    keys = ("joints", "scores", "covariance") if has_covariance else ("joints", "scores")
+    optional = ("covariance", "freedom")
+    known = [key for key in optional if all(getattr(estimate, key) is not None for estimate in estimates)]
+    keys = ("joints", "scores", *known)
     matchings = [estimate.matching for estimate in estimates]
     return {
         "frame": _frame_index(map(len, estimates)),
@@ -130,13 +131,14 @@ def estimates_of(
     counts = arrays.get("label_counts")
     labelled = detected if counts is None else np.repeat(np.arange(frames), counts)
     parts = zip(rows_of_frames(arrays["frame"], frames), rows_of_frames(labelled, frames), strict=True)
-    covariance = arrays.get("covariance")
+    covariance, freedom = arrays.get("covariance"), arrays.get("freedom")
     for index, (people, labels) in enumerate(parts):
         primal, dual = arrays["residuals"][index]
         yield Estimate(
             joints=arrays["joints"][people],
             scores=arrays["scores"][people],
             covariance=None if covariance is None else covariance[people],
+            freedom=None if freedom is None else freedom[people],
             matching=Matching(
                 labels=arrays["labels"][labels],
                 iterations=int(arrays["iterations"][index]),

@@ -18,10 +18,10 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
     `detections.npz`, ``person`` (n,) and ``error`` (n, J).
 `estimates.npz`
     ``variants`` are their names; for each, over k estimated people of all frames, ``NAME/frame`` (k,) ascending,
-    ``NAME/joints`` (k, J, 3) m, ``NAME/scores`` (k, J), ``NAME/covariance`` (k, J, 3, 3) m² where the variant
-    has it; ``NAME/labels`` (n,) of the detections; and of the matching of each frame ``NAME/iterations``
-    (T,), ``NAME/residuals`` (T, 2), ``NAME/objective`` (T,), ``NAME/converged`` (T,). The relaxed P is not
-    stored.
+    ``NAME/joints`` (k, J, 3) m, ``NAME/scores`` (k, J), ``NAME/covariance`` (k, J, 3, 3) m² and ``NAME/freedom`` (k, J)
+    where the variant has them; ``NAME/labels`` (n,) of the detections; and of the matching of each frame
+    ``NAME/iterations`` (T,), ``NAME/residuals`` (T, 2), ``NAME/objective`` (T,), ``NAME/converged`` (T,). The relaxed
+    P is not stored.
 `scores.parquet`
     a row for each frame and variant: :mod:`simharness.scoring.summary`.
 `timings.parquet`

@@ -76,3 +76,36 @@ def test_labels_cover_all_detections_or_none():
     assert Matching([]).covers(0)
     with pytest.raises(ValueError, match=r"labels must be \(3,\), got \(2,\)"):
         Matching([0, -1]).labels_of(3)
+
+
+@pytest.mark.parametrize("freedom", [2.5, 4.0, 12.0, None])
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.99])
+def test_an_ellipsoid_holds_its_share_of_draws(freedom, share):
+    """Draws from a multivariate t, or a Gaussian, of the given covariance; 40,000 have a deviation of 0.25 points."""
+    rng, n = np.random.default_rng(0), 40_000
+    root = np.array([[0.05, 0.0, 0.0], [0.02, 0.03, 0.0], [-0.01, 0.0, 0.01]])
+    draws = rng.standard_normal((n, 3)) @ root.T
+    if freedom is not None:
+        draws *= np.sqrt((freedom - 2) / rng.chisquare(freedom, n))[:, None]
+    covariance = np.broadcast_to(root @ root.T, (1, 17, 3, 3))
+    given = None if freedom is None else np.full((1, 17), freedom)
+    ellipsoid = Estimate(PEOPLE[:1], np.ones((1, 17)), Matching([]), covariance, freedom=given).ellipsoids(share)[0, 3]
+    distance = np.einsum("ni,ni->n", draws, np.linalg.solve(ellipsoid, draws.T).T)
+    assert np.mean(distance <= 1.0) == pytest.approx(share, abs=0.01)
+
+
+def test_many_degrees_of_freedom_are_a_gaussian():
+    covariance = np.broadcast_to(np.eye(3), (2, 17, 3, 3))
+    gaussian = Estimate(PEOPLE, np.ones((2, 17)), Matching([]), covariance)
+    nearly = Estimate(PEOPLE, np.ones((2, 17)), Matching([]), covariance, freedom=np.full((2, 17), 1e7))
+    np.testing.assert_allclose(nearly.ellipsoids(0.9), gaussian.ellipsoids(0.9), rtol=1e-5)
+    assert gaussian.ellipsoids(0.9)[0, 0, 0, 0] == pytest.approx(6.2514, rel=1e-4)  # of tables of chi-square
+    assert Estimate.of_joints(PEOPLE).ellipsoids(0.9) is None
+
+
+def test_degrees_of_freedom_and_shares_are_checked():
+    with pytest.raises(ValueError, match="above 2"):
+        Estimate(PEOPLE, np.ones((2, 17)), Matching([]), freedom=np.full((2, 17), 2.0))
+    for share in (0.0, 1.0, 90, float("nan")):
+        with pytest.raises(ValueError, match="above 0 and below 1"):
+            Estimate.of_joints(PEOPLE).ellipsoids(share)

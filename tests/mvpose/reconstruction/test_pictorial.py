@@ -6,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from people import STANDING, detect, ring
 
-from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Rig, Skeleton
+from mvpose import COCO17, PANOPTIC19, SHELF14, Detections, Estimate, Matching, Rig, Skeleton
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Noise, PictorialStructure, Triangulation
 from mvpose.reconstruction.bone_graph import bone_graph, mirror_images
 from mvpose.reconstruction.bone_length_prior import PROPORTION_DEVIATION, bone_lengths
+from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.inference import marginalize, max_product
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.limb_direction_prior import (
@@ -25,7 +26,7 @@ from mvpose.reconstruction.triangulation import consensus
 
 def reconstruct(rays, method=None):
     """Joints, scores and covariances of the single person to whom all rays belong."""
-    return (each[0] for each in (method or PictorialStructure())(rays, np.zeros(len(rays), int), COCO17))
+    return (each[0] for each in (method or PictorialStructure())(rays, np.zeros(len(rays), int), COCO17)[:3])
 
 
 def bones_of(graph):
@@ -253,7 +254,7 @@ def test_refinement_raises_the_posterior_and_does_not_diverge(seed):
     skeletal = (bone_graph(COCO17), length, bone_graph(COCO17).share / deviation**2)
     climb(joints, rays.origins, *alone, noise.pixels * rays.pixel, noise.sigmas(COCO17), noise.floor, *skeletal)
     assert log_posterior(joints, rays) > log_posterior(start, rays)
-    refined, scores, _ = refine(start, rays, COCO17, noise=noise, length=length, deviation=deviation)
+    refined, scores, *_ = refine(start, rays, COCO17, noise=noise, length=length, deviation=deviation)
     np.testing.assert_array_equal(refined, np.where(scores[:, None] > 0, joints, np.nan))
     whole, _, _ = reconstruct(rays)
     assert np.nanmax(np.linalg.norm(whole - STANDING, axis=1)) < 1.5
@@ -376,24 +377,24 @@ def test_the_prior_adapts_to_the_size_of_the_person(stature):
 @pytest.mark.parametrize("method", [Triangulation(), PictorialStructure()])
 @pytest.mark.parametrize("share", [0.3, 0.7, 1.2])
 def test_the_true_joint_is_in_the_90_percent_ellipsoid(method, share):
-    """Keypoints with errors smaller or larger than the error model, some hidden, some grossly wrong.
-
-    Calibrated means 85 to 95 % here; 6.25 is the 90 % quantile of the chi-square distribution with three degrees of
-    freedom.
+    """Keypoints with errors smaller or larger than the error model, some hidden, some grossly wrong, on joints that all
+    views see displaced alike. Calibrated means 85 to 97 % here: bones of an average adult help more than they claim.
     """
     rng, inside = np.random.default_rng(int(10 * share)), []
     for _ in range(60):
         rig = ring(int(rng.integers(4, 8)))
         body = STANDING * rng.normal(1.0, PROPORTION_DEVIATION)
+        seen = body + SHARED * Noise().sigmas(COCO17)[:, None] * rng.standard_normal(body.shape)
         depth = np.linalg.norm(body - rig.centers[:, None], axis=2)
         scatter = share * Noise().sigmas(COCO17) * 800 / depth
-        pixels = rig.project(body) + rng.standard_normal((len(rig), 17, 2)) * scatter[..., None]
+        pixels = rig.project(seen) + rng.standard_normal((len(rig), 17, 2)) * scatter[..., None]
         pixels[rng.random(pixels.shape[:2]) < 0.03] += 90  # the model's floor is for these
         scores = np.where(rng.random(pixels.shape[:2]) < 0.15, 0.0, 0.9)
         rays = viewing_rays(rig, Detections.from_keypoints(np.arange(len(rig)), pixels, scores))
-        joints, _, covariance = reconstruct(rays, method)
+        poses = method(rays, np.zeros(len(rays), int), COCO17)
+        estimate = Estimate(poses.joints, poses.scores, Matching([]), poses.covariance, freedom=poses.freedom)
         for j in np.flatnonzero((scores > 0).sum(axis=0) > 1):
-            off = joints[j] - body[j]
-            inside.append(off @ np.linalg.solve(covariance[j], off) < 6.25)
+            off = estimate.joints[0, j] - body[j]
+            inside.append(off @ np.linalg.solve(estimate.ellipsoids(0.9)[0, j], off) < 1.0)
     assert len(inside) > 900
-    assert 0.85 < np.mean(inside) < 0.95
+    assert 0.85 < np.mean(inside) < 0.97

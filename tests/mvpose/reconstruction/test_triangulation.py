@@ -9,7 +9,6 @@ from people import STANDING, detect, look_at, ring
 from mvpose import COCO17, Detections, Rig
 from mvpose.rays import viewing_rays
 from mvpose.reconstruction import Triangulation
-from mvpose.reconstruction.error_scale import joint_scales
 from mvpose.reconstruction.likelihood import log_likelihood
 from mvpose.reconstruction.triangulation import consensus, pair_point
 
@@ -21,7 +20,7 @@ def rays_of(rig, pixels, scores=None):
 
 def triangulate(rays, **kwargs):
     """Joints, scores and covariances of the single person to whom all rays belong."""
-    return (each[0] for each in Triangulation(**kwargs)(rays, np.zeros(len(rays), int), COCO17))
+    return (each[0] for each in Triangulation(**kwargs)(rays, np.zeros(len(rays), int), COCO17)[:3])
 
 
 @given(st.integers(2, 7), st.floats(-1, 1), st.floats(-1, 1))
@@ -136,15 +135,6 @@ def test_people_do_not_affect_each_other():
     alone = Triangulation()(rays.select(person == 0), np.zeros(4, int), COCO17)
     np.testing.assert_array_equal(both.joints[1], alone.joints[0])
     np.testing.assert_array_equal(both.covariance[1], alone.covariance[0])
-
-
-@pytest.mark.parametrize("scale", [0.3, 1.0, 2.0])
-def test_error_scales_follow_the_residuals(scale):
-    """The scale of many joints with known misfits is estimated within its uncertainty."""
-    rights = np.full(17, 20.0)
-    misfit = scale * np.random.default_rng(0).chisquare(2 * 20 - 3, 17) * 0.9  # the tail is not seen
-    np.testing.assert_allclose(np.median(joint_scales(misfit, rights)), scale, rtol=0.15)
-    np.testing.assert_allclose(joint_scales(np.zeros(17), np.zeros(17)), 1.0)
 
 
 def test_an_unknown_method_is_refused():
