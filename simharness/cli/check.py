@@ -14,11 +14,12 @@ from simharness.cli.exit_codes import BAD_INPUT, REGRESSION, exit_on_error, run_
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from simharness.gate.compare import Verdict
     from simharness.gate.gate_result import FailedCase, GateResult
     from simharness.scenario.study_definition import Study
 
 _LISTED = 8  # changes of each kind: a bug that breaks everything breaks a hundred scores
-_VERDICTS = {"worse": "[red]worse[/]", "better": "[green]better[/]", "same": ""}
+_STYLES: dict[Verdict, str] = {"worse": "red", "unexpected": "yellow", "better": "green"}
 
 
 def add_to(app: typer.Typer) -> None:
@@ -44,14 +45,18 @@ def check(
     update: Annotated[
         bool, typer.Option("--update-baseline", help="Write a new baseline instead of comparing with it.")
     ] = False,
+    accept_better: Annotated[
+        bool, typer.Option("--accept-better", help="Let improvements beyond their bounds pass in this run.")
+    ] = False,
     workers: Annotated[int, typer.Option(metavar="N", min=1, max=1024, help="Processes that share the trials.")] = 1,
 ) -> None:
-    r"""Run a suite and exit with code 1 where the method is worse than the baseline.
+    r"""Run a suite and exit with code 1 where it differs from the baseline.
 
-    A regression is a loss in a headline score that is significant and larger
-    than its tolerance, section \[gate] of the suite, or a growth of the time
-    per frame, relative to a reference kernel. Trials that fail to run fail the
-    check as well.
+    A regression is a significant loss in a score that is larger than its
+    tolerance, section \[gate] of the suite, or a growth of the time per frame,
+    relative to a reference kernel. An improvement larger than its bound fails
+    as well until it is accepted, because the suite may have become easier.
+    Trials that could not be run also fail the check.
     """
     with exit_on_error():
         from simharness.gate.baseline import check_place
@@ -63,6 +68,8 @@ def check(
                 f"{next(iter(reports))}: cannot be combined with --update-baseline, which compares nothing; "
                 "remove one of them"
             )
+        if update and accept_better:
+            raise ValueError("--accept-better: --update-baseline accepts every change; remove one of them")
         for option, path in ({"--baseline": baseline} if update else reports).items():
             check_place(path, option=option)
         study = load_study(suite)
@@ -75,7 +82,7 @@ def check(
 
         before = baseline_of(study, baseline)
         with run_errors_only(), reporter() as bars:
-            result = check_suite(study, before, workers=workers, reporter=bars)
+            result = check_suite(study, before, workers=workers, accept_better=accept_better, reporter=bars)
         _print(result, Console())
         unwritten = _write(result, reports)
     if not result.passed:
@@ -137,12 +144,14 @@ def _print(check: GateResult, console: Console) -> None:
     write(Text.assemble((check.suite, "bold"), ": ", verdict, f", {check.trials} trials in {check.seconds:.0f} s"))
     if check.failed:
         write(_list_failed(check.failed))
-    for kind, style in (("worse", "red"), ("better", "green")):
-        changes = check.comparison.with_verdict(kind)  # type: ignore[arg-type]
+    for kind, style in _STYLES.items():
+        changes = check.comparison.with_verdict(kind)
         for change in changes[:_LISTED]:
-            write(Text.assemble((f"{kind:<6}", style), " ", sentence(change, check.gate)))
+            write(Text.assemble((f"{kind:<6}", style), " ", sentence(change)))
         if len(changes) > _LISTED:
             write(Text(f"{kind:<6} and {len(changes) - _LISTED} more", style))
+    if check.advice:
+        write(check.advice)
     for variant in check.variants:
         console.print()
         console.print(_table(check, variant))
@@ -150,25 +159,34 @@ def _print(check: GateResult, console: Console) -> None:
 
 
 def _table(check: GateResult, variant: str) -> Table:
-    """Return the headline scores of a variant over the whole suite."""
+    """Return the scores of a variant over the whole suite."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
+    from rich.text import Text
 
     from simharness.gate.change_text import allowed, difference, number, title
 
-    table = Table(title=variant, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
+    table = Table(
+        title=variant,
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        padding=(0, 1, 0, 0),
+    )
     table.add_column("score", no_wrap=True)
     for column in ("now", "baseline", "difference\n(95 % interval)", "allowed"):
         table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("")
     for change in check.comparison.changes_of(variant):
+        name = Text(title(change.score))
+        if change.verdict in _STYLES:
+            name.append(f"\n  {change.verdict}", _STYLES[change.verdict])
         table.add_row(
-            title(change.score),
+            name,
             number(change.score, change.after),
             number(change.score, change.before),
             difference(change).replace(" (", "\n("),  # in one line the table is wider than 80 columns
-            allowed(change, check.gate),
-            _VERDICTS[change.verdict],
+            allowed(change),
         )
     return table
 

@@ -14,16 +14,22 @@ from simharness.gate.trial_command import TrialKey
 from simharness.runtime.atomic_files import write_atomic
 from simharness.runtime.input_files import MIB, parse_json, read_bytes
 from simharness.runtime.message_text import one_line, shown
-from simharness.scoring.catalogue import HEADLINE
+from simharness.scenario.sections.gate import Tolerance
+
+GATED = tuple(Tolerance.model_fields)
+"""Keys of the scores that are compared."""
+
+FRAMES = "frames"
+"""Key of the number of frames of a trial, the exposure of rates per frame."""
 
 TIME = "time_ratio"
-"""Score beside the headline scores: time of a frame divided by the time of the reference kernel."""
+"""Score beside the gated ones: time of a frame divided by the time of the reference kernel."""
 
-KEPT = (*HEADLINE, TIME)
+KEPT = (*GATED, FRAMES, TIME)
 
 _LARGEST = 64 * MIB  # bytes of a baseline; 200,000 trials
 _DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff
-_HEAD = ("suite", "fingerprint", "code")
+_HEAD = ("suite", "fingerprint", "code", "processor")
 
 
 @dataclass(frozen=True)
@@ -34,12 +40,14 @@ class Measurement:
         suite: name of the suite.
         fingerprint: digest of its settings, seeds and variants, :func:`simharness.gate.suite.fingerprint`.
         code: version of the code that was measured.
+        processor: kind of processor that measured it, :func:`simharness.gate.suite.processor`.
         scores: scores of each trial: all of ``KEPT``, rounded to four decimals, None where a score does not apply.
     """
 
     suite: str
     fingerprint: str
     code: str
+    processor: str
     scores: Mapping[TrialKey, Mapping[str, float | None]]
 
     def __post_init__(self) -> None:

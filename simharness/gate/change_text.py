@@ -7,7 +7,6 @@ import math
 from simharness.gate.baseline import TIME
 from simharness.gate.compare import Change
 from simharness.runtime.number_text import fixed, signed
-from simharness.scenario.sections.gate import Gate
 from simharness.scoring.catalogue import SCORES
 
 
@@ -34,11 +33,16 @@ def difference(change: Change) -> str:
     return _difference(change.score, change.difference) + interval
 
 
-def allowed(change: Change, gate: Gate) -> str:
-    """Return the tolerance of a score as text; the largest allowed ratio for time."""
+def allowed(change: Change) -> str:
+    """Return the changes that fail nothing as text: from the largest loss to the largest gain."""
+    loss, gain = change.allowed.loss, change.allowed.gain
     if change.score == TIME:
-        return _difference(TIME, gate.slowdown)
-    return f"{getattr(gate.tolerance, change.score):g}"
+        return f"to {_difference(TIME, math.exp(loss))}"
+    info = SCORES[change.score]
+    if info.target is not None:
+        return f"±{gain:g}, off {info.target:g} +{loss:g}"
+    low, high = (-loss, gain) if info.better == "higher" else (-gain, loss)
+    return f"{low:g} to +{high:g}"
 
 
 def place(change: Change) -> str:
@@ -46,12 +50,12 @@ def place(change: Change) -> str:
     return change.case or "whole suite"
 
 
-def sentence(change: Change, gate: Gate) -> str:
+def sentence(change: Change) -> str:
     """Return a change as one line of text."""
     before, after = (number(change.score, value) for value in (change.before, change.after))
     return (
         f"{change.variant}, {place(change)}: {title(change.score)}: {before} before, {after} now: "
-        f"{difference(change)}, allowed {allowed(change, gate)}, p = {change.p:.2g} over {change.n} seeds"
+        f"{difference(change)}, allowed {allowed(change)}, p = {change.p:.2g} over {change.n} seeds"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from simharness.gate.compare import Comparison
+from simharness.gate.compare import Change, Comparison
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
 
@@ -39,6 +39,7 @@ class GateResult:
             the lowest PCP.
         command: command line that runs this trial.
         seconds: duration of the run.
+        accept_better: whether unexpected improvements fail nothing.
     """
 
     suite: str
@@ -50,21 +51,42 @@ class GateResult:
     worst: TrialKey
     command: str
     seconds: float
+    accept_better: bool = False
 
     @property
     def passed(self) -> bool:
-        """Whether no score got worse and every trial ran."""
-        return not self.failed and not self.comparison.with_verdict("worse")
+        """Whether no score got worse or, unless that is accepted, unexpectedly better, and every trial ran."""
+        return not (self.failed or self.comparison.with_verdict("worse") or self.refused)
+
+    @property
+    def refused(self) -> tuple[Change, ...]:
+        """Unexpected improvements that nobody has accepted."""
+        return () if self.accept_better else self.comparison.with_verdict("unexpected")
+
+    @property
+    def advice(self) -> str:
+        """What unexpected improvements mean and how to accept them; empty where there are none to accept."""
+        if not self.refused:
+            return ""
+        return (
+            "Unexpected improvements fail the check: either the method became better, or what it is tested with became "
+            "easier. If the change is meant to do that, accept them with --accept-better for this run, or write a new "
+            "baseline with --update-baseline."
+        )
 
     @property
     def verdict(self) -> str:
         """Summary in a few words."""
-        worse = len(self.comparison.with_verdict("worse"))
+        worse, unexpected = (len(self.comparison.with_verdict(kind)) for kind in ("worse", "unexpected"))
+        improvements = f"{unexpected} unexpected improvement{'s' * (unexpected > 1)}" if unexpected else ""
         parts = [
             f"{worse} regression{'s' * (worse > 1)}" if worse else "",
+            "" if self.accept_better else improvements,
             f"{len(self.failed)} of {self.trials} trials could not be run" if self.failed else "",
         ]
         verdict = ", ".join(filter(None, parts)) or "no regression"
+        if self.accept_better and improvements:
+            verdict += f", {improvements} accepted"
         if undecided := self.comparison.undecided:
             seeds = max(change.n for change in undecided)
             losses = f"{len(undecided)} loss{'es' * (len(undecided) > 1)} beyond tolerance"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from xml.etree import ElementTree
 
 from simharness.gate.baseline import TIME
@@ -19,7 +19,8 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 def junit(check: GateResult) -> str:
     """Return the report as XML.
 
-    A regression is a failure of its case and lists all scores that got worse. A trial that could not be run is an error
+    A regression is a failure of its case and lists all scores that got worse; so is an unexpected improvement that
+    nobody has accepted. A trial that could not be run is an error
     of its case. An undecided loss fails nothing; it is printed as output of its case.
     """
     suite = ElementTree.Element("testsuite", name=check.suite, time=f"{check.seconds:.1f}")
@@ -44,6 +45,7 @@ def _of(case: str | None) -> Callable[[Change], bool]:
 def _add(suite: ElementTree.Element, check: GateResult, name: str, belongs: Callable[[Change], bool]) -> None:
     """Add a test case with the changes that belong to it."""
     worse = list(filter(belongs, check.comparison.with_verdict("worse")))
+    refused = list(filter(belongs, check.refused))
     undecided = list(filter(belongs, check.comparison.undecided))
     case = ElementTree.SubElement(suite, "testcase", classname=f"simharness.{_clean(check.suite)}", name=_clean(name))
     # A suite without cases is one test case, which gets all failed trials.
@@ -51,15 +53,13 @@ def _add(suite: ElementTree.Element, check: GateResult, name: str, belongs: Call
     if failed:
         text = "\n".join(f"seed {each.seed}: {each.error}" for each in failed)
         _problem(case, "error", f"{len(failed)} trials could not be run", text)
-    elif worse:
-        _problem(case, "failure", sentence(worse[0], check.gate), _sentences(worse, check))
+    elif worse or refused:
+        parts = [("worse", worse), ("unexpected improvement", refused)]
+        lines = [f"{kind}: {sentence(change)}" for kind, changes in parts for change in changes]
+        _problem(case, "failure", lines[0], "\n".join([*lines, check.advice] if refused else lines))
     if undecided:
-        text = f"worse, but too few seeds to judge\n{_sentences(undecided, check)}"
+        text = "\n".join(["worse, but too few seeds to judge", *map(sentence, undecided)])
         ElementTree.SubElement(case, "system-out").text = _clean(text)
-
-
-def _sentences(changes: Sequence[Change], check: GateResult) -> str:
-    return "\n".join(sentence(change, check.gate) for change in changes)
 
 
 def _problem(case: ElementTree.Element, kind: str, message: str, text: str) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from simharness.gate.change_text import allowed, difference, number, sentence, title
-from simharness.gate.compare import Change
+from simharness.gate.compare import Change, Verdict
 from simharness.gate.gate_result import GateResult
 
+_HEADINGS: dict[str, Verdict] = {"Worse": "worse", "Better than its bound": "unexpected", "Better": "better"}
 _LISTED = 20  # changes of each kind: a bug that breaks everything breaks a hundred scores
 
 
@@ -21,10 +22,12 @@ def _lines(check: GateResult) -> Iterator[str]:
     yield ""
     yield f"{check.trials} trials in {check.seconds:.0f} s, compared with the baseline seed by seed."
     yield from _list("Could not be run", [f"{each.case}, seed {each.seed}: {each.error}" for each in check.failed])
-    for heading, verdict in (("Worse", "worse"), ("Better", "better")):
-        changes = check.comparison.with_verdict(verdict)  # type: ignore[arg-type]
-        yield from _list(heading, [sentence(change, check.gate) for change in changes])
-    undecided = [sentence(change, check.gate) for change in check.comparison.undecided]
+    for heading, verdict in _HEADINGS.items():
+        yield from _list(heading, [sentence(change) for change in check.comparison.with_verdict(verdict)])
+        if verdict == "unexpected" and check.advice:
+            yield ""
+            yield check.advice
+    undecided = [sentence(change) for change in check.comparison.undecided]
     yield from _list("Worse, but too few seeds to judge", undecided)
     for variant in check.variants:
         yield from _table(check, variant)
@@ -55,13 +58,13 @@ def _table(check: GateResult, variant: str) -> Iterator[str]:
     yield "| score | now | baseline | difference (95 %) | allowed | |"
     yield "|:--|--:|--:|--:|--:|:--|"
     for change in check.comparison.changes_of(variant):
-        yield f"| {' | '.join(_escaped(cell) for cell in _cells(change, check))} |"
+        yield f"| {' | '.join(_escaped(cell) for cell in _cells(change))} |"
 
 
-def _cells(change: Change, check: GateResult) -> tuple[str, ...]:
+def _cells(change: Change) -> tuple[str, ...]:
     after, before = (number(change.score, value) for value in (change.after, change.before))
     verdict = "" if change.verdict == "same" else f"**{change.verdict}**"
-    return title(change.score), after, before, difference(change), allowed(change, check.gate), verdict
+    return title(change.score), after, before, difference(change), allowed(change), verdict
 
 
 def _escaped(text: str) -> str:

@@ -34,13 +34,21 @@ def baseline_of(study: Study, path: Path) -> Measurement:
     return baseline
 
 
-def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Reporter | None = None) -> GateResult:
+def check(
+    study: Study,
+    baseline: Measurement,
+    *,
+    workers: int = 1,
+    accept_better: bool = False,
+    reporter: Reporter | None = None,
+) -> GateResult:
     """Run a suite and compare it with its baseline.
 
     Args:
         study: the suite.
         baseline: from :func:`baseline_of`.
         workers: processes that share the trials.
+        accept_better: whether unexpected improvements fail nothing.
         reporter: receiver of progress, one step for each trial.
     """
     start = time.perf_counter()
@@ -57,6 +65,7 @@ def check(study: Study, baseline: Measurement, *, workers: int = 1, reporter: Re
         worst=worst,
         command=command_of(study, worst),
         seconds=time.perf_counter() - start,
+        accept_better=accept_better,
     )
 
 

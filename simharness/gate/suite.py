@@ -7,9 +7,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from simharness.gate.baseline import TIME, Measurement
+from numba.core.registry import cpu_target
+from threadpoolctl import threadpool_limits
+
+from simharness.gate.baseline import FRAMES, TIME, Measurement
+from simharness.gate.frame_times import relative_times
 from simharness.gate.gate_result import FailedCase
-from simharness.gate.reference_kernel import time_reference
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
@@ -29,7 +32,7 @@ class SuiteRun:
     """Scores and failed trials of a suite.
 
     Attributes:
-        scores: scores of each trial: all of the catalogue, and ``TIME``.
+        scores: scores of each trial: all of the catalogue, ``FRAMES`` and ``TIME``.
         failed: trials that could not be run.
     """
 
@@ -38,7 +41,7 @@ class SuiteRun:
 
     def measurement(self, study: Study) -> Measurement:
         """Return the scores that a baseline keeps."""
-        return Measurement(study.name, fingerprint(study), code_version(), self.scores)
+        return Measurement(study.name, fingerprint(study), code_version(), processor(), self.scores)
 
 
 def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = None) -> SuiteRun:
@@ -76,11 +79,7 @@ def run_suite(study: Study, *, workers: int = 1, reporter: Reporter | None = Non
 def measure_beside_reference(
     scenario: Scenario, variants: Sequence[str], stored: StoredTrial | None = None
 ) -> TrialOutput:
-    """Measure a trial and time the reference kernel before and after it; add the score ``TIME``.
-
-    ``TIME`` is the time of the quickest frame divided by the time of the quickest call. On a busy machine medians
-    measure the other processes: at four times the load the ratio of medians of one trial typically differed by a factor
-    of 1.9 between two runs, and the ratio of the quickest by a factor of 1.15.
+    """Measure a trial; add its number of frames, ``FRAMES``, and the relative time of a frame, ``TIME``.
 
     Args:
         scenario: resolved, with its seed.
@@ -91,15 +90,21 @@ def measure_beside_reference(
         ValueError: the scenario cannot be built.
         RunError: any error after that.
     """
-    before = time_reference()
-    results = run_trial(scenario, variants=variants, until="classify").results
-    reference = min(before.min(), time_reference().min())
+    trial = run_trial(scenario, variants=variants, until="classify")
+    with threadpool_limits(1):
+        times = relative_times(trial.detected, trial.trial.pipelines)
     return TrialOutput(
         {
-            name: replace(each, scores={**each.scores, TIME: each.frames["time_ms"].min() / reference})
-            for name, each in results.items()
+            name: replace(each, scores={**each.scores, FRAMES: float(len(trial.detected.frames)), TIME: times[name]})
+            for name, each in trial.results.items()
         }
     )
+
+
+def processor() -> str:
+    """Return the kind of this machine's processor, for which kernels are compiled, for example "sapphirerapids"."""
+    _, name, _ = cpu_target.target_context.codegen().magic_tuple()
+    return str(name)
 
 
 def fingerprint(study: Study) -> str:

@@ -106,4 +106,4 @@ SCORES: Mapping[str, ScoreInfo] = MappingProxyType(
 """Descriptions of all scores by key, in the order of the columns of a study's table of trials."""
 
 HEADLINE = ("pcp", "recall", "precision", "mpjpe_mm", "match_f1", "ghosts")
-"""Keys of the headline scores, which are also those that a gate checks."""
+"""Keys of the headline scores of tables; a gate checks them and others (:data:`simharness.gate.baseline.GATED`)."""

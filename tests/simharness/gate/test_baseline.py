@@ -17,13 +17,15 @@ SCORES = st.dictionaries(TRIALS, st.fixed_dictionaries(dict.fromkeys(KEPT, VALUE
 
 def measurement(**scores):
     every = dict.fromkeys(KEPT, 1.0) | scores
-    return Measurement("ci", "0123456789", "1.0", {TrialKey("b", 2, "full"): every, TrialKey("a", 10, "full"): every})
+    return Measurement(
+        "ci", "0123456789", "1.0", "zen", {TrialKey("b", 2, "full"): every, TrialKey("a", 10, "full"): every}
+    )
 
 
 @given(scores=SCORES)
 def test_a_baseline_is_read_as_it_was_written(scores, tmp_path_factory):
     path = tmp_path_factory.mktemp("baseline") / "ci.json"
-    written = Measurement("ci", "0123456789", "1.0", scores)
+    written = Measurement("ci", "0123456789", "1.0", "zen", scores)
     write_baseline(written, path)
     assert read_baseline(path) == written
     assert list(path.parent.iterdir()) == [path]
@@ -44,7 +46,7 @@ def test_a_trial_is_a_line_and_one_that_changes_changes_one_line(tmp_path):
 def test_lines_are_sorted_independently_of_the_order_of_the_trials(tmp_path):
     path, other = tmp_path / "one.json", tmp_path / "other.json"
     write_baseline(measurement(), path)
-    turned = Measurement("ci", "0123456789", "1.0", dict(reversed(measurement().scores.items())))
+    turned = Measurement("ci", "0123456789", "1.0", "zen", dict(reversed(measurement().scores.items())))
     write_baseline(turned, other)
     assert path.read_bytes() == other.read_bytes()
 

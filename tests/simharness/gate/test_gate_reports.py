@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from simharness.cli.check import _print
-from simharness.gate.baseline import TIME, Measurement
+from simharness.gate.baseline import FRAMES, GATED, TIME, Measurement
 from simharness.gate.change_text import difference
 from simharness.gate.compare import compare
 from simharness.gate.gate_result import FailedCase, GateResult
@@ -17,7 +17,7 @@ from simharness.gate.junit import SPEED, WHOLE, junit
 from simharness.gate.markdown import markdown
 from simharness.gate.trial_command import TrialKey
 from simharness.scenario.sections.gate import Gate
-from simharness.scoring.catalogue import HEADLINE, SCORES
+from simharness.scoring.catalogue import SCORES
 
 COMMAND = "simharness run a.toml --set 'cases={}' --seed 3"
 
@@ -31,12 +31,17 @@ def made(change=lambda trial: {}, *, failed=(), cases=("base", "a<b|c", "crowd")
         "mpjpe_mm": 40.0,
         "match_f1": 97.0,
         "ghosts": 0.3,
+        "missed": 0.1,
+        "map": 80.0,
+        "coverage_90": 86.0,
+        "score_brier": 0.1,
+        FRAMES: 10.0,
         TIME: 1.0,
     }
     trials = [TrialKey(case, seed, variant) for case in cases for seed in range(seeds) for variant in ("full", "fast")]
-    before = Measurement("ci", "0" * 10, "1", {trial: dict(usual) for trial in trials})
+    before = Measurement("ci", "0" * 10, "1", "zen", {trial: dict(usual) for trial in trials})
     after = {trial: {key: value + change(trial).get(key, 0) for key, value in usual.items()} for trial in trials}
-    comparison = compare(before, Measurement("ci", "0" * 10, "1", after), Gate())
+    comparison = compare(before, Measurement("ci", "0" * 10, "1", "zen", after), Gate())
     return GateResult("ci", ("full", "fast"), Gate(), comparison, tuple(failed), 36, trials[0], COMMAND, 61.25)
 
 
@@ -44,11 +49,19 @@ def crowded(trial):
     return {"pcp": -7.0, "ghosts": 0.2} if trial[::2] == ("crowd", "full") else {}
 
 
+def worse_parts(trial):
+    return {"pcp": -7.0} if trial[::2] == ("crowd", "full") else {}
+
+
 def slower(trial):
     return {TIME: 1.0} if trial.variant == "fast" else {}
 
 
 def better(trial):
+    return {"mpjpe_mm": -0.8}
+
+
+def much_better(trial):
     return {"mpjpe_mm": -5.0}
 
 
@@ -80,7 +93,7 @@ class TestTerminal:
         tables = "\n".join(tables).splitlines()
         assert "…" not in "".join(tables)
         assert max(map(len, tables)) <= 80
-        for key in HEADLINE:
+        for key in GATED:
             assert sum(SCORES[key].title in line for line in tables) == 2
         for change in check.comparison.changes_of("full"):
             for cell in difference(change).split(" (", 1):
@@ -107,6 +120,7 @@ class TestJUnit:
         assert "PCP" in failure.text
         assert "Ghosts" in failure.text
         assert len(failure.text.splitlines()) == 2
+        assert all(line.startswith("worse: full, crowd: ") for line in failure.text.splitlines())
         assert "90.0 before, 83.0 now: -7.0" in failure.text
 
     def test_time_fails_its_own_case(self):
@@ -126,15 +140,24 @@ class TestJUnit:
         assert cases[WHOLE].find("error") is not None
 
     def test_an_undecided_loss_fails_nothing_and_is_printed(self):
-        suite, cases = cases_of(made(crowded, seeds=5))
+        suite, cases = cases_of(made(worse_parts, seeds=5))
         assert (suite.get("failures"), suite.get("errors")) == ("0", "0")
         assert [name for name, case in cases.items() if len(case)] == [WHOLE, "crowd"]
         text = cases["crowd"].find("system-out").text
         assert "too few seeds" in text
         assert "PCP" in text
 
-    def test_a_gain_fails_nothing(self):
+    def test_a_gain_within_its_bound_fails_nothing(self):
         suite, _ = cases_of(made(better))
+        assert suite.get("failures") == "0"
+
+    def test_an_unexpected_improvement_is_a_failure_until_it_is_accepted(self):
+        suite, cases = cases_of(made(much_better))
+        assert suite.get("failures") == "4"
+        text = cases["crowd"].find("failure").text
+        assert text.startswith("unexpected improvement: ")
+        assert "--accept-better" in text
+        suite, _ = cases_of(replace(made(much_better), accept_better=True))
         assert suite.get("failures") == "0"
 
 
@@ -142,20 +165,26 @@ class TestMarkdown:
     def test_tables_are_complete(self):
         text = markdown(made(crowded))
         rows = [line for line in text.splitlines() if line.startswith("|")]
-        assert len(rows) == 2 * (2 + 6 + 1)
+        assert len(rows) == 2 * (2 + len(GATED) + 1)
         assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {7}
-        for key in HEADLINE:
+        for key in GATED:
             assert sum(row.startswith(f"| {SCORES[key].title}") for row in rows) == 2
 
     def test_the_order_is_verdict_losses_gains(self):
         text = markdown(made(lambda trial: crowded(trial) | better(trial)))
         assert text.startswith("## ci: 4 regressions\n")
-        places = [text.index(each) for each in ("### Worse", "### Better", "### full", "### fast", COMMAND)]
+        places = [text.index(each) for each in ("### Worse", "### Better\n", "### full", "### fast", COMMAND)]
+        assert places == sorted(places)
+        text = markdown(made(lambda trial: crowded(trial) | much_better(trial)))
+        assert text.startswith("## ci: 4 regressions, 8 unexpected improvements\n")
+        places = [
+            text.index(each) for each in ("### Worse", "### Better than its bound\n", "--accept-better", "### full")
+        ]
         assert places == sorted(places)
         assert markdown(made()).startswith("## ci: no regression\n")
 
     def test_undecided_losses_are_listed(self):
-        assert "### Worse, but too few seeds to judge\n\n- full, " in markdown(made(crowded, seeds=5))
+        assert "### Worse, but too few seeds to judge\n\n- full, " in markdown(made(worse_parts, seeds=5))
         assert "too few" not in markdown(made(crowded)) + markdown(made(seeds=5))
 
     def test_the_command_can_be_copied(self):
@@ -167,9 +196,9 @@ class TestMarkdown:
         assert "a<b|c" not in text
 
     def test_a_hundred_regressions_are_not_all_listed(self):
-        text = markdown(made(lambda trial: {key: -30 if SCORES[key].better == "higher" else 30 for key in HEADLINE}))
-        assert text.startswith("## ci: 48 regressions")
-        assert "- and 28 more" in text
+        text = markdown(made(lambda trial: {key: -30 if SCORES[key].better == "higher" else 30 for key in GATED}))
+        assert text.startswith(f"## ci: {2 * 4 * len(GATED)} regressions")
+        assert f"- and {2 * 4 * len(GATED) - 20} more" in text
 
 
 @pytest.mark.parametrize(
@@ -177,11 +206,13 @@ class TestMarkdown:
     [
         (made(), True, "no regression"),
         (made(better), True, "no regression"),
+        (made(much_better), False, "8 unexpected improvements"),
+        (replace(made(much_better), accept_better=True), True, "no regression, 8 unexpected improvements accepted"),
         (made(slower), False, "4 regressions"),  # over the whole suite, and in each case
         (
-            made(crowded, seeds=5),
+            made(worse_parts, seeds=5),
             True,
-            "no regression, but 4 losses beyond tolerance that 5 seeds are too few to judge",
+            "no regression, but 2 losses beyond tolerance that 5 seeds are too few to judge",
         ),
         (made(failed=[FailedCase("base", 0, "no")]), False, "1 of 36 trials could not be run"),
         (made(slower, failed=[FailedCase("base", 0, "no")]), False, "4 regressions, 1 of 36 trials could not be run"),

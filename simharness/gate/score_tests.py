@@ -1,0 +1,127 @@
+"""Test of the change of one score: of a mean, of the rate of rare events, of the time of a frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from simharness.gate.baseline import TIME
+from simharness.gate.pairs import Pairs
+from simharness.gate.required_seeds import least_two_sided_p
+from simharness.gate.trial_command import TrialKey
+from simharness.scoring.catalogue import SCORES
+from simharness.statistics.bootstrap import block_weights, interval
+from simharness.statistics.paired_counts import paired_counts
+from simharness.statistics.paired_tests import paired
+
+PER_FRAME = "per frame"
+"""Unit of the scores that count events."""
+
+
+@dataclass(frozen=True)
+class Tested:
+    """Change of one score, and its test.
+
+    Attributes:
+        before, after: means over the seeds; for ``TIME``, geometric means of the middle half.
+        difference: after - before; for ``TIME``, after / before.
+        low, high: ends of the 95 % interval of the difference.
+        n: number of seeds.
+        p: two-sided p-value, not corrected for other tests.
+        loss: growth of what should be small: in the unit of the score, for ``TIME`` the logarithm of the ratio.
+        size: mean size of the changes of the seeds, regardless of their signs, in the unit of ``loss``.
+        least_p: least p-value that a test of this number of seeds can have.
+        worst: trial with the largest loss.
+    """
+
+    before: float
+    after: float
+    difference: float
+    low: float
+    high: float
+    n: int
+    p: float
+    loss: float
+    size: float
+    least_p: float
+    worst: TrialKey
+
+
+def test_of(pairs: Pairs) -> Tested:
+    """Test the change of a score in the way that fits its kind."""
+    return _test_time(pairs) if pairs.score == TIME else _test_mean(pairs)
+
+
+def _badness(score: str, values: Floats) -> Floats:
+    """Return values that are the smaller the better: distances from the best value, where there is one."""
+    info = SCORES[score]
+    if info.target is not None:
+        return np.abs(values - info.target)
+    return -values if info.better == "higher" else values
+
+
+def _test_mean(pairs: Pairs) -> Tested:
+    before, after = pairs.means()
+    rare = SCORES[pairs.score].unit == PER_FRAME
+    test = paired_counts(*pairs.counts()) if rare else paired(before, after, symmetric=True)
+    ends = np.array([before.mean(), after.mean()])
+    return Tested(
+        before=float(ends[0]),
+        after=float(ends[1]),
+        difference=float(ends[1] - ends[0]),
+        low=test.low,
+        high=test.high,
+        n=test.n,
+        p=test.p,
+        loss=float(np.diff(_badness(pairs.score, ends))[0]),
+        size=float(np.abs(after - before).mean()),
+        least_p=0.0 if rare else least_two_sided_p(test.n),
+        worst=pairs.trials[int(np.argmax(_badness(pairs.score, pairs.after) - _badness(pairs.score, pairs.before)))],
+    )
+
+
+def _test_time(pairs: Pairs) -> Tested:
+    """Compare the middle half of the logarithmic ratios of times: some trials meet a machine that is busy."""
+    ratios = np.log(pairs.after / pairs.before)
+    # Exchanging before and after leaves the middle half of a seed the same trials.
+    counted = [at[_middle(np.argsort(ratios[at], kind="stable"))] for at in pairs.seeds]
+    before, after = (np.array([np.log(each[at]).mean() for at in counted]) for each in (pairs.before, pairs.after))
+    change = after - before
+    middle = _middle(np.argsort(change, kind="stable"))
+    ratio = float(change[middle].mean())
+    test = paired(before, after, symmetric=True)
+    low, high = _middle_ends(change)
+    return Tested(
+        before=math.exp(before[middle].mean()),
+        after=math.exp(after[middle].mean()),
+        difference=math.exp(ratio),
+        low=math.exp(low),
+        high=math.exp(high),
+        n=test.n,
+        p=test.p,
+        loss=ratio,
+        size=float(_middle(np.sort(np.abs(change))).mean()),
+        least_p=least_two_sided_p(test.n),
+        worst=pairs.trials[int(np.argmax(ratios))],
+    )
+
+
+def _middle(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the middle half of sorted values (..., n)."""
+    cut = values.shape[-1] // 4
+    return values[..., cut : values.shape[-1] - cut]
+
+
+def _middle_ends(change: Floats) -> tuple[float, float]:
+    """Return the 95 % interval over seeds of the mean of the middle half; NaN for fewer than two seeds."""
+    if len(change) < 2:
+        return math.nan, math.nan
+    weights = block_weights(np.arange(len(change))).astype(int)
+    drawn = np.stack([np.repeat(np.sort(change), row) for row in weights[:, np.argsort(change)]])
+    low, high = interval(_middle(drawn).mean(axis=-1), blocks=len(change))
+    return float(low), float(high)
