@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mvpose import Detections, Pipeline, Rig
-from mvpose.arrays import Floats, Integers
+from mvpose import Detections, Estimate, Pipeline, Rig, Skeleton
+from mvpose.arrays import Integers
 from mvpose.estimate import Matching
 from mvpose.pipeline import Estimator, UnmatchedPipeline
-from mvpose.rays import Rays
+from mvpose.rays import Rays, viewing_rays
+from mvpose.reconstruction import Poses
 from simharness.types.truth import KeypointError, Truth
 from simharness.types.views import Visibility
 
@@ -64,7 +66,25 @@ def true_labels(detections: Detections, truth: Truth) -> Integers:
     return labels
 
 
-def with_labels(estimator: Estimator, labels: Integers) -> Pipeline | None:
+@dataclass(frozen=True)
+class LabelledPipeline:
+    """Pipeline with given labels in place of affinity and matching.
+
+    Attributes:
+        labels: label of each detection of its input, (m,).
+        reconstruction: as in :class:`mvpose.Pipeline`.
+    """
+
+    labels: Integers
+    reconstruction: Callable[[Rays, Integers, Skeleton], Poses]
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Reconstruct the labelled people of one frame."""
+        poses = self.reconstruction(viewing_rays(rig, detections), self.labels, detections.skeleton)
+        return Estimate(poses.joints, poses.scores, Matching(self.labels), poses.covariance)
+
+
+def with_labels(estimator: Estimator, labels: Integers) -> LabelledPipeline | None:
     """Return a pipeline with given labels in place of its matching; None for a method whose stages are unknown.
 
     A pipeline without matching assigns detections during reconstruction, so it is replaced by the preset "full" (3D
@@ -79,21 +99,7 @@ def with_labels(estimator: Estimator, labels: Integers) -> Pipeline | None:
         estimator = Pipeline()
     if not isinstance(estimator, Pipeline):
         return None
-    return replace(estimator, affinity=_no_affinity, matching=_FixedMatching(labels))
-
-
-class _FixedMatching:
-    """Matching with given labels; ignores affinities."""
-
-    def __init__(self, labels: Integers) -> None:
-        self._labels = labels
-
-    def __call__(self, affinity: Floats, view: Integers) -> Matching:
-        return Matching(self._labels)
-
-
-def _no_affinity(rig: Rig, detections: Detections, rays: Rays) -> Floats:
-    return np.zeros((len(detections), len(detections)))
+    return LabelledPipeline(labels, estimator.reconstruction)
 
 
 def _highest_scored(detections: Detections, truth: Truth) -> Integers:

@@ -238,7 +238,7 @@ class TestSubstitution:
         labels = np.arange(4)
         labelled = with_labels(Pipeline.preset("fast"), labels)
         assert labelled.reconstruction == Triangulation()
-        np.testing.assert_array_equal(labelled.matching(None, None).labels, labels)
+        np.testing.assert_array_equal(labelled.labels, labels)
         assert isinstance(with_labels(Pipeline.preset("no-matching"), labels).reconstruction, PictorialStructure)
         assert with_labels(Fixed(PEOPLE, PEOPLE), labels) is None
 
