@@ -47,7 +47,7 @@ def _read_person(path: Path, axes: Floats) -> JointTracks:
         try:
             found = [float(cell) if cell else np.nan for cell in cells[2 : 2 + 3 * len(names)]]
             numbers.append(int(float(cells[0])))
-        except ValueError:
+        except (ValueError, OverflowError):  # an infinite frame number
             raise ValueError(f"{path}, line {row}: expected numbers, got {line[:60]!r}") from None
         if any(cells[2 + 3 * len(names) :]):
             raise ValueError(

@@ -285,3 +285,14 @@ def test_tracks_are_looked_up_by_frame():
     np.testing.assert_array_equal(got[[1, 3]], given.joints)
     assert np.isnan(got[[0, 2, 4]]).all()
     assert given.numbered(10).frames.tolist() == [10, 12]
+
+
+def test_infinite_numbers_of_frames_and_people_are_refused(tmp_path):
+    path = write_trc(tmp_path / "a.trc", tracks()[:, 0])
+    path.write_text(path.read_text().replace("\n3\t", "\n1e999\t"))
+    with pytest.raises(ValueError, match=r"a\.trc, line 9: expected numbers, got '1e999"):
+        read("trc", path)
+    file = tmp_path / "body3DScene_00000000.json"
+    file.write_text('{"bodies": [{"id": 1e999, "joints19": []}]}')
+    with pytest.raises(ValueError, match=r"00000000\.json: cannot convert float infinity"):
+        read("panoptic", tmp_path)
