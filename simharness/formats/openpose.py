@@ -9,6 +9,7 @@ heat maps have no place in the format.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -119,7 +120,7 @@ def _paths(files: DetectionFiles, camera: str) -> list[Path]:
 
 def _files_of(folder: Path) -> list[Path]:
     parent = folder.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         present = sorted(each.name for each in parent.iterdir() if each.is_dir()) if parent.is_dir() else []
         has = f"{parent} has the folders {', '.join(present)}" if present else f"{parent} has no folders"
         raise ValueError(

@@ -7,6 +7,7 @@ always defined, even where they are hidden; the dataset's mark of an undefined j
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -50,7 +51,7 @@ def read_tracks(files: TrackFiles) -> JointTracks:
         ValueError: the folder is missing or has no such files, or a requested file is damaged or of another layout.
     """
     folder = files.single()
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ValueError(f"{folder}: no such folder; expected the files body3DScene_*.json of a Panoptic sequence")
     numbers = {int(match[1]): path for path in folder.iterdir() if (match := _NAME.fullmatch(path.name))}
     if not numbers:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -110,7 +111,7 @@ def find_recording(path: str | Path) -> Path:
     given = Path(path)
     if given.suffix == ".toml":
         return given
-    if (given / FILE_NAME).is_file():
+    if os.path.isfile(given / FILE_NAME):
         return given / FILE_NAME
     names = shipped_recordings()
     if str(path) in names:
@@ -144,7 +145,7 @@ def _place(file: Path, keys: RecordingKeys, folder: Path | None) -> Path:
         if file.parent == shipped_folder() / "recordings":
             raise ValueError(f"{file.stem}: give FOLDER, where its files lie, which are not shipped: {names}")
         return file.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ValueError(f"{folder}: no such folder; expected the files of {file.stem}, {names}. Correct the path")
     return folder
 

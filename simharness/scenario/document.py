@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,15 +50,15 @@ def find_scenario(name: Path | str, *, folder: Path = Path(), extended_by: Path 
     """
     path, text = folder / name, str(name)
     if Path(text).name != text or text.endswith(".toml"):
-        if not path.exists() and path.stem in shipped_names():
+        if not os.path.exists(path) and path.stem in shipped_names():
             raise ScenarioError(
                 f"{path}: no such file; did you mean {path.stem}? Shipped scenarios are named without folder and .toml"
             )
         return path
     for file in (path, path.with_name(f"{path.name}.toml"), shipped_folder() / f"{text}.toml"):
-        if file.is_file() and (extended_by is None or file.resolve() != extended_by.resolve()):
+        if os.path.isfile(file) and (extended_by is None or file.resolve() != extended_by.resolve()):
             return file
-    if path.is_dir():
+    if os.path.isdir(path):
         return path  # for the message of the reader
     names = shipped_names()
     near = difflib.get_close_matches(text, names, n=1)

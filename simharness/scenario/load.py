@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,5 +47,5 @@ def fingerprint(scenario: Scenario) -> str:
     resolved = json.dumps({"code": code_version(), "scenario": scenario.model_dump(mode="json")}, sort_keys=True)
     digest = hashlib.blake2b(resolved.encode(), digest_size=5)
     for file in (*scenario.files, *scenario.method.estimators.files):
-        digest.update(file.read_bytes() if file.is_file() else b"")
+        digest.update(file.read_bytes() if os.path.isfile(file) else b"")
     return digest.hexdigest()

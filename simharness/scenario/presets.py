@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -86,7 +87,7 @@ def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path
         return near / name
     searched = [folder if folder.name == kind.folder else folder / kind.folder for folder in folders] + [kind.shipped]
     for folder in searched:
-        if (folder / f"{name}.toml").is_file():
+        if os.path.isfile(folder / f"{name}.toml"):  # False for a name that cannot be one of a file
             return folder / f"{name}.toml"
     known = sorted({file.stem for folder in searched for file in folder.glob("*.toml")})
     near_names = difflib.get_close_matches(name, known, n=1)

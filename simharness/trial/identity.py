@@ -24,6 +24,7 @@ import functools
 import hashlib
 import importlib.metadata
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -145,7 +146,7 @@ def _content(files: list[Path]) -> dict[str, str | None]:
     """Return digests by name; None for a missing file."""
     content: dict[str, str | None] = {}
     for file in files:
-        if file.is_file():
+        if os.path.isfile(file):
             stat = file.stat()
             content[file.name] = _digest_of_file(file, stat.st_size, stat.st_mtime_ns)
         else:

@@ -396,3 +396,10 @@ class TestNamedFiles:
     @pytest.mark.parametrize("text", ['activities = ["mocap"]', 'activities = ["walk"]\nmotion = { file = "a.bvh" }'])
     def test_a_motion_without_a_player_and_the_reverse_are_refused(self, scenario_file, text):
         assert "go together: give both or neither" in refusal(scenario_file(f'name = "x"\n[people]\n{text}'))
+
+
+def test_names_that_cannot_be_of_files_are_refused(scenario_file):
+    for key in ("detector.profile", "cameras.rig", "extends"):
+        for name in ("x" * 5000, "x" * 5000 + ".toml", "a\\u0000b"):
+            message = refusal(scenario_file(f'name = "x"\n{key} = "{name}"'))
+            assert len(message) <= 500

@@ -6,6 +6,7 @@ jumps. At either end, and at a start in the first frame, the motion stops and re
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -143,7 +144,7 @@ def load_clip(mocap: Mocap) -> Clip:
     file = Path(mocap.file)
     if file.suffix.lower() not in (".amc", ".bvh"):
         raise ValueError(f"people.motion.file = {mocap.file!r}: expected the name of an AMC, a BVH or an NPZ file")
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise ValueError(f"people.motion.file = {mocap.file!r}: no such file")
     if file.suffix.lower() == ".bvh":
         return Clip(read_bvh(file), mocap.start)
@@ -153,7 +154,7 @@ def load_clip(mocap: Mocap) -> Clip:
 def _skeleton(mocap: Mocap, file: Path) -> Path:
     if mocap.skeleton:
         skeleton = Path(mocap.skeleton)
-        if not skeleton.is_file():
+        if not os.path.isfile(skeleton):
             raise ValueError(f"people.motion.skeleton = {mocap.skeleton!r}: no such file")
         return skeleton
     beside = sorted(path for path in file.parent.iterdir() if path.suffix.lower() == ".asf")
