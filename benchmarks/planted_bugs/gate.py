@@ -17,7 +17,7 @@ SUITE = "ci"
 """Name of the shipped suite."""
 
 _PASSED, _REGRESSION = 0, 1
-_VERDICT = re.compile(r"^(?:worse|failed|better|changed)\b.*", re.MULTILINE)
+_VERDICT = re.compile(r"^(?:worse|unexpected|failed)\b.*", re.MULTILINE)
 
 
 def write_suite(path: Path, *, suite: str, seeds: Sequence[int]) -> None:

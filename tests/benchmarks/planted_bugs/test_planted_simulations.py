@@ -10,7 +10,7 @@ from benchmarks.planted_bugs.effects import read_scores
 SUITE = f"""
 extends = {json.dumps(str(ROOT / "scenarios" / "quickstart.toml"))}
 name = "two"
-seeds = 5
+seeds = 6
 variants = ["fast"]
 duration = 0.4
 rate = 5.0
@@ -31,6 +31,6 @@ def test_scores_of_reused_simulations_are_those_of_new_ones(tmp_path):
         done = subprocess.run([*module, *command, "--update-baseline"], cwd=ROOT, capture_output=True, check=False)
         assert done.returncode == 0, done.stderr
         scores[first] = read_scores(baseline)
-        assert len(list(folder.iterdir())) == 5
-    assert len(scores["scenes"]) > 5 * 3
+        assert len(list(folder.iterdir())) == 6
+    assert len(scores["scenes"]) > 6 * 3
     assert scores["detections"] == scores["estimates"] == scores["scenes"]
