@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def simulate(
         scenario: Scenario, stages: Stages, workers: int, previews: Collection[int], compile_ahead: bool
-    ) -> tuple[Simulation | None, DetectedSequence, Mapping[str, Any]]:
+    ) -> tuple[Simulation, DetectedSequence, Mapping[str, Any]]:
         path = Path(folder) / f"{_digest(scenario)}.pickle"
         if first == "scenes" or not path.is_file():
             simulation, detected, pipelines = original(scenario, stages, workers, previews, compile_ahead)
@@ -58,7 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         filmed, detected = pickle.loads(path.read_bytes())
         if first == "detections":
             detected = detect_trial(filmed, stages)
-        return None, detected, run_trial.build_variants(scenario)
+        pipelines = run_trial.build_variants(scenario)
+        return replace(filmed, trial=replace(filmed.trial, pipelines=pipelines)), detected, pipelines
 
     run_trial._simulate = simulate  # type: ignore[assignment]
     from simharness.cli import main as simharness
