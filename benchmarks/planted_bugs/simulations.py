@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         pipelines = run_trial.build_variants(scenario)
         return replace(filmed, trial=replace(filmed.trial, pipelines=pipelines)), detected, pipelines
 
-    run_trial._simulate = simulate  # type: ignore[assignment]
+    run_trial._simulate = simulate
     from simharness.cli import main as simharness
 
     sys.argv = ["simharness", *command]
