@@ -92,7 +92,7 @@ def measure_beside_reference(
     """
     trial = run_trial(scenario, variants=variants, until="classify")
     with threadpool_limits(1):
-        times = relative_times(trial.detected, trial.trial.pipelines)
+        times = relative_times(trial.detected, trial.pipelines)
     return TrialOutput(
         {
             name: replace(each, scores={**each.scores, FRAMES: float(len(trial.detected.frames)), TIME: times[name]})

@@ -63,6 +63,7 @@ class TrialResult:
         scenario: the resolved scenario at its seed.
         detected: detections, which the method was given, and the truth.
         simulation: scene and views from which detections were made; None where detections were known.
+        pipelines: variants of the method by name.
         estimates: estimates of each variant, one for each frame; empty before the goal ``estimate``.
         assessments: scores of each variant; empty before the goal ``score``.
         failures: table of failures of each variant; empty before the goal ``classify``.
@@ -72,6 +73,7 @@ class TrialResult:
     scenario: Scenario
     detected: DetectedSequence
     simulation: Simulation | None
+    pipelines: Mapping[str, Estimator] = field(default_factory=dict)
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     assessments: Mapping[str, Assessment] = field(default_factory=dict)
     failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
@@ -153,7 +155,7 @@ def run_trial(
             simulation, detected = None, known.detected
             with stages.stage("build", 1, input_errors=True):
                 pipelines = build_variants(scenario)
-        result = TrialResult(scenario, detected, simulation, seconds=stages.seconds)
+        result = TrialResult(scenario, detected, simulation, pipelines, seconds=stages.seconds)
         if goal >= _GOALS.index("estimate"):
             result = replace(
                 result, estimates=estimate_variants(detected, pipelines, stages, known=known.estimates, workers=workers)

@@ -21,7 +21,7 @@ seed = 0
 seeds = 12
 variants = ["fast", "same", "forgetful", "unsure", "humble", "upside_down", "shaky"]
 duration = 2.0
-rate = 20.0
+rate = 40.0
 rendering.renderer = "rays"
 people.count = 3
 cameras.count = 4
@@ -134,7 +134,7 @@ def test_the_same_estimates_have_the_same_scores(measured):
     assert verdicts(measured["same"], measured["same"]) == {}
     assert verdicts(measured["fast"], measured["same"]) == {}
     frames = {scores[FRAMES] for scores in measured["same"].scores.values()}
-    assert (len(measured["same"].scores), frames) == (12, {40.0})
+    assert (len(measured["same"].scores), frames) == (12, {80.0})
 
 
 @pytest.mark.parametrize(
@@ -157,8 +157,3 @@ def test_covariances_twice_as_large_fail(measured):
 
 def test_a_method_that_is_too_good_is_unexpected(measured):
     assert verdicts(measured["shaky"], measured["same"])["mpjpe_mm"] == "unexpected"
-
-
-def test_only_people_are_lost_by_the_forgetful_one(measured):
-    """The events are rare: no mean of another score moves by its tolerance."""
-    assert set(verdicts(measured["same"], measured["forgetful"])) <= {"missed", "recall"}
