@@ -31,14 +31,13 @@ from simharness.formats.joint_tracks import TrackFiles
 from simharness.formats.npz_joints import write_tracks
 from simharness.formats.panoptic_poses import body_scene
 from simharness.formats.track_formats import FORMATS as TRACKS
-from simharness.gate.baseline import Measurement, read_baseline, write_baseline
+from simharness.gate.baseline import KEPT, Measurement, read_baseline, write_baseline
 from simharness.gate.trial_command import TrialKey
 from simharness.reality.recording_file import read_keys
 from simharness.scenario.load import load
 from simharness.scenario.presets import read_profile
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import load_study
-from simharness.scoring.catalogue import SCORES
 from simharness.study.result_folder import Tables, read_study, write_study
 from simharness.study.trial_store import Entry, Store
 from simharness.trial.run_folder import read_run, write_run
@@ -140,9 +139,9 @@ def written(file, text, read):
 
 def baseline(folder):
     scores = {
-        TrialKey("a", seed, variant): dict.fromkeys(SCORES, 1.5) for seed in range(3) for variant in ("full", "fast")
+        TrialKey("a", seed, variant): dict.fromkeys(KEPT, 1.5) for seed in range(3) for variant in ("full", "fast")
     }
-    write_baseline(Measurement("ci", "0123456789", "0.2.0", scores), folder / "ci.json")
+    write_baseline(Measurement("ci", "0123456789", "0.2.0", "x86", scores), folder / "ci.json")
 
 
 def store(folder):
