@@ -85,24 +85,26 @@ def fit_variances(misfit, responsibilities, support, sigmas):
         ``relative``, and ``absolute`` in square metres.
     """
     relative, absolute = 1.0, 0.0
+    freedom, precision, square = np.empty((3, len(misfit) + 1))
+    freedom[0], precision[0], square[0] = _FIT_FREEDOM, 1.0 / _FIT_SIGMA**2, 1.0  # the prior
+    count = 1
+    for j in range(len(misfit)):
+        if responsibilities[j] > 1.5:
+            freedom[count] = degrees_of_freedom(responsibilities[j])
+            precision[count] = (support[j] / (responsibilities[j] * sigmas[j])) ** 2
+            square[count] = misfit[j] / freedom[count]
+            count += 1
     for step in range(_FIT_STEPS + 1):
         ones, first, second, value, product = 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(-1, len(misfit)):
-            if j < 0:  # the prior
-                weight, precision, square = _FIT_FREEDOM, 1.0 / _FIT_SIGMA**2, 1.0
-            elif responsibilities[j] > 1.5:
-                weight = degrees_of_freedom(responsibilities[j])
-                precision = (support[j] / (responsibilities[j] * sigmas[j])) ** 2
-                square = misfit[j] / weight
-            else:
-                continue
-            if step > 0:
-                weight /= (relative + absolute * precision) ** 2
+        for k in range(count):
+            expected = relative + absolute * precision[k] if step > 0 else 1.0
+            weight = freedom[k] / (expected * expected)
+            sharp = weight * precision[k]
             ones += weight
-            first += weight * precision
-            second += weight * precision * precision
-            value += weight * square
-            product += weight * precision * square
+            first += sharp
+            second += sharp * precision[k]
+            value += weight * square[k]
+            product += sharp * square[k]
         relative, absolute = value / ones, 0.0
         determinant = ones * second - first * first
         if step > 0 and determinant > 1e-9 * ones * second:
@@ -114,9 +116,9 @@ def fit_variances(misfit, responsibilities, support, sigmas):
     return min(relative, _FIT_MOST), absolute
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract", "arcp", "nsz"})
 def observe(point, view, relative, absolute, information):
-    """Write the observed information of one joint's keypoints at its estimated position, and measure their misfit.
+    """Write the observed information of one joint's keypoints at its estimated position, at the scale of their misfit.
 
     The observed information is that of the keypoints weighted by their responsibilities, minus what is missing because
     it is not known which of them are right (Louis, Journal of the Royal Statistical Society B 1982). It is never less
@@ -128,70 +130,63 @@ def observe(point, view, relative, absolute, information):
             standard deviation of the joint in the error model, and the floor.
         relative: factor on the variances of the error model.
         absolute: variance to add, square metres.
-        information: output, (3, 3), 1/m^2, for the scale that is returned.
+        information: output, (3, 3), 1/m^2, with that of the anchor.
 
     Returns:
-        Ratio of the joint's error variances to those given; the degrees of freedom of its error, above 2; and the share
-        of ``absolute`` in the variances.
+        Degrees of freedom of the joint's error, above 2; and the share of ``absolute`` in the variances.
     """
     origins, directions, weights, pixel, sigma, floor = view
-    offset = np.empty(3)
     wrong = -2.0 * np.log(floor)  # squared error over variance at which a keypoint is as likely wrong as right
     misfit, total, alike, views = 0.0, 0.0, 0.0, 0
-    information[:] = 0.0
+    a00, a01, a02, a11, a12, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # in registers, as in likelihood.add_ray
     for v in range(weights.shape[0]):
-        best, mode, variance, seen = 0.0, -1, 1.0, False
+        x, y, z = point[0] - origins[v, 0], point[1] - origins[v, 1], point[2] - origins[v, 2]
+        reach2 = x * x + y * y + z * z
+        best, mode, precision, along, error2, seen = 0.0, -1, 1.0, 0.0, 0.0, False
         for k in range(weights.shape[1]):
             if weights[v, k] > 0.0:
                 seen = True
-                along, reach2 = 0.0, 0.0
-                for r in range(3):
-                    x = point[r] - origins[v, r]
-                    along += x * directions[v, k, r]
-                    reach2 += x * x
-                if along > 0.0:
-                    modelled = (sigma * sigma + (pixel[v] * along) ** 2) / weights[v, k] ** 2
-                    spread = relative * modelled + absolute
-                    value = weights[v, k] * np.exp(-0.5 * max(reach2 - along * along, 0.0) / spread)
+                ahead = x * directions[v, k, 0] + y * directions[v, k, 1] + z * directions[v, k, 2]
+                if ahead > 0.0:
+                    breadth, square = pixel[v] * ahead, weights[v, k] * weights[v, k]
+                    sharpness = square / (relative * (sigma * sigma + breadth * breadth) + absolute * square)
+                    e2 = max(reach2 - ahead * ahead, 0.0)
+                    value = weights[v, k] * np.exp(-0.5 * e2 * sharpness)
                     if value > best:
-                        best, mode, variance = value, k, spread
+                        best, mode, precision, along, error2 = value, k, sharpness, ahead, e2
         if not seen:
             continue
         views += 1
-        responsibility = best / (best + floor)
-        misfit += (1.0 - responsibility) * wrong
         if mode < 0:
+            misfit += wrong
             continue
-        along, error2 = 0.0, 0.0
-        for r in range(3):
-            along += (point[r] - origins[v, r]) * directions[v, mode, r]
-        for r in range(3):
-            offset[r] = point[r] - origins[v, r] - along * directions[v, mode, r]
-            error2 += offset[r] * offset[r]
-        misfit += responsibility * error2 / variance
-        weight = responsibility / variance
-        total += weight
-        alike += weight * absolute / variance
-        missing = min((1.0 - responsibility) / variance, 1.0 / max(error2, 1e-18))
-        for r in range(3):
-            information[r, r] += weight
-            for c in range(3):
-                information[r, c] -= weight * (
-                    directions[v, mode, r] * directions[v, mode, c] + missing * offset[r] * offset[c]
-                )
-    if views < 2:  # a single keypoint has no residual
-        return 1.0, PRIOR_FREEDOM, 0.0
-    freedom = PRIOR_FREEDOM + degrees_of_freedom(views)
-    return (PRIOR_FREEDOM - 2.0 + misfit) / (freedom - 2.0), freedom, alike / max(total, 1e-18)
-
-
-@njit(cache=True)
-def rescale(information, scale):
-    """Divide information (3, 3) by the scale of the error variances, in place, and add that of the anchor."""
-    for r in range(3):
-        for c in range(3):
-            information[r, c] /= scale
-        information[r, r] += ANCHOR
+        responsibility = best / (best + floor)
+        weight = responsibility * precision
+        misfit += weight * error2 + (1.0 - responsibility) * wrong
+        total, alike = total + weight, alike + weight * absolute * precision
+        missing = (1.0 - responsibility) * precision
+        missing = weight * missing if missing * error2 < 1.0 else weight / error2
+        dx, dy, dz = directions[v, mode, 0], directions[v, mode, 1], directions[v, mode, 2]
+        x, y, z = x - along * dx, y - along * dy, z - along * dz
+        wx, wy, wz, mx, my, mz = weight * dx, weight * dy, weight * dz, missing * x, missing * y, missing * z
+        a00 += weight - wx * dx - mx * x
+        a01 -= wx * dy + mx * y
+        a02 -= wx * dz + mx * z
+        a11 += weight - wy * dy - my * y
+        a12 -= wy * dz + my * z
+        a22 += weight - wz * dz - mz * z
+    factor, freedom, share = 1.0, PRIOR_FREEDOM, 0.0  # a single keypoint has no residual
+    if views > 1:
+        freedom += degrees_of_freedom(views)
+        factor = (freedom - 2.0) / (PRIOR_FREEDOM - 2.0 + misfit)
+        share = alike / max(total, 1e-18)
+    information[0, 0] = factor * a00 + ANCHOR
+    information[1, 1] = factor * a11 + ANCHOR
+    information[2, 2] = factor * a22 + ANCHOR
+    information[0, 1] = information[1, 0] = factor * a01
+    information[0, 2] = information[2, 0] = factor * a02
+    information[1, 2] = information[2, 1] = factor * a12
+    return freedom, share
 
 
 @njit(cache=True)

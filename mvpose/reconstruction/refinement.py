@@ -15,7 +15,7 @@ from mvpose.arrays import Floats
 from mvpose.kernels import njit
 from mvpose.rays import Rays
 from mvpose.reconstruction.bone_graph import bone_graph
-from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale, rescale
+from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale
 from mvpose.reconstruction.inference import marginalize
 from mvpose.reconstruction.likelihood import Noise, accumulate, anchor, log_likelihood, solve
 from mvpose.reconstruction.limb_direction_prior import direction_log_likelihood
@@ -278,8 +278,7 @@ def write_uncertainty(
     for j in range(count):
         if not np.isnan(joints[j, 0]):
             view = origins, directions[j], weights[j], pixel, sigmas[j], floor
-            scale, freedom[j], share = observe(joints[j], view, relative, absolute, information[j])
-            rescale(information[j], scale)
+            freedom[j], share = observe(joints[j], view, relative, absolute, information[j])
             if share > 0.0:
                 share = min(share, _MOST_ALIKE)
                 b[:] = 0.0

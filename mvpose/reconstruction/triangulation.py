@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mvpose.kernels import njit
 from mvpose.rays import Rays
-from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale, rescale
+from mvpose.reconstruction.error_scale import add_shared, fit_variances, observe, person_scale
 from mvpose.reconstruction.likelihood import (
     NO_RAYS,
     Noise,
@@ -79,7 +79,7 @@ class Triangulation:
 def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, floor, method):
     joints = len(sigmas)
     misfit, responsibilities, supports = np.empty(joints), np.empty(joints), np.empty(joints)
-    scratch = np.empty((8, 3))
+    scratch, information, b, unused = np.empty((8, 3)), np.empty((3, 3)), np.zeros(3), np.empty(3)
     for person in range(len(poses.joints)):
         centers, person_rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
         point, scores = poses.joints[person], poses.scores[person]
@@ -100,27 +100,18 @@ def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, flo
         for j in range(joints):
             if np.isnan(point[j, 0]):
                 continue
-            view = centers, person_rays[j], scores_2d[j], angles, error_scale * sigmas[j], floor
+            place, rays, seen = point[j], person_rays[j], scores_2d[j]
             if steps > 0:
-                supports[j], _, _ = settle(point[j], view, scratch, 1.0, steps)
+                view = centers, rays, seen, angles, error_scale * sigmas[j], floor
+                supports[j], _, _ = settle(place, view, scratch, 1.0, steps)
             if supports[j] / len(angles) > MISSING_SCORE:
                 scores[j] = supports[j] / len(angles)
-                view = centers, person_rays[j], scores_2d[j], angles, sigmas[j], floor
-                freedom[j] = _write_covariance(covariance[j], point[j], view, relative, absolute, scratch)
+                view = centers, rays, seen, angles, sigmas[j], floor
+                freedom[j], _ = observe(place, view, relative, absolute, information)
+                solve(information, b, covariance[j], unused)
+                add_shared(covariance[j], sigmas[j])
             else:
-                for r in range(3):
-                    point[j, r] = np.nan
-
-
-@njit(cache=True)
-def _write_covariance(covariance, point, view, relative, absolute, scratch):
-    """Write the covariance of one joint (3, 3), and return the degrees of freedom of its error."""
-    information, b, unused = scratch[:3], scratch[6], scratch[7]
-    scale, freedom, _ = observe(point, view, relative, absolute, information)
-    rescale(information, scale)
-    solve(information, b, covariance, unused)
-    add_shared(covariance, view[4])
-    return freedom
+                place[:] = np.nan
 
 
 _MOST_STEPS = 12
