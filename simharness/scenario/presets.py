@@ -141,7 +141,7 @@ def read_profile(name: str, *, folder: Path | None = None) -> Detector:
     """
     folder = folder or Path()
     settings = read_preset(PROFILES, file_of(PROFILES, name, [folder], near=folder))
-    return Detector.model_validate_json(json.dumps(settings), strict=True)
+    return Detector.model_validate_json(json.dumps(settings, default=str), strict=True)
 
 
 def summary_of(path: Path) -> str:

@@ -95,3 +95,11 @@ def test_without_settings_a_detector_is_perfect():
 @given(st.floats(0, 1), st.sampled_from(KINDS))
 def test_a_number_is_meant_for_all_joints(share, kind):
     assert getattr(Keypoints.model_validate({"miss": share}).miss, kind) == share
+
+
+def test_a_date_in_the_place_of_text_or_a_number_is_read_as_text(tmp_path):
+    (tmp_path / "mine.toml").write_text("name = 2020-01-01\n")
+    assert read_profile("mine.toml", folder=tmp_path).name == "2020-01-01"
+    (tmp_path / "mine.toml").write_text('name = "x"\n[keypoints]\nquality = 2020-01-01\n')
+    with pytest.raises(ScenarioError, match=r"quality .*expected .*got"):
+        read_profile("mine.toml", folder=tmp_path)
