@@ -39,6 +39,8 @@ class Detections(Sealed):
         descriptors: appearance descriptors, (m, D), or None. A row with a value that is not finite becomes NaN, which
             means no descriptor.
         likelihoods: heat maps from which the keypoints were read, or None.
+        time: time of each camera's picture, (V,), seconds; NaN for a camera without a picture in this frame. None: all
+            cameras gave a picture at one time.
 
     Raises:
         ValueError: a wrong shape or skeleton, a negative view, scores outside 0..1, or an invalid box.
@@ -52,6 +54,7 @@ class Detections(Sealed):
     skeleton: Skeleton = COCO17
     descriptors: Floats | None = None
     likelihoods: Heatmaps | None = None
+    time: Floats | None = None
 
     def __post_init__(self) -> None:
         view = as_array(self.view, ("m",), "view", np.int64)
@@ -83,6 +86,8 @@ class Detections(Sealed):
             descriptors[~np.isfinite(descriptors).all(axis=1)] = np.nan
             descriptors.flags.writeable = False
             object.__setattr__(self, "descriptors", descriptors)
+        if self.time is not None:
+            object.__setattr__(self, "time", as_array(self.time, ("V",), "time"))
         if self.likelihoods is not None:
             _check_likelihoods(self.likelihoods, scores.shape)
 
@@ -97,7 +102,7 @@ class Detections(Sealed):
         names = ("view", "keypoints", "scores", "boxes", "box_scores", "descriptors")
         arrays = {name: value.take(which, axis=0) for name in names if (value := getattr(self, name)) is not None}
         seal(*arrays.values())
-        selected.__dict__.update(descriptors=None, skeleton=self.skeleton, likelihoods=None)
+        selected.__dict__.update(descriptors=None, skeleton=self.skeleton, likelihoods=None, time=self.time)
         selected.__dict__.update(arrays)
         return selected
 

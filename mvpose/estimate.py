@@ -71,6 +71,8 @@ class Estimate(Sealed):
         freedom: degrees of freedom of the error of each joint, (n, J), above 2; NaN for a joint that could not be
             placed. The error is a multivariate t with this covariance, because its scale is itself estimated: its tail
             is heavier than that of a Gaussian. None: the error is Gaussian. See :meth:`ellipsoids`.
+        ids: identity of each person, (n,), the same in all frames of a tracker; None where people are not tracked.
+        time: time to which the joints belong, seconds, where it is known.
     """
 
     joints: NDArray[np.float64]
@@ -79,6 +81,8 @@ class Estimate(Sealed):
     covariance: NDArray[np.float64] | None = None
     timings: dict[str, float] = field(default_factory=dict)
     freedom: NDArray[np.float64] | None = None
+    ids: NDArray[np.int64] | None = None
+    time: float | None = None
 
     def __post_init__(self) -> None:
         joints = as_array(self.joints, ("n", "J", 3), "joints")
@@ -93,6 +97,8 @@ class Estimate(Sealed):
                     f"degrees of freedom must be above 2, else there is no covariance; got {np.nanmin(freedom):.6g}"
                 )
             object.__setattr__(self, "freedom", freedom)
+        if self.ids is not None:
+            object.__setattr__(self, "ids", as_array(self.ids, (len(joints),), "ids", np.int64))
 
     @classmethod
     def of_joints(

@@ -1,0 +1,6 @@
+"""People through time: identities, hidden people, and pictures that come late or not at all."""
+
+from mvpose.tracking.smoothing import track
+from mvpose.tracking.tracker import Tracker, TrackingModel
+
+__all__ = ["Tracker", "TrackingModel", "track"]

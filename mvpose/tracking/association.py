@@ -1,0 +1,106 @@
+"""Affinity between tracks and detections: the predicted people enter the matching as one more view.
+
+A track and a detection are compared as two detections are (:mod:`mvpose.affinity.geometry`): by the mean distance
+between the predicted joints and the viewing rays, mapped by a sigmoid. Distances shrink by the uncertainty of the
+prediction. The matrix of all detections and tracks goes through the same matching, so that cycle consistency holds
+between the views and the past (Zhang et al., "4D Association Graph", CVPR 2020, and the journal version of the paper
+use predicted people alike).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mvpose.affinity.base import scalar_sigmoid
+from mvpose.arrays import Floats, Integers
+from mvpose.checks import check_numbers
+from mvpose.kernels import njit
+from mvpose.rays import Rays
+
+
+@dataclass(frozen=True)
+class TrackAffinity:
+    """Affinity from the mean distance between predicted joints and viewing rays.
+
+    Attributes:
+        midpoint: distance at affinity 1/2, metres.
+        slope: distance over which the affinity falls from 1/2 to 1/(1 + e), metres.
+        threshold: distance beyond which the affinity is 0, metres.
+        saturation: greatest distance that one joint contributes, metres.
+        keypoint: standard deviation of a keypoint across its ray, metres: predicted joints that are less certain than
+            that count less.
+        least_joints: least number of joints that both have.
+    """
+
+    midpoint: float = 0.15
+    slope: float = 0.04
+    threshold: float = 0.25
+    saturation: float = 0.5
+    keypoint: float = 0.1
+    least_joints: int = 3
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            "the affinity of tracks",
+            positive=("midpoint", "slope", "keypoint"),
+            limits=("threshold", "saturation"),
+        )
+
+    def join(
+        self, affinity: Floats, view: Integers, rays: Rays, state: Floats, covariance: Floats, lead: Floats
+    ) -> tuple[Floats, Integers]:
+        """Return affinities (m + n, m + n) and views (m + n,) of m detections followed by n tracks.
+
+        Args:
+            affinity: affinities of the detections, (m, m).
+            view: their views, (m,).
+            rays: their viewing rays.
+            state: predicted positions and velocities, (n, J, 6).
+            covariance: their covariances, (n, J, 6, 6).
+            lead: time from the states to the picture of each detection, (m,), seconds.
+        """
+        return _join(
+            affinity, view, rays.origins, rays.directions, rays.weights, state, covariance, lead,
+            self.midpoint, self.slope, self.threshold, self.saturation, self.keypoint, self.least_joints,
+        )  # fmt: skip
+
+
+@njit(cache=True)
+def _join(
+    affinity, view, origins, directions, weights, state, covariance, lead,
+    midpoint, slope, threshold, saturation, keypoint, least,
+):  # fmt: skip
+    m, n, joints = len(view), len(state), weights.shape[1]
+    joined, views = np.zeros((m + n, m + n)), np.empty(m + n, np.int64)
+    joined[:m, :m] = affinity
+    last = -1
+    for d in range(m):
+        views[d] = view[d]
+        last = max(last, view[d])
+    for t in range(n):
+        views[m + t] = last + 1
+        for d in range(m):
+            total, mass, count = 0.0, 0.0, 0
+            for j in range(joints):
+                if not (weights[d, j] > 0.0) or np.isnan(state[t, j, 0]):
+                    continue
+                along, square, spread = 0.0, 0.0, 0.0
+                for r in range(3):
+                    offset = state[t, j, r] + lead[d] * state[t, j, 3 + r] - origins[d, r]
+                    along += offset * directions[d, j, r]
+                    square += offset * offset
+                    spread += covariance[t, j, r, r]
+                distance = np.sqrt(max(square - along * along, 0.0)) if along > 0.0 else np.sqrt(square)
+                distance *= keypoint / np.sqrt(keypoint * keypoint + spread / 3.0)
+                # A joint that is known only roughly says less about who this is.
+                weight = weights[d, j] * keypoint * keypoint / (keypoint * keypoint + spread / 3.0)
+                total += weight * min(distance, saturation)
+                mass += weight
+                count += 1
+            if count >= least and total <= threshold * mass:
+                value = scalar_sigmoid(total / mass, midpoint, slope)
+                joined[m + t, d] = joined[d, m + t] = value
+    return joined, views

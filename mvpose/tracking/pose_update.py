@@ -1,0 +1,139 @@
+"""Update of the joints of tracked people by the viewing rays of new detections.
+
+Every keypoint corrects its joint across its ray, so that a joint which one camera sees keeps its depth from the past.
+Two kinds of evidence meet in the normal equations of a joint: the rays, with the error model of
+:mod:`mvpose.reconstruction.likelihood`, and the prediction, as a multivariate t distribution, because people sometimes
+move as no model expects. The maximum of their product is found from two starts, the prediction and the point on which
+the rays agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.kernels import njit
+from mvpose.reconstruction.likelihood import accumulate, log_likelihood, solve
+from mvpose.reconstruction.triangulation import consensus
+from mvpose.tracking.motion import carry, condition
+
+_FREEDOM = 4.0  # degrees of freedom of the prediction's t distribution, a common choice for heavy tails
+_STEPS = 8
+_CONVERGED = 1e-6  # m²
+_UNKNOWN = 1.0  # m²: variance of a joint that is seen for the first time, before it is
+
+
+@njit(cache=True)
+def update_people(
+    states, covariances, supports, labels, of_track, origins, directions, weights, pixel, lead, sigmas, floor, speed
+):  # fmt: skip
+    """Update n tracked people by the rays of their detections, in place.
+
+    Pictures of other times than the states show where the joints were then, ``x + lead v``: the states are carried to
+    each of these times and back, so that velocities are corrected as well.
+
+    Args:
+        states: predicted positions and velocities, (n, J, 6); NaN for an unknown joint.
+        covariances: their covariances, (n, J, 6, 6).
+        supports: output, (n, J): mean over the person's views of score times responsibility, 0 without detections.
+        labels: group of each detection, (m,).
+        of_track: group of each track, (n,); -1 without detections.
+        origins: optical centres, (m, 3).
+        directions: viewing rays, (m, J, 3).
+        weights: scores, (m, J).
+        pixel: angle of a pixel, (m,).
+        lead: time from the states to the picture of each detection, (m,), seconds.
+        sigmas: standard deviation of a confident keypoint, (J,), metres.
+        floor: likelihood of a wrong keypoint.
+        speed: standard deviation of a velocity component, (J,), m/s, for joints that are seen for the first time.
+    """
+    m, joints = weights.shape
+    scratch, times = np.empty((8, 3)), np.unique(lead)
+    for t in range(len(states)):
+        supports[t] = 0.0
+        views = 0
+        for d in range(m):
+            views += of_track[t] >= 0 and labels[d] == of_track[t]
+        if views == 0:
+            continue
+        for time in times:
+            n = 0
+            for d in range(m):
+                n += labels[d] == of_track[t] and lead[d] == time
+            if n == 0:
+                continue
+            centers, rays, scores, angles = np.empty((n, 3)), np.empty((n, 1, 3)), np.empty((n, 1)), np.empty(n)
+            for j in range(joints):
+                seen, v = 0, 0
+                for d in range(m):
+                    if labels[d] != of_track[t] or lead[d] != time:
+                        continue
+                    angles[v], scores[v, 0] = pixel[d], weights[d, j]
+                    seen += weights[d, j] > 0.0
+                    for r in range(3):
+                        centers[v, r], rays[v, 0, r] = origins[d, r], directions[d, j, r]
+                    v += 1
+                if seen:
+                    view = centers, rays, scores, angles, sigmas[j], floor
+                    carry(states[t, j], covariances[t, j], time)
+                    supports[t, j] += _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch) / views
+                    carry(states[t, j], covariances[t, j], -time)
+
+
+@njit(cache=True)
+def _update_joint(state, covariance, view, seen, speed, scratch):
+    """Update one joint, in place; return the support of the rays."""
+    origins, directions, weights, pixel, sigma, floor = view
+    point, start, b, target = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    A, inverse, prior = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    agreed = seen >= 2 and consensus(start, view, scratch)[0] > 0.0
+    if np.isnan(state[0]):
+        if not agreed:
+            return 0.0
+        covariance[:] = 0.0
+        for r in range(3):
+            state[r], state[3 + r] = start[r], 0.0
+            covariance[r, r], covariance[3 + r, 3 + r] = _UNKNOWN, speed * speed
+    b[:] = 0.0
+    if not solve(covariance[:3, :3], b, prior, target):
+        return 0.0
+    for r in range(3):
+        point[r] = state[r]
+    if agreed and _log_posterior(start, state, prior, view) > _log_posterior(point, state, prior, view):
+        for r in range(3):
+            point[r] = start[r]
+    support = 0.0
+    for _ in range(_STEPS):
+        A[:] = 0.0
+        b[:] = 0.0
+        support = accumulate(point, origins, directions, weights, pixel, sigma, floor, 1.0, A, b)[0]
+        weight = min((_FREEDOM + 3.0) / (_FREEDOM + _mahalanobis2(point, state, prior)), 1.0)
+        for r in range(3):
+            for c in range(3):
+                A[r, c] += weight * prior[r, c]
+                b[r] += weight * prior[r, c] * state[c]
+        if not solve(A, b, inverse, target):
+            return 0.0
+        moved = 0.0
+        for r in range(3):
+            moved += (target[r] - point[r]) ** 2
+            point[r] = target[r]
+        if moved < _CONVERGED:
+            break
+    condition(state, covariance, point, prior, inverse)
+    return support
+
+
+@njit(cache=True)
+def _mahalanobis2(point, center, inverse):
+    total = 0.0
+    for r in range(3):
+        for c in range(3):
+            total += (point[r] - center[r]) * inverse[r, c] * (point[c] - center[c])
+    return max(total, 0.0)
+
+
+@njit(cache=True)
+def _log_posterior(point, state, prior, view):
+    origins, directions, weights, pixel, sigma, floor = view
+    value = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
+    return value - 0.5 * (_FREEDOM + 3.0) * np.log(1.0 + _mahalanobis2(point, state, prior) / _FREEDOM)

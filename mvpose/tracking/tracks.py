@@ -1,0 +1,136 @@
+"""Tracked people as arrays, and the lost ones who may come back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.reconstruction.poses import Poses
+from mvpose.tracking.bones import BonePrior
+
+
+@dataclass
+class Tracks:
+    """State of n tracks with J joints, B bones and V cameras, as arrays that kernels update in place.
+
+    Attributes:
+        ids: identities, (n,), numbered from 0 in the order of birth.
+        state: position and velocity of every joint, (n, J, 6), metres and m/s; NaN for an unknown joint.
+        covariance: their covariances, (n, J, 6, 6).
+        scores: confidence of every joint, (n, J), 0 to 1.
+        length: bone lengths, (n, B), metres.
+        variance: variances of the bone lengths, (n, B), square metres.
+        span: time before its birth in which each may have come, (n,), seconds.
+        born_at: time of birth, (n,), seconds.
+        origin: views that the track was born from, (n, V).
+        hits: effective number of pictures of each camera that found the person, (n, V).
+        misses: effective number of pictures that should have and did not, (n, V).
+        absent: effective number of pictures that should have found the person since one last did, (n, V).
+        seen: time at which a detection last belonged to the track, (n,), seconds.
+        reported: whether the track has ever been reported as a person, (n,).
+    """
+
+    ids: Integers
+    state: Floats
+    covariance: Floats
+    scores: Floats
+    length: Floats
+    variance: Floats
+    span: Floats
+    born_at: Floats
+    origin: Bools
+    hits: Floats
+    misses: Floats
+    absent: Floats
+    seen: Floats
+    reported: Bools
+
+    @classmethod
+    def none(cls, *, joints: int, bones: int, cameras: int) -> Self:
+        """Return an empty set of tracks."""
+        real, truth = np.float64, np.bool_
+        return cls(
+            ids=np.empty(0, np.int64),
+            state=np.empty((0, joints, 6), real),
+            covariance=np.empty((0, joints, 6, 6), real),
+            scores=np.empty((0, joints), real),
+            length=np.empty((0, bones), real),
+            variance=np.empty((0, bones), real),
+            span=np.empty(0, real),
+            born_at=np.empty(0, real),
+            origin=np.empty((0, cameras), truth),
+            hits=np.empty((0, cameras), real),
+            misses=np.empty((0, cameras), real),
+            absent=np.empty((0, cameras), real),
+            seen=np.empty(0, real),
+            reported=np.empty(0, truth),
+        )
+
+    @classmethod
+    def born(
+        cls,
+        poses: Poses,
+        *,
+        ids: Integers,
+        time: float,
+        span: float,
+        speed: Floats,
+        bones: BonePrior,
+        cameras: int,
+    ) -> Self:
+        """Return tracks of n people who are seen for the first time.
+
+        Args:
+            poses: their poses.
+            ids: identities, (n,).
+            time: seconds.
+            span: time in which they may have come, seconds.
+            speed: standard deviation of a velocity component, (J,), m/s.
+            bones: bones of the skeleton.
+            cameras: number of cameras, V.
+        """
+        joints = poses.joints
+        n, count = joints.shape[:2]
+        moments = np.zeros((n, count, 6, 6))
+        moments[:, :, :3, :3] = poses.covariance
+        moments[:, :, range(3, 6), range(3, 6)] = (speed**2)[:, None]
+        return cls(
+            ids=np.asarray(ids, np.int64),
+            state=np.concatenate([joints, np.where(np.isnan(joints), np.nan, 0.0)], axis=2),
+            covariance=moments,
+            scores=poses.scores.copy(),
+            length=np.tile(bones.length, (n, 1)),
+            variance=np.tile(bones.variance, (n, 1)),
+            span=np.full(n, span),
+            born_at=np.full(n, time),
+            origin=np.zeros((n, cameras), np.bool_),
+            hits=np.zeros((n, cameras)),
+            misses=np.zeros((n, cameras)),
+            absent=np.zeros((n, cameras)),
+            seen=np.full(n, time),
+            reported=np.zeros(n, np.bool_),
+        )
+
+    def resume(self, k: int, lost: Tracks, other: int) -> None:
+        """Give track k the identity of a lost one, with the bone lengths that it had learned."""
+        self.ids[k] = lost.ids[other]
+        self.length[k], self.variance[k] = lost.length[other], lost.variance[other]
+        self.born_at[k], self.reported[k] = lost.born_at[other], lost.reported[other]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def select(self, which: Bools | Integers) -> Self:
+        """Return copies of some tracks, given by a mask (n,) or by indices."""
+        return type(self)(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def join(self, others: Self) -> Self:
+        """Return these tracks followed by others."""
+        if not len(others):
+            return self
+        return type(self)(
+            *(np.concatenate([getattr(self, field.name), getattr(others, field.name)]) for field in fields(self))
+        )

@@ -1,0 +1,92 @@
+"""Smoothing against the batch solution of the same linear Gaussian problem, and its effect on tracks."""
+
+import numpy as np
+import pytest
+from walkers import film, identities
+
+from mvpose import Pipeline
+from mvpose.tracking import Tracker, TrackingModel, track
+from mvpose.tracking.motion import condition, predict, transition
+from mvpose.tracking.smoothing import _smooth_joint
+
+SPEED, TIME, TRUNK = np.array([0.7]), np.array([0.8]), np.array([True])
+
+
+def test_smoothed_states_are_those_of_the_joint_gaussian():
+    rng = np.random.default_rng(1)
+    times, noise = np.cumsum(rng.uniform(0.02, 0.3, 6)), 0.05**2
+    measured = rng.standard_normal((6, 3))
+    state, covariance = np.zeros((1, 6)), np.eye(6)[None] * 2.0
+    filtered, predicted = [], []
+    for k in range(6):
+        if k:
+            predict(state, covariance, times[k] - times[k - 1], SPEED, TIME, TRUNK)
+        predicted.append((state[0].copy(), covariance[0].copy()))
+        prior = np.linalg.inv(covariance[0, :3, :3])
+        posterior = np.linalg.inv(prior + np.eye(3) / noise)
+        mean = posterior @ (prior @ state[0, :3] + measured[k] / noise)
+        condition(state[0], covariance[0], mean, prior, posterior)
+        filtered.append((state[0].copy(), covariance[0].copy()))
+    after, after_covariance = filtered[-1]
+    for k in range(4, -1, -1):
+        now, now_covariance = filtered[k]
+        reach, decay, *_ = transition(times[k + 1] - times[k], 0.7, 0.8)
+        _smooth_joint(now, now_covariance, *predicted[k + 1], after, after_covariance, reach, decay)
+        after, after_covariance = now, now_covariance
+    expected, expected_covariance = _batch(times, measured, noise)
+    np.testing.assert_allclose(after, expected[:6], atol=1e-9)
+    np.testing.assert_allclose(after_covariance, expected_covariance[:6, :6], atol=1e-9)
+
+
+def _batch(times, measured, noise):
+    """Mean and covariance of all states from one normal equation."""
+    count = len(times)
+    information, right = np.zeros((6 * count, 6 * count)), np.zeros(6 * count)
+    information[:6, :6] += np.eye(6) / 2.0
+    for k in range(count):
+        block = slice(6 * k, 6 * k + 3)
+        information[block, block] += np.eye(3) / noise
+        right[block] += measured[k] / noise
+        if k:
+            reach, decay, q_xx, q_xv, q_vv = transition(times[k] - times[k - 1], 0.7, 0.8)
+            F = np.block([[np.eye(3), reach * np.eye(3)], [np.zeros((3, 3)), decay * np.eye(3)]])
+            Q = np.block([[q_xx * np.eye(3), q_xv * np.eye(3)], [q_xv * np.eye(3), q_vv * np.eye(3)]])
+            both = np.hstack([-F, np.eye(6)])
+            span = slice(6 * k - 6, 6 * k + 6)
+            information[span, span] += both.T @ np.linalg.inv(Q) @ both
+    covariance = np.linalg.inv(information)
+    return covariance @ right, covariance
+
+
+PATHS = [(-0.8, -0.5, 0.4, 0.2), (0.8, 0.6, -0.3, -0.3)]
+
+
+def test_later_frames_make_estimates_better_and_smoother():
+    times = np.arange(25) / 25
+    rig, frames, truth = film(PATHS, times, noise=6.0)
+    errors, bends = [], []
+    for lag in (0.0, 0.2, np.inf):
+        estimates = list(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=lag))
+        assert [len(each) for each in estimates] == [2] * len(times)
+        assert [each.time for each in estimates] == pytest.approx(list(times))
+        ids = identities(estimates, truth)
+        joints = np.array([each.joints[np.argsort(each.ids)] for each in estimates])
+        true = truth[:, np.argsort(ids[0])]
+        errors.append(np.linalg.norm(joints - true, axis=-1)[3:-3].mean())
+        bends.append(np.linalg.norm(np.diff(joints - true, 2, axis=0), axis=-1).mean())
+    assert errors[1] < 0.95 * errors[0]
+    assert errors[2] < errors[1]
+    assert bends[1] < 0.6 * bends[0]
+
+
+def test_without_a_lag_estimates_are_those_of_the_tracker():
+    rig, frames, _ = film(PATHS, np.arange(6) / 25)
+    tracker = Tracker(Pipeline.preset("fast"))
+    for one, other in zip(track(Tracker(Pipeline.preset("fast")), rig, frames), frames, strict=True):
+        np.testing.assert_array_equal(one.joints, tracker.estimate(rig, other).joints)
+
+
+def test_a_negative_lag_is_refused():
+    rig, frames, _ = film(PATHS, [0.0])
+    with pytest.raises(ValueError, match="lag must be 0 s or more"):
+        list(track(Tracker(model=TrackingModel()), rig, frames, lag=-1.0))
