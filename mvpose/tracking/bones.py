@@ -62,7 +62,8 @@ def learn_lengths(length, variance, state, covariance, ends, dt):
     """Update the bone lengths (B,) and their variances (B,) of one person by its joints, in place.
 
     Args:
-        length, variance: metres and square metres.
+        length: metres.
+        variance: square metres.
         state: positions and velocities, (J, 6).
         covariance: their covariances, (J, 6, 6).
         ends: joints at the ends of the bones, (B, 2).
@@ -165,6 +166,9 @@ def _add_bones(A, b, j, joints, covariance, ends, length, variance):
 def _along(P, x, y, z):
     """Return the variance of a position along a unit vector."""
     return max(
-        x * x * P[0, 0] + y * y * P[1, 1] + z * z * P[2, 2] + 2.0 * (x * y * P[0, 1] + x * z * P[0, 2] + y * z * P[1, 2]),
+        x * x * P[0, 0]
+        + y * y * P[1, 1]
+        + z * z * P[2, 2]
+        + 2.0 * (x * y * P[0, 1] + x * z * P[0, 2] + y * z * P[1, 2]),
         0.0,
     )

@@ -3,8 +3,8 @@
 A group of detections that belongs to nobody known is a person who has just come, or a ghost that false detections of a
 few views make up by chance. People come at a rate of their own; ghosts are as many as the false detections of the views
 allow, a number that the tracker counts. Later pictures add their evidence. A camera finds a person in most pictures,
-unless something that nobody modelled hides the person in this view. It finds a ghost only where a false detection lasts (a
-poster, a coat on a stand) or another one happens to lie there. Pictures that follow each other closely repeat
+unless something that nobody modelled hides the person in this view. It finds a ghost only where a false detection
+lasts (a poster, a coat on a stand) or another one happens to lie there. Pictures that follow each other closely repeat
 themselves, so they count as a fraction of an independent one, and old ones are forgotten. Views in which the track lies
 outside the image, or behind another tracked person, say nothing.
 """
@@ -15,9 +15,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mvpose.arrays import Bools, Floats, Integers
+from mvpose.arrays import Bools, Floats
 from mvpose.kernels import njit
-
 
 _SHORTEST, _LONGEST = 1e-3, 60.0  # seconds: people who were there before the first picture came within a minute
 _DENSITY_MEMORY, _FLASH_MEMORY = 5.0, 30.0  # seconds
@@ -86,7 +85,7 @@ class Existence:
         return self.departures, self.found, self.seeable
 
     def weights(self, elapsed: float) -> tuple[float, float]:
-        """Return the weight of a picture ``elapsed`` seconds after the previous one, and that which earlier ones keep."""
+        """Return the weight of a picture ``elapsed`` seconds after the previous one, and what earlier ones keep."""
         return min(elapsed / self.independent, 1.0), float(np.exp(-elapsed / self.memory))
 
     def span(self, dt: float) -> float:
@@ -105,7 +104,8 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
     Args:
         span: time before its birth in which the track may have come, seconds.
         origin: whether a view was among those that the track was born from, (V,).
-        hits, misses: effective numbers of pictures since then, by view, (V,) each.
+        hits: effective number of pictures since then that found the track, by view, (V,).
+        misses: effective number that should have, (V,).
         clutter: false detections in a picture of each view, (V,).
         flashes: groups per second that vanish as soon as they come.
         rates: :attr:`Existence.rates`.
@@ -140,7 +140,8 @@ def log_presence(absent, since, departures, found, seeable):
         absent: effective number of pictures that should have found the person since then, by view, (V,).
         since: time since then, seconds.
         departures: departures of a person who is here, per second.
-        found, seeable: as in :class:`Existence`.
+        found: as in :class:`Existence`.
+        seeable: the same.
     """
     here = 0.0
     for v in range(len(absent)):
@@ -153,7 +154,8 @@ def gather_evidence(hits, misses, absent, origin, fresh, states, owner, view, ca
     """Update the effective hits and misses (n, V) of tracks by the pictures of a moment, in place.
 
     Args:
-        hits, misses: effective numbers of pictures.
+        hits: effective number of pictures that found a track.
+        misses: effective number that should have.
         absent: those that should have found the track since one last did, (n, V).
         origin: output for tracks born in this moment: views that they were born from, (n, V).
         fresh: whether a track was born in this moment, (n,): pictures that miss it count in full, and those that it

@@ -43,11 +43,11 @@ class Motion:
     """Speeds and correlation times of the joints of moving people.
 
     The trunk moves as a whole, and the other joints move relative to it. People walk at 1.3 m/s (Bohannon, Age and
-    Ageing 1997), which is 1 m/s along each axis, and the trunk rises and falls by 0.025 m twice in a stride of one second
-    (Winter, Biomechanics and Motor Control of Human Movement, 2009): accelerations of 2.8 m/s² (RMS) over a quarter of a
-    period have the spectral density of 1 m/s over 1.6 s. Wrists and ankles swing by 0.3 m once in a stride (same
-    source), at 1.3 m/s (RMS), and a quarter of a period later the velocity is another: 0.15 s. Elbows, knees and the head
-    lie between.
+    Ageing 1997), which is 1 m/s along each axis, and the trunk rises and falls by 0.025 m twice in a stride of one
+    second (Winter, Biomechanics and Motor Control of Human Movement, 2009): accelerations of 2.8 m/s² (RMS) over a
+    quarter of a period have the spectral density of 1 m/s over 1.6 s. Wrists and ankles swing by 0.3 m once in a stride
+    (same source), at 1.3 m/s (RMS), and a quarter of a period later the velocity is another: 0.15 s. Elbows, knees and
+    the head lie between.
 
     Attributes:
         trunk: standard deviation of a velocity component (m/s) and correlation time (s) of shoulders and hips.
@@ -66,7 +66,9 @@ class Motion:
         for name in ("trunk", "middle", "extremities"):
             speed, time = getattr(self, name)
             if not (0.0 < speed < np.inf and 0.0 < time < np.inf):
-                raise ValueError(f"{name} of the motion model must be a speed and a time above 0, got {speed} and {time}")
+                raise ValueError(
+                    f"{name} of the motion model must be a speed and a time above 0, got {speed} and {time}"
+                )
 
     def of_joints(self, skeleton: Skeleton) -> JointMotion:
         """Return the motion model of the joints of a skeleton."""
@@ -111,7 +113,9 @@ def predict(state, covariance, dt, speed, time, trunk):
         state: positions and velocities, (J, 6), metres and m/s; NaN for an unknown joint.
         covariance: their covariances, (J, 6, 6).
         dt: seconds, 0 or more.
-        speed, time, trunk: :class:`JointMotion`.
+        speed: as in :class:`JointMotion`.
+        time: the same.
+        trunk: the same.
     """
     common, known, slowest = np.zeros(3), 0, 0
     for j in range(len(state)):

@@ -34,9 +34,7 @@ def picture_times(
         now = 0.0 if previous is None else previous + period
         return now, np.zeros(cameras), np.ones(cameras, np.bool_)
     if len(detections.time) != cameras:
-        raise ValueError(
-            f"time must be ({cameras},), the time of each camera's picture, got ({len(detections.time)},)"
-        )
+        raise ValueError(f"time must be ({cameras},), the time of each camera's picture, got ({len(detections.time)},)")
     pictures = np.isfinite(detections.time)
     if not pictures.any():
         if previous is None:
@@ -48,7 +46,7 @@ def picture_times(
     now = float(detections.time[pictures].max())
     if previous is not None and now < previous:
         raise ValueError(
-            f"frames must come in the order of their times, got {now:.6g} s after {previous:.6g} s: sort them, or start "
-            "another tracker"
+            f"frames must come in the order of their times, got {now:.6g} s after {previous:.6g} s: sort them, or "
+            "start another tracker"
         )
     return now, np.where(pictures, detections.time - now, 0.0), pictures

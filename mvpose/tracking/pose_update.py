@@ -75,7 +75,9 @@ def update_people(
                 if seen:
                     view = centers, rays, scores, angles, sigmas[j], floor
                     carry(states[t, j], covariances[t, j], time)
-                    supports[t, j] += _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch) / views
+                    supports[t, j] += (
+                        _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch) / views
+                    )
                     carry(states[t, j], covariances[t, j], -time)
 
 
@@ -83,7 +85,7 @@ def update_people(
 def _update_joint(state, covariance, view, seen, speed, scratch):
     """Update one joint, in place; return the support of the rays."""
     origins, directions, weights, pixel, sigma, floor = view
-    point, start, b, target = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    point, start, b, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     A, inverse, prior = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     agreed = seen >= 2 and consensus(start, view, scratch)[0] > 0.0
     if np.isnan(state[0]):
@@ -94,7 +96,7 @@ def _update_joint(state, covariance, view, seen, speed, scratch):
             state[r], state[3 + r] = start[r], 0.0
             covariance[r, r], covariance[3 + r, 3 + r] = _UNKNOWN, speed * speed
     b[:] = 0.0
-    if not solve(covariance[:3, :3], b, prior, target):
+    if not solve(covariance[:3, :3], b, prior, step):
         return 0.0
     for r in range(3):
         point[r] = state[r]
@@ -110,13 +112,13 @@ def _update_joint(state, covariance, view, seen, speed, scratch):
         for r in range(3):
             for c in range(3):
                 A[r, c] += weight * prior[r, c]
-                b[r] += weight * prior[r, c] * state[c]
-        if not solve(A, b, inverse, target):
+                b[r] += weight * prior[r, c] * (state[c] - point[c])
+        if not solve(A, b, inverse, step):
             return 0.0
         moved = 0.0
         for r in range(3):
-            moved += (target[r] - point[r]) ** 2
-            point[r] = target[r]
+            moved += step[r] ** 2
+            point[r] += step[r]
         if moved < _CONVERGED:
             break
     condition(state, covariance, point, prior, inverse)

@@ -18,8 +18,8 @@ from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.kernels import njit
-from mvpose.tracking.motion import transition
 from mvpose.tracking.existence import FLASH
+from mvpose.tracking.motion import transition
 from mvpose.tracking.tracker import Moment, Tracker, vagueness
 
 
@@ -77,8 +77,16 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment) -> Moment:
         odds = np.where((row >= 0) & np.isneginf(later.odds[row]), -np.inf, odds)
     if moment.poses is not None:
         return moment
-    presence = np.where(row >= 0, np.maximum(moment.presence, later.presence[row]), moment.presence) if len(after) else moment.presence
-    shown = (odds > 0.0) & (presence > 0.0) & (vagueness(smoothed.state, smoothed.covariance) < tracker.model.existence.vague)
+    presence = (
+        np.where(row >= 0, np.maximum(moment.presence, later.presence[row]), moment.presence)
+        if len(after)
+        else moment.presence
+    )
+    shown = (
+        (odds > 0.0)
+        & (presence > 0.0)
+        & (vagueness(smoothed.state, smoothed.covariance) < tracker.model.existence.vague)
+    )
     return replace(moment, tracks=smoothed, odds=odds, presence=presence, shown=shown)
 
 
@@ -110,7 +118,8 @@ def _smooth_joint(state, covariance, predicted, predicted_covariance, after, aft
         predicted_covariance: its covariance, (6, 6).
         after: smoothed at the next moment, (6,).
         after_covariance: its covariance, (6, 6).
-        reach, decay: transition of position and velocity, :func:`mvpose.tracking.motion.transition`.
+        reach: reach of the velocity, :func:`mvpose.tracking.motion.transition`.
+        decay: decay of the velocity.
     """
     # gain = P Fᵀ S⁻¹, with F the transition and S the predicted covariance: solve S gainᵀ = F P by Cholesky
     L, gain = np.zeros((6, 6)), np.empty((6, 6))

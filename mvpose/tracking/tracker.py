@@ -20,6 +20,7 @@ from mvpose.kernels import njit
 from mvpose.ordering import number_views
 from mvpose.pipeline import Pipeline, enter
 from mvpose.rays import Rays
+from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import MISSING_SCORE, Poses
 from mvpose.skeleton import Skeleton
@@ -71,7 +72,8 @@ class Moment:
         time: time of the frame, seconds.
         elapsed: time since the previous frame, seconds.
         tracks: tracks after the frame, with those that end here.
-        predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new tracks.
+        predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new
+            tracks.
         odds: log-odds that each track is a person, (n,).
         presence: log-odds that this person is still here, (n,).
         shown: whether each track is reported, (n,).
@@ -137,8 +139,8 @@ class Tracker:
             self._start(rig, detections.skeleton)
         elif len(rig) != len(self._sizes) or detections.skeleton != self._skeleton:
             raise ValueError(
-                f"a tracker serves one rig and one skeleton, {len(self._sizes)} cameras and {self._skeleton.name!r}, got "
-                f"{len(rig)} and {detections.skeleton.name!r}: start another tracker"
+                f"a tracker serves one rig and one skeleton, {len(self._sizes)} cameras and {self._skeleton.name!r}, "
+                f"got {len(rig)} and {detections.skeleton.name!r}: start another tracker"
             )
         now, lead, pictures = picture_times(detections, len(rig), self._time, model.period)
         elapsed = 0.0 if first else now - self._time  # type: ignore[operator]
@@ -153,32 +155,43 @@ class Tracker:
         labels = self.pipeline.matching(joined, views).labels
         labels, groups = labels[: len(ordered)], labels[len(ordered) :]
         matched = clock.perf_counter()
-        self._update(rays, labels, groups, lead, elapsed)
+        self._update(rays, labels, groups, lead, now, elapsed)
         owner, fresh = _owners(labels, groups)
-        poses = self._give_birth(rays, fresh, owner, model.existence.span(np.inf if first else elapsed))
+        poses = self._give_birth(rays, fresh, owner, now, model.existence.span(np.inf if first else elapsed))
         tracks, count = self._tracks, len(before[0])
         gather_evidence(
-            tracks.hits, tracks.misses, tracks.absent, tracks.origin, np.arange(len(tracks)) >= count, tracks.state, owner,
-            ordered.view, rig.packed, self._sizes, pictures, *model.existence.weights(elapsed),
+            tracks.hits, tracks.misses, tracks.absent, tracks.origin, np.arange(len(tracks)) >= count, tracks.state,
+            owner, ordered.view, rig.packed, self._sizes, pictures, *model.existence.weights(elapsed),
         )  # fmt: skip
         clutter = self._clutter
-        odds = _odds(tracks.span, tracks.origin, tracks.hits, tracks.misses, clutter.density, clutter.flashes, model.existence.rates)
+        odds = _odds(
+            tracks.span,
+            tracks.origin,
+            tracks.hits,
+            tracks.misses,
+            clutter.density,
+            clutter.flashes,
+            model.existence.rates,
+        )
         vague = vagueness(tracks.state, tracks.covariance)
         here = _log_presence(tracks.absent, now - tracks.seen, *model.existence.presence)
         shown = (odds > 0.0) & (here > 0.0) & (vague < model.existence.vague) | first
         tracks.reported |= shown
-        false = np.ones(len(owner))  # probability that a detection shows nobody
+        false = np.ones(len(owner), np.float64)  # probability that a detection shows nobody
         false[owner >= 0] = 1.0 / (1.0 + np.exp(np.clip(odds[owner[owner >= 0]], -50.0, 50.0)))
-        clutter.count(np.bincount(ordered.view, false, len(rig)), pictures, elapsed)
+        clutter.count(np.bincount(ordered.view, false, len(rig)).astype(np.float64), pictures, elapsed)
         given = np.full(len(detections), -1)
         given[chosen] = owner
         new = len(tracks) - count
         moment = Moment(
             now, elapsed, tracks.select(np.arange(len(tracks))),
-            tuple(np.concatenate([each, np.full((new, *each.shape[1:]), np.nan)]) for each in before),  # type: ignore[arg-type]
+            (_with_nan(before[0], new), _with_nan(before[1], new)),
             odds, here, shown, given, poses if first else None, {},
         )  # fmt: skip
-        self._drop((odds > _GIVEN_UP) & (vague < 2.0 * model.existence.vague) & ~_absorbed(tracks.state, vague, _ONE_PERSON))
+        self._drop(
+            now,
+            (odds > _GIVEN_UP) & (vague < 2.0 * model.existence.vague) & ~_absorbed(tracks.state, vague, _ONE_PERSON),
+        )
         end = clock.perf_counter()
         moment.timings.update(
             affinity=compared - start, matching=matched - compared, reconstruction=end - matched, total=end - start
@@ -193,17 +206,18 @@ class Tracker:
         labels = np.where(moment.owner >= 0, number[moment.owner] if len(number) else -1, -1)
         if moment.poses is None:
             joints, covariance = constrain_people(tracks, self._bones)
-            joints, covariance, scores = joints[shown], covariance[shown], tracks.scores[shown]
+            joints, covariance, scores, freedom = joints[shown], covariance[shown], tracks.scores[shown], None
+            covariance = covariance + (SHARED * self._sigmas[:, None, None]) ** 2 * np.eye(3)  # no residual shows it
             joints[scores == 0.0] = covariance[scores == 0.0] = np.nan
             scores = np.where(np.isnan(joints[..., 0]), 0.0, scores)
         else:
-            joints, scores, covariance = moment.poses
+            joints, scores, covariance, freedom = moment.poses
         seal(joints, covariance, scores, labels)
         seconds = clock.perf_counter() - start
-        timings = {
-            key: value + seconds * (key in ("reconstruction", "total")) for key, value in moment.timings.items()
-        }
-        return Estimate(joints, scores, Matching(labels), covariance, timings, ids=tracks.ids[shown], time=moment.time)
+        timings = {key: value + seconds * (key in ("reconstruction", "total")) for key, value in moment.timings.items()}
+        return Estimate(
+            joints, scores, Matching(labels), covariance, timings, freedom, ids=tracks.ids[shown], time=moment.time
+        )
 
     def _start(self, rig: Rig, skeleton: Skeleton) -> None:
         self._skeleton = skeleton
@@ -214,7 +228,7 @@ class Tracker:
         self._clutter = Clutter(self.model.existence, len(rig))
         self._tracks = self._lost = Tracks.none(joints=len(skeleton), bones=len(self._bones.length), cameras=len(rig))
 
-    def _update(self, rays: Rays, labels: Integers, groups: Integers, lead: Floats, elapsed: float) -> None:
+    def _update(self, rays: Rays, labels: Integers, groups: Integers, lead: Floats, now: float, elapsed: float) -> None:
         """Update tracks by the detections that were matched with them."""
         tracks, noise = self._tracks, self.model.noise
         supports = np.empty_like(tracks.scores)
@@ -225,10 +239,10 @@ class Tracker:
         faded = tracks.scores * np.exp(-elapsed / _FORGETTING)
         faded[faded <= MISSING_SCORE] = 0.0
         tracks.scores = np.where(supports > MISSING_SCORE, supports, faded)
-        tracks.seen[groups >= 0] = self._time
+        tracks.seen[groups >= 0] = now
         _learn(tracks.length, tracks.variance, tracks.state, tracks.covariance, groups, self._bones.ends, elapsed)
 
-    def _give_birth(self, rays: Rays, fresh: Integers, owner: Integers, span: float) -> Poses:
+    def _give_birth(self, rays: Rays, fresh: Integers, owner: Integers, now: float, span: float) -> Poses:
         """Start tracks of the groups ``fresh`` (m,) of detections that belong to nobody known; set their owner.
 
         A group that repeats the pose of a track is left out: its detections were torn from that person's.
@@ -239,10 +253,12 @@ class Tracker:
         tracks, count, cameras = self._tracks, len(poses.joints), len(self._sizes)
         new = ~_repeats(poses.joints, tracks.state, _SAME_POSE)
         born = Tracks.born(
-            poses, ids=np.zeros(count, np.int64), time=self._time, span=span, speed=self.motion.speed,  # type: ignore[arg-type]
+            poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self.motion.speed,
             bones=self._bones, cameras=cameras,
         ).select(new)  # fmt: skip
-        back = self.model.reappearance.match(born, self._lost, self._time)  # type: ignore[arg-type]
+        back = self.model.reappearance.match(
+            born, self._lost, time=now, motion=self.model.motion, trunk=self.motion.trunk
+        )
         for k, lost in enumerate(back):
             if lost >= 0:
                 born.resume(k, self._lost, lost)
@@ -256,9 +272,9 @@ class Tracker:
         self._tracks = tracks.join(born)
         return poses
 
-    def _drop(self, followed: Bools) -> None:
+    def _drop(self, now: float, followed: Bools) -> None:
         """Stop to follow tracks; those who were people may come back."""
-        tracks, now = self._tracks, self._time
+        tracks = self._tracks
         if not followed.all():
             self._clutter.vanish(now - tracks.born_at[~followed])
             self._lost = self._lost.join(tracks.select(~followed & tracks.reported))
@@ -272,6 +288,11 @@ def constrain_people(tracks: Tracks, bones: BonePrior) -> tuple[Floats, Floats]:
     joints, covariance = np.empty((*tracks.state.shape[:2], 3)), np.empty((*tracks.state.shape[:2], 3, 3))
     _constrain(joints, covariance, tracks.state, tracks.covariance, bones.ends, tracks.length, tracks.variance)
     return joints, covariance
+
+
+def _with_nan(array: Floats, rows: int) -> Floats:
+    """Return an array with rows of NaN appended."""
+    return np.concatenate([array, np.full((rows, *array.shape[1:]), np.nan)])
 
 
 @njit(cache=True)

@@ -111,4 +111,6 @@ def test_limbs_come_to_move_with_the_trunk():
     state[:, 3] = 1.3
     state[9, 3] = 4.0  # a wrist that swings forward
     predict(state, covariance, 2.0, speed, time, trunk)
-    np.testing.assert_allclose(state[:, 0], np.where(np.arange(17) == 9, state[5, 0] + 2.7 * 0.15, state[5, 0]), atol=1e-3)
+    np.testing.assert_allclose(
+        state[:, 0], np.where(np.arange(17) == 9, state[5, 0] + 2.7 * 0.15, state[5, 0]), atol=1e-3
+    )

@@ -70,9 +70,8 @@ def test_pictures_have_times_of_their_own():
     _, blind, _ = film(fast, times, offsets=offsets, timed=False)
     _, together, _ = film(fast, times)
     known, unknown, best = (_errors(_run(rig, each), truth)[8:].mean() for each in (frames, blind, together))
-    print(known, unknown, best)
-    assert known < 1.25 * best
-    assert known < 0.5 * unknown
+    assert known < 2.0 * best
+    assert known < 0.2 * unknown
 
 
 def test_who_is_hidden_for_a_second_comes_back_as_the_same_person():
@@ -86,21 +85,19 @@ def test_who_is_hidden_for_a_second_comes_back_as_the_same_person():
 
 
 def test_two_false_detections_that_meet_for_a_moment_are_nobody():
-    rig, frames, truth = film(PATHS[:2], np.arange(20) / RATE, noise=1.0)
+    rig, frames, _ = film(PATHS[:2], np.arange(20) / RATE, noise=1.0)
     ghost = walking(0.0, paths=[(1.8, -1.8, 0.1, 0.0)])[0]
     for frame in (5, 9, 14):
         views = [frame % 5, (frame + 2) % 5]
         given = frames[frame]
         keypoints = np.concatenate([given.keypoints, [rig[view].project(ghost) for view in views]])
-        frames[frame] = Detections.from_keypoints(
-            [*given.view, *views], keypoints, np.full(keypoints.shape[:2], 0.9)
-        )
+        frames[frame] = Detections.from_keypoints([*given.view, *views], keypoints, np.full(keypoints.shape[:2], 0.9))
     assert len(Pipeline.preset("fast").estimate(rig, frames[5])) == 3
     assert [len(each) for each in _run(rig, frames)] == [2] * 20
 
 
 def test_who_walks_in_is_reported_within_a_fifth_of_a_second():
-    rig, frames, truth = film(PATHS, np.arange(20) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 8)
+    rig, frames, _ = film(PATHS, np.arange(20) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 8)
     people = [len(each) for each in _run(rig, frames)]
     assert people[:8] == [2] * 8
     assert people[13:] == [3] * 7
@@ -131,10 +128,7 @@ def test_memory_does_not_grow():
     tracker = Tracker(Pipeline.preset("fast"))
     sizes = []
     for k in range(60):
-        frame = frames[k % 4]
-        late = Detections(
-            frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, time=np.full(5, k * 20.0)
-        )
+        late = _at(frames[k % 4], k * 20.0)
         tracker.estimate(rig, late)  # 20 s between frames: somebody new each time
         sizes.append(len(pickle.dumps(tracker)))
     assert max(sizes[30:]) <= max(sizes[:30])
@@ -145,15 +139,17 @@ def test_nobody_for_a_minute_and_a_jump_of_an_hour():
     tracker = Tracker(Pipeline.preset("fast"))
     for frame in frames:
         assert len(tracker.estimate(rig, frame)) == 1
-    empty = Detections.empty()
     for k in range(60):
-        late = Detections(*(getattr(empty, key) for key in ("view", "keypoints", "scores", "boxes", "box_scores")),
-                          time=np.full(5, 1.0 + k))  # fmt: skip
-        estimate = tracker.estimate(rig, late)
+        estimate = tracker.estimate(rig, _at(Detections.empty(), 1.0 + k))
     assert len(estimate) == 0
-    frame = frames[0]
-    later = Detections(frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, time=np.full(5, 3600.0))
-    assert len(tracker.estimate(rig, later)) == 1
+    assert len(tracker.estimate(rig, _at(frames[0], 3600.0))) == 1
+
+
+def _at(frame, time):
+    """The same detections, all of one time."""
+    return Detections(
+        frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, time=np.full(5, float(time))
+    )
 
 
 @pytest.mark.parametrize(
