@@ -221,7 +221,7 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 5, "toml": 7, "yaml": 1}
+    assert languages == {"python": 6, "toml": 7, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -495,3 +495,14 @@ def test_the_workflow_is_valid():
     assert runs[1] in CHECKS
     (written,) = re.findall(r"--summary (\S+)", runs[1])
     assert f"cat {written} " in runs[2]
+
+
+def test_the_block_of_the_tracker_runs():
+    scenario = simharness.load_scenario("quickstart", overrides=["duration=0.4", 'rendering.renderer="rays"'])
+    recording = simharness.simulate(scenario)
+    (block,) = [block for block in blocks("python") if "Tracker(" in block]
+    names = {"rig": recording.rig, "frames": recording.detections}
+    exec(block, names)
+    assert len(names["smooth"]) == len(recording.detections)
+    assert names["estimate"].ids.tolist() == names["smooth"][-1].ids.tolist()
+    assert len(names["estimate"]) == 4
