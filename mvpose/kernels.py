@@ -26,13 +26,16 @@ from mvpose.kernel_code import code_digest
 
 __all__ = ["njit"]
 
-_DEFAULTS = {"error_model": "numpy", "fastmath": False, "forceinline": False}  # all that numba inherits from callers
+# All that numba inherits from callers.
+_DEFAULTS = {"error_model": "numpy", "fastmath": False, "forceinline": False, "_nrt": True}
 _CHECKSUM = hashlib.sha256().digest_size  # bytes at the start of a file: the digest of the rest
 # Arguments whose types say all of them that is compiled. Others, such as functions, bring code that no key would see.
 _PLAIN = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.Omitted, types.Array)
 
 
-def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **options: Any) -> Any:
+def njit(
+    function: Callable[..., Any] | None = None, *, cache: bool = False, borrows: bool = False, **options: Any
+) -> Any:
     """Compile a function by ``numba.njit``; also a decorator with options.
 
     Division by zero gives infinity or NaN, as in NumPy, and arithmetic is strict (``fastmath=False``) unless options
@@ -43,11 +46,14 @@ def njit(function: Callable[..., Any] | None = None, *, cache: bool = False, **o
         function: function to compile on its first call.
         cache: keep compiled code on disk, where numba's own cache would: in ``NUMBA_CACHE_DIR``, in ``__pycache__``, or
             in a folder of the user where the package cannot be written.
+        borrows: the kernel works on arrays of its caller alone: it makes none and gets none from other kernels. Then it
+            need not count references to them, which takes longer than to invert a 3 x 3 matrix. One that makes an array
+            does not compile; one that gets an array from another kernel would never free it.
         **options: options of ``numba.njit``.
     """
     if function is None:
-        return lambda decorated: njit(decorated, cache=cache, **options)
-    kernel = numba.njit(**{**_DEFAULTS, **options})(function)
+        return lambda decorated: njit(decorated, cache=cache, borrows=borrows, **options)
+    kernel = numba.njit(**{**_DEFAULTS, "_nrt": not borrows, **options})(function)
     if cache and hasattr(kernel, "_cache"):  # not with NUMBA_DISABLE_JIT, nor in a numba that keeps its cache elsewhere
         kernel._cache = KernelCache(kernel)
     return kernel

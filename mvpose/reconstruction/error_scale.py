@@ -189,7 +189,7 @@ def observe(point, view, relative, absolute, information):
     return freedom, share
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def add_shared(covariance, sigma):
     """Add the variance of the error that all views share to the covariance of a joint (3, 3), in place."""
     for r in range(3):

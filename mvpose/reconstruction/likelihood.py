@@ -70,7 +70,7 @@ def _sigmas(area: float, definition: float, skeleton: Skeleton) -> Floats:
     return sigmas
 
 
-@njit(cache=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def log_likelihood(point, origins, directions, weights, pixel, sigma, floor):
     """Sum the log-likelihood over the views that detected the joint; a point behind a camera has the floor there."""
     total, product = 0.0, 1.0
@@ -98,7 +98,7 @@ NO_RAYS = (0.0,) * 9
 """Empty sums for :func:`add_ray`."""
 
 
-@njit(cache=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def add_ray(sums, weight, direction, origin):
     """Add ``weight * (I - d dᵀ)`` and its product with the origin to normal equations held in nine numbers.
 
@@ -122,7 +122,7 @@ def add_ray(sums, weight, direction, origin):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def add_sums(sums, A, b):
     """Add the sums of :func:`add_ray` to A (3, 3) and b (3,)."""
     k = 0
@@ -135,7 +135,7 @@ def add_sums(sums, A, b):
             k += 1
 
 
-@njit(cache=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper, A, b):
     """Add the rays of all views to the normal equations A (3, 3) and b (3,) of the step from the point to the joint.
 
@@ -175,7 +175,7 @@ def accumulate(point, origins, directions, weights, pixel, sigma, floor, temper,
     return support, responsibilities, misfit
 
 
-@njit(cache=True, fastmath=_FASTMATH)
+@njit(cache=True, borrows=True, fastmath=_FASTMATH)
 def evaluate_strongest_modes(point, origins, directions, weights, pixel, sigma, floor):
     """Return the sums of :func:`accumulate` for the strongest modes only, and the greatest squared error, m^2."""
     support, responsibilities, misfit, worst = 0.0, 0.0, 0.0, 0.0
@@ -201,7 +201,7 @@ ANCHOR = 1.0
 """Information, 1/m^2, that keeps a joint at its current position; it matters only where no view agrees."""
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def anchor(A, b):
     """Start normal equations of a step with weak information that the step is zero."""
     for r in range(3):
@@ -211,7 +211,7 @@ def anchor(A, b):
         b[r] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def solve(A, b, inverse, point):
     """Write the inverse of a symmetric A (3, 3) and ``inverse @ b``; return False if A is numerically singular.
 

@@ -123,7 +123,7 @@ _NEARLY_ALL = 0.8  # of the total score
 _BEYOND_CHANCE = 3.5  # views; three rays may pass one point by chance
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def consensus(point, view, scratch):
     """Write the most likely point of one joint and return its support as :func:`settle` does.
 
@@ -154,7 +154,7 @@ def consensus(point, view, scratch):
     if support > (_MAJORITY if responsibilities > _BEYOND_CHANCE else _NEARLY_ALL) * total:
         return support, responsibilities, misfit
     best = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)
-    trial = np.empty(3)
+    trial = scratch[7]
     for first in range(len(weights)):
         for second in range(first + 1, len(weights)):
             if pair_point(
@@ -169,7 +169,7 @@ def consensus(point, view, scratch):
     return settle(point, view, scratch, 1.0, _MOST_STEPS)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def settle(point, view, scratch, temper, steps):
     """Move a point to the nearby maximum of its likelihood by expectation maximisation.
 
@@ -197,7 +197,7 @@ def settle(point, view, scratch, temper, steps):
     return sums
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _all_views(point, view, scratch):
     """Write the point nearest to all rays, weighted by score; return False if fewer than two views see the joint."""
     origins, directions, weights = view[:3]
@@ -247,7 +247,7 @@ def _best_pair(point, view):
 _LEAST_SINE2 = 1e-10  # squared sine of the angle between two rays; below it they count as parallel
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def pair_point(origin, direction, weight, other_origin, other_direction, other_weight, point):
     """Write the point nearest to two rays, weighted by score, and return a measure of how well they determine it.
 

@@ -10,6 +10,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from numba.extending import is_jitted
@@ -17,6 +18,7 @@ from numba.extending import is_jitted
 import mvpose
 import simharness
 from mvpose.kernel_code import UnknownDependencyError, code_digest
+from mvpose.kernels import njit
 
 ROOT = Path(__file__).parents[2]
 
@@ -165,6 +167,36 @@ def test_a_kernel_does_not_inherit_the_options_of_who_compiles_it(toy, caller_fi
         assert kernel(5.0) == np.inf
     (code,) = inner.inspect_llvm().values()
     assert " fast " not in code
+
+
+def test_a_kernel_that_borrows_arrays_counts_no_references():
+    @njit
+    def count(values):
+        return len(np.zeros(len(values)))
+
+    @njit(borrows=True)
+    def shift(values):
+        later = values[count(values) - 2 :]  # the first to compile the other kernel, which does make an array
+        for k in range(len(later)):
+            later[k] += 1.0
+        return later[0]
+
+    array = np.zeros(3)
+    references = sys.getrefcount(array)
+    assert [shift(array) for _ in range(3)] == [1.0, 2.0, 3.0]
+    assert array.tolist() == [0.0, 3.0, 3.0]
+    assert sys.getrefcount(array) == references
+    (code,) = shift.inspect_llvm().values()
+    assert "call void @NRT_incref" not in code
+
+
+def test_a_kernel_that_borrows_arrays_cannot_make_one():
+    @njit(borrows=True)
+    def doubled(values):
+        return (2.0 * values).sum()
+
+    with pytest.raises((numba.core.errors.NumbaError, TypeError), match="NRT"):
+        doubled(np.ones(3))
 
 
 def test_only_callers_of_edited_code_are_compiled(toy):
