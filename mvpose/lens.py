@@ -16,7 +16,7 @@ _LONGEST_STEP = 0.02  # focal lengths; shorter than any fold of a real lens
 _LEAST_STRIDE = 1.0 / 64.0  # fraction of Newton's step; if a shorter step still makes no progress, the lens ends here
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def distort(x, y, terms):
     """Return the normalised image point of the direction (x, y, 1)."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
@@ -28,7 +28,7 @@ def distort(x, y, terms):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def undistort(u, v, terms):
     """Return x, y of the direction (x, y, 1) that the lens images at (u, v); NaN if there is none.
 
@@ -61,7 +61,7 @@ def undistort(u, v, terms):
     return _undistort_damped(u, v, terms)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _linearised(x, y, terms):
     """Return :func:`distort` (u, v) and its derivatives du/dx, du/dy = dv/dx, dv/dy."""
     k1, k2, p1, p2, k3 = terms[0], terms[1], terms[2], terms[3], terms[4]
@@ -77,7 +77,7 @@ def _linearised(x, y, terms):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _undistort_damped(u, v, terms):
     """Run Newton's method in short, damped steps that stay on the branch of the lens through the centre."""
     x, y = 0.0, 0.0

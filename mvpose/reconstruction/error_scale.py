@@ -44,13 +44,13 @@ SHARED = 0.15
 """Standard deviation along each axis of the error that all views share, over that of a keypoint across its ray."""
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def degrees_of_freedom(views):
     """Return the degrees of freedom of a joint's residuals: two per view, minus three for the position."""
     return _OBSERVED_VARIANCE * max(2.0 * views - 3.0, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def person_scale(misfit, responsibilities):
     """Return the ratio of a person's squared keypoint errors to those of the error model.
 
@@ -116,7 +116,7 @@ def fit_variances(misfit, responsibilities, support, sigmas):
     return min(relative, _FIT_MOST), absolute
 
 
-@njit(cache=True, fastmath={"contract", "arcp", "nsz"})
+@njit(cache=True, borrows=True)
 def observe(point, view, relative, absolute, information):
     """Write the observed information of one joint's keypoints at its estimated position, at the scale of their misfit.
 

@@ -29,17 +29,21 @@ def max_product(states, unary, count, graph, length, precision):
         Index of the chosen state of every joint, (J,); 0 for a joint without states.
     """
     joints, most = len(count), max(count.max(), 1)
-    belief, choice = np.zeros((joints, most)), np.zeros((joints, most, most), np.int64)
-    pairs = np.zeros((joints, 2, most, most))  # terms of each joint with the joints that it is eliminated before
+    belief, choice = np.zeros((joints, most)), np.empty((joints, most, most), np.int64)
+    pairs = np.empty((joints, 2, most, most))  # terms of each joint with the joints that it is eliminated before
     for joint in range(joints):
         for s in range(count[joint]):
             belief[joint, s] = unary[joint, s]
         for slot in range(2):
             bone, other = graph.joint_bones[joint, slot], graph.later[joint, slot]
+            others = count[other] if other >= 0 else 0
+            for s in range(max(count[joint], 1)):
+                for o in range(max(others, 1)):
+                    pairs[joint, slot, s, o] = 0.0
             if bone < 0 or precision[bone] == 0.0:
                 continue
             for s in range(count[joint]):
-                for o in range(count[other]):
+                for o in range(others):
                     x = states[joint, s, 0] - states[other, o, 0]
                     y = states[joint, s, 1] - states[other, o, 1]
                     z = states[joint, s, 2] - states[other, o, 2]
@@ -67,7 +71,7 @@ def max_product(states, unary, count, graph, length, precision):
     return chosen
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _slot(graph, joint, other):
     """Return the place of another joint among the two that a joint is eliminated before."""
     return 0 if graph.later[joint, 0] == other else 1
@@ -88,41 +92,59 @@ def marginalize(joints, information, covariance, graph, precision):
     coupling = np.zeros((count, 2, 3, 3))  # blocks of the information matrix with the joints eliminated later
     gain, cross = np.zeros((count, 2, 3, 3)), np.zeros((count, 2, 3, 3))
     inverse, known = np.zeros((count, 3, 3)), np.zeros(count, np.bool_)
-    b, unused, along = np.zeros(3), np.empty(3), np.empty(3)
+    _couple(joints, information, coupling, graph, precision)
     for j in range(count):
+        known[j] = not np.isnan(joints[j, 0])
+    _eliminate(information, coupling, gain, inverse, known, graph, (np.zeros(3), np.empty(3)))
+    _substitute(covariance, gain, cross, inverse, known, graph)
+
+
+@njit(cache=True, borrows=True)
+def _couple(joints, information, coupling, graph, precision):
+    """Add the bones to the information of the joints, (J, 3, 3), and to its blocks between joints, (J, 2, 3, 3)."""
+    for j in range(len(joints)):
         for slot in range(2):
             bone, other = graph.joint_bones[j, slot], graph.later[j, slot]
             if bone < 0 or precision[bone] == 0.0 or np.isnan(joints[j, 0]) or np.isnan(joints[other, 0]):
                 continue
-            reach = 0.0
-            for r in range(3):
-                along[r] = joints[j, r] - joints[other, r]
-                reach += along[r] * along[r]
-            weight = precision[bone] / max(reach, 1e-18)
+            x, y, z = joints[j, 0] - joints[other, 0], joints[j, 1] - joints[other, 1], joints[j, 2] - joints[other, 2]
+            weight = precision[bone] / max(x * x + y * y + z * z, 1e-18)
+            along = (x, y, z)
             for r in range(3):
                 for c in range(3):
                     value = weight * along[r] * along[c]
                     information[j, r, c] += value
                     information[other, r, c] += value
                     coupling[j, slot, r, c] -= value
+
+
+@njit(cache=True, borrows=True)
+def _eliminate(information, coupling, gain, inverse, known, graph, work):
+    """Eliminate the joints in order: write the gain of each joint, (J, 2, 3, 3), and its inverse information."""
+    b, unused = work
     for j in graph.order:
-        known[j] = not np.isnan(joints[j, 0]) and solve(information[j], b, inverse[j], unused)
+        known[j] = known[j] and solve(information[j], b, inverse[j], unused)
         if not known[j]:
             continue
+        first, second = graph.later[j, 0], graph.later[j, 1]
         for slot in range(2):
             if graph.later[j, slot] >= 0:
                 _multiply(inverse[j], coupling[j, slot], gain[j, slot])
-        first, second = graph.later[j]
-        for slot in range(2):
-            if graph.later[j, slot] >= 0:
                 _subtract(coupling[j, slot], gain[j, slot], information[graph.later[j, slot]])
         if second >= 0:
             _subtract(coupling[j, 0], gain[j, 1], coupling[first, _slot(graph, first, second)])
-    # With x the joint, y those eliminated later and G the gain: cov(x, y) = -G cov(y), cov(x) = inverse - cov(x, y) G'.
+
+
+@njit(cache=True, borrows=True)
+def _substitute(covariance, gain, cross, inverse, known, graph):
+    """Write the covariance of each joint, (J, 3, 3), and with the joints eliminated later, (J, 2, 3, 3), in reverse.
+
+    With x the joint, y those eliminated later and G the gain: cov(x, y) = -G cov(y), cov(x) = inverse - cov(x, y) G'.
+    """
     for j in graph.order[::-1]:
         if not known[j]:
             continue
-        first, second = graph.later[j]
+        first, second = graph.later[j, 0], graph.later[j, 1]
         for slot in range(2):
             one, other = graph.later[j, slot], graph.later[j, 1 - slot]
             if one < 0:
@@ -148,14 +170,14 @@ def marginalize(joints, information, covariance, graph, precision):
                 covariance[j, r, c] = value
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _multiply(a, b, result):
     for r in range(3):
         for c in range(3):
             result[r, c] = a[r, 0] * b[0, c] + a[r, 1] * b[1, c] + a[r, 2] * b[2, c]
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _subtract(a, b, result):
     """Subtract ``a.T @ b`` in place."""
     for r in range(3):

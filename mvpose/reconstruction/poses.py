@@ -39,7 +39,7 @@ class Poses(NamedTuple):
         return cls(np.empty((*shape, 3)), np.empty(shape), np.empty((*shape, 3, 3)), np.empty(shape))
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def clear(joints, scores, covariance, freedom):
     """Mark all joints of one person as missing."""
     for j in range(len(scores)):

@@ -62,7 +62,7 @@ def propose_all(origins, directions, weights, pixel, sigmas, floor, most_pairs, 
     return states, unary, count, np.sqrt(person_scale(misfit, responsibilities))
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def insert(states, unary, count, value, x, y, z):
     """Insert a point into the ``count`` states (S, 3) of a joint, which are ordered with the likeliest first."""
     place = count
@@ -112,7 +112,7 @@ def _pairs(origins, directions, weights, sigma, points, quality):
     return filled
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _agreement(point, origins, directions, first, mode, second, other, sigma):
     """Return the relative likelihood, at most 1, of the distances of two rays from their common point."""
     e2, a, b = 0.0, 0.0, 0.0

@@ -78,73 +78,77 @@ _LONG = 4e-4  # m^2; a step below 2 cm turns no bone by much, so it cannot overs
 @njit(cache=True)
 def climb(joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision):
     """Move the joints (J, 3) to a maximum of the posterior, in place; joints that are NaN are skipped."""
-    A, b, inverse = np.empty((3, 3)), np.empty(3), np.empty((2, 3, 3))
-    target, trial = np.empty((2, 3)), np.empty((2, 3))
+    keypoints, bones = (origins, directions, weights, pixel, sigmas, floor), (graph.neighbours, graph.bones)
+    work = np.empty((3, 3)), np.empty(3), np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3))
     for _ in range(_SWEEPS):
-        furthest = 0.0
-        for j in graph.visits:
-            mate = graph.mate[j]
-            if mate < j and not np.isnan(joints[mate, 0]):
-                continue  # moved together with its mate
-            if np.isnan(joints[mate, 0]):
-                mate = j
-            if np.isnan(joints[j, 0]):
-                continue
-            members = (j, mate)
-            size, shared, moved = (1 if mate == j else 2), -1, 0.0
-            for k in range(size):
-                joint = members[k]
-                anchor(A, b)
-                accumulate(
-                    joints[joint], origins, directions[joint], weights[joint], pixel, sigmas[joint], floor, 1.0, A, b
-                )
-                between = _add_bones(A, b, joint, members[1 - k], joints, graph, length, precision)
-                shared = max(shared, between)
-                if not solve(A, b, inverse[k], target[k]):
-                    target[k] = 0.0
-                    inverse[k] = 0.0
-                for r in range(3):
-                    target[k, r] += joints[joint, r]
-            if shared >= 0:
-                _join(target, inverse, joints[j], joints[mate], length[shared], precision[shared])
-            for k in range(size):
-                step2 = 0.0
-                for r in range(3):
-                    step2 += (target[k, r] - joints[members[k], r]) ** 2
-                moved = max(moved, step2)
-            if moved > _LONG:
-                # The bones are linearised, so a long step can overshoot: it is taken only if the posterior rises.
-                for k in range(size):
-                    trial[k] = joints[members[k]]
-                current = _local_posterior(
-                    trial, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph,
-                    length, precision,
-                )  # fmt: skip
-                step, climbs = 1.0, False
-                for _ in range(_HALVINGS):
-                    for k in range(size):
-                        for r in range(3):
-                            trial[k, r] = joints[members[k], r] + step * (target[k, r] - joints[members[k], r])
-                    proposed = _local_posterior(
-                        trial, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph,
-                        length, precision,
-                    )  # fmt: skip
-                    climbs = proposed >= current
-                    if climbs:
-                        break
-                    step *= 0.5
-                if not climbs:
-                    continue
-                target[:] = trial
-            for k in range(size):
-                for r in range(3):
-                    joints[members[k], r] = target[k, r]
-            furthest = max(furthest, moved)
-        if furthest < _CONVERGED:
+        if _sweep(joints, keypoints, graph.visits, graph.mate, bones, length, precision, work) < _CONVERGED:
             break
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
+def _sweep(joints, keypoints, visits, mates, bones, length, precision, work):
+    """Move each joint once, or together with its mate; return the squared length of the longest step, m^2."""
+    origins, directions, weights, pixel, sigmas, floor = keypoints
+    A, b, inverse, target, trial = work
+    furthest = 0.0
+    for j in visits:
+        mate = mates[j]
+        if mate < j and not np.isnan(joints[mate, 0]):
+            continue  # moved together with its mate
+        if np.isnan(joints[mate, 0]):
+            mate = j
+        if np.isnan(joints[j, 0]):
+            continue
+        members = (j, mate)
+        size, shared, moved = (1 if mate == j else 2), -1, 0.0
+        for k in range(size):
+            joint = members[k]
+            anchor(A, b)
+            accumulate(
+                joints[joint], origins, directions[joint], weights[joint], pixel, sigmas[joint], floor, 1.0, A, b
+            )
+            between = _add_bones(A, b, joint, members[1 - k], joints, bones, length, precision)
+            shared = max(shared, between)
+            if not solve(A, b, inverse[k], target[k]):
+                target[k] = 0.0
+                inverse[k] = 0.0
+            for r in range(3):
+                target[k, r] += joints[joint, r]
+        if shared >= 0:
+            _join(target, inverse, joints[j], joints[mate], length[shared], precision[shared])
+        for k in range(size):
+            step2 = 0.0
+            for r in range(3):
+                step2 += (target[k, r] - joints[members[k], r]) ** 2
+            moved = max(moved, step2)
+        goal = target
+        if moved > _LONG:
+            # The bones are linearised, so a long step can overshoot: it is taken only if the posterior rises.
+            for k in range(size):
+                for r in range(3):
+                    trial[k, r] = joints[members[k], r]
+            current = _local_posterior(trial, members, size, shared, joints, keypoints, bones, length, precision)
+            step, climbs = 1.0, False
+            for _ in range(_HALVINGS):
+                for k in range(size):
+                    for r in range(3):
+                        trial[k, r] = joints[members[k], r] + step * (target[k, r] - joints[members[k], r])
+                proposed = _local_posterior(trial, members, size, shared, joints, keypoints, bones, length, precision)
+                climbs = proposed >= current
+                if climbs:
+                    break
+                step *= 0.5
+            if not climbs:
+                continue
+            goal = trial
+        for k in range(size):
+            for r in range(3):
+                joints[members[k], r] = goal[k, r]
+        furthest = max(furthest, moved)
+    return furthest
+
+
+@njit(cache=True, borrows=True)
 def _join(target, inverse, here, there, length, precision):
     """Add the bone between two joints to their solutions (2, 3) without it, exactly for the linearised bone.
 
@@ -184,15 +188,15 @@ def fit_scale(joints, origins, directions, weights, pixel, sigmas, floor):
     return person_scale(misfit, responsibilities)
 
 
-@njit(cache=True)
-def _add_bones(A, b, j, mate, joints, graph, length, precision):
+@njit(cache=True, borrows=True)
+def _add_bones(A, b, j, mate, joints, bones, length, precision):
     """Add the bones that end in joint j to the normal equations of its step, linearised along their current directions.
 
     The bone to the mate is left out; its index is returned, or -1 where there is none.
     """
     shared = -1
-    for slot in range(graph.neighbours.shape[1]):
-        other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
+    for slot in range(bones[0].shape[1]):
+        other, bone = bones[0][j, slot], bones[1][j, slot]
         if other < 0 or precision[bone] == 0.0 or np.isnan(joints[other, 0]):
             continue
         if other == mate:
@@ -218,17 +222,16 @@ def _add_bones(A, b, j, mate, joints, graph, length, precision):
     return shared
 
 
-@njit(cache=True)
-def _local_posterior(
-    points, members, size, shared, joints, origins, directions, weights, pixel, sigmas, floor, graph, length, precision
-):
+@njit(cache=True, borrows=True)
+def _local_posterior(points, members, size, shared, joints, keypoints, bones, length, precision):
     """Return the terms of the log-posterior that change when one or two joints move to ``points``, (2, 3)."""
+    origins, directions, weights, pixel, sigmas, floor = keypoints
     value = 0.0
     for k in range(size):
         j, mate = members[k], members[1 - k]
         value += log_likelihood(points[k], origins, directions[j], weights[j], pixel, sigmas[j], floor)
-        for slot in range(graph.neighbours.shape[1]):
-            other, bone = graph.neighbours[j, slot], graph.bones[j, slot]
+        for slot in range(bones[0].shape[1]):
+            other, bone = bones[0][j, slot], bones[1][j, slot]
             if other >= 0 and other != mate and precision[bone] > 0.0 and not np.isnan(joints[other, 0]):
                 value -= 0.5 * precision[bone] * (_distance(points[k], joints[other]) - length[bone]) ** 2
     if shared >= 0:
@@ -236,7 +239,7 @@ def _local_posterior(
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _distance(a, b):
     return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
@@ -275,24 +278,33 @@ def write_uncertainty(
     # Errors of calibration move all joints of a person alike, so that no bone shows or reduces them: their share of the
     # covariance from the keypoints bypasses the bones.
     alike, unused = np.zeros((count, 3, 3)), np.empty(3)
+    b[:] = 0.0
     for j in range(count):
         if not np.isnan(joints[j, 0]):
             view = origins, directions[j], weights[j], pixel, sigmas[j], floor
             freedom[j], share = observe(joints[j], view, relative, absolute, information[j])
             if share > 0.0:
-                share = min(share, _MOST_ALIKE)
-                b[:] = 0.0
                 solve(information[j], b, alike[j], unused)
-                alike[j] *= share
-                information[j] /= 1.0 - share
+                _split(information[j], alike[j], min(share, _MOST_ALIKE))
     marginalize(joints, information, covariance, graph, precision)
     for j in range(count):
-        covariance[j] += alike[j]
+        for r in range(3):
+            for c in range(3):
+                covariance[j, r, c] += alike[j, r, c]
         add_shared(covariance[j], sigmas[j])
     _add_ambiguity(covariance, joints, origins, directions, weights, graph, precision, concentrations, trunk)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
+def _split(information, covariance, share):
+    """Leave a share of the variances to the covariance (3, 3), and the rest to the information (3, 3), in place."""
+    for r in range(3):
+        for c in range(3):
+            covariance[r, c] *= share
+            information[r, c] /= 1.0 - share
+
+
+@njit(cache=True, borrows=True)
 def _add_outer(matrix, vector, weight):
     for r in range(3):
         for c in range(3):
