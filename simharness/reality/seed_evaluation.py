@@ -33,12 +33,16 @@ class PcpInterval:
 
     Attributes:
         pcp: value.
-        low, high: ends of the interval.
+        low, high: ends of the interval; NaN where fewer than two seeds have the value.
     """
 
     pcp: float
     low: float
     high: float
+
+    def summary(self) -> dict[str, float | None]:
+        """Return the fields, ready for JSON: None for a value that is unknown."""
+        return {key: value if np.isfinite(value) else None for key, value in vars(self).items()}
 
     def __str__(self) -> str:
         return f"{self.pcp:.1f} ({self.low:.1f}–{self.high:.1f})"
@@ -99,9 +103,11 @@ class SeedEvaluation:
             "frames": self.scenario.frames,
             "seeds": list(self.seeds),
             "head": self.head,
-            "pcp": {name: vars(self.pcp(name)) for name in (first, *others)},
-            "pcp_people": {name: [vars(self.pcp(name, [person])) for person in people] for name in (first, *others)},
-            f"ahead_of_{first}": {name: vars(self.difference(name, first)) for name in others},
+            "pcp": {name: self.pcp(name).summary() for name in (first, *others)},
+            "pcp_people": {
+                name: [self.pcp(name, [person]).summary() for person in people] for name in (first, *others)
+            },
+            f"ahead_of_{first}": {name: self.difference(name, first).summary() for name in others},
             "summaries": {name: self.pooled(name).summary() for name in (first, *others)},
         }
 

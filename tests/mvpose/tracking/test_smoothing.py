@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from walkers import film, identities
+from walking_people import film, identities
 
 from mvpose import Pipeline
 from mvpose.tracking import Tracker, TrackingModel, track

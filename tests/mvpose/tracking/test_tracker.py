@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from people import ring
-from walkers import film, identities, walking
+from walking_people import film, identities, walking
 
 from mvpose import Detections, Pipeline
 from mvpose.tracking import Tracker, TrackingModel

@@ -222,7 +222,7 @@ def test_a_malformed_skeleton_names_the_line(files, old, new, message):
 
 
 def test_a_missing_file(tmp_path):
-    with pytest.raises(ValueError, match=r"none.asf: cannot be read"):
+    with pytest.raises(ValueError, match=r"none.asf: no such file"):
         read_asf(tmp_path / "none.asf")
 
 
