@@ -102,7 +102,7 @@ def test_the_canonical_order_goes_from_top_to_bottom_and_has_no_blank_detection(
     rig, detections = frame(3)
     weights = viewing_rays(rig, detections).weights.copy()
     weights[2] = 0.0
-    order = canonical_order(detections, weights)
+    order = canonical_order(detections.keypoints, weights, detections.box_scores)
     assert sorted(order) == [index for index in range(len(detections)) if index != 2]
     heights = np.nanmean(np.where(weights > 0, detections.keypoints[..., 1], np.nan)[order], axis=1)
     assert (np.diff(heights) >= 0).all()
