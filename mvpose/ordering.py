@@ -69,19 +69,21 @@ def canonical_order(keypoints, weights, box_scores):
                 count += 1.0
         if count > 0.0:
             keys[d, 0], keys[d, 1], keys[d, 2], keys[d, 3] = row / count, -score, -box_scores[d], column / count
-            place = filled  # insertion sort, because a library call takes longer than to sort what a frame has
-            while place > 0 and _precedes(keys[d], keys[order[place - 1]]):
+            low, high = 0, filled  # the place after all detections that do not come later
+            while low < high:
+                middle = (low + high) // 2
+                low, high = (low, middle) if _precedes(keys, d, order[middle]) else (middle + 1, high)
+            for place in range(filled, low, -1):
                 order[place] = order[place - 1]
-                place -= 1
-            order[place] = d
+            order[low] = d
             filled += 1
     return order[:filled].copy()
 
 
 @njit(cache=True, borrows=True)
-def _precedes(keys, others):
-    """Return whether keys (4,) come before others in lexicographic order."""
+def _precedes(keys, one, other):
+    """Return whether one row of the keys (m, 4) comes before another in lexicographic order."""
     for k in range(4):
-        if keys[k] != others[k]:
-            return keys[k] < others[k]
+        if keys[one, k] != keys[other, k]:
+            return keys[one, k] < keys[other, k]
     return False
