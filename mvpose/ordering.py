@@ -10,24 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mvpose.arrays import Floats, Integers
-from mvpose.detections import Detections
+from mvpose.arrays import Integers
 from mvpose.kernels import njit
-
-
-def canonical_order(detections: Detections, weights: Floats) -> Integers:
-    """Return the indices of the detections with a keypoint, from the top to the bottom of their pictures.
-
-    Detections of equal mean height are ordered by score, then by column. Those that agree in all of this are taken to
-    be copies of each other.
-
-    Args:
-        detections: m detections.
-        weights: scores of the keypoints that have a viewing ray, (m, J).
-    """
-    keys = _sort_keys(detections.keypoints, weights, detections.box_scores)
-    order = np.lexsort(keys[:-1])
-    return order[keys[-1, order] > 0.0]
 
 
 def number_views(view: Integers) -> Integers:
@@ -62,10 +46,19 @@ def rank_views(view):
 
 
 @njit(cache=True)
-def _sort_keys(keypoints, weights, box_scores):
-    """Return the keys of the order, the last one first, (4, m), and as the last row the number of keypoints."""
+def canonical_order(keypoints, weights, box_scores):
+    """Return the indices of the detections with a keypoint, from the top to the bottom of their pictures.
+
+    Detections of equal mean height are ordered by score, then by column. Those that agree in all of this are taken to
+    be copies of each other.
+
+    Args:
+        keypoints: pixels, (m, J, 2).
+        weights: scores of the keypoints that have a viewing ray, (m, J).
+        box_scores: confidence of each box, (m,).
+    """
     m, joints = weights.shape
-    keys = np.zeros((5, m))
+    keys, order, filled = np.empty((m, 4)), np.empty(m, np.int64), 0
     for d in range(m):
         column, row, score, count = 0.0, 0.0, 0.0, 0.0
         for j in range(joints):
@@ -75,6 +68,22 @@ def _sort_keys(keypoints, weights, box_scores):
                 score += weights[d, j]
                 count += 1.0
         if count > 0.0:
-            keys[0, d], keys[1, d], keys[2, d] = column / count, -box_scores[d], -score
-            keys[3, d], keys[4, d] = row / count, count
-    return keys
+            keys[d, 0], keys[d, 1], keys[d, 2], keys[d, 3] = row / count, -score, -box_scores[d], column / count
+            low, high = 0, filled  # the place after all detections that do not come later
+            while low < high:
+                middle = (low + high) // 2
+                low, high = (low, middle) if _precedes(keys, d, order[middle]) else (middle + 1, high)
+            for place in range(filled, low, -1):
+                order[place] = order[place - 1]
+            order[low] = d
+            filled += 1
+    return order[:filled].copy()
+
+
+@njit(cache=True, borrows=True)
+def _precedes(keys, one, other):
+    """Return whether one row of the keys (m, 4) comes before another in lexicographic order."""
+    for k in range(4):
+        if keys[one, k] != keys[other, k]:
+            return keys[one, k] < keys[other, k]
+    return False

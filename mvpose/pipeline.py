@@ -17,8 +17,8 @@ from mvpose.detections import Detections
 from mvpose.duplicates import Duplicates
 from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Matcher
-from mvpose.ordering import canonical_order, number_views, restored_pairs
-from mvpose.rays import Rays, viewing_rays
+from mvpose.ordering import number_views, restored_pairs
+from mvpose.rays import Rays, ordered_rays
 from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
 
@@ -147,13 +147,12 @@ def enter(
 
     Blank and repeated detections are left out before any other stage, so that they cannot influence it.
     """
-    rays = viewing_rays(rig, detections)
-    order = canonical_order(detections, rays.weights)
+    order, rays = ordered_rays(rig, detections)
     ordered = detections.select(order)
     kept = duplicates(ordered)
-    if not kept.all():
-        order, ordered = order[kept], ordered.select(kept)
-    return order, ordered, rays.select(order)
+    if np.count_nonzero(kept) < len(kept):
+        return order[kept], ordered.select(kept), rays.select(kept)
+    return order, ordered, rays
 
 
 def _restored(matching: Matching, chosen: NDArray[np.int64], detections: int) -> Matching:

@@ -18,6 +18,7 @@ from mvpose.detections import MOST_DETECTIONS, Detections
 from mvpose.heatmaps import Heatmaps
 from mvpose.kernels import njit
 from mvpose.lens import undistort
+from mvpose.ordering import canonical_order
 
 _MODES = 3  # modes read per heat map: the joint, its left-right counterpart, and the joint of a neighbour
 
@@ -41,6 +42,11 @@ class Modes:
     values: NDArray[np.float32]
     grid: Floats
     cameras: Floats
+
+    def select(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Modes:
+        """Return the modes of some detections; all maps stay where they are, because copies would take long."""
+        directions, weights, row = self.directions[which], self.weights[which], self.row[which]
+        return Modes(directions, weights, row, self.values, self.grid[which], self.cameras[which])
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +76,7 @@ class Rays:
         """Return the rays of some detections, given by a mask (m,) or by indices in a new order."""
         if which.dtype == np.bool_:
             which = np.flatnonzero(which)
-        modes = self.modes
-        if modes is not None:  # all maps stay where they are, because copies would dominate the time
-            directions, weights, row = modes.directions[which], modes.weights[which], modes.row[which]
-            modes = Modes(directions, weights, row, modes.values, modes.grid[which], modes.cameras[which])
+        modes = None if self.modes is None else self.modes.select(which)
         view = self.view.take(which)
         seal(view)
         origins, directions, weights = _select(self.origins, self.directions, self.weights, which)
@@ -95,6 +98,32 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
         ValueError: an argument of another type, a detection in a view that the rig does not have, or more than
             :data:`mvpose.detections.MOST_DETECTIONS` detections.
     """
+    _check(rig, detections)
+    origins, directions, weights, pixel, last = _viewing_rays(
+        rig.packed, detections.view, detections.keypoints, detections.scores
+    )
+    _check_views(rig, last)
+    modes = None if detections.likelihoods is None else _modes(rig, detections, detections.likelihoods)
+    return Rays(detections.view, origins, directions, weights, pixel, modes)
+
+
+def ordered_rays(rig: Rig, detections: Detections) -> tuple[Integers, Rays]:
+    """Return the canonical order of the detections (:func:`mvpose.ordering.canonical_order`) and their rays in it.
+
+    Raises:
+        ValueError: as :func:`viewing_rays`.
+    """
+    _check(rig, detections)
+    order, view, origins, directions, weights, pixel, last = _ordered_rays(
+        rig.packed, detections.view, detections.keypoints, detections.scores, detections.box_scores
+    )
+    _check_views(rig, last)
+    seal(view)
+    modes = None if detections.likelihoods is None else _modes(rig, detections, detections.likelihoods).select(order)
+    return order, Rays(view, origins, directions, weights, pixel, modes)
+
+
+def _check(rig: Rig, detections: Detections) -> None:
     for value, kind in ((rig, Rig), (detections, Detections)):
         if not isinstance(value, kind):
             raise ValueError(
@@ -105,16 +134,14 @@ def viewing_rays(rig: Rig, detections: Detections) -> Rays:
             f"a frame must have at most {MOST_DETECTIONS} detections, got {len(detections)}; pass one frame at a time, "
             "or drop detections with low scores"
         )
-    origins, directions, weights, pixel, last = _viewing_rays(
-        rig.packed, detections.view, detections.keypoints, detections.scores
-    )
+
+
+def _check_views(rig: Rig, last: int) -> None:
     if last >= len(rig):
         raise ValueError(
             f"a detection names view {last}, but the rig has {len(rig)} cameras (0 to {len(rig) - 1}); "
             "pass the rig that the detections were made with, its cameras in that order"
         )
-    modes = None if detections.likelihoods is None else _modes(rig, detections, detections.likelihoods)
-    return Rays(detections.view, origins, directions, weights, pixel, modes)
 
 
 def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
@@ -132,6 +159,14 @@ def _modes(rig: Rig, detections: Detections, maps: Heatmaps) -> Modes:
         np.hstack([maps.origin, maps.stride]),
         rig.packed[view],
     )
+
+
+@njit(cache=True)
+def _ordered_rays(cameras, view, keypoints, scores, box_scores):
+    """Return the canonical order, and in it the fields of :class:`Rays`; last the greatest view."""
+    origins, directions, weights, pixel, last = _viewing_rays(cameras, view, keypoints, scores)
+    order = canonical_order(keypoints, weights, box_scores)
+    return order, view[order], origins[order], directions[order], weights[order], pixel[order], last
 
 
 @njit(cache=True)

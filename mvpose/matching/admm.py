@@ -106,9 +106,18 @@ def solve(
     S = np.diag((_WITHIN * P * edges).sum(axis=1)) - np.where(P > 0, _WITHIN, _BETWEEN) * edges
     with one_thread():
         iterations, primal, dual = _iterate(P, S, gain, starts, weight, rho, tolerance, most_iterations)
-    P, S = (np.triu(upper) + np.triu(upper, k=1).T for upper in (P, S))
+    _fill_lower(P)
+    _fill_lower(S)
     converged = primal < tolerance and dual < tolerance
     return Relaxation(P, weight * np.eye(m) - S, iterations, (primal, dual), converged, gain, weight)
+
+
+@njit(cache=True, borrows=True)
+def _fill_lower(matrix):
+    """Copy the upper triangle of a matrix to the lower one, in place."""
+    for i in range(len(matrix)):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
 
 
 def _iterate(

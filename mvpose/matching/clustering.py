@@ -37,29 +37,39 @@ def cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: fl
         Part of every detection, (m,): arbitrary numbers below m, with at most one detection per view in a part.
     """
     order = np.argsort(view, kind="stable")  # the search visits views in the same order for any order of detections
-    part = np.empty(len(order), np.int64)
-    part[order] = _cluster(affinity[order[:, None], order], view[order], alpha)
-    return part
-
-
-def _cluster(affinity: NDArray[np.float64], view: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
-    """Partition detections that are sorted by view; see :func:`cluster`."""
-    affinity, alpha = read_only(affinity, np.float64), float(alpha)
-    rank, views = rank_views(read_only(view, np.int64))
-    gains = _pair_gains(affinity, alpha, rank)
-    part = _contract(gains)
-    parts, size, order, start = _member_gains(affinity, alpha, rank, views, part, gains)
-    for _ in range(_MOST_ROUNDS):
-        parts = _reassign_views(affinity, alpha, rank, order, start, part, parts, size, gains)
-        if not _join_parts(rank, views, part, parts, size, gains):
-            break
-    return part
+    return _cluster(read_only(affinity, np.float64), read_only(view, np.int64), order, float(alpha))
 
 
 def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: float = 0.5) -> NDArray[np.int64]:
     """Partition the detections by greedy contraction only, the first step of :func:`cluster`."""
-    affinity, alpha = read_only(affinity, np.float64), float(alpha)
-    rank, _ = rank_views(read_only(view, np.int64))
+    return _contract_pairs(read_only(affinity, np.float64), read_only(view, np.int64), float(alpha))
+
+
+@njit(cache=True)
+def _cluster(affinity, view, order, alpha):
+    """Partition the detections in an order by view, (m,); see :func:`cluster`."""
+    m = len(order)
+    rank, views = rank_views(view[order])
+    ordered, result = np.empty((m, m)), np.empty(m, np.int64)
+    for i in range(m):
+        for j in range(m):
+            ordered[i, j] = affinity[order[i], order[j]]
+    gains = _pair_gains(ordered, alpha, rank)
+    part = _contract(gains)
+    parts, size, members, start = _member_gains(ordered, alpha, rank, views, part, gains)
+    for _ in range(_MOST_ROUNDS):
+        parts = _reassign_views(ordered, alpha, rank, members, start, part, parts, size, gains)
+        if not _join_parts(rank, views, part, parts, size, gains):
+            break
+    for i in range(m):
+        result[order[i]] = part[i]
+    return result
+
+
+@njit(cache=True)
+def _contract_pairs(affinity, view, alpha):
+    """Partition the detections; see :func:`contract`."""
+    rank, _ = rank_views(view)
     return _contract(_pair_gains(affinity, alpha, rank))
 
 

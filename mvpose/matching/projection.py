@@ -46,11 +46,18 @@ def project(matrix: ArrayLike, view: ArrayLike) -> NDArray[np.float64]:
     return result
 
 
-def block_starts(view: NDArray[np.int64]) -> NDArray[np.int64]:
+@njit(cache=True)
+def block_starts(view):
     """Return the first row of every view's block, followed by m; ``view`` must be sorted."""
-    if (np.diff(view) < 0).any():
-        raise ValueError("rows must be sorted by view: sort matrix and view by np.argsort(view, kind='stable') first")
-    return np.concatenate([[0], np.flatnonzero(np.diff(view)) + 1, [len(view)]]) if len(view) else np.zeros(1, np.int64)
+    starts, blocks = np.empty(len(view) + 1, np.int64), 0
+    for i in range(len(view)):
+        if i == 0 or view[i] != view[i - 1]:
+            if i > 0 and view[i] < view[i - 1]:
+                raise ValueError("rows must be sorted by view: sort matrix and view by np.argsort(view, kind='stable')")
+            starts[blocks] = i
+            blocks += 1
+    starts[blocks] = len(view)
+    return starts[: blocks + 1].copy()
 
 
 @njit(cache=True)

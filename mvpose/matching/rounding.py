@@ -24,8 +24,8 @@ def round_to_people(P: NDArray[np.float64], view: NDArray[np.int64], *, threshol
     Returns:
         Person of each detection, (m,), numbered by first detection; -1 for a detection that matches no other.
     """
-    first, second = np.nonzero(np.triu(threshold < P, k=1))
-    descending = np.argsort(-P[first, second], kind="stable")
+    first, second, value = _pairs_above(read_only(P, np.float64), float(threshold))
+    descending = np.argsort(-value, kind="stable")
     return number_people(_join_pairs(first[descending], second[descending], read_only(view, np.int64)))
 
 
@@ -43,6 +43,19 @@ def read_only(array: ArrayLike, dtype: type[np.generic]) -> NDArray:
         result = result.view()
         result.flags.writeable = False
     return result
+
+
+@njit(cache=True)
+def _pairs_above(P, threshold):
+    """Return the rows and columns of the upper triangle with a value above the threshold, and the values, (k,) each."""
+    m, count = len(P), 0
+    first, second, value = np.empty(m * m // 2, np.int64), np.empty(m * m // 2, np.int64), np.empty(m * m // 2)
+    for i in range(m):
+        for j in range(i + 1, m):
+            if P[i, j] > threshold:
+                first[count], second[count], value[count] = i, j, P[i, j]
+                count += 1
+    return first[:count], second[:count], value[:count]
 
 
 @njit(cache=True)

@@ -22,7 +22,7 @@ from mvpose.reconstruction.heatmap_likelihood import rescore
 from mvpose.reconstruction.inference import max_product
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.limb_direction_prior import direction_concentrations, trunk_direction, trunk_segments
-from mvpose.reconstruction.poses import Poses, clear, gather
+from mvpose.reconstruction.poses import Poses, clear, empty_poses, gather
 from mvpose.reconstruction.proposals import propose_all, propose_single_views
 from mvpose.reconstruction.refinement import climb, fit_scale, write_uncertainty
 from mvpose.skeleton import Skeleton
@@ -64,9 +64,7 @@ class PictorialStructure:
         length, definition = published_bones(skeleton)
         modes = rays.modes
         maps = None if modes is None else (modes.values, modes.row, modes.grid, modes.cameras)
-        poses = Poses.empty(labels, len(skeleton))
-        _structures(
-            poses,
+        poses = _structures(
             labels,
             rays.origins,
             rays.directions[:, :, None] if modes is None else modes.directions,
@@ -84,18 +82,17 @@ class PictorialStructure:
             self.most_pairs,
             self.most_states,
         )
-        return poses
+        return Poses(*poses)
 
 
 @njit(cache=True)
 def _structures(
-    poses, labels, origins, directions, weights, pixel, maps, sigmas, floor,
+    labels, origins, directions, weights, pixel, maps, sigmas, floor,
     graph, length, definition, concentrations, segments, personal, most_pairs, most_states,
 ):  # fmt: skip
-    trunk = np.empty(3)
-    for person in range(len(poses.joints)):
-        joints, scores = poses.joints[person], poses.scores[person]
-        covariance, freedom = poses.covariance[person], poses.freedom[person]
+    poses, trunk = empty_poses(labels, len(sigmas)), np.empty(3)
+    for person in range(len(poses[0])):
+        joints, scores, covariance, freedom = poses[0][person], poses[1][person], poses[2][person], poses[3][person]
         clear(joints, scores, covariance, freedom)
         centers, rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
         states, unary, count, scale = propose_all(
@@ -124,3 +121,4 @@ def _structures(
             scores, covariance, freedom, joints, centers, rays, scores_2d, angles, sigmas, deviations, floor, graph,
             lengths, precision, concentrations, trunk,
         )  # fmt: skip
+    return poses

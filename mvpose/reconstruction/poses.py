@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.kernels import njit
@@ -31,12 +30,15 @@ class Poses(NamedTuple):
     covariance: Floats
     freedom: Floats
 
-    @classmethod
-    def empty(cls, labels: NDArray[np.int64], joints: int) -> Poses:
-        """Return uninitialised arrays for the people in labels (m,)."""
-        people = int(labels.max()) + 1 if len(labels) else 0
-        shape = people, joints
-        return cls(np.empty((*shape, 3)), np.empty(shape), np.empty((*shape, 3, 3)), np.empty(shape))
+
+@njit(cache=True)
+def empty_poses(labels, joints):
+    """Return uninitialised arrays of :class:`Poses`, in its order, for the people in labels (m,)."""
+    people = 0
+    for d in range(len(labels)):
+        people = max(people, labels[d] + 1)
+    shape = (people, joints)
+    return np.empty((people, joints, 3)), np.empty(shape), np.empty((people, joints, 3, 3)), np.empty(shape)
 
 
 @njit(cache=True, borrows=True)

@@ -28,7 +28,7 @@ from mvpose.reconstruction.likelihood import (
     log_likelihood,
     solve,
 )
-from mvpose.reconstruction.poses import MISSING_SCORE, Poses, clear, gather
+from mvpose.reconstruction.poses import MISSING_SCORE, Poses, clear, empty_poses, gather
 from mvpose.skeleton import Skeleton
 
 Method = Literal["robust", "dlt", "best-pair"]
@@ -60,9 +60,7 @@ class Triangulation:
 
     def __call__(self, rays: Rays, labels: NDArray[np.int64], skeleton: Skeleton) -> Poses:
         """Return the joints of all people; labels (m,) count from 0, -1 for a detection of no person."""
-        poses = Poses.empty(labels, len(skeleton))
-        _triangulate(
-            poses,
+        poses = _triangulate(
             labels,
             rays.origins,
             rays.directions[:, :, None],
@@ -72,18 +70,18 @@ class Triangulation:
             self.noise.floor,
             _METHODS.index(self.method),
         )
-        return poses
+        return Poses(*poses)
 
 
 @njit(cache=True)
-def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, floor, method):
+def _triangulate(labels, origins, directions, weights, pixel, sigmas, floor, method):
     joints = len(sigmas)
+    poses = empty_poses(labels, joints)
     misfit, responsibilities, supports = np.empty(joints), np.empty(joints), np.empty(joints)
     scratch, information, b, unused = np.empty((8, 3)), np.empty((3, 3)), np.zeros(3), np.empty(3)
-    for person in range(len(poses.joints)):
+    for person in range(len(poses[0])):
         centers, person_rays, scores_2d, angles = gather(labels, person, origins, directions, weights, pixel)
-        point, scores = poses.joints[person], poses.scores[person]
-        covariance, freedom = poses.covariance[person], poses.freedom[person]
+        point, scores, covariance, freedom = poses[0][person], poses[1][person], poses[2][person], poses[3][person]
         clear(point, scores, covariance, freedom)
         error_scale, steps = 1.0, 0
         for j in range(joints):
@@ -112,6 +110,7 @@ def _triangulate(poses, labels, origins, directions, weights, pixel, sigmas, flo
                 add_shared(covariance[j], sigmas[j])
             else:
                 place[:] = np.nan
+    return poses
 
 
 _MOST_STEPS = 12

@@ -1,5 +1,7 @@
 """Changes of a frame that must change nothing in its people, on random scenes with every preset (metamorphic tests)."""
 
+import hypothesis
+import hypothesis.strategies as st
 import numpy as np
 import pytest
 from relations import RELATIONS, Frame, frame, movement, people, rig, skeletons
@@ -102,10 +104,24 @@ def test_the_canonical_order_goes_from_top_to_bottom_and_has_no_blank_detection(
     rig, detections = frame(3)
     weights = viewing_rays(rig, detections).weights.copy()
     weights[2] = 0.0
-    order = canonical_order(detections, weights)
+    order = canonical_order(detections.keypoints, weights, detections.box_scores)
     assert sorted(order) == [index for index in range(len(detections)) if index != 2]
     heights = np.nanmean(np.where(weights > 0, detections.keypoints[..., 1], np.nan)[order], axis=1)
     assert (np.diff(heights) >= 0).all()
+
+
+@hypothesis.given(st.integers(0, 2**32 - 1))
+def test_ties_of_the_canonical_order_are_broken_by_scores_then_by_column_then_by_place(seed):
+    rng = np.random.default_rng(seed)
+    m, joints = rng.integers(0, 40), rng.integers(1, 3)
+    keypoints = rng.integers(0, 3, (m, joints, 2)).astype(float)
+    weights, box_scores = rng.integers(0, 3, (m, joints)) / 2, rng.integers(0, 2, m) / 2
+    seen = weights > 0
+    with np.errstate(invalid="ignore"):
+        column, row = ((keypoints * seen[..., None]).sum(axis=1) / seen.sum(axis=1)[:, None]).T
+    expected = np.lexsort([column, -box_scores, -weights.sum(axis=1), row])
+    expected = expected[seen.any(axis=1)[expected]]
+    np.testing.assert_array_equal(canonical_order(keypoints, weights, box_scores), expected)
 
 
 def test_views_are_numbered_by_their_first_detections():
