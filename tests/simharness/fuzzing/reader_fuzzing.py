@@ -70,7 +70,9 @@ class Worker:
     def _start(self):
         """Start the process and return the names of the readers."""
         script = Path(__file__).with_name("fuzz_worker.py")
-        modules = [str(Path(__file__).parents[2] / folder) for folder in _HELPERS]
+        tests = Path(__file__).parents[2]
+        # The packages first: the folder tests/simharness would hide them.
+        modules = [str(tests.parent), *(str(tests / folder) for folder in _HELPERS)]
         modules += [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
         self._process = subprocess.Popen(
             [sys.executable, str(script), str(self._folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
