@@ -18,8 +18,8 @@ def pseudo_values(figure: Callable[[Floats], Floats], sums: ArrayLike) -> Floats
     Intervals and tests of means so apply to ratios and other smooth figures.
 
     Args:
-        figure: function of sums (..., *shape) that returns figures (...).
-        sums: contribution of each scene, (n, *shape).
+        figure: function of sums, ``(..., *shape)``, that returns figures, ``(...)``.
+        sums: contribution of each scene, ``(n, *shape)``.
     """
     sums = np.asarray(sums, float)
     n, whole = len(sums), sums.sum(axis=0)
