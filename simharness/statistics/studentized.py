@@ -9,8 +9,8 @@ function of T = t / sqrt(n),
 removes this error to second order, whatever the distribution (Johnson, "Modified t tests and confidence intervals for
 asymmetrical populations", JASA 1978; Hall, "On the removal of skewness by transformation", JRSS B 1992). The higher
 orders are free. Here g is T -> (exp(k T) - 1) / k where this strengthens the evidence, and its inverse,
-T -> log(1 + k T) / k, where this weakens it, with ``k = 2 |skewness| / 3``: unlike Hall's cubic, both ascend everywhere and
-without a bound, so that changes of equal size remain significant in samples that happen to be skewed.
+T -> log(1 + k T) / k, where this weakens it, with ``k = 2 |skewness| / 3``: unlike Hall's cubic, both ascend everywhere
+and without a bound, so that changes of equal size remain significant in samples that happen to be skewed.
 
 The skewness of a small sample is far less than that of its population, so it is multiplied by 1 + 10 / n. The factor is
 chosen on exponential and gamma populations.
