@@ -135,15 +135,18 @@ def film(
     pixels = np.full((*shape, joints, 2), np.nan)
     visibility = np.full((*shape, joints), int(Visibility.OUTSIDE), np.int8)
     boxed, area = np.zeros((*shape, 4)), np.zeros(shape, np.int64)
-    names = Lookalikes.of(playback.scene).names
+    lookalikes = Lookalikes.of(playback.scene)
+    names = lookalikes.names
     lookalike_pixels = np.full((*shape[:2], len(names), joints, 2), np.nan)
     lookalike_visible = np.zeros(lookalike_pixels.shape[:-1], bool)
     for f, view_group, states in _simultaneous_exposures(playback, exposures, frames):
         cameras = [exposures.camera(frames[f], view) for view in view_group]
         for view, one in zip(view_group, observer.observe(states, cameras), strict=True):
-            pixels[f, view], visibility[f, view] = one.pixels, one.visibility
-            boxed[f, view], area[f, view] = one.boxes, one.area_visible
-            lookalike_pixels[f, view], lookalike_visible[f, view] = one.lookalike_pixels, one.lookalike_visible
+            here = np.all([state.present for state in states], axis=0)
+            pixels[f, view, here], visibility[f, view, here] = one.pixels[here], one.visibility[here]
+            boxed[f, view, here], area[f, view, here] = one.boxes[here], one.area_visible[here]
+            lookalike_pixels[f, view] = one.lookalike_pixels
+            lookalike_visible[f, view] = one.lookalike_visible & lookalikes.exist(here)[:, None]
     kept: dict[int, tuple[NDArray[np.uint8], ...]] = {}
     for frame in frames:
         if picture_source is not None and frame in previews:

@@ -34,10 +34,13 @@ _BLUR_STEPS = 5  # times averaged for the motion blur of one picture
 
 
 def meshes_at(scene: Scene, state: State) -> list[Mesh]:
-    """Return the meshes of a scene in one state: the P people, then the solids, so mesh indices < P are people."""
+    """Return the meshes of a scene in one state: the P people, then the solids, so mesh indices < P are people.
+
+    The mesh of an absent person is a point on the floor: it has no area in a picture and does not extend the scene.
+    """
     people = [
-        figure.moved(body.skin(bones))
-        for body, bones, figure in zip(scene.bodies, state.bones, scene.figures, strict=True)
+        figure.moved(body.skin(bones) if here else np.zeros_like(figure.vertices))
+        for body, bones, figure, here in zip(scene.bodies, state.bones, scene.figures, state.present, strict=True)
     ]
     placements = iter(state.placements)
     objects = [

@@ -102,7 +102,7 @@ def _frames(block: DetectionBlock, context: Context, sampler: DescriptorSampler 
             None if descriptors is None else descriptors[start:end],
         )
         truth = Truth(
-            joints=sequence.joints[t],
+            joints=np.where(sequence.present[t][:, None, None], sequence.joints[t], np.nan),
             pixels=views.pixels[t],
             visibility=views.visibility[t],
             boxes=views.boxes[t],

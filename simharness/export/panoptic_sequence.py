@@ -97,11 +97,11 @@ def export_sequence(
             write_cameras(layout.believed, believed_rig, source=f"{scenario.name}, as believed")
         write_description(layout, scenario, sequence, true_rig, frames=frames, believed=faulty)
         for frame in frames:
-            current = detected[frame]
+            current, here = detected[frame], sequence.present[frame]
             bodies = body_scene(
-                joints[frame],
-                confidences(current.truth.visibility),
-                ids=sequence.ids.tolist(),
+                joints[frame, here],
+                confidences(current.truth.visibility[:, here]),
+                ids=sequence.ids[here].tolist(),
                 time=float(sequence.time[frame]),
                 rate=scenario.rate,
             )

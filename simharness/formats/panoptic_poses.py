@@ -2,7 +2,8 @@
 
 Centimetres, y down: (X, Y, Z) = 100 (x, -z, y) of our metres, z up, as in the calibrations of
 :mod:`simharness.formats.calibration.panoptic`. The name of a file ends in the number of its frame. Simulated joints are
-always defined, even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) is never written.
+always defined, even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) is never written. A
+person who is absent in a frame has no body in its file.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views, Visibility
 from simharness.world.motion.mocap.joint_tracks import tracks_file
+from simharness.world.motion.presence import held
 
 _LONGEST = 4.0  # seconds of a take
 _SHORTEST = 0.6  # seconds; shorter takes are joined with a neighbour
@@ -60,24 +61,21 @@ class Film:
     People who are absent in a frame are outside of all pictures there.
 
     Attributes:
-        sequence: true poses of everyone, with the floor at z = 0.
+        sequence: true poses of everyone and who is present in each frame, with the floor at z = 0.
         views: truth in the pictures.
         rig: the cameras, with the floor at z = 0.
         floor: height of the recording's floor, metres.
-        present: which people are present in which frames, (F, P).
     """
 
     sequence: Sequence
     views: Views
     rig: Rig
     floor: float
-    present: Bools
 
     @property
     def joints(self) -> Floats:
         """True joints in the recording's world, COCO-17, (F, P, 17, 3) metres; NaN where absent."""
-        joints = self.sequence.joints + [0.0, 0.0, self.floor]
-        return np.where(self.present[..., None, None], joints, np.nan)
+        return self.sequence.of_skeleton(COCO17) + [0.0, 0.0, self.floor]
 
     def detected(self, config: Detector, *, seed: int) -> list[Detections]:
         """Return the detections of a simulated detector in each frame.
@@ -127,18 +125,13 @@ def film(
             present[rows, person] = True
         advance(1)
     source = np.broadcast_to(np.arange(frames)[:, None], (frames, views))
-    sequence = Sequence(_waiting(landmarks, present), np.arange(count), np.arange(frames) / recording.rate)
-    return Film(sequence, Views(pixels, visibility, boxes, area, source), rig, floor, present)
+    sequence = Sequence(_waiting(landmarks, present), np.arange(count), np.arange(frames) / recording.rate, present)
+    return Film(sequence, Views(pixels, visibility, boxes, area, source), rig, floor)
 
 
 def _waiting(landmarks: Floats, present: Bools) -> Floats:
     """Return landmarks (F, P, L, 3) in which people keep the pose of the nearest frame in which they are present."""
-    result = landmarks.copy()
-    rows = np.arange(len(landmarks))
-    for person in np.flatnonzero(present.any(axis=0)):
-        known = rows[present[:, person]]
-        result[:, person] = landmarks[known[np.abs(rows[:, None] - known).argmin(axis=1)], person]
-    return result
+    return np.stack([held(landmarks[:, person], here) for person, here in enumerate(present.T)], axis=1)
 
 
 def cut_takes(recording: AnnotatedRecording, people: TrackedPeople) -> list[Take]:

@@ -143,8 +143,12 @@ def _check_projection(playback: Playback, exposures: ExposureSchedule, views: Vi
         camera, pixels = exposures.camera(frame, int(view)), views.pixels[frame, view]
         if not pixels.size:
             continue
-        joints = playback.at(exposures.time[frame, view]).joints
-        expected = _projected(camera, joints)
+        state = playback.at(exposures.time[frame, view])
+        shown = np.isfinite(pixels).any(axis=(-1, -2)) | (views.boxes[frame, view] > 0).any(axis=-1)
+        if (shown & ~state.present).any():
+            person = int((shown & ~state.present).argmax())
+            raise AuditError(f"presence: frame {frame}, view {view} shows person {person}, who is absent")
+        expected = np.where(state.present[:, None, None], _projected(camera, state.joints), np.nan)
         # OpenCV also projects points outside the picture that the lens does not image.
         error = np.where(camera.inside(pixels), np.linalg.norm(pixels - expected, axis=-1), 0.0)
         if not (error <= _PIXELS).all():

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.checks import as_array
 from mvpose.skeleton import COCO17, Skeleton
 from simharness.types.landmarks import LANDMARKS, of_skeleton
@@ -18,9 +18,11 @@ class Sequence:
     """Ground truth of T frames with P people; P may be 0.
 
     Attributes:
-        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (T, P, L, 3), metres.
+        landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (T, P, L, 3), metres; finite in
+            all frames: an absent person waits somewhere outside of the scene.
         ids: numbers of the people, (P,) int.
         time: times of the frames, (T,), seconds.
+        present: who is in the scene in each frame, (T, P); by default everyone in all frames.
 
     Raises:
         ValueError: a wrong shape or a value that is not finite.
@@ -29,6 +31,7 @@ class Sequence:
     landmarks: Floats
     ids: NDArray[np.int64]
     time: Floats
+    present: Bools = field(default_factory=lambda: np.zeros((0, 0), bool))
 
     def __post_init__(self) -> None:
         time = as_array(self.time, ("T",), "sequence time")
@@ -38,19 +41,23 @@ class Sequence:
             if not np.isfinite(value).all():
                 raise ValueError(f"sequence {key} must be finite: no true value may be missing")
             object.__setattr__(self, key, value)
+        present = self.present if np.size(self.present) else np.ones(landmarks.shape[:2], bool)
+        object.__setattr__(self, "present", as_array(present, landmarks.shape[:2], "sequence present", np.bool_))
 
     def __len__(self) -> int:
         return len(self.time)
 
     @property
     def joints(self) -> Floats:
-        """COCO-17 joints in the world, (T, P, 17, 3), metres."""
+        """COCO-17 joints in the world, (T, P, 17, 3), metres; finite even where a person is absent."""
         return self.landmarks[:, :, : len(COCO17)]
 
     def of_skeleton(self, skeleton: Skeleton) -> Floats:
-        """Return the joints of a skeleton in the world, (T, P, J, 3), metres: landmarks, not computed from COCO joints.
+        """Return the joints of a skeleton in the world, (T, P, J, 3), metres; NaN where a person is absent.
+
+        They are landmarks, not computed from COCO joints.
 
         Raises:
             ValueError: the skeleton has a joint for which the body has no landmark.
         """
-        return self.landmarks[:, :, of_skeleton(skeleton)]
+        return np.where(self.present[..., None, None], self.landmarks[:, :, of_skeleton(skeleton)], np.nan)

@@ -32,9 +32,9 @@ class Truth:
     """Ground truth of one frame: known to the scorer, never given to the method.
 
     Attributes:
-        joints: COCO-17 joints in the world, (P, J, 3), metres.
-        pixels: projections of the joints, (V, P, J, 2); NaN behind the camera.
-        visibility: :class:`simharness.types.views.Visibility`, (V, P, J).
+        joints: COCO-17 joints in the world, (P, J, 3), metres; NaN of a person who is absent in the frame.
+        pixels: projections of the joints, (V, P, J, 2); NaN behind the camera, and of absent people.
+        visibility: :class:`simharness.types.views.Visibility`, (V, P, J); OUTSIDE of absent people.
         boxes: x, y, width, height of each whole silhouette inside the image, (V, P, 4); zeros if it is outside.
         person: true person of each detection of the frame, (m,), -1 for a phantom.
         error: :class:`KeypointError` of each detected keypoint, (m, J).
@@ -46,6 +46,11 @@ class Truth:
     boxes: NDArray[np.float64]
     person: NDArray[np.int64]
     error: NDArray[np.int8]
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Who is in the scene, (P,): people with at least one defined joint."""
+        return np.asarray(np.isfinite(self.joints).all(axis=-1).any(axis=-1))
 
     def __post_init__(self) -> None:
         joints = as_array(self.joints, ("P", "J", 3), "joints")

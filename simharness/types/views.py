@@ -55,7 +55,8 @@ class LookalikeViews:
 class Views:
     """Ground truth in the pictures that V cameras deliver in T frames.
 
-    A picture that never arrives has NaN pixels, visibility OUTSIDE and boxes of zeros.
+    A picture that never arrives has NaN pixels, visibility OUTSIDE and boxes of zeros, and so has a person who is
+    absent while the picture is taken.
 
     Attributes:
         pixels: pixel of each joint, (T, V, P, J, 2); NaN behind the camera.

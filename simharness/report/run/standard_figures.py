@@ -41,10 +41,11 @@ def error_over_time(record: Record, variant: str) -> str | None:
 )
 def visibility(record: Record, variant: str) -> str | None:
     """Plot the visibility of the joints in each camera; None without people."""
-    labels = np.stack([true.visibility for true in record.truth])
-    if not labels.shape[2]:
+    labels = np.stack([true.visibility for true in record.truth], axis=1)  # (V, T, P, J)
+    labels = labels[:, np.stack([true.present for true in record.truth])]  # absent people have no visibility
+    if not labels.shape[1]:
         return None
-    shares = np.stack([(labels == label).mean(axis=(0, 2, 3)) for label in _VISIBILITY_LABELS], axis=1)
+    shares = np.stack([(labels == label).mean(axis=(1, 2)) for label in _VISIBILITY_LABELS], axis=1)
     return plots.visibility_shares(
         [camera.name for camera in record.rig], shares, labels=list(_VISIBILITY_LABELS.values())
     )

@@ -17,6 +17,7 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotation_2d
 from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.presence import ALWAYS, Presence
 from simharness.world.motion.registry import Activity, activities, solo
 from simharness.world.motion.track_planning import LoopRequest, RecordedRequest, SpotRequest, TrackRequest, plan_tracks
 from simharness.world.motion.trajectory import Trajectory
@@ -32,10 +33,11 @@ _ORIGIN = Spot(place=np.zeros(2), bearing=0.0)
 
 @dataclass(frozen=True)
 class Choreography:
-    """Motions of all people, in their order, and the props that they use."""
+    """Motions of all people, in their order, the props that they use, and the times at which they are in the scene."""
 
     motions: tuple[Motion, ...]
     props: tuple[Prop, ...]
+    presence: tuple[Presence, ...]
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def choreograph(
     """
     people = scenario.people
     if people.motion.tracks:
-        return Choreography(_reenacted(scenario, cast, time), props=())
+        return Choreography(_reenacted(scenario, cast, time), props=(), presence=(ALWAYS,) * len(cast))
     known = dict(activities())
     if "mocap" in people.activities:
         known["mocap"] = _recorded(scenario)
@@ -99,6 +101,7 @@ def choreograph(
     return Choreography(
         motions=tuple(motion for performance in stage.performances for motion in performance.motions),
         props=tuple(prop for performance in stage.performances for prop in performance.props),
+        presence=tuple(each for performance in stage.performances for each in performance.presence),
     )
 
 
@@ -258,7 +261,7 @@ def move_to(performance: Performance, spot: Spot) -> Performance:
         Prop(prop.kind, prop.size, Trajectory(prop.trajectory.time, _moved_poses(prop.trajectory.pose, spot)))
         for prop in performance.props
     )
-    return Performance(motions, props)
+    return Performance(motions, props, performance.presence)
 
 
 def _moved_poses(pose: Floats, spot: Spot) -> Floats:

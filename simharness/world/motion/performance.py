@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from simharness.world.motion.motion import Motion
+from simharness.world.motion.presence import ALWAYS, Presence
 from simharness.world.motion.trajectory import Trajectory
 
 PropKind = Literal["chair", "table", "box", "step", "bottle"]
@@ -29,7 +30,15 @@ class Prop:
 
 @dataclass(frozen=True)
 class Performance:
-    """Motions of the performers of one activity, in their order, and the props that they use."""
+    """Motions of the performers of one activity, in their order, and the props that they use.
+
+    ``presence`` are the times at which each performer is in the scene; by default all times.
+    """
 
     motions: tuple[Motion, ...]
     props: tuple[Prop, ...] = ()
+    presence: tuple[Presence, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.presence:
+            object.__setattr__(self, "presence", (ALWAYS,) * len(self.motions))

@@ -25,6 +25,7 @@ from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_tracks, recorded_shape
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.presence import Presence, held
 from simharness.world.motion.trajectory import motion_clock
 from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.tracking import track
@@ -49,6 +50,7 @@ class Scene:
         bodies: bodies of the P people.
         figures: visible meshes of the people (body and clothing) in the rest pose.
         motions: motions of the people, which can be sampled at any time.
+        presence: times at which each person is in the scene.
         solids: room, then objects.
         lighting: lighting of the scene.
         time: times of the frames, (T,), seconds.
@@ -58,6 +60,7 @@ class Scene:
     bodies: tuple[Body, ...]
     figures: tuple[Mesh, ...]
     motions: tuple[Motion, ...]
+    presence: tuple[Presence, ...]
     solids: tuple[Solid, ...]
     lighting: Lighting
     time: NDArray[np.float64]
@@ -96,8 +99,9 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario))
     props = tuple(make_prop(prop, name=f"prop{k} {prop.kind}") for k, prop in enumerate(plan.props))
     motions = plan.motions
-    pelvises = [motion.root[:, :3] for motion in motions]
-    joints = [mover.joints(motion) for mover, motion in zip(cast, motions, strict=True)]
+    present = [presence.at(clock) for presence in plan.presence]
+    pelvises = [held(motion.root[:, :3], here) for motion, here in zip(motions, present, strict=True)]
+    joints = [held(mover.joints(motion), here) for mover, motion, here in zip(cast, motions, present, strict=True)]
     space = FreeSpace(
         room=scenario.room,
         area=people.area,
@@ -117,7 +121,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         motions = track(model, bodies, motions, assist=people.assist, solids=solids)
     figures = tuple(_figure(body, look) for body, look in zip(bodies, looks, strict=True))
     time = np.arange(scenario.frames) / scenario.rate
-    return Scene(model, bodies, figures, motions, solids, room_lighting(scenario.room, seed), time)
+    return Scene(model, bodies, figures, motions, plan.presence, solids, room_lighting(scenario.room, seed), time)
 
 
 def _shapes(scenario: Scenario) -> list[Shape]:

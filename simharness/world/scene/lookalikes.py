@@ -83,6 +83,12 @@ class Lookalikes:
         turned = people[:, :, COCO17.mirror]
         return np.concatenate([still, *(mirror.reflect(turned) for mirror in self.mirrors)], axis=1)
 
+    def exist(self, present: Bools) -> Bools:
+        """Return which lookalikes exist, (D,), while the people ``present`` (P,) are in the scene: no one else has a
+        mirror image.
+        """
+        return np.concatenate([np.ones(len(self.figures), bool), *(present for _ in self.mirrors)])
+
     def targets(self, viewpoint: Floats, joints: Floats) -> tuple[Floats, Bools]:
         """Return the points to which lines of sight from a viewpoint must be free, and whether they exist.
 

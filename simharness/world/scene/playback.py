@@ -9,14 +9,18 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import COCO17
 from simharness.types.landmarks import LANDMARKS
 from simharness.types.sequence import Sequence
 from simharness.world.humans.body import body_model
 from simharness.world.humans.mujoco_model import bone_transforms
 from simharness.world.motion.poses.kinematics import Addresses
+from simharness.world.motion.presence import presence_at
 from simharness.world.scene.build import Scene
+
+_NOWHERE = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]])
+"""Transform of all bones of an absent person: every point to 1 m under the origin."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +30,17 @@ class State:
     Attributes:
         time: time in seconds.
         landmarks: positions of ``simharness.types.landmarks.LANDMARKS`` in the world, (P, L, 3), metres.
-        bones: skinning transforms from rest pose to world, (P, B, 3, 4).
+        bones: skinning transforms from rest pose to world, (P, B, 3, 4); those of an absent person take the whole body
+            to one point under the floor, where it stops no ray.
         placements: poses of the moving solids of the scene in their order, (M, 7): metres, quaternion w x y z.
+        present: who is in the scene, (P,).
     """
 
     time: float
     landmarks: Floats
     bones: Floats
     placements: Floats
+    present: Bools
 
     @property
     def joints(self) -> Floats:
@@ -64,6 +71,7 @@ class Playback:
         """Yield the states of the scene at times (n,) in seconds."""
         times = np.asarray(times, float)
         motions = [motion.read(times) for motion in self.scene.motions]
+        present = presence_at(self.scene.presence, times)
         placements = np.empty((len(times), len(self._mocap), 7))
         for k, solid in enumerate(self.scene.moving):
             assert solid.trajectory is not None  # all moving solids have one
@@ -79,11 +87,14 @@ class Playback:
                 for body, address in zip(self.scene.bodies, self._people, strict=True)
             ]
             landmarks = [body.landmarks(pose) for body, pose in zip(self.scene.bodies, bones, strict=True)]
+            transforms = np.stack(bones) if bones else self._empty
+            transforms[~present[n]] = _NOWHERE
             yield State(
                 time=float(time),
                 landmarks=np.stack(landmarks) if landmarks else np.zeros((0, len(LANDMARKS), 3)),
-                bones=np.stack(bones) if bones else self._empty,
+                bones=transforms,
                 placements=placements[n],
+                present=present[n],
             )
 
 
@@ -95,4 +106,4 @@ def simulate(scene: Scene) -> Sequence:
     landmarks = np.empty((len(scene.time), len(scene.bodies), len(LANDMARKS), 3))
     for frame, state in enumerate(Playback(scene).over(scene.time)):
         landmarks[frame] = state.landmarks
-    return Sequence(landmarks=landmarks, ids=np.arange(len(scene.bodies)), time=scene.time)
+    return Sequence(landmarks, np.arange(len(scene.bodies)), scene.time, presence_at(scene.presence, scene.time))

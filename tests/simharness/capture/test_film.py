@@ -68,6 +68,7 @@ class BallPlayback:
                 landmarks=places[:, None] + offsets,
                 bones=np.concatenate([turns, places[..., None]], axis=-1)[:, None],
                 placements=np.zeros((0, 7)),
+                present=np.ones(len(places), bool),
             )
 
     def at(self, time):
