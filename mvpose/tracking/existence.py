@@ -286,7 +286,7 @@ class Clutter:
         self.density = np.maximum(np.where(pictures, mean, self.density), self._least)
         keep = np.exp(-elapsed / _FLASH_MEMORY)
         self._flashes = keep * self._flashes + (1.0 - keep) * _FLASHES * _WEIGHT
-        self._time = keep * self._time + (1.0 - keep) * _WEIGHT + elapsed
+        self._time = keep * self._time + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes
 
     def vanish(self, ages: Floats) -> None:
         """Count the tracks that ended at these ages, in seconds."""

@@ -22,6 +22,8 @@ from mvpose.tracking.existence import FLASH
 from mvpose.tracking.motion import transition
 from mvpose.tracking.tracker import Moment, Tracker, vagueness
 
+_FASTEST = 1e3  # frames per second; more wait only for a clock that stands still
+
 
 def track(tracker: Tracker, rig: Rig, frames: Iterable[Detections], *, lag: float = 0.0) -> Iterator[Estimate]:
     """Yield the estimate of every frame, in order.
@@ -31,7 +33,8 @@ def track(tracker: Tracker, rig: Rig, frames: Iterable[Detections], *, lag: floa
         rig: calibrated cameras.
         frames: detections of each frame, in the order of time.
         lag: seconds of later frames that an estimate waits for: 0 for none, infinite for a whole recording. Memory
-            grows with the frames within the lag.
+            grows with the frames within the lag, at most a thousand per second: a clock that stands still holds up
+            no more.
 
     Raises:
         ValueError: a negative lag, or as :meth:`mvpose.tracking.Tracker.estimate`.
@@ -43,12 +46,20 @@ def track(tracker: Tracker, rig: Rig, frames: Iterable[Detections], *, lag: floa
         waiting.append(tracker.advance(rig, detections))
         if lag == np.inf:
             continue
-        smoothed = _smooth(tracker, waiting) if waiting[-1].time - waiting[0].time >= lag > 0.0 else list(waiting)
-        while waiting and waiting[-1].time - waiting[0].time >= lag:
-            waiting.popleft()
-            yield tracker.report(smoothed.pop(0))
+        if _is_due(waiting, lag):
+            smoothed = deque(_smooth(tracker, waiting) if lag > 0.0 else waiting)
+            while _is_due(waiting, lag):
+                waiting.popleft()
+                yield tracker.report(smoothed.popleft())
     for moment in _smooth(tracker, waiting):
         yield tracker.report(moment)
+
+
+def _is_due(waiting: deque[Moment], lag: float) -> bool:
+    """Return whether the first moment has waited for the lag; one before the first picture waits for nothing."""
+    if not waiting:
+        return False
+    return len(waiting) > _FASTEST * lag + 1.0 or not waiting[-1].time - waiting[0].time < lag
 
 
 def _smooth(tracker: Tracker, moments: Iterable[Moment]) -> list[Moment]:
@@ -70,8 +81,8 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment) -> Moment:
         tracker.motion.speed, tracker.motion.time,
     )  # fmt: skip
     odds = np.where(row >= 0, np.maximum(moment.odds, later.odds[row]), moment.odds) if len(after) else moment.odds
-    # A track that ends within half a second of its birth was a ghost.
-    ended = (row < 0) & (moment.time - tracks.born_at < FLASH)
+    # A track that ends within half a second of its birth was a ghost, unless nobody looked for longer.
+    ended = (row < 0) & (moment.time - tracks.born_at < FLASH) & (later.elapsed < FLASH)
     odds = np.where(ended, -np.inf, odds)
     if len(after):
         odds = np.where((row >= 0) & np.isneginf(later.odds[row]), -np.inf, odds)

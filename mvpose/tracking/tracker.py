@@ -28,7 +28,7 @@ from mvpose.tracking.association import TrackAffinity
 from mvpose.tracking.bones import BonePrior, bone_prior, constrain, learn_lengths
 from mvpose.tracking.existence import Clutter, Existence, gather_evidence, log_odds, log_presence
 from mvpose.tracking.motion import JointMotion, Motion, predict
-from mvpose.tracking.picture_times import picture_times
+from mvpose.tracking.picture_times import FrameClock
 from mvpose.tracking.pose_update import update_people
 from mvpose.tracking.reappearance import Reappearance
 from mvpose.tracking.tracks import Tracks
@@ -69,7 +69,7 @@ class Moment:
     """What a tracker knows after a frame, for its estimate and for smoothing.
 
     Attributes:
-        time: time of the frame, seconds.
+        time: time of the frame, seconds; NaN before the first picture.
         elapsed: time since the previous frame, seconds.
         tracks: tracks after the frame, with those that end here.
         predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new
@@ -105,13 +105,14 @@ class Tracker:
     def __init__(self, pipeline: Pipeline | None = None, *, model: TrackingModel | None = None) -> None:
         self.pipeline = Pipeline() if pipeline is None else pipeline
         self.model = TrackingModel() if model is None else model
-        self._time: float | None = None
+        self._clock = FrameClock(self.model.period, self.model.period)
+        self._skeleton: Skeleton | None = None  # before the first frame
         self._born = 0  # people so far
 
     @property
     def time(self) -> float | None:
-        """Time of the latest frame, seconds; None before the first."""
-        return self._time
+        """Time of the latest frame, seconds; None before the first picture."""
+        return self._clock.time if self._clock.started else None
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of the next frame.
@@ -121,32 +122,37 @@ class Tracker:
             detections: 2D poses of all views, with the times of their pictures where they are known.
 
         Returns:
-            The people at the time of the latest picture, with their identities.
+            The people at the time of the latest picture, with their identities. A frame without pictures gives the
+            people whom the past predicts, and nobody before the first picture.
 
         Raises:
-            ValueError: as :meth:`mvpose.Pipeline.estimate`; another rig or skeleton than in the first frame; a time
-                before that of the previous frame.
+            ValueError: as :meth:`mvpose.Pipeline.estimate`; another rig or skeleton than in the first frame; times
+                that :meth:`mvpose.tracking.picture_times.FrameClock.read` refuses. The tracker stays as it was.
         """
         return self.report(self.advance(rig, detections))
 
     def advance(self, rig: Rig, detections: Detections) -> Moment:
         """Take the next frame, without an estimate; see :meth:`estimate`."""
         start = clock.perf_counter()
-        model, first = self.model, self._time is None
+        model, first = self.model, not self._clock.started
         chosen, ordered, rays = enter(rig, detections, self.pipeline.duplicates)
-        affinity = self.pipeline.affinity(rig, ordered, rays)
-        if first:
+        if self._skeleton is None:
             self._start(rig, detections.skeleton)
         elif len(rig) != len(self._sizes) or detections.skeleton != self._skeleton:
             raise ValueError(
                 f"a tracker serves one rig and one skeleton, {len(self._sizes)} cameras and {self._skeleton.name!r}, "
                 f"got {len(rig)} and {detections.skeleton.name!r}: start another tracker"
             )
-        now, lead, pictures = picture_times(detections, len(rig), self._time, model.period)
-        elapsed = 0.0 if first else now - self._time  # type: ignore[operator]
-        self._time = now
-        tracks, lead = self._tracks, lead[ordered.view]
-        _predict_people(tracks.state, tracks.covariance, elapsed, *self.motion)
+        times = self._clock.read(detections, len(rig))
+        now, elapsed, pictures = times.now, times.elapsed, times.pictures
+        of_use = pictures[ordered.view]
+        if not of_use.all():
+            chosen, ordered, rays = chosen[of_use], ordered.select(of_use), rays.select(of_use)
+        affinity = self.pipeline.affinity(rig, ordered, rays)
+        self._clock.take(times)
+        _predict_people(self._tracks.state, self._tracks.covariance, elapsed, *self.motion)
+        self._drop(now, vagueness(self._tracks.state, self._tracks.covariance) < 2.0 * model.existence.vague)
+        tracks, lead = self._tracks, times.lead[ordered.view]
         before = tracks.state.copy(), tracks.covariance.copy()
         joined, views = model.affinity.join(
             affinity, number_views(ordered.view), rays, tracks.state, tracks.covariance, lead
@@ -157,7 +163,9 @@ class Tracker:
         matched = clock.perf_counter()
         self._update(rays, labels, groups, lead, now, elapsed)
         owner, fresh = _owners(labels, groups)
-        poses = self._give_birth(rays, fresh, owner, now, model.existence.span(np.inf if first else elapsed))
+        poses = self._give_birth(
+            rays, detections.skeleton, fresh, owner, now, model.existence.span(np.inf if first else elapsed)
+        )
         tracks, count = self._tracks, len(before[0])
         gather_evidence(
             tracks.hits, tracks.misses, tracks.absent, tracks.origin, np.arange(len(tracks)) >= count, tracks.state,
@@ -216,7 +224,14 @@ class Tracker:
         seconds = clock.perf_counter() - start
         timings = {key: value + seconds * (key in ("reconstruction", "total")) for key, value in moment.timings.items()}
         return Estimate(
-            joints, scores, Matching(labels), covariance, timings, freedom, ids=tracks.ids[shown], time=moment.time
+            joints,
+            scores,
+            Matching(labels),
+            covariance,
+            timings,
+            freedom,
+            ids=tracks.ids[shown],
+            time=None if np.isnan(moment.time) else moment.time,
         )
 
     def _start(self, rig: Rig, skeleton: Skeleton) -> None:
@@ -242,12 +257,14 @@ class Tracker:
         tracks.seen[groups >= 0] = now
         _learn(tracks.length, tracks.variance, tracks.state, tracks.covariance, groups, self._bones.ends, elapsed)
 
-    def _give_birth(self, rays: Rays, fresh: Integers, owner: Integers, now: float, span: float) -> Poses:
+    def _give_birth(
+        self, rays: Rays, skeleton: Skeleton, fresh: Integers, owner: Integers, now: float, span: float
+    ) -> Poses:
         """Start tracks of the groups ``fresh`` (m,) of detections that belong to nobody known; set their owner.
 
         A group that repeats the pose of a track is left out: its detections were torn from that person's.
         """
-        poses = self.pipeline.reconstruction(rays, fresh, self._skeleton)
+        poses = self.pipeline.reconstruction(rays, fresh, skeleton)
         if not len(poses.joints):
             return poses
         tracks, count, cameras = self._tracks, len(poses.joints), len(self._sizes)
@@ -344,23 +361,30 @@ def vagueness(state, covariance):
 
 @njit(cache=True)
 def _owners(labels, groups):
-    """Return the track of each detection, (m,), and the number of its group without a track, (m,); -1 for neither."""
+    """Return the track of each detection, (m,), and the number of its group without a track, (m,); -1 for neither.
+
+    Groups without a track are numbered in the order of their labels, so that without any track they are the labels.
+    """
     m, n = len(labels), len(groups)
     owner, fresh = np.full(m, -1), np.full(m, -1)
-    count = 0
+    most = labels.max() if m else -1
+    number = np.full(most + 1, -1)
     for d in range(m):
-        if labels[d] < 0:
-            continue
-        for t in range(n):
-            if groups[t] == labels[d]:
-                owner[d] = t
-        if owner[d] < 0:
-            for e in range(d):
-                if labels[e] == labels[d]:
-                    fresh[d] = fresh[e]
-            if fresh[d] < 0:
-                fresh[d] = count
-                count += 1
+        if labels[d] >= 0:
+            number[labels[d]] = -2
+    for t in range(n):
+        if 0 <= groups[t] <= most:
+            number[groups[t]] = t
+    count = 0
+    for label in range(most + 1):
+        if number[label] == -2:
+            number[label] = n + count
+            count += 1
+    for d in range(m):
+        if labels[d] >= 0 and number[labels[d]] < n:
+            owner[d] = number[labels[d]]
+        elif labels[d] >= 0:
+            fresh[d] = number[labels[d]] - n
     return owner, fresh
 
 
