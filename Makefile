@@ -5,6 +5,8 @@ BIN    := $(VENV)/bin
 RUN    := $(VENV)/.run
 DEV    := $(VENV)/.dev
 WORKERS ?= 2
+# Oracles of tests whose requirements stay out: opencv-python of trackeval would overwrite opencv-python-headless.
+ORACLES := trackeval==1.3.0
 STUDIES := angle calibration clutter crowd detector look_alike panoptic phantoms stress sync views views_corners views_side
 
 PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
@@ -90,6 +92,7 @@ $(RUN): $(PROJECTS) | $(VENV)
 
 $(DEV): $(PROJECTS) | $(VENV)
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable '.[dev]'
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps $(ORACLES)
 	touch $@ $(RUN)
 
 clean:

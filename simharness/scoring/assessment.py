@@ -20,7 +20,7 @@ from simharness.scoring.joint_errors import joint_errors
 from simharness.scoring.matching import GroupCounts, PairCounts, count_groups, count_pairs, count_violations
 from simharness.scoring.pck import pck, pck_area
 from simharness.scoring.pcp import Part
-from simharness.scoring.registry import ScoreInput, registered_scores
+from simharness.scoring.registry import ScoreInput, compute_scores
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
 from simharness.types.recording import Recording
@@ -85,7 +85,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         | _joint_scores(errors)
         | _precision_scores(truth, estimates)
         | _pck_scores(errors)
-        | _registered_scores(ScoreInput(recording, tuple(estimates), truth, placed, partner))
+        | compute_scores(ScoreInput(recording, tuple(estimates), truth, placed, partner))
         | _picture_scores(recording, placed)
         | _matching_scores(summary, groups)
         | _time_scores(summary)
@@ -181,10 +181,6 @@ def _pck_scores(errors: Floats) -> Scores:
     curve = pck(errors, np.array(PCK_MM) / 1000.0)
     shares = {f"pck{limit}": _finite(share) for limit, share in zip(PCK_MM, curve, strict=True)}
     return {**shares, "pck_auc": _finite(pck_area(errors, PCK_MM[-1] / 1000.0))}
-
-
-def _registered_scores(given: ScoreInput) -> Scores:
-    return {key: each.compute(given) for key, each in registered_scores().items()}
 
 
 def _picture_scores(recording: Recording, placed: Floats) -> Scores:

@@ -62,7 +62,7 @@ def _pose() -> Iterator[ScoreInfo]:
     for limit in PCK_MM:
         yield _higher(f"pck{limit}", f"PCK {limit}", f"true joints of all people estimated within {limit} mm")
     yield _higher("pck_auc", "PCK area", f"mean of PCK over all limits from 0 to {PCK_MM[-1]} mm")
-    yield from (each.info for each in registered_scores().values())
+    yield from (info for group in registered_scores() for info in group.infos)
     about = "median error of the reprojected estimates at visible, detected joints"
     yield _lower("reprojection_px", "Reprojection", "px", about, digits=2)
     about = "median error of the detections at the joints of Reprojection; should be the larger one"

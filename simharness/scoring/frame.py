@@ -78,15 +78,16 @@ def score_frame(
     """
     truth = as_array(truth, ("P", "J", 3), "truth")
     estimate = as_array(estimate, ("n", "J", 3), "estimate")
-    parts = score_parts(_on_shelf14(truth, head, "truth"), _on_shelf14(estimate, head, "estimate"))
+    parts = score_parts(on_shelf14(truth, head, "truth"), on_shelf14(estimate, head, "estimate"))
     if truth.shape[1] == len(SHELF14):
-        estimate = _on_shelf14(estimate, head, "estimate")
+        estimate = on_shelf14(estimate, head, "estimate")
     return FrameScore(parts, pair(truth, estimate), matching)
 
 
-def _on_shelf14(joints: NDArray[np.float64], head: HeadMapping, name: str) -> NDArray[np.float64]:
-    if joints.shape[1] == len(COCO17):
+def on_shelf14(joints: NDArray[np.float64], head: HeadMapping, name: str) -> NDArray[np.float64]:
+    """Return joints on SHELF14, (..., 14, 3), of joints on COCO17 or SHELF14; ``name`` is that of the error message."""
+    if joints.shape[-2] == len(COCO17):
         return coco17_to_shelf14(joints, head=head)
-    if joints.shape[1] == len(SHELF14):
+    if joints.shape[-2] == len(SHELF14):
         return joints
-    raise ValueError(f"{name} must have the 17 joints of COCO17 or the 14 of SHELF14, got {joints.shape[1]}")
+    raise ValueError(f"{name} must have the 17 joints of COCO17 or the 14 of SHELF14, got {joints.shape[-2]}")

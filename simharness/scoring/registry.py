@@ -9,6 +9,9 @@ How to add a score:
 
 2. Add the name of the module to :data:`MODULES`.
 
+Several scores that share work are registered together: ``@scores(info, info, ...)`` on a function that returns their
+values by key.
+
 Tables, reports, thresholds of ``simharness report`` and :func:`simharness.testing.assert_robust` take all scores from
 :data:`simharness.scoring.catalogue.SCORES`, which contains the registered ones. A score that does not apply is None,
 never zero. Keys end in ``_mm``, ``_px`` or ``_ms`` where that is the unit.
@@ -20,7 +23,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from mvpose import Estimate
     from simharness.types.recording import Recording
 
-MODULES = ("joint_errors", "confidence")
+MODULES = ("joint_errors", "confidence", "tracking.columns")
 """Modules of ``simharness.scoring`` that register scores, in the order of the columns of tables."""
 
 Better = Literal["higher", "lower"]
@@ -83,17 +85,25 @@ class ScoreInput:
 
 
 ScoreFunction = Callable[[ScoreInput], float | None]
+GroupFunction = Callable[[ScoreInput], Mapping[str, float | None]]
 
 
 @dataclass(frozen=True)
-class Score:
-    """A registered score: its description and its function."""
+class ScoreGroup:
+    """Scores that one function computes.
 
-    info: ScoreInfo
-    compute: ScoreFunction
+    Attributes:
+        infos: their descriptions.
+        compute: function that returns their values by key.
+        module: name of the module that registers them.
+    """
+
+    infos: tuple[ScoreInfo, ...]
+    compute: GroupFunction
+    module: str
 
 
-_registered: dict[str, Score] = {}
+_registered: dict[str, ScoreGroup] = {}  # by the key of the first score
 
 
 def score(info: ScoreInfo) -> Callable[[ScoreFunction], ScoreFunction]:
@@ -102,22 +112,51 @@ def score(info: ScoreInfo) -> Callable[[ScoreFunction], ScoreFunction]:
     Raises:
         ValueError: the key is registered already.
     """
-    if info.key in _registered:
-        raise ValueError(f"the score {info.key!r} is registered twice: choose another key for one of them")
 
     def register(function: ScoreFunction) -> ScoreFunction:
-        _registered[info.key] = Score(info, function)
+        _register((info,), lambda given: {info.key: function(given)}, function.__module__)
         return function
 
     return register
 
 
+def scores(*infos: ScoreInfo) -> Callable[[GroupFunction], GroupFunction]:
+    """Register the decorated function as several scores: it returns the value of each by key.
+
+    Raises:
+        ValueError: a key is registered already.
+    """
+
+    def register(function: GroupFunction) -> GroupFunction:
+        _register(infos, function, function.__module__)
+        return function
+
+    return register
+
+
+def _register(infos: tuple[ScoreInfo, ...], compute: GroupFunction, module: str) -> None:
+    known = {info.key for group in _registered.values() for info in group.infos}
+    for info in infos:
+        if info.key in known:
+            raise ValueError(f"the score {info.key!r} is registered twice: choose another key for one of them")
+        known.add(info.key)
+    _registered[infos[0].key] = ScoreGroup(infos, compute, module)
+
+
 @cache
-def registered_scores() -> Mapping[str, Score]:
-    """Return all registered scores by key, in the order of :data:`MODULES`."""
+def registered_scores() -> tuple[ScoreGroup, ...]:
+    """Return all registered scores, in the order of :data:`MODULES`."""
     modules = [import_module(f"simharness.scoring.{module}").__name__ for module in MODULES]
-    ordered = sorted(_registered.items(), key=lambda item: modules.index(item[1].compute.__module__))
-    return MappingProxyType(dict(ordered))
+    return tuple(sorted(_registered.values(), key=lambda group: modules.index(group.module)))
+
+
+def compute_scores(given: ScoreInput) -> dict[str, float | None]:
+    """Return all registered scores by key, in the order of the columns of tables."""
+    found: dict[str, float | None] = {}
+    for group in registered_scores():
+        values = group.compute(given)
+        found |= {info.key: values[info.key] for info in group.infos}
+    return found
 
 
 def finite_mean(values: Floats) -> float | None:

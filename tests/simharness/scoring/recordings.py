@@ -18,7 +18,7 @@ PERSON = np.array([
 # fmt: on
 
 RATE = 25.0
-NO_PEOPLE = Estimate(np.zeros((0, 17, 3)), np.zeros((0, 17)), Matching(np.zeros(0, np.int64)))
+NO_PEOPLE = Estimate(np.zeros((0, 17, 3)), np.zeros((0, 17)), Matching(np.zeros(0, np.int64)), ids=[])
 
 
 def ring(views):
@@ -67,7 +67,10 @@ def record(frames=5, people=2, views=3, *, noise=0.0, phantoms=0, seed=0):
 
 
 def perfect_estimates(recording, *, noise=0.0, seed=0):
-    """Return estimates of all people, with ``noise`` metres along each axis and true labels; phantoms are unmatched."""
+    """Return estimates of all people, with ``noise`` metres along each axis, true labels and true identities.
+
+    Phantoms are unmatched.
+    """
     rng = np.random.default_rng(seed)
     return [
         Estimate(
@@ -75,6 +78,7 @@ def perfect_estimates(recording, *, noise=0.0, seed=0):
             rng.uniform(0.5, 1.0, true.joints.shape[:2]),
             Matching(true.person),
             timings={"affinity": 0.001, "matching": 0.002, "reconstruction": 0.003, "total": 0.006},
+            ids=np.arange(len(true.joints)),
         )
         for true in recording.truth
     ]
@@ -84,4 +88,4 @@ def with_ghost(estimate, *, score=0.1):
     """Return an estimate with one more person, far from all others."""
     joints = np.concatenate([estimate.joints, PERSON[None] + [0, 0, 30.0]])
     scores = np.concatenate([estimate.scores, np.full((1, len(COCO17)), score)])
-    return replace(estimate, joints=joints, scores=scores)
+    return replace(estimate, joints=joints, scores=scores, ids=np.append(estimate.ids, 100))

@@ -18,6 +18,7 @@ from simharness.types.views import Visibility
 
 ASSESSED = [key for key in SCORES if not key.startswith(("failures_", "blame_"))]
 POSE_SHARES = [key for key in ASSESSED if key.startswith(("pcp", "ap", "pck"))] + ["recall", "precision", "map"]
+NEEDED = {"velocity_mm_s": 2, "switches_per_minute": 2, "jitter_mm": 3, "jerk_ratio": 4}  # frames
 WRONG = [key for key in ASSESSED if SCORES[key].better == "lower" and not key.startswith("time_")]
 
 
@@ -33,8 +34,8 @@ def permuted(recording, estimates, rng):
         views = (each[:, people] for each in (true.pixels, true.visibility, true.boxes))
         truth.append(Truth(true.joints[people], *views, number[true.person][order], true.error[order]))
         labels = label[estimate.matching.labels][order]
-        joints, scores = estimate.joints[order_3d], estimate.scores[order_3d]
-        reordered.append(replace(estimate, joints=joints, scores=scores, matching=Matching(labels)))
+        joints, scores, ids = (getattr(estimate, key)[order_3d] for key in ("joints", "scores", "ids"))
+        reordered.append(replace(estimate, joints=joints, scores=scores, ids=ids, matching=Matching(labels)))
     return Recording(recording.time, recording.rig, tuple(detections), tuple(truth)), reordered
 
 
@@ -51,8 +52,10 @@ def test_the_truth_itself_is_perfect(frames, people, views, phantoms, seed):
     for key in ASSESSED:
         if key.startswith("phantoms"):
             assert scores[key] == (None if not phantoms else 100.0 if key == "phantoms_pruned" else 0.0), key
-        elif key == "coverage_90" or (key == "jitter_mm" and frames < 3):
+        elif key == "coverage_90" or frames < NEEDED.get(key, 1):
             assert scores[key] is None
+        elif key == "jerk_ratio":
+            assert scores[key] == pytest.approx(1.0)
         elif SCORES[key].better == "higher":
             assert scores[key] == pytest.approx(100.0), key
         elif key in WRONG and key not in ("detection_px", "phantoms_admitted", "score_brier"):
@@ -153,7 +156,10 @@ def test_joints_are_scored_separately():
 
 def test_a_missed_person_has_wrong_joints_and_no_error():
     recording = record(4, 2)
-    estimates = [replace(each, joints=each.joints[:1], scores=each.scores[:1]) for each in perfect_estimates(recording)]
+    estimates = [
+        replace(each, **{key: getattr(each, key)[:1] for key in ("joints", "scores", "ids")})
+        for each in perfect_estimates(recording)
+    ]
     assessed = assess(recording, estimates)
     assert assessed.scores["recall"] == assessed.scores["pck150"] == assessed.scores["ap150"] == 50.0
     assert (assessed.scores["mpjpe_mm"], assessed.scores["missed"]) == (0.0, 1.0)

@@ -1,0 +1,1 @@
+"""Scores over time: whether people keep their identities, and how smoothly and where they move."""
