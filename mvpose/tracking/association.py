@@ -2,9 +2,11 @@
 
 A track and a detection are compared as two detections are (:mod:`mvpose.affinity.geometry`): by the mean distance
 between the predicted joints and the viewing rays, mapped by a sigmoid. Distances shrink by the uncertainty of the
-prediction. The matrix of all detections and tracks goes through the same matching, so that cycle consistency holds
-between the views and the past (Zhang et al., "4D Association Graph", CVPR 2020, and the journal version of the paper
-use predicted people alike).
+prediction, so any detection lies near a track that is known only roughly. The normalisation of its Gaussian makes up
+for it where several tracks claim one detection: a lost person does not take the detections of one who is there. The
+matrix of all detections and tracks goes through the same matching, so that cycle consistency holds between the views
+and the past (Zhang et al., "4D Association Graph", CVPR 2020, and the journal version of the paper use predicted
+people alike).
 """
 
 from __future__ import annotations
@@ -80,10 +82,13 @@ def _join(
     for d in range(m):
         views[d] = view[d]
         last = max(last, view[d])
+    cost, vagueness = np.empty(n), np.empty(n)
     for t in range(n):
         views[m + t] = last + 1
-        for d in range(m):
-            total, mass, count = 0.0, 0.0, 0
+    for d in range(m):
+        least_vague = np.inf
+        for t in range(n):
+            total, vague, mass, count = 0.0, 0.0, 0.0, 0
             for j in range(joints):
                 if not (weights[d, j] > 0.0) or np.isnan(state[t, j, 0]):
                     continue
@@ -94,13 +99,18 @@ def _join(
                     square += offset * offset
                     spread += covariance[t, j, r, r]
                 distance = np.sqrt(max(square - along * along, 0.0)) if along > 0.0 else np.sqrt(square)
-                distance *= keypoint / np.sqrt(keypoint * keypoint + spread / 3.0)
-                # A joint that is known only roughly says less about who this is.
-                weight = weights[d, j] * keypoint * keypoint / (keypoint * keypoint + spread / 3.0)
-                total += weight * min(distance, saturation)
+                certainty = keypoint * keypoint / (keypoint * keypoint + spread / 3.0)
+                weight = weights[d, j] * certainty  # a joint that is known only roughly says less about who this is
+                total += weight * min(distance * np.sqrt(certainty), saturation)
+                vague -= weight * np.log(certainty)
                 mass += weight
                 count += 1
-            if count >= least and total <= threshold * mass:
-                value = scalar_sigmoid(total / mass, midpoint, slope)
-                joined[m + t, d] = joined[d, m + t] = value
+            cost[t] = total / mass if count >= least else np.inf
+            vagueness[t] = vague / mass if count >= least else np.inf
+            if cost[t] <= threshold:
+                least_vague = min(least_vague, vagueness[t])
+        for t in range(n):
+            if cost[t] <= threshold:
+                more = min(slope * (vagueness[t] - least_vague), 0.5 * midpoint)
+                joined[m + t, d] = joined[d, m + t] = scalar_sigmoid(cost[t] + more, midpoint, slope)
     return joined, views

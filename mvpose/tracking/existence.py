@@ -76,7 +76,8 @@ class Existence:
     def rates(self) -> tuple[float, ...]:
         """Probabilities for :func:`log_odds`."""
         return (
-            self.arrivals, self.statues, self.found, self.seeable, self.band, self.patch, self.lasting, self.repeated
+            self.arrivals, self.statues, self.found, self.seeable, self.band, self.patch, self.lasting, self.repeated,
+            self.memory,
         )  # fmt: skip
 
     @property
@@ -99,7 +100,8 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
 
     A track is a person who came, false detections that agreed by chance, one false detection of all views at once for a
     moment (a reflection, an error that views share), or the same for long. The expected numbers of each at birth are
-    those of the rates known now.
+    those of the rates known now. False detections that last are there from picture to picture, so that those of all
+    views agree anew only when one of them has just come: people whom a single view shows make no ghosts all the time.
 
     Args:
         span: time before its birth in which the track may have come, seconds.
@@ -110,13 +112,15 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
         flashes: groups per second that vanish as soon as they come.
         rates: :attr:`Existence.rates`.
     """
-    arrivals, statues, found, seeable, band, patch, lasting, repeated = rates
+    arrivals, statues, found, seeable, band, patch, lasting, repeated, memory = rates
     person, statue = np.log(arrivals * span), np.log(statues * span)
     flash, chance = np.log(flashes * min(span, _FRAME)), np.log(band) - 2.0 * np.log(patch)
+    born_from, all_last = 0, 1.0  # probability that all of them last, given that they agree
     for v in range(len(hits)):
         if origin[v]:
             person += np.log(found)
             chance += np.log(clutter[v] * patch)
+            born_from += 1
     for v in range(len(hits)):
         h, m = hits[v], misses[v]
         stray = min(max(patch * clutter[v], 1e-3), 0.5)
@@ -124,10 +128,13 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
         as_found = found**h * (1.0 - found) ** m
         sees = 1.0 - _TURNS_BLIND if origin[v] else seeable
         last = lasting if origin[v] else lasting * stray
+        lasts, goes = last * repeated**h * (1.0 - repeated) ** m, (1.0 - last) * by_chance
         person += np.log(max(sees * as_found + (1.0 - sees) * by_chance, 1e-300))
         statue += np.log(max(sees * as_found + (1.0 - sees) * by_chance, 1e-300))
-        chance += np.log(max(last * repeated**h * (1.0 - repeated) ** m + (1.0 - last) * by_chance, 1e-300))
+        chance += np.log(max(lasts + goes, 1e-300))
+        all_last *= lasts / max(lasts + goes, 1e-300) if origin[v] else 1.0
         flash += np.log(max(by_chance, 1e-300))
+    chance += np.log(max(1.0 - all_last * (1.0 - min(born_from * span / memory, 1.0)), 1e-300))
     most = max(chance, flash, statue)
     return person - most - np.log(np.exp(chance - most) + np.exp(flash - most) + np.exp(statue - most))
 
@@ -150,7 +157,9 @@ def log_presence(absent, since, departures, found, seeable):
 
 
 @njit(cache=True)
-def gather_evidence(hits, misses, absent, origin, fresh, states, owner, view, cameras, sizes, pictures, step, keep):
+def gather_evidence(
+    hits, misses, absent, origin, fresh, states, owner, view, cameras, sizes, pictures, last, now, step, keep
+):
     """Update the effective hits and misses (n, V) of tracks by the pictures of a moment, in place.
 
     Args:
@@ -166,6 +175,8 @@ def gather_evidence(hits, misses, absent, origin, fresh, states, owner, view, ca
         cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
         sizes: width and height, (V, 2), pixels.
         pictures: whether each camera gave a picture, (V,).
+        last: time at which each camera last found a track, (n, V), seconds.
+        now: seconds.
         step: weight of this picture.
         keep: weight that the earlier ones keep.
     """
@@ -185,6 +196,7 @@ def gather_evidence(hits, misses, absent, origin, fresh, states, owner, view, ca
         if owner[d] >= 0:
             seen[owner[d]] = True
             absent[owner[d]] = 0.0
+            last[owner[d], view[d]] = now
     for v in range(views):
         found[:] = False
         for d in range(len(owner)):

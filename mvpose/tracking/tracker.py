@@ -34,6 +34,7 @@ from mvpose.tracking.reappearance import Reappearance
 from mvpose.tracking.tracks import Tracks
 
 _GIVEN_UP = -7.0  # log-odds below which a track is no longer followed: one in a thousand
+_ALONE = 0.5  # seconds for which one camera alone follows somebody who is likelier a ghost: the depth is a guess
 _FORGETTING = 0.5  # seconds: time constant of the score of a joint that no view supports
 _SAME_POSE = 0.2  # metres: mean distance between the joints of two poses of one person
 _ONE_PERSON = 0.12  # metres: the same, of two tracks; people who hug are further apart
@@ -169,7 +170,8 @@ class Tracker:
         tracks, count = self._tracks, len(before[0])
         gather_evidence(
             tracks.hits, tracks.misses, tracks.absent, tracks.origin, np.arange(len(tracks)) >= count, tracks.state,
-            owner, ordered.view, rig.packed, self._sizes, pictures, *model.existence.weights(elapsed),
+            owner, ordered.view, rig.packed, self._sizes, pictures, tracks.found, now,
+            *model.existence.weights(elapsed),
         )  # fmt: skip
         clutter = self._clutter
         odds = _odds(
@@ -198,7 +200,10 @@ class Tracker:
         )  # fmt: skip
         self._drop(
             now,
-            (odds > _GIVEN_UP) & (vague < 2.0 * model.existence.vague) & ~_absorbed(tracks.state, vague, _ONE_PERSON),
+            (odds > _GIVEN_UP)
+            & (vague < 2.0 * model.existence.vague)
+            & ((odds > 0.0) | (now - tracks.agreed < _ALONE))
+            & ~_absorbed(tracks.state, vague, _ONE_PERSON),
         )
         end = clock.perf_counter()
         moment.timings.update(
@@ -254,7 +259,6 @@ class Tracker:
         faded = tracks.scores * np.exp(-elapsed / _FORGETTING)
         faded[faded <= MISSING_SCORE] = 0.0
         tracks.scores = np.where(supports > MISSING_SCORE, supports, faded)
-        tracks.seen[groups >= 0] = now
         _learn(tracks.length, tracks.variance, tracks.state, tracks.covariance, groups, self._bones.ends, elapsed)
 
     def _give_birth(

@@ -29,7 +29,7 @@ class Tracks:
         hits: effective number of pictures of each camera that found the person, (n, V).
         misses: effective number of pictures that should have and did not, (n, V).
         absent: effective number of pictures that should have found the person since one last did, (n, V).
-        seen: time at which a detection last belonged to the track, (n,), seconds.
+        found: time at which each camera last found the track, (n, V), seconds; -inf if none ever did.
         reported: whether the track has ever been reported as a person, (n,).
     """
 
@@ -45,7 +45,7 @@ class Tracks:
     hits: Floats
     misses: Floats
     absent: Floats
-    seen: Floats
+    found: Floats
     reported: Bools
 
     @classmethod
@@ -65,7 +65,7 @@ class Tracks:
             hits=np.empty((0, cameras), real),
             misses=np.empty((0, cameras), real),
             absent=np.empty((0, cameras), real),
-            seen=np.empty(0, real),
+            found=np.empty((0, cameras), real),
             reported=np.empty(0, truth),
         )
 
@@ -110,9 +110,19 @@ class Tracks:
             hits=np.zeros((n, cameras)),
             misses=np.zeros((n, cameras)),
             absent=np.zeros((n, cameras)),
-            seen=np.full(n, time),
+            found=np.full((n, cameras), -np.inf),
             reported=np.zeros(n, np.bool_),
         )
+
+    @property
+    def seen(self) -> Floats:
+        """Time at which any camera last found each track, (n,), seconds."""
+        return self.found.max(axis=1)
+
+    @property
+    def agreed(self) -> Floats:
+        """Time since which no two cameras have found the track, (n,), seconds."""
+        return np.sort(self.found, axis=1)[:, -2]
 
     def resume(self, k: int, lost: Tracks, other: int) -> None:
         """Give track k the identity of a lost one, with the bone lengths that it had learned."""

@@ -1,0 +1,89 @@
+"""What makes a track a person, and which track a detection belongs to: few cameras, each of which sees people alone."""
+
+import numpy as np
+import pytest
+from people import ring
+from walking_people import film, identities
+
+from mvpose import Detections, Pipeline, Rig
+from mvpose.rays import viewing_rays
+from mvpose.tracking import Tracker, TrackingModel
+from mvpose.tracking.association import TrackAffinity
+from mvpose.tracking.existence import Existence, log_odds
+
+RATE = 25.0
+
+
+def test_lasting_false_detections_agree_anew_as_rarely_as_people_come():
+    """Both are rates once they have lasted: the odds do not depend on how many pictures a second has."""
+    rates = Existence(statues=1e-12).rates
+    both, hits, misses, clutter = np.ones(2, np.bool_), np.full(2, 8.0), np.full(2, 0.5), np.full(2, 0.8)
+    often, rare = (log_odds(span, both, hits, misses, clutter, 1e-12, rates) for span in (0.005, 0.05))
+    assert often == pytest.approx(rare, abs=0.02)
+    # At the start all those who came in the latest minute are there, but only as many false detections as ever.
+    start = log_odds(60.0, both, hits, misses, clutter, 1e-12, rates)
+    assert start - rare == pytest.approx(np.log(60.0 / (Existence().memory / 2.0)), abs=0.02)
+
+
+def test_a_vague_track_does_not_take_a_person_from_a_certain_one():
+    rig, frames, truth = film([(0.0, 0.0, 0.0, 0.0)], [0.0], noise=0.0)
+    frame, rays = frames[0], viewing_rays(rig, frames[0])
+    state = np.zeros((2, 17, 6))
+    state[:, :, :3] = truth[0, 0]
+    state[:, :, 0] += 0.06
+    covariance = np.zeros((2, 17, 6, 6))
+    for track, deviation in ((0, 0.03), (1, 0.4)):
+        covariance[track, :, range(3), range(3)] = deviation**2
+    m = len(frame)
+
+    def affinities(*tracks):
+        tracks = list(tracks)
+        joined, views = TrackAffinity().join(
+            np.zeros((m, m)), frame.view, rays, state[tracks], covariance[tracks], np.zeros(m)
+        )
+        assert (views[m:] > frame.view.max()).all()
+        np.testing.assert_array_equal(joined, joined.T)
+        return joined[m:, :m]
+
+    both = affinities(0, 1)
+    assert (both[0] > both[1]).all()
+    assert (both[1] > 0.5).all()  # but likelier than nobody
+    np.testing.assert_array_equal(both, affinities(1, 0)[::-1])
+    np.testing.assert_array_equal(affinities(0)[0], both[0])
+    assert (affinities(1)[0] > both[0]).all()  # nobody else claims the person
+
+
+@pytest.mark.parametrize("seconds", [0.08, 0.24])
+def test_who_was_taken_for_a_ghost_is_a_person_once_two_cameras_agree(seconds):
+    """A false detection lies where one camera sees a person: their ghost is a child half as far away, for a moment.
+
+    The camera follows the ghost on, so that the person's own detections, when the other camera sees them, belong to a
+    track that this camera missed for two seconds.
+    """
+    rig = Rig([ring(6)[0], ring(6)[2]])
+    times = np.arange(90) / RATE
+    paths = [(0.6, 0.4, 0.1, 0.1), (-1.2, -1.0, 0.0, 0.05), (0.2, -1.4, 0.05, 0.0)]
+    paths += [(-1.4, 0.6, 0.05, 0.0), (1.3, -0.9, 0.0, 0.1)]  # all but the first: seen by one camera each
+
+    def hidden(frame, view, person):
+        return frame < 65 and view == 0 if person == 0 else view != person % 2
+
+    _, frames, truth = film(paths, times, rig=rig, noise=1.0, hidden=hidden)
+    center = rig[1].center
+    for k in range(20, 20 + round(seconds * RATE)):
+        small = center + 0.6 * (truth[k, 0] - center)
+        given = frames[k]
+        keypoints = np.concatenate([[rig[0].project(small)], given.keypoints])
+        frames[k] = Detections.from_keypoints([0, *given.view], keypoints, np.full(keypoints.shape[:2], 0.9))
+        frames[k] = _timed(frames[k], times[k])
+    tracker = Tracker(Pipeline.preset("fast"), model=TrackingModel())
+    estimates = [tracker.estimate(rig, frame) for frame in frames]
+    there = identities(estimates, truth)[:, 0] >= 0
+    assert not there[:65].any()
+    assert there[72:].all()
+
+
+def _timed(frame, time):
+    return Detections(
+        frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, time=np.full(2, float(time))
+    )
