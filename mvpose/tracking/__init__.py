@@ -1,6 +1,7 @@
 """People through time: identities, hidden people, and pictures that come late or not at all."""
 
 from mvpose.tracking.smoothing import track
+from mvpose.tracking.state import TrackerState
 from mvpose.tracking.tracker import Tracker, TrackingModel
 
-__all__ = ["Tracker", "TrackingModel", "track"]
+__all__ = ["Tracker", "TrackerState", "TrackingModel", "track"]

@@ -276,12 +276,13 @@ class Clutter:
 
     Attributes:
         density: false detections in a picture of each view, (V,), a mean over the latest seconds.
+        counts: weighted number of groups that vanished as soon as they came, and of seconds, (2,).
     """
 
     def __init__(self, model: Existence, cameras: int) -> None:
         self._least = model.least_clutter
         self.density = np.full(cameras, model.least_clutter)
-        self._flashes, self._time = _FLASHES * _WEIGHT, _WEIGHT
+        self.counts = np.array([_FLASHES * _WEIGHT, _WEIGHT])
 
     @property
     def flashes(self) -> float:
@@ -289,17 +290,22 @@ class Clutter:
 
         The mean of a gamma distribution that starts with a low rate and the weight of ten seconds.
         """
-        return self._flashes / self._time
+        return float(self.counts[0] / self.counts[1])
 
     def count(self, unclaimed: Floats, pictures: Bools, elapsed: float) -> None:
         """Count the expected number of false detections (V,) of a frame."""
-        share = 1.0 - np.exp(-elapsed / _DENSITY_MEMORY)
-        mean = (1.0 - share) * self.density + share * unclaimed
-        self.density = np.maximum(np.where(pictures, mean, self.density), self._least)
-        keep = np.exp(-elapsed / _FLASH_MEMORY)
-        self._flashes = keep * self._flashes + (1.0 - keep) * _FLASHES * _WEIGHT
-        self._time = keep * self._time + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes
+        _count(self.density, self.counts, unclaimed, pictures, self._least, elapsed)
 
     def vanish(self, ages: Floats) -> None:
         """Count the tracks that ended at these ages, in seconds."""
-        self._flashes += float((ages < FLASH).sum())
+        self.counts[0] += float((ages < FLASH).sum())
+
+
+@njit(cache=True)
+def _count(density, counts, unclaimed, pictures, least, elapsed):
+    share, keep = 1.0 - np.exp(-elapsed / _DENSITY_MEMORY), np.exp(-elapsed / _FLASH_MEMORY)
+    for v in range(len(density)):
+        if pictures[v]:
+            density[v] = max((1.0 - share) * density[v] + share * unclaimed[v], least)
+    counts[0] = keep * counts[0] + (1.0 - keep) * _FLASHES * _WEIGHT
+    counts[1] = keep * counts[1] + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats
 from mvpose.detections import Detections
+from mvpose.kernels import njit
 
 _LARGEST = 1e11  # seconds: three thousand years; milliseconds since 1970 are more
 _OLDEST = 1.0  # seconds: nobody knows where a joint was so long ago, because its velocity is forgotten as fast
@@ -25,6 +27,7 @@ class FrameTimes(NamedTuple):
         elapsed: time since the previous frame, seconds; 0 in the first.
         lead: time from the frame to the picture of each camera, (V,), at most 0 seconds; 0 without a picture.
         pictures: whether each camera gave a picture that is of use, (V,).
+        some_unused: whether a picture is of no use, because it is too old.
         latest: time of the latest picture, seconds; NaN without any.
     """
 
@@ -32,6 +35,7 @@ class FrameTimes(NamedTuple):
     elapsed: float
     lead: Floats
     pictures: Bools
+    some_unused: bool
     latest: float
 
 
@@ -52,13 +56,13 @@ class FrameClock:
 
     period: float
     interval: float
-    time: float = np.nan
-    pictured: float = np.nan
+    time: float = math.nan
+    pictured: float = math.nan
 
     @property
     def started(self) -> bool:
         """Whether a picture has come."""
-        return not np.isnan(self.time)
+        return not math.isnan(self.time)
 
     def read(self, detections: Detections, cameras: int) -> FrameTimes:
         """Return the times of the next frame, without taking it.
@@ -74,37 +78,34 @@ class FrameClock:
         times = detections.time
         if times is None:
             now = self.time + self.period if self.started else 0.0
-            return FrameTimes(now, self._since(now), np.zeros(cameras), np.ones(cameras, np.bool_), now)
+            return FrameTimes(now, self._since(now), np.zeros(cameras), np.ones(cameras, np.bool_), False, now)
         _check(times, detections, cameras)
-        pictures = np.isfinite(times)
-        if not pictures.any():
-            if not self.started:
-                return FrameTimes(np.nan, 0.0, np.zeros(cameras), pictures, np.nan)
+        latest = _latest(times)
+        if latest == -math.inf:
             # At half the speed after a while, so that the guess of a long time is not ahead of the next picture.
             step = self.interval if self.time - self.pictured < _BLIND else 0.5 * self.interval
-            return FrameTimes(self.time + step, step, np.zeros(cameras), pictures, np.nan)
-        latest = float(times[pictures].max())
+            now, step = (self.time + step, step) if self.started else (math.nan, 0.0)
+            return FrameTimes(now, step, np.zeros(cameras), np.zeros(cameras, np.bool_), False, math.nan)
         if latest < self.pictured:
             raise ValueError(
                 f"frames must come in the order of their times, got {latest:.6g} s after {self.pictured:.6g} s: sort "
                 "them, or start another tracker"
             )
         now = max(latest, self.time) if self.started else latest
-        lead = np.where(pictures, times - now, 0.0)
-        old = lead < latest - now - _OLDEST
-        if old.any():
+        lead, pictures, old = _leads(times, now, latest - _OLDEST)
+        if old >= 0:
             warnings.warn(
-                f"camera {np.flatnonzero(old)[0]}: a picture more than {_OLDEST:g} s before that of another camera is "
-                "not used; give the times of all cameras by one clock, and NaN for a camera without a new picture",
+                f"camera {old}: a picture more than {_OLDEST:g} s before that of another camera is not used; give the "
+                "times of all cameras by one clock, and NaN for a camera without a new picture",
                 stacklevel=2,
             )
-        return FrameTimes(now, self._since(now), np.where(old, 0.0, lead), pictures & ~old, latest)
+        return FrameTimes(now, self._since(now), lead, pictures, old >= 0, latest)
 
     def take(self, times: FrameTimes) -> None:
         """Go on to a frame."""
-        if np.isnan(times.now):
+        if math.isnan(times.now):
             return
-        if not np.isnan(times.latest):
+        if not math.isnan(times.latest):
             if 0.0 < times.latest - self.pictured < _BLIND:
                 self.interval += _SHARE * (times.latest - self.pictured - self.interval)
             self.pictured = times.latest
@@ -117,12 +118,44 @@ class FrameClock:
 def _check(times: Floats, detections: Detections, cameras: int) -> None:
     if len(times) != cameras:
         raise ValueError(f"time must be ({cameras},), the time of each camera's picture, got ({len(times)},)")
-    if (np.abs(times) > _LARGEST).any():
-        camera = int(np.flatnonzero(np.abs(times) > _LARGEST)[0])
+    wild, silent = _first_bad(times, detections.view)
+    if wild >= 0:
         raise ValueError(
-            f"time must be in seconds, of at most {_LARGEST:g}, got {times[camera]:g} for camera {camera}: divide "
+            f"time must be in seconds, of at most {_LARGEST:g}, got {times[wild]:g} for camera {wild}: divide "
             "milliseconds by 1e3 and nanoseconds by 1e9; NaN means no picture"
         )
-    silent = detections.view[np.isnan(times)[detections.view]]
-    if len(silent):
-        raise ValueError(f"camera {silent[0]} has detections, but the time of its picture is NaN (no picture)")
+    if silent >= 0:
+        raise ValueError(f"camera {silent} has detections, but the time of its picture is NaN (no picture)")
+
+
+@njit(cache=True)
+def _first_bad(times, view):
+    """Return a camera whose time cannot be seconds, and one that has detections but no picture; -1 for none."""
+    for camera in range(len(times)):
+        if abs(times[camera]) > _LARGEST:
+            return camera, -1
+    for d in range(len(view)):
+        if np.isnan(times[view[d]]):
+            return -1, view[d]
+    return -1, -1
+
+
+@njit(cache=True)
+def _latest(times):
+    """Return the greatest time; minus infinity if all are NaN."""
+    latest = -np.inf
+    for time in times:
+        latest = max(latest, time)
+    return latest
+
+
+@njit(cache=True)
+def _leads(times, now, oldest):
+    """Return lead and use of each camera's picture, as in :class:`FrameTimes`, and a camera with a too old picture."""
+    lead, pictures, old = np.zeros(len(times)), np.zeros(len(times), np.bool_), -1
+    for camera in range(len(times)):
+        if times[camera] >= oldest:
+            lead[camera], pictures[camera] = times[camera] - now, True
+        elif times[camera] < oldest:
+            old = camera if old < 0 else old
+    return lead, pictures, old

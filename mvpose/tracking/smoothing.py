@@ -19,8 +19,9 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.kernels import njit
 from mvpose.tracking.existence import FLASH
+from mvpose.tracking.frame_kernels import vagueness
 from mvpose.tracking.motion import transition
-from mvpose.tracking.tracker import Moment, Tracker, vagueness
+from mvpose.tracking.tracker import Moment, Tracker
 
 _FASTEST = 1e3  # frames per second; more wait only for a clock that stands still
 
@@ -43,7 +44,7 @@ def track(tracker: Tracker, rig: Rig, frames: Iterable[Detections], *, lag: floa
         raise ValueError(f"lag must be 0 s or more, got {lag}")
     waiting: deque[Moment] = deque()
     for detections in frames:
-        waiting.append(tracker.advance(rig, detections))
+        waiting.append(tracker.advance(rig, detections, keep=lag > 0.0))
         if lag == np.inf:
             continue
         if _is_due(waiting, lag):
@@ -75,6 +76,7 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment) -> Moment:
     tracks, after = moment.tracks, later.tracks
     match = (tracks.ids[:, None] == after.ids) if len(after) else np.zeros((len(tracks), 1), np.bool_)
     row = np.where(match.any(axis=1), match.argmax(axis=1), -1)
+    assert later.predicted is not None, "moments to smooth are kept"
     smoothed = replace(tracks, state=tracks.state.copy(), covariance=tracks.covariance.copy())
     _smooth_people(
         smoothed.state, smoothed.covariance, row, *later.predicted, after.state, after.covariance, later.elapsed,

@@ -6,38 +6,38 @@ gives the people of the pipeline.
 
 from __future__ import annotations
 
+import math
 import time as clock
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate, Matching
-from mvpose.kernels import njit
 from mvpose.ordering import number_views
 from mvpose.pipeline import Pipeline, enter
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.likelihood import Noise
-from mvpose.reconstruction.poses import MISSING_SCORE, Poses
+from mvpose.reconstruction.poses import Poses
 from mvpose.skeleton import Skeleton
 from mvpose.tracking.association import TrackAffinity
-from mvpose.tracking.bones import BonePrior, bone_prior, constrain, learn_lengths
-from mvpose.tracking.existence import Clutter, Existence, gather_evidence, log_odds, log_presence
-from mvpose.tracking.motion import JointMotion, Motion, predict
+from mvpose.tracking.bones import BonePrior, bone_prior
+from mvpose.tracking.existence import Clutter, Existence
+from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, repeats, report_tracks, update_tracks
+from mvpose.tracking.motion import JointMotion, Motion
 from mvpose.tracking.picture_times import FrameClock
-from mvpose.tracking.pose_update import update_people
 from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
 from mvpose.tracking.tracks import Tracks
 
-_GIVEN_UP = -7.0  # log-odds below which a track is no longer followed: one in a thousand
-_ALONE = 0.5  # seconds for which one camera alone follows somebody who is likelier a ghost: the depth is a guess
 _FORGETTING = 0.5  # seconds: time constant of the score of a joint that no view supports
-_SAME_POSE = 0.2  # metres: mean distance between the joints of two poses of one person
-_ONE_PERSON = 0.12  # metres: the same, of two tracks; people who hug are further apart
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,13 @@ class Moment:
         elapsed: time since the previous frame, seconds.
         tracks: tracks after the frame, with those that end here.
         predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new
-            tracks.
+            tracks. None where nobody smooths.
         odds: log-odds that each track is a person, (n,).
         presence: log-odds that this person is still here, (n,).
         shown: whether each track is reported, (n,).
-        owner: track of each detection, (m,), or -1.
+        owner: track of each detection that took part, (k,), or -1.
+        chosen: indices of these detections, (k,).
+        detections: number of detections of the frame.
         poses: poses of the tracks as the pipeline gives them, where the frame is the first.
         timings: seconds by stage.
     """
@@ -86,11 +88,13 @@ class Moment:
     time: float
     elapsed: float
     tracks: Tracks
-    predicted: tuple[Floats, Floats]
+    predicted: tuple[Floats, Floats] | None
     odds: Floats
     presence: Floats
     shown: Bools
     owner: Integers
+    chosen: Integers
+    detections: int
     poses: Poses | None
     timings: dict[str, float]
 
@@ -107,8 +111,10 @@ class Tracker:
         self.pipeline = Pipeline() if pipeline is None else pipeline
         self.model = TrackingModel() if model is None else model
         self._clock = FrameClock(self.model.period, self.model.period)
-        self._skeleton: Skeleton | None = None  # before the first frame
         self._born = 0  # people so far
+        self._rig: Rig | None = None  # before the first frame, and after a restoration
+        self._skeleton: Skeleton | None = None
+        self._layout: Mapping[str, NDArray[Any]] | None = None  # rig and skeleton of the first frame
 
     @property
     def time(self) -> float | None:
@@ -132,79 +138,73 @@ class Tracker:
         """
         return self.report(self.advance(rig, detections))
 
-    def advance(self, rig: Rig, detections: Detections) -> Moment:
-        """Take the next frame, without an estimate; see :meth:`estimate`."""
+    def advance(self, rig: Rig, detections: Detections, *, keep: bool = False) -> Moment:
+        """Take the next frame, without an estimate; see :meth:`estimate`.
+
+        Args:
+            rig: calibrated cameras.
+            detections: detections of the frame.
+            keep: whether the moment is still needed after the next frame; else it shares memory with the tracker.
+        """
         start = clock.perf_counter()
         model, first = self.model, not self._clock.started
         chosen, ordered, rays = enter(rig, detections, self.pipeline.duplicates)
-        if self._skeleton is None:
-            self._start(rig, detections.skeleton)
-        elif len(rig) != len(self._sizes) or detections.skeleton != self._skeleton:
-            raise ValueError(
-                f"a tracker serves one rig and one skeleton, {len(self._sizes)} cameras and {self._skeleton.name!r}, "
-                f"got {len(rig)} and {detections.skeleton.name!r}: start another tracker"
-            )
+        if rig is not self._rig or detections.skeleton is not self._skeleton:
+            self._serve(rig, detections.skeleton)
         times = self._clock.read(detections, len(rig))
         now, elapsed, pictures = times.now, times.elapsed, times.pictures
-        of_use = pictures[ordered.view]
-        if not of_use.all():
+        if times.some_unused:
+            of_use = pictures[ordered.view]
             chosen, ordered, rays = chosen[of_use], ordered.select(of_use), rays.select(of_use)
         affinity = self.pipeline.affinity(rig, ordered, rays)
         self._clock.take(times)
-        _predict_people(self._tracks.state, self._tracks.covariance, elapsed, *self.motion)
-        self._drop(now, vagueness(self._tracks.state, self._tracks.covariance) < 2.0 * model.existence.vague)
-        tracks, lead = self._tracks, times.lead[ordered.view]
-        before = tracks.state.copy(), tracks.covariance.copy()
+        tracks, vague = self._tracks, model.existence.vague
+        known, all_known = predict_tracks(tracks.state, tracks.covariance, elapsed, *self.motion, 2.0 * vague)
+        self._drop(now, known, all_known)
+        tracks = self._tracks
+        before = (tracks.state.copy(), tracks.covariance.copy()) if keep else None
+        lead, count = times.lead[ordered.view], len(tracks)
         joined, views = model.affinity.join(
             affinity, number_views(ordered.view), rays, tracks.state, tracks.covariance, lead
         )
         compared = clock.perf_counter()
         labels = self.pipeline.matching(joined, views).labels
-        labels, groups = labels[: len(ordered)], labels[len(ordered) :]
         matched = clock.perf_counter()
-        self._update(rays, labels, groups, lead, now, elapsed)
-        owner, fresh = _owners(labels, groups)
-        poses = self._give_birth(
-            rays, detections.skeleton, fresh, owner, now, model.existence.span(np.inf if first else elapsed)
-        )
-        tracks, count = self._tracks, len(before[0])
-        gather_evidence(
-            tracks.hits, tracks.misses, tracks.absent, tracks.origin, np.arange(len(tracks)) >= count, tracks.state,
-            owner, ordered.view, rig.packed, self._sizes, pictures, tracks.found, now,
-            *model.existence.weights(elapsed),
+        m, noise, bones = len(ordered), model.noise, self._bones
+        owner, fresh, groups = update_tracks(
+            tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels[:m],
+            labels[m:], rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas,
+            noise.floor, self.motion.speed, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
         )  # fmt: skip
-        clutter = self._clutter
-        odds = _odds(
-            tracks.span,
-            tracks.origin,
-            tracks.hits,
-            tracks.misses,
-            clutter.density,
-            clutter.flashes,
-            model.existence.rates,
-        )
-        vague = vagueness(tracks.state, tracks.covariance)
-        here = _log_presence(tracks.absent, now - tracks.seen, *model.existence.presence)
-        shown = (odds > 0.0) & (here > 0.0) & (vague < model.existence.vague) | first
-        tracks.reported |= shown
-        false = np.ones(len(owner), np.float64)  # probability that a detection shows nobody
-        false[owner >= 0] = 1.0 / (1.0 + np.exp(np.clip(odds[owner[owner >= 0]], -50.0, 50.0)))
-        clutter.count(np.bincount(ordered.view, false, len(rig)).astype(np.float64), pictures, elapsed)
-        given = np.full(len(detections), -1)
-        given[chosen] = owner
-        new = len(tracks) - count
+        poses: Poses | None = None
+        if groups or first:
+            span = model.existence.span(np.inf if first else elapsed)
+            poses = self._give_birth(rays, detections.skeleton, fresh, owner, now, span)
+        tracks, new = self._tracks, len(self._tracks) - count
+        odds, here, shown, followed, all_followed, false = judge_tracks(
+            tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
+            tracks.found, tracks.reported, new, owner, ordered.view, rig.packed, self._sizes, pictures,
+            *model.existence.weights(elapsed), self._clutter.density, self._clutter.flashes, model.existence.rates,
+            model.existence.presence, now, vague, first,
+        )  # fmt: skip
+        self._clutter.count(false, pictures, elapsed)
+        if before is not None:
+            tracks, before = tracks.copy(), (_with_nan(before[0], new), _with_nan(before[1], new))
         moment = Moment(
-            now, elapsed, tracks.select(np.arange(len(tracks))),
-            (_with_nan(before[0], new), _with_nan(before[1], new)),
-            odds, here, shown, given, poses if first else None, {},
-        )  # fmt: skip
-        self._drop(
             now,
-            (odds > _GIVEN_UP)
-            & (vague < 2.0 * model.existence.vague)
-            & ((odds > 0.0) | (now - tracks.agreed < _ALONE))
-            & ~_absorbed(tracks.state, vague, _ONE_PERSON),
+            elapsed,
+            tracks,
+            before,
+            odds,
+            here,
+            shown,
+            owner,
+            chosen,
+            len(detections),
+            poses if first else None,
+            {},
         )
+        self._drop(now, followed, all_followed)
         end = clock.perf_counter()
         moment.timings.update(
             affinity=compared - start, matching=matched - compared, reconstruction=end - matched, total=end - start
@@ -214,52 +214,78 @@ class Tracker:
     def report(self, moment: Moment) -> Estimate:
         """Return the estimate of a moment."""
         start = clock.perf_counter()
-        tracks, shown = moment.tracks, moment.shown
-        number = np.where(shown, np.cumsum(shown) - 1, -1)
-        labels = np.where(moment.owner >= 0, number[moment.owner] if len(number) else -1, -1)
-        if moment.poses is None:
-            joints, covariance = constrain_people(tracks, self._bones)
-            joints, covariance, scores, freedom = joints[shown], covariance[shown], tracks.scores[shown], None
-            covariance = covariance + (SHARED * self._sigmas[:, None, None]) ** 2 * np.eye(3)  # no residual shows it
-            joints[scores == 0.0] = covariance[scores == 0.0] = np.nan
-            scores = np.where(np.isnan(joints[..., 0]), 0.0, scores)
-        else:
+        tracks = moment.tracks
+        joints, covariance, scores, labels = report_tracks(
+            moment.shown, tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance,
+            self._bones.ends, SHARED * self._sigmas, moment.owner, moment.chosen, moment.detections,
+        )  # fmt: skip
+        ids, freedom = tracks.ids[moment.shown], None
+        if moment.poses is not None:
             joints, scores, covariance, freedom = moment.poses
-        seal(joints, covariance, scores, labels)
+        seal(joints, covariance, scores, labels, ids)
         seconds = clock.perf_counter() - start
-        timings = {key: value + seconds * (key in ("reconstruction", "total")) for key, value in moment.timings.items()}
-        return Estimate(
-            joints,
-            scores,
-            Matching(labels),
-            covariance,
-            timings,
-            freedom,
-            ids=tracks.ids[shown],
-            time=None if np.isnan(moment.time) else moment.time,
+        timings = dict(moment.timings)
+        timings["reconstruction"] += seconds
+        timings["total"] += seconds
+        time = None if math.isnan(moment.time) else moment.time
+        return Estimate(joints, scores, Matching(labels), covariance, timings, freedom, ids=ids, time=time)
+
+    def state(self) -> TrackerState:
+        """Return all that the tracker knows of the past, for :meth:`restored`.
+
+        Estimates that a lag still holds back (:func:`mvpose.tracking.track`) are no part of it.
+
+        Raises:
+            ValueError: before the first frame, when nothing is known.
+        """
+        if self._layout is None:
+            raise ValueError("a tracker has no state before its first frame")
+        watch, clutter = self._clock, self._clutter
+        return TrackerState(
+            {
+                **self._layout,
+                "clock": np.array([watch.interval, watch.time, watch.pictured]),
+                "born": np.array([self._born]),
+                "density": clutter.density,
+                "clutter": clutter.counts,
+                **of_tracks(self._tracks, self._lost),
+            }
         )
 
-    def _start(self, rig: Rig, skeleton: Skeleton) -> None:
-        self._skeleton = skeleton
+    @classmethod
+    def restored(
+        cls, state: TrackerState, pipeline: Pipeline | None = None, *, model: TrackingModel | None = None
+    ) -> Self:
+        """Return a tracker that goes on where another one was.
+
+        Args:
+            state: of the other tracker.
+            pipeline: as for the class; the same as that of the other tracker for the same estimates.
+            model: the same.
+        """
+        tracker, arrays = cls(pipeline, model=model), state.arrays
+        tracker._layout = {name: arrays[name] for name in arrays if name.startswith(("version", "rig.", "skeleton."))}
+        tracker._clock = FrameClock(tracker.model.period, *map(float, arrays["clock"]))
+        tracker._born = int(arrays["born"][0])
+        tracker._clutter = Clutter(tracker.model.existence, len(arrays["density"]))
+        tracker._clutter.density, tracker._clutter.counts = arrays["density"].copy(), arrays["clutter"].copy()
+        tracker._tracks, tracker._lost = state.group("tracks"), state.group("lost")
+        return tracker
+
+    def _serve(self, rig: Rig, skeleton: Skeleton) -> None:
+        """Start with a rig and a skeleton; refuse others in later frames."""
+        bones = bone_prior(skeleton)
+        if self._layout is None:
+            self._layout = layout(rig, skeleton)
+            self._clutter = Clutter(self.model.existence, len(rig))
+            self._tracks = self._lost = Tracks.none(joints=len(skeleton), bones=len(bones.length), cameras=len(rig))
+        else:
+            check_serves(self._layout, rig, skeleton)
+        self._rig, self._skeleton = rig, skeleton
         self._sizes = np.array([camera.size for camera in rig], float)
         self.motion: JointMotion = self.model.motion.of_joints(skeleton)
-        self._bones: BonePrior = bone_prior(skeleton)
+        self._bones: BonePrior = bones
         self._sigmas = self.model.noise.sigmas(skeleton)
-        self._clutter = Clutter(self.model.existence, len(rig))
-        self._tracks = self._lost = Tracks.none(joints=len(skeleton), bones=len(self._bones.length), cameras=len(rig))
-
-    def _update(self, rays: Rays, labels: Integers, groups: Integers, lead: Floats, now: float, elapsed: float) -> None:
-        """Update tracks by the detections that were matched with them."""
-        tracks, noise = self._tracks, self.model.noise
-        supports = np.empty_like(tracks.scores)
-        update_people(
-            tracks.state, tracks.covariance, supports, labels, groups, rays.origins, rays.directions, rays.weights,
-            noise.pixels * rays.pixel, lead, self._sigmas, noise.floor, self.motion.speed,
-        )  # fmt: skip
-        faded = tracks.scores * np.exp(-elapsed / _FORGETTING)
-        faded[faded <= MISSING_SCORE] = 0.0
-        tracks.scores = np.where(supports > MISSING_SCORE, supports, faded)
-        _learn(tracks.length, tracks.variance, tracks.state, tracks.covariance, groups, self._bones.ends, elapsed)
 
     def _give_birth(
         self, rays: Rays, skeleton: Skeleton, fresh: Integers, owner: Integers, now: float, span: float
@@ -272,7 +298,7 @@ class Tracker:
         if not len(poses.joints):
             return poses
         tracks, count, cameras = self._tracks, len(poses.joints), len(self._sizes)
-        new = ~_repeats(poses.joints, tracks.state, _SAME_POSE)
+        new = ~repeats(poses.joints, tracks.state)
         born = Tracks.born(
             poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self.motion.speed,
             bones=self._bones, cameras=cameras,
@@ -293,134 +319,19 @@ class Tracker:
         self._tracks = tracks.join(born)
         return poses
 
-    def _drop(self, now: float, followed: Bools) -> None:
+    def _drop(self, now: float, followed: Bools, everyone: bool) -> None:
         """Stop to follow tracks; those who were people may come back."""
         tracks = self._tracks
-        if not followed.all():
+        if not everyone:
             self._clutter.vanish(now - tracks.born_at[~followed])
             self._lost = self._lost.join(tracks.select(~followed & tracks.reported))
             self._tracks = tracks.select(followed)
         if len(self._lost):
-            self._lost = self._lost.select(now - self._lost.seen < self.model.reappearance.memory)
-
-
-def constrain_people(tracks: Tracks, bones: BonePrior) -> tuple[Floats, Floats]:
-    """Return the joints of tracks (n, J, 3), shaped by their bone lengths, and covariances (n, J, 3, 3)."""
-    joints, covariance = np.empty((*tracks.state.shape[:2], 3)), np.empty((*tracks.state.shape[:2], 3, 3))
-    _constrain(joints, covariance, tracks.state, tracks.covariance, bones.ends, tracks.length, tracks.variance)
-    return joints, covariance
+            remembered = now - self._lost.seen < self.model.reappearance.memory
+            if not remembered.all():
+                self._lost = self._lost.select(remembered)
 
 
 def _with_nan(array: Floats, rows: int) -> Floats:
     """Return an array with rows of NaN appended."""
-    return np.concatenate([array, np.full((rows, *array.shape[1:]), np.nan)])
-
-
-@njit(cache=True)
-def _predict_people(state, covariance, elapsed, speed, time, trunk):
-    for t in range(len(state)):
-        predict(state[t], covariance[t], elapsed, speed, time, trunk)
-
-
-@njit(cache=True)
-def _learn(length, variance, state, covariance, groups, ends, elapsed):
-    for t in range(len(state)):
-        if groups[t] >= 0:
-            learn_lengths(length[t], variance[t], state[t], covariance[t], ends, elapsed)
-
-
-@njit(cache=True)
-def _constrain(joints, covariance, state, moments, ends, length, variance):
-    for t in range(len(state)):
-        constrain(joints[t], covariance[t], state[t], moments[t], ends, length[t], variance[t])
-
-
-@njit(cache=True)
-def _odds(span, origin, hits, misses, density, flashes, rates):
-    odds = np.empty(len(hits))
-    for t in range(len(hits)):
-        odds[t] = log_odds(span[t], origin[t], hits[t], misses[t], density, flashes, rates)
-    return odds
-
-
-@njit(cache=True)
-def _log_presence(absent, since, departures, found, seeable):
-    presence = np.empty(len(absent))
-    for t in range(len(absent)):
-        presence[t] = log_presence(absent[t], since[t], departures, found, seeable)
-    return presence
-
-
-@njit(cache=True)
-def vagueness(state, covariance):
-    """Return the standard deviation along an axis of each track's best-known joint, (n,), metres."""
-    least = np.full(len(state), np.inf)
-    for t in range(len(state)):
-        for j in range(state.shape[1]):
-            if not np.isnan(state[t, j, 0]):
-                total = covariance[t, j, 0, 0] + covariance[t, j, 1, 1] + covariance[t, j, 2, 2]
-                least[t] = min(least[t], np.sqrt(max(total, 0.0) / 3.0))
-    return least
-
-
-@njit(cache=True)
-def _owners(labels, groups):
-    """Return the track of each detection, (m,), and the number of its group without a track, (m,); -1 for neither.
-
-    Groups without a track are numbered in the order of their labels, so that without any track they are the labels.
-    """
-    m, n = len(labels), len(groups)
-    owner, fresh = np.full(m, -1), np.full(m, -1)
-    most = labels.max() if m else -1
-    number = np.full(most + 1, -1)
-    for d in range(m):
-        if labels[d] >= 0:
-            number[labels[d]] = -2
-    for t in range(n):
-        if 0 <= groups[t] <= most:
-            number[groups[t]] = t
-    count = 0
-    for label in range(most + 1):
-        if number[label] == -2:
-            number[label] = n + count
-            count += 1
-    for d in range(m):
-        if labels[d] >= 0 and number[labels[d]] < n:
-            owner[d] = number[labels[d]]
-        elif labels[d] >= 0:
-            fresh[d] = number[labels[d]] - n
-    return owner, fresh
-
-
-@njit(cache=True)
-def _absorbed(state, vague, distance):
-    """Return which tracks lie within a mean distance of a better-known one, (n,): they follow its person."""
-    absorbed = np.zeros(len(state), np.bool_)
-    for t in range(len(state)):
-        for other in range(len(state)):
-            better = vague[other] < vague[t] or (vague[other] == vague[t] and other < t)
-            if better and not absorbed[other] and _mean_distance(state[t], state[other]) < distance:
-                absorbed[t] = True
-    return absorbed
-
-
-@njit(cache=True)
-def _mean_distance(one, other):
-    """Return the mean distance of the joints that two poses (J, 3 or more) have; infinite if there are none."""
-    total, count = 0.0, 0
-    for j in range(len(one)):
-        if not np.isnan(one[j, 0]) and not np.isnan(other[j, 0]):
-            x, y, z = one[j, 0] - other[j, 0], one[j, 1] - other[j, 1], one[j, 2] - other[j, 2]
-            total += np.sqrt(x * x + y * y + z * z)
-            count += 1
-    return total / count if count else np.inf
-
-
-@njit(cache=True)
-def _repeats(joints, state, distance):
-    """Return which poses (k, J, 3) lie within a mean distance of those of a track (n, J, 6), (k,)."""
-    repeats = np.zeros(len(joints), np.bool_)
-    for k in range(len(joints)):
-        for t in range(len(state)):
-            repeats[k] = repeats[k] or _mean_distance(joints[k], state[t]) < distance
-    return repeats
+    return np.concatenate([array, np.full((rows, *array.shape[1:]), np.nan)]) if rows else array

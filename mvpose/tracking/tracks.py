@@ -137,6 +137,10 @@ class Tracks:
         """Return copies of some tracks, given by a mask (n,) or by indices."""
         return type(self)(*(getattr(self, field.name)[which] for field in fields(self)))
 
+    def copy(self) -> Self:
+        """Return copies of all tracks."""
+        return type(self)(*(getattr(self, field.name).copy() for field in fields(self)))
+
     def join(self, others: Self) -> Self:
         """Return these tracks followed by others."""
         if not len(others):

@@ -1,0 +1,20 @@
+"""Command line of the benchmark of the tracker; see ``--help``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from benchmarks.method.command import Section, run
+from benchmarks.tracking import cost, endurance
+
+SECTIONS: dict[str, Section] = {"cost": cost, "endurance": endurance}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the requested sections; see :func:`benchmarks.method.command.run`."""
+    return run("benchmarks.tracking", "The tracker on synthetic streams, on one core.", SECTIONS, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""State of a tracker as named arrays, saved to one file and restored from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Self
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.camera import Rig
+from mvpose.skeleton import Skeleton
+from mvpose.tracking.tracks import Tracks
+
+VERSION = 1
+"""Version of the layout; a change of the fields of :class:`mvpose.tracking.tracks.Tracks` needs another."""
+
+_SINGLE = {"clock": 3, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
+_GROUPS = ("tracks", "lost")
+
+
+@dataclass(frozen=True)
+class TrackerState:
+    """All that a tracker knows of the past.
+
+    Attributes:
+        arrays: read-only arrays by name: ``tracks.*`` and ``lost.*`` are the fields of
+            :class:`mvpose.tracking.tracks.Tracks`, the others clock, rates, rig and skeleton.
+
+    Raises:
+        ValueError: arrays of another version of the layout, or that do not fit each other.
+    """
+
+    arrays: Mapping[str, NDArray[Any]]
+
+    def __post_init__(self) -> None:
+        copies = {name: np.array(value) for name, value in self.arrays.items()}
+        _check(copies)
+        for value in copies.values():
+            value.setflags(write=False)
+        object.__setattr__(self, "arrays", MappingProxyType(copies))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (dict(self.arrays),)
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all arrays, bytes."""
+        return sum(value.nbytes for value in self.arrays.values())
+
+    @property
+    def followed(self) -> int:
+        """Number of tracks that are followed."""
+        return len(self.arrays["tracks.ids"])
+
+    @property
+    def lost(self) -> int:
+        """Number of tracks that were lost and may come back."""
+        return len(self.arrays["lost.ids"])
+
+    def group(self, name: str) -> Tracks:
+        """Return copies of the tracks that are followed (``"tracks"``) or ``"lost"``."""
+        return Tracks(*(self.arrays[f"{name}.{field.name}"].copy() for field in fields(Tracks)))
+
+    def save(self, path: str | Path) -> None:
+        """Write the arrays to an npz file, without pickle; a file of this name is replaced when all is written."""
+        path = Path(path)
+        part = path.with_name(path.name + ".part")
+        try:
+            with part.open("wb") as file:
+                np.savez(file, **self.arrays)  # type: ignore[arg-type]
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a file of :meth:`save`.
+
+        Raises:
+            ValueError: a file of another kind or version.
+            OSError: a file that cannot be read.
+        """
+        try:
+            file = np.load(path, allow_pickle=False)
+            if not isinstance(file, np.lib.npyio.NpzFile):
+                raise ValueError("not an npz file")
+            with file:
+                return cls(dict(file))
+        except (ValueError, BadZipFile, EOFError) as error:
+            raise ValueError(f"{path}: expected the state of a tracker (TrackerState.save): {error}") from None
+
+
+def layout(rig: Rig, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
+    """Return the arrays that say for which rig and skeleton a state is."""
+    return {
+        "version": np.array([VERSION]),
+        "rig.cameras": rig.packed,
+        "rig.sizes": np.array([camera.size for camera in rig]),
+        "skeleton.joints": np.array(skeleton.joints),
+        "skeleton.edges": np.array(skeleton.edges).reshape(-1, 2),
+    }
+
+
+def of_tracks(tracks: Tracks, lost: Tracks) -> dict[str, NDArray[Any]]:
+    """Return the arrays of the tracks that are followed, and of lost ones."""
+    return {
+        f"{name}.{field.name}": getattr(group, field.name)
+        for name, group in zip(_GROUPS, (tracks, lost), strict=True)
+        for field in fields(Tracks)
+    }
+
+
+def check_serves(expected: Mapping[str, NDArray[Any]], rig: Rig, skeleton: Skeleton) -> None:
+    """Refuse another rig or skeleton than that of a tracker.
+
+    Raises:
+        ValueError: a rig or skeleton other than that of ``expected``, arrays of :func:`layout`.
+    """
+    got = layout(rig, skeleton)
+    start = "a tracker serves one rig and one skeleton"
+    for name, what in (("skeleton.joints", "joints"), ("skeleton.edges", "bones")):
+        if not np.array_equal(expected[name], got[name]):
+            raise ValueError(
+                f"{start}, but the skeleton {skeleton.name!r} of {len(skeleton)} joints has other {what} than that "
+                f"of its first frame of {len(expected['skeleton.joints'])}: start another tracker"
+            )
+    cameras = len(expected["rig.cameras"])
+    if cameras != len(rig):
+        raise ValueError(f"{start}, of {cameras} cameras, got {len(rig)}: start another tracker")
+    for name in ("rig.cameras", "rig.sizes"):
+        other = (expected[name] != got[name]).any(axis=1)
+        if other.any():
+            view = int(np.flatnonzero(other)[0])
+            raise ValueError(
+                f"{start}, but camera {view} ({rig[view].name!r}) has another calibration or image size than in its "
+                "first frame: start another tracker"
+            )
+
+
+def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
+    version = arrays.get("version")
+    if version is None or version.shape != (1,) or version.dtype.kind != "i":
+        raise ValueError("there is no version")
+    if version[0] != VERSION:
+        raise ValueError(f"version of the layout must be {VERSION}, got {version[0]}: track the recording again")
+    tracks = [f"{name}.{field.name}" for name in _GROUPS for field in fields(Tracks)]
+    names = {
+        "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", *_SINGLE, *tracks,
+    }  # fmt: skip
+    if names != set(arrays):
+        raise ValueError(f"arrays are missing or unknown: {', '.join(sorted(names ^ set(arrays)))}")
+    cameras, joints = len(_of(arrays, "rig.cameras", (None, 22))), len(_of(arrays, "skeleton.joints", (None,), "U"))
+    _of(arrays, "rig.sizes", (cameras, 2), "i")
+    _of(arrays, "skeleton.edges", (None, 2), "i")
+    _of(arrays, "density", (cameras,))
+    for name, size in _SINGLE.items():
+        _of(arrays, name, (size,), "i" if name == "born" else "f")
+    bones = _of(arrays, "tracks.length", (None, None)).shape[1]
+    like = Tracks.none(joints=joints, bones=bones, cameras=cameras)
+    for group in _GROUPS:
+        count = len(_of(arrays, f"{group}.ids", (None,), "i"))
+        for field in fields(Tracks):
+            expected = getattr(like, field.name)
+            _of(arrays, f"{group}.{field.name}", (count, *expected.shape[1:]), expected.dtype.kind)
+
+
+def _of(arrays: Mapping[str, NDArray[Any]], name: str, shape: tuple[int | None, ...], kind: str = "f") -> NDArray[Any]:
+    """Return an array of a shape, None for any size, and of a kind of numbers."""
+    array = arrays[name]
+    fits = array.ndim == len(shape) and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
+    if not fits or array.dtype.kind != kind:
+        sizes = ", ".join("any" if size is None else str(size) for size in shape)
+        raise ValueError(f"{name} must be ({sizes}) of kind {kind!r}, got {array.shape} of kind {array.dtype.kind!r}")
+    return array
