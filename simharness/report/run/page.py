@@ -14,12 +14,14 @@ from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17
 from simharness.pairing.pairing import pair
 from simharness.report.documents import fill_template
+from simharness.report.figures.palette import line_color
 from simharness.report.run import plots
 from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Animation
 from simharness.report.run.headline import COLUMNS, NOTHING
 from simharness.report.run.pictures import Picture
-from simharness.report.run.standard_figures import line_color, person_errors
+from simharness.report.run.standard_figures import person_errors
+from simharness.report.run.tracked_people import TRACKING_COLUMNS, tracked_variants
 from simharness.scenario.toml_files import dumps
 from simharness.scoring.pcp import GROUPS, Part
 from simharness.trial.run_folder import Record
@@ -62,6 +64,8 @@ def render(
         animation=animation,
         plots=_plots(record, main, things),
         figures=draw_figures(record, main),
+        tracking_columns=TRACKING_COLUMNS,
+        tracked=tracked_variants(record),
         stages=summary.get("run", {}).get("stages_s", {}),
         command=_command(record),
         resolved=dumps(record.scenario),

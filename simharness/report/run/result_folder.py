@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from simharness.report.run.film import animate, animated_frames
@@ -16,6 +18,8 @@ from simharness.runtime.stages import Stages
 from simharness.scenario.load import fingerprint
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.summary import VariantScores, summarize
+from simharness.scoring.tracking.summary import tracking_summary
+from simharness.scoring.tracking.tracked_frames import ids_of
 from simharness.trial.needs import require_memory
 from simharness.trial.run_folder import Record, write_run
 from simharness.trial.run_trial import TrialResult, run_trial
@@ -84,6 +88,11 @@ def _record(result: TrialResult, about: Mapping[str, Any]) -> Record:
     """Return the record of a run; ``about`` is its part of the summary and may still grow."""
     scenario, recording = result.scenario, result.recording
     scores = {variant: assessment.variant_scores for variant, assessment in result.assessments.items()}
+    if any(ids_of(estimates) is not None for estimates in result.estimates.values()):
+        truth = np.stack([true.joints for true in recording.truth])
+        for variant, scored in scores.items():
+            over_time = tracking_summary(truth, result.estimates[variant], recording.time)
+            scores[variant] = replace(scored, tracking=over_time)
     summary = summarize(
         scenario.name,
         scores,

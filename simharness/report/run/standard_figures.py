@@ -6,13 +6,12 @@ import numpy as np
 import polars as pl
 
 from mvpose.arrays import Floats
-from simharness.report.figures.palette import css, person_color
+from simharness.report.figures.palette import line_color
 from simharness.report.run import plots
 from simharness.report.run.figures import figure
 from simharness.trial.run_folder import Record
 from simharness.types.views import Visibility
 
-_MAX_LUMA = 165.0  # of a line on white, 0 to 255
 _VISIBILITY_LABELS = {
     Visibility.VISIBLE: "visible",
     Visibility.SELF_OCCLUDED: "self-occluded",
@@ -57,11 +56,3 @@ def person_errors(scores: pl.DataFrame, variant: str) -> Floats:
     return np.array([[np.nan if error is None else error for error in row] for row in rows], float).reshape(
         len(rows), -1
     )
-
-
-def line_color(person: int) -> str:
-    """Return the colour of a person, darkened where a line of it would be invisible on white."""
-    color = person_color(person)
-    luma = float(np.dot(color, (0.299, 0.587, 0.114)))  # Rec. 601
-    red, green, blue = (round(part * min(1.0, _MAX_LUMA / luma)) for part in color)
-    return css((red, green, blue))
