@@ -85,9 +85,10 @@ class Existence:
         """Arguments of :func:`log_presence`."""
         return self.departures, self.found, self.seeable
 
-    def weights(self, elapsed: float) -> tuple[float, float]:
-        """Return the weight of a picture ``elapsed`` seconds after the previous one, and what earlier ones keep."""
-        return min(elapsed / self.independent, 1.0), float(np.exp(-elapsed / self.memory))
+    @property
+    def correlation(self) -> tuple[float, float]:
+        """Arguments of :func:`gather_evidence`: time between independent pictures, and memory, seconds."""
+        return self.independent, self.memory
 
     def span(self, dt: float) -> float:
         """Return the time in which people of a new track may have come, from the time since the previous pictures."""
@@ -158,8 +159,9 @@ def log_presence(absent, since, departures, found, seeable):
 
 @njit(cache=True)
 def gather_evidence(
-    hits, misses, absent, origin, fresh, states, owner, view, cameras, sizes, pictures, last, now, step, keep
-):
+    hits, misses, absent, origin, fresh, states, owner, view, cameras, sizes, pictures, last, now, since,
+    independent, memory,
+):  # fmt: skip
     """Update the effective hits and misses (n, V) of tracks by the pictures of a moment, in place.
 
     Args:
@@ -177,8 +179,9 @@ def gather_evidence(
         pictures: whether each camera gave a picture, (V,).
         last: time at which each camera last found a track, (n, V), seconds.
         now: seconds.
-        step: weight of this picture.
-        keep: weight that the earlier ones keep.
+        since: time from the previous picture of each camera, (V,), seconds.
+        independent: as in :class:`Existence`.
+        memory: the same.
     """
     n, views = hits.shape
     centers, depth = np.zeros((n, 3)), np.empty(n)
@@ -202,7 +205,7 @@ def gather_evidence(
         for d in range(len(owner)):
             if view[d] == v and owner[d] >= 0:
                 found[owner[d]] = True
-        camera = cameras[v]
+        camera, step, keep = cameras[v], min(since[v] / independent, 1.0), np.exp(-since[v] / memory)
         for t in range(n):
             depth[t] = _depth(camera, centers[t])
         for t in range(n):
@@ -292,9 +295,17 @@ class Clutter:
         """
         return float(self.counts[0] / self.counts[1])
 
-    def count(self, unclaimed: Floats, pictures: Bools, elapsed: float) -> None:
-        """Count the expected number of false detections (V,) of a frame."""
-        _count(self.density, self.counts, unclaimed, pictures, self._least, elapsed)
+    def count(self, unclaimed: Floats, pictures: Bools, since: Floats, elapsed: float) -> None:
+        """Count the expected number of false detections (V,) of a frame.
+
+        Args:
+            unclaimed: expected numbers, (V,).
+            pictures: whether each camera gave a picture, (V,).
+            since: time from the previous picture of each camera, (V,), seconds; infinite for its first, in which
+                nobody is known yet.
+            elapsed: time since the previous frame, seconds.
+        """
+        _count(self.density, self.counts, unclaimed, pictures, since, self._least, elapsed)
 
     def vanish(self, ages: Floats) -> None:
         """Count the tracks that ended at these ages, in seconds."""
@@ -302,10 +313,11 @@ class Clutter:
 
 
 @njit(cache=True)
-def _count(density, counts, unclaimed, pictures, least, elapsed):
-    share, keep = 1.0 - np.exp(-elapsed / _DENSITY_MEMORY), np.exp(-elapsed / _FLASH_MEMORY)
+def _count(density, counts, unclaimed, pictures, since, least, elapsed):
+    keep = np.exp(-elapsed / _FLASH_MEMORY)
     for v in range(len(density)):
-        if pictures[v]:
+        if pictures[v] and since[v] < np.inf:
+            share = 1.0 - np.exp(-since[v] / _DENSITY_MEMORY)
             density[v] = max((1.0 - share) * density[v] + share * unclaimed[v], least)
     counts[0] = keep * counts[0] + (1.0 - keep) * _FLASHES * _WEIGHT
     counts[1] = keep * counts[1] + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes

@@ -125,7 +125,7 @@ def _owners(labels, groups):
 @njit(cache=True)
 def judge_tracks(
     state, covariance, span, origin, hits, misses, absent, found, reported, new, owner, view, cameras, sizes, pictures,
-    step, keep, density, flashes, rates, presence, now, vague, first,
+    since, independent, memory, density, flashes, rates, presence, now, vague, first,
 ):  # fmt: skip
     """Gather the evidence of a frame for and against each track, and decide who is a person and who is present.
 
@@ -145,8 +145,9 @@ def judge_tracks(
         cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
         sizes: width and height, (V, 2), pixels.
         pictures: whether each camera gave a picture, (V,).
-        step: weight of this picture.
-        keep: weight that the earlier ones keep.
+        since: time from the previous picture of each camera, (V,), seconds.
+        independent: :attr:`mvpose.tracking.existence.Existence.correlation`, and so ``memory``.
+        memory: the same.
         density: false detections in a picture of each view, (V,).
         flashes: groups per second that vanish as soon as they come.
         rates: :attr:`mvpose.tracking.existence.Existence.rates`.
@@ -162,8 +163,9 @@ def judge_tracks(
     n = len(state)
     fresh = np.arange(n) >= n - new
     gather_evidence(
-        hits, misses, absent, origin, fresh, state, owner, view, cameras, sizes, pictures, found, now, step, keep
-    )
+        hits, misses, absent, origin, fresh, state, owner, view, cameras, sizes, pictures, found, now, since,
+        independent, memory,
+    )  # fmt: skip
     departures, in_picture, seeable = presence
     odds, here, spread, agreed = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     shown, followed, everyone = np.zeros(n, np.bool_), np.zeros(n, np.bool_), True

@@ -21,6 +21,10 @@ VERSION = 1
 
 _SINGLE = {"clock": 3, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
 _GROUPS = ("tracks", "lost")
+_RECENT: dict[str, tuple[tuple[Any, ...], str]] = {  # fields of RecentPictures, their shapes and kinds
+    "latest": (("V",), "f"), "view": (("k",), "i"), "keypoints": (("k", "J", 2), "f"), "scores": (("k", "J"), "f"),
+    "boxes": (("k", 4), "f"), "box_scores": (("k",), "f"), "descriptors": (("k", "D"), "f"), "time": (("k",), "f"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,8 @@ class TrackerState:
 
     Attributes:
         arrays: read-only arrays by name: ``tracks.*`` and ``lost.*`` are the fields of
-            :class:`mvpose.tracking.tracks.Tracks`, the others clock, rates, rig and skeleton.
+            :class:`mvpose.tracking.tracks.Tracks`, ``recent.*`` those of
+            :class:`mvpose.tracking.recent_pictures.RecentPictures`, the others clock, rates, rig and skeleton.
 
     Raises:
         ValueError: arrays of another version of the layout, or that do not fit each other.
@@ -65,6 +70,11 @@ class TrackerState:
     def group(self, name: str) -> Tracks:
         """Return copies of the tracks that are followed (``"tracks"``) or ``"lost"``."""
         return Tracks(*(self.arrays[f"{name}.{field.name}"].copy() for field in fields(Tracks)))
+
+    @property
+    def recent(self) -> dict[str, NDArray[Any]]:
+        """Arrays of the latest pictures."""
+        return {name: self.arrays[f"recent.{name}"] for name in _RECENT}
 
     def save(self, path: str | Path) -> None:
         """Write the arrays to an npz file, without pickle; a file of this name is replaced when all is written."""
@@ -151,6 +161,7 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
     tracks = [f"{name}.{field.name}" for name in _GROUPS for field in fields(Tracks)]
     names = {
         "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", *_SINGLE, *tracks,
+        *(f"recent.{name}" for name in _RECENT),
     }  # fmt: skip
     if names != set(arrays):
         raise ValueError(f"arrays are missing or unknown: {', '.join(sorted(names ^ set(arrays)))}")
@@ -160,6 +171,10 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
     _of(arrays, "density", (cameras,))
     for name, size in _SINGLE.items():
         _of(arrays, name, (size,), "i" if name == "born" else "f")
+    waiting, descriptor = len(_of(arrays, "recent.time", (None,))), len(arrays["recent.descriptors"].T)
+    for name, (shape, kind) in _RECENT.items():
+        sizes = {"V": cameras, "k": waiting, "J": joints, "D": descriptor}
+        _of(arrays, f"recent.{name}", tuple(sizes.get(size, size) for size in shape), kind)
     bones = _of(arrays, "tracks.length", (None, None)).shape[1]
     like = Tracks.none(joints=joints, bones=bones, cameras=cameras)
     for group in _GROUPS:

@@ -34,6 +34,7 @@ from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, repeats,
 from mvpose.tracking.motion import JointMotion, Motion
 from mvpose.tracking.picture_times import FrameClock
 from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
 from mvpose.tracking.tracks import Tracks
 
@@ -177,17 +178,23 @@ class Tracker:
             noise.floor, self.motion.speed, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
         )  # fmt: skip
         poses: Poses | None = None
+        since = self._recent.take(now, times.lead, pictures)
+        span = model.existence.span(float(since.min(where=pictures, initial=np.inf)))
         if groups or first:
-            span = model.existence.span(np.inf if first else elapsed)
             poses = self._give_birth(rays, detections.skeleton, fresh, owner, now, span)
+        shown_by, in_view = owner, ordered.view
+        if self._recent.wait_for(now, pictures):
+            partners, cameras = self._pair_with_recent(rig, ordered, lead, owner, now, span)
+            shown_by, in_view = np.concatenate([owner, partners]), np.concatenate([in_view, cameras])
+        self._recent.add(ordered, owner < 0)
         tracks, new = self._tracks, len(self._tracks) - count
         odds, here, shown, followed, all_followed, false = judge_tracks(
             tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
-            tracks.found, tracks.reported, new, owner, ordered.view, rig.packed, self._sizes, pictures,
-            *model.existence.weights(elapsed), self._clutter.density, self._clutter.flashes, model.existence.rates,
+            tracks.found, tracks.reported, new, shown_by, in_view, rig.packed, self._sizes, pictures, since,
+            *model.existence.correlation, self._clutter.density, self._clutter.flashes, model.existence.rates,
             model.existence.presence, now, vague, first,
         )  # fmt: skip
-        self._clutter.count(false, pictures, elapsed)
+        self._clutter.count(false, pictures, since, elapsed)
         if before is not None:
             tracks, before = tracks.copy(), (_with_nan(before[0], new), _with_nan(before[1], new))
         moment = Moment(
@@ -249,6 +256,7 @@ class Tracker:
                 "density": clutter.density,
                 "clutter": clutter.counts,
                 **of_tracks(self._tracks, self._lost),
+                **{f"recent.{name}": array for name, array in self._recent.state().items()},
             }
         )
 
@@ -270,6 +278,7 @@ class Tracker:
         tracker._clutter = Clutter(tracker.model.existence, len(arrays["density"]))
         tracker._clutter.density, tracker._clutter.counts = arrays["density"].copy(), arrays["clutter"].copy()
         tracker._tracks, tracker._lost = state.group("tracks"), state.group("lost")
+        tracker._recent = RecentPictures.restored(state.recent)
         return tracker
 
     def _serve(self, rig: Rig, skeleton: Skeleton) -> None:
@@ -278,6 +287,7 @@ class Tracker:
         if self._layout is None:
             self._layout = layout(rig, skeleton)
             self._clutter = Clutter(self.model.existence, len(rig))
+            self._recent = RecentPictures(len(rig), len(skeleton))
             self._tracks = self._lost = Tracks.none(joints=len(skeleton), bones=len(bones.length), cameras=len(rig))
         else:
             check_serves(self._layout, rig, skeleton)
@@ -288,15 +298,26 @@ class Tracker:
         self._sigmas = self.model.noise.sigmas(skeleton)
 
     def _give_birth(
-        self, rays: Rays, skeleton: Skeleton, fresh: Integers, owner: Integers, now: float, span: float
+        self,
+        rays: Rays,
+        skeleton: Skeleton,
+        fresh: Integers,
+        owner: Integers,
+        now: float,
+        span: float,
+        motion: float = 0.0,
     ) -> Poses:
         """Start tracks of the groups ``fresh`` (m,) of detections that belong to nobody known; set their owner.
 
-        A group that repeats the pose of a track is left out: its detections were torn from that person's.
+        A group that repeats the pose of a track is left out: its detections were torn from that person's. ``motion`` is
+        the time, in seconds, in which people may have moved since the pictures.
         """
         poses = self.pipeline.reconstruction(rays, fresh, skeleton)
         if not len(poses.joints):
             return poses
+        if motion > 0.0:
+            moved = (motion * self.motion.speed) ** 2
+            poses = poses._replace(covariance=poses.covariance + moved[:, None, None] * np.eye(3))
         tracks, count, cameras = self._tracks, len(poses.joints), len(self._sizes)
         new = ~repeats(poses.joints, tracks.state)
         born = Tracks.born(
@@ -318,6 +339,37 @@ class Tracker:
         owner[fresh >= 0] = slot[fresh[fresh >= 0]]
         self._tracks = tracks.join(born)
         return poses
+
+    def _pair_with_recent(
+        self, rig: Rig, ordered: Detections, lead: Floats, owner: Integers, now: float, span: float
+    ) -> tuple[Integers, Integers]:
+        """Start tracks of people whom two cameras saw at different times of the latest tenth of a second.
+
+        The owners of detections that get a track are set, (m,).
+
+        Returns:
+            Track and camera of each detection of an earlier picture that got a track, (k,) each.
+        """
+        alone, recent = np.flatnonzero(owner < 0), self._recent
+        if not len(alone):
+            return alone, alone
+        both = recent.beside(ordered.select(alone), ordered.skeleton)
+        motion = float(np.abs(np.concatenate([lead[alone], recent.rows["time"] - now])).max())
+        chosen, both, rays = enter(rig, both, self.pipeline.duplicates)
+        labels = self.pipeline.matching(self.pipeline.affinity(rig, both, rays), number_views(both.view)).labels
+        present = chosen < len(alone)
+        people, fresh = np.unique(labels[present & (labels >= 0)]), np.full(len(labels), -1)
+        of_present = np.isin(labels, people)
+        fresh[of_present] = np.searchsorted(people, labels[of_present])
+        tracks = np.full(len(labels), -1)
+        if len(people):
+            self._give_birth(rays, both.skeleton, fresh, tracks, now, span, motion)
+        owner[alone[chosen[present]]] = tracks[present]
+        earlier = ~present & (tracks >= 0)
+        claimed = np.zeros(len(recent.rows["time"]), np.bool_)
+        claimed[chosen[earlier] - len(alone)] = True
+        recent.drop(claimed)
+        return tracks[earlier], both.view[earlier]
 
     def _drop(self, now: float, followed: Bools, everyone: bool) -> None:
         """Stop to follow tracks; those who were people may come back."""

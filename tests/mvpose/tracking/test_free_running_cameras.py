@@ -1,0 +1,141 @@
+"""Cameras that deliver one after the other: no frame shows anybody to two of them."""
+
+import numpy as np
+import pytest
+from walking_people import film, identities, walking
+
+from mvpose import Detections, Pipeline
+from mvpose.tracking import Tracker, track
+from mvpose.tracking.recent_pictures import RecentPictures
+
+PATHS = [(-0.9, -0.5, 0.9, 0.3), (0.9, 0.6, -0.8, -0.4), (0.0, 1.2, 0.3, -0.9)]
+RATE = 30.0
+
+
+def _one_by_one(paths, times, **settings):
+    """Frames of one picture each, of five cameras that take turns, and the true joints at their times."""
+    offsets = np.array([0.0, 0.013, 0.006, 0.028, 0.021])
+    rig, frames, _ = film(paths, times, offsets=offsets, **settings)
+    parts = []
+    for frame in frames:
+        for view in range(5):
+            time = np.where(np.arange(5) == view, frame.time, np.nan)
+            if np.isnan(time).all():
+                continue
+            own = frame.select(frame.view == view)
+            parts.append(
+                Detections(own.view, own.keypoints, own.scores, own.boxes, own.box_scores, own.skeleton, time=time)
+            )
+    parts.sort(key=lambda part: np.nanmax(part.time))
+    return rig, parts, np.array([walking(np.nanmax(part.time), paths=paths) for part in parts])
+
+
+def _error(estimates, truth):
+    return np.mean(
+        [
+            [np.linalg.norm(e.joints - person, axis=2).mean(axis=1).min() for person in people]
+            for e, people in zip(estimates, truth, strict=True)
+        ]
+    )
+
+
+@pytest.mark.parametrize("preset", ["fast", "full"])
+def test_single_pictures_place_people_as_well_as_synchronised_ones(preset):
+    times = np.arange(25) / RATE
+    rig, parts, truth = _one_by_one(PATHS, times, noise=3.0)
+    _, frames, together = film(PATHS, times, noise=3.0)
+    alone = list(track(Tracker(Pipeline.preset(preset)), rig, parts, lag=0.2))
+    best = list(track(Tracker(Pipeline.preset(preset)), rig, frames, lag=0.2))
+    settled = 20  # pictures, until everybody was seen by all cameras
+    ids = identities(alone[settled:], truth[settled:])
+    assert (ids == ids[0]).all()
+    assert sorted(ids[0]) == [0, 1, 2]
+    assert [len(each) for each in alone[settled:]] == [3] * (len(parts) - settled)
+    assert _error(alone[settled:], truth[settled:]) < _error(best[4:], together[4:]) + 0.002
+
+
+def test_who_walks_in_is_found_within_a_tenth_of_a_second():
+    rig, parts, _ = _one_by_one(PATHS, np.arange(30) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 15)
+    tracker = Tracker(Pipeline.preset("fast"))
+    people = np.array([len(tracker.estimate(rig, part)) for part in parts])
+    assert (people[10:75] == 2).all()
+    assert (people[75 + 15 :] == 3).all()
+
+
+def test_false_detections_of_pictures_that_are_apart_in_time_are_nobody():
+    rig, parts, _ = _one_by_one(PATHS[:1], np.arange(40) / RATE, noise=1.0)
+    ghost = walking(0.0, paths=[(1.8, -1.8, 0.1, 0.0)])[0]
+    for k in range(20, 180, 37):  # a quarter of a second apart, of different cameras
+        view, given = np.flatnonzero(np.isfinite(parts[k].time))[0], parts[k]
+        keypoints = np.concatenate([given.keypoints, [rig[view].project(ghost)]])
+        false = Detections.from_keypoints([*given.view, view], keypoints, np.full(keypoints.shape[:2], 0.9))
+        parts[k] = Detections(false.view, false.keypoints, false.scores, false.boxes, false.box_scores, time=given.time)
+    tracker = Tracker(Pipeline.preset("fast"))
+    assert [len(tracker.estimate(rig, part)) for part in parts][10:] == [1] * (len(parts) - 10)
+
+
+def test_only_the_latest_picture_of_a_camera_waits_and_not_for_long():
+    _, frames, _ = film(PATHS, [0.0])
+    frame, recent, seen_by = frames[0], RecentPictures(5, 17), frames[0].view
+
+    def take(now, **pictures):
+        """Take pictures, by camera, whose detections belong to nobody, or to somebody ("claimed")."""
+        times = np.full(5, np.nan)
+        for name, (time, _) in pictures.items():
+            times[int(name[1])] = time
+        here = np.isfinite(times)
+        since = recent.take(now, np.where(here, times - now, 0.0), here)
+        recent.wait_for(now, here)
+        unclaimed = [here[view] and pictures[f"c{view}"][1] for view in seen_by]
+        recent.add(frame.select(here[seen_by]), np.array(unclaimed)[here[seen_by]])
+        return since
+
+    def waiting():
+        return [(int(view), float(time)) for view, time in zip(recent.rows["view"], recent.rows["time"], strict=True)]
+
+    np.testing.assert_array_equal(take(1.01, c0=(1.0, True), c1=(1.01, True)), [np.inf, np.inf, 0, 0, 0])
+    assert waiting() == [(0, 1.0)] * 3 + [(1, 1.01)] * 3
+    np.testing.assert_allclose(take(1.05, c1=(1.04, False), c2=(1.05, True)), [0, 0.03, np.inf, 0, 0])
+    assert waiting() == [(0, 1.0)] * 3 + [(2, 1.05)] * 3
+    take(1.12)
+    assert waiting() == [(2, 1.05)] * 3
+    restored = RecentPictures.restored(recent.state())
+    for name, array in recent.state().items():
+        np.testing.assert_array_equal(restored.state()[name], array)
+    take(2.0, c4=(2.0, True))
+    assert waiting() == [(4, 2.0)] * 3
+    recent.drop(np.array([True, False, True]))
+    assert waiting() == [(4, 2.0)]
+
+
+@pytest.mark.parametrize("described", [True, False])
+def test_those_who_wait_keep_their_descriptors_if_all_have_some(described):
+    _, frames, _ = film(PATHS, [0.0])
+    frame, everybody = frames[0], np.ones(len(frames[0]), np.bool_)
+    with_descriptors = Detections(
+        frame.view, frame.keypoints, frame.scores, frame.boxes, frame.box_scores, descriptors=np.eye(len(frame))
+    )
+    recent = RecentPictures(5, 17)
+    recent.take(0.0, np.zeros(5), np.ones(5, np.bool_))
+    recent.add(with_descriptors, everybody)
+    recent.add(with_descriptors if described else frame, everybody)
+    both = recent.beside(with_descriptors, frame.skeleton)
+    np.testing.assert_array_equal(both.view, np.tile(frame.view, 3))
+    np.testing.assert_array_equal(both.keypoints, np.tile(frame.keypoints, (3, 1, 1)))
+    if described:
+        np.testing.assert_array_equal(both.descriptors, np.tile(np.eye(len(frame)), (3, 1)))
+    else:
+        assert both.descriptors is None
+
+
+@pytest.mark.parametrize("middle", [3, 40])
+def test_a_tracker_restored_between_pictures_goes_on_with_the_same_bytes(middle):
+    rig, parts, _ = _one_by_one(PATHS, np.arange(12) / RATE, hidden=lambda frame, _, person: person == 2 and frame < 8)
+    tracker = Tracker(Pipeline.preset("fast"))
+    for part in parts[:middle]:
+        tracker.estimate(rig, part)
+    restored = Tracker.restored(tracker.state(), Pipeline.preset("fast"))
+    for part in parts[middle:]:
+        one, other = tracker.estimate(rig, part), restored.estimate(rig, part)
+        assert one.joints.tobytes() == other.joints.tobytes()
+        assert one.ids.tobytes() == other.ids.tobytes()
