@@ -16,6 +16,7 @@ from simharness.reality.published_scores import ABLATION, PublishedPcp
 from simharness.reality.twin_comparison import TOLERANCE
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.summary import STAGES
+from simharness.scoring.tracking.columns import DISTANCE
 
 if TYPE_CHECKING:
     from simharness.reality.seed_evaluation import SeedEvaluation
@@ -46,6 +47,7 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         *tables,
         *([_variants_table(evaluation)] if len(tables) > 1 else []),
         _people_table(summaries),
+        *([_identities_table(summaries)] if any("tracking" in each for each in summaries.values()) else []),
         _time_table(summaries),
         notes,
     ]
@@ -163,6 +165,25 @@ def _people_table(summaries: Mapping[str, Any]) -> Table:
             _number(scores["mpjpe_mm"]["median"], 1),
             str(scores["same_view_violations"]),
         )
+    return table
+
+
+def _identities_table(summaries: Mapping[str, Any]) -> Table:
+    table = _table("Identities of annotated people: PCP and people under their identity in %, MPJPE in mm", "variant")
+    for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "fragments"):
+        table.add_column(column, justify="right")
+    for name, scores in summaries.items():
+        if tracking := scores.get("tracking"):
+            at = tracking["mean_joint"][f"{DISTANCE:g}"]
+            table.add_row(
+                name,
+                _number(tracking["pcp_tracked"], 1),
+                _number(at["idr"], 1, scale=100),
+                _number(tracking["mpjpe_tracked_mm"], 1),
+                _number(at["id_switches"], 0),
+                _number(at["switches_per_minute"], 2),
+                _number(at["fragmentations"], 0),
+            )
     return table
 
 

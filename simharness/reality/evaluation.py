@@ -15,6 +15,7 @@ from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
 from simharness.scoring.summary import VariantScores, summarize
+from simharness.scoring.tracking.summary import tracking_of_some
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class Evaluation:
     def summary(self) -> dict[str, Any]:
         """Return the summary, ready for JSON, with the keys of a run's ``summary.json``.
 
-        Further keys: ``head``, ``frames_annotated``, and ``same_view_violations`` of every variant.
+        Further keys: ``head``, ``frames_annotated``, and of every variant ``same_view_violations``, and ``tracking``
+        where it has identities (:func:`simharness.scoring.tracking.summary.tracking_of_some`).
         """
         summary = summarize(
             self.name,
@@ -115,7 +117,14 @@ def score_estimates(
                 violations[name] += count_violations(detections.view, estimate.matching.labels)
             if annotated[frame]:
                 scores.append(score_frame(recording.truth[frame], estimate.joints, head=head))
-        variants[name] = VariantScores(tuple(scores), tuple(estimate.timings for estimate in of_frames))
+        scored = [estimate for estimate, known in zip(of_frames, annotated, strict=True) if known]
+        variants[name] = VariantScores(
+            tuple(scores),
+            tuple(estimate.timings for estimate in of_frames),
+            tracking_of_some(
+                recording.truth[annotated], scored, recording.time[annotated], head=head, actors=recording.scored
+            ),
+        )
     return Evaluation(
         recording.name, head, len(recording), int(annotated.sum()), variants, violations, recording.scored
     )

@@ -71,7 +71,7 @@ def tracking_of_some(
         estimates: estimates on COCO-17, T.
         time: times of the frames, (T,), seconds.
         head: mapping to the head of SHELF14.
-        actors: indices of the people who are scored; None: all.
+        actors: indices of the people whose PCP is averaged; None: all.
 
     Returns:
         ``mean_joint`` and ``root``, each with IDR, switches, fragmentations and switches a minute by distance;
@@ -80,7 +80,6 @@ def tracking_of_some(
     ids = ids_of(estimates)
     if ids is None:
         return None
-    truth = truth if actors is None else truth[:, list(actors)]
     joints = [coco17_to_shelf14(estimate.joints, head=head) for estimate in estimates]
     found: Summary = {}
     for place in PLACES:
@@ -88,4 +87,4 @@ def tracking_of_some(
         figures = {f"{each:g}": identity_figures(frames, time, distance=each) for each in DISTANCES}
         found[place] = {key: {name: each[name] for name in OF_SOME_PEOPLE} for key, each in figures.items()}
     frames = tracked_frames(truth, joints, ids, skeleton=SHELF14)
-    return found | pose_figures(frames, truth, joints, distance=DISTANCE)
+    return found | pose_figures(frames, truth, joints, distance=DISTANCE, actors=actors)

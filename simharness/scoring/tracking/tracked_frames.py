@@ -127,9 +127,9 @@ def tracked_frames(
 
 
 def ids_of(estimates: Sequence[Estimate]) -> list[Labels] | None:
-    """Return the identities of each frame, (k,); None if a frame has none, because people are not tracked."""
+    """Return the identities of each frame, (k,); None without frames, or if people are not tracked in one of them."""
     ids = [estimate.ids for estimate in estimates if estimate.ids is not None]
-    return ids if len(ids) == len(estimates) else None
+    return ids if ids and len(ids) == len(estimates) else None
 
 
 def roots(joints: Floats, skeleton: Skeleton) -> Floats:

@@ -1,7 +1,10 @@
 """Terminal tables of evaluations."""
 
 import io
+import json
+from dataclasses import replace
 
+import numpy as np
 from rich.console import Console
 from small_recording import PERSON, Fixed, small_recording
 
@@ -57,3 +60,24 @@ def test_a_twin_comparison_fits_80_columns_and_names_the_limit():
     assert row == ["no-matching", "97.0", "(96.0–98.0)", "95.5", "(95.0–96.0)", "-1.5", "41.2", "–"]
     assert "2 twins of 300 frames." in " ".join(text.split())
     assert "Largest difference 1.5 points (limit: 2), same order." in " ".join(text.split())
+
+
+class Renaming(Fixed):
+    """Estimator that gives its people other identities in every frame."""
+
+    def estimate(self, rig, detections):
+        fixed = super().estimate(rig, detections)
+        return replace(fixed, ids=self.calls * 10 + np.arange(len(fixed)))
+
+
+def test_variants_with_identities_have_a_table():
+    """Actor 1 has two identities in two frames; the second person, who is not annotated in frame 1, costs nothing."""
+    methods = {"full": Fixed(PERSON), "track": Renaming([PERSON, PERSON + np.array([2, 0, 0])])}
+    evaluation = evaluate(small_recording("2019"), methods, head="2019")
+    text = printed(evaluation)
+    assert max(map(len, text.splitlines())) <= 100
+    assert ["track", "75.0", "66.7", "0.0", "1", "500.00", "0"] in [line.split() for line in text.splitlines()]
+    summary = json.loads(json.dumps(evaluation.summary(), allow_nan=False))["variants"]
+    assert "tracking" not in summary["full"]
+    assert summary["track"]["tracking"]["root"]["0.25"]["id_switches"] == 1
+    assert "Identities" not in printed(evaluate(small_recording("2019"), {"full": Fixed(PERSON)}, head="2019"))
