@@ -7,25 +7,33 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from mvpose.affinity import AppearanceAffinity
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.checks import check_numbers
+from mvpose.tracking.looks import evidence_of_looks
 from mvpose.tracking.motion import Motion, transition
 from mvpose.tracking.tracks import Tracks
 
 
 @dataclass(frozen=True)
 class Reappearance:
-    """Model of where people who were lost come back.
+    """Model of where people who were lost come back, and of how they look then.
 
     The trunk of a person who is lost moves on as the motion model says, a random walk after a while. Somebody new is
     taken for the lost person whom that motion makes likeliest, one to one; if it makes none likely, for nobody known.
+    Where detections carry descriptors, the likelihood of the looks (:mod:`mvpose.tracking.looks`) counts as well. It
+    alone decides when the place says nothing more, and only if it outweighs the chance that somebody new is seen.
 
     Attributes:
-        memory: time after which a lost person is forgotten, seconds. People in a room of a few metres are anywhere in
-            it after ten seconds of walking, so that their place says nothing more.
+        memory: time after which the place of a lost person says nothing more, seconds. People in a room of a few
+            metres are anywhere in it after ten seconds of walking. Who has no descriptors is forgotten then.
         gate: largest squared distance from the place where the person was lost, in variances of the motion model; a
             person stays within 9 in 97 of 100 cases (chi-square of three degrees of freedom).
         deviation: standard deviation of the trunk's position in one frame, metres.
+        looks_memory: time after which a lost person with descriptors is forgotten, seconds. Clothes are worn for hours;
+            but so many other people pass in hours that one of them looks alike, and all of them must be kept.
+        odds: least odds that somebody who comes after ``memory`` is one of the lost people, by their looks.
+        most: largest number of lost people who are remembered, the latest.
 
     Raises:
         ValueError: a value that is not above 0.
@@ -34,11 +42,34 @@ class Reappearance:
     memory: float = 10.0
     gate: float = 9.0
     deviation: float = 0.1
+    looks_memory: float = 600.0
+    odds: float = 9.0
+    most: int = 200
 
     def __post_init__(self) -> None:
-        check_numbers(self, "the reappearance model", positive=("memory", "gate", "deviation"))
+        names = ("memory", "gate", "deviation", "looks_memory", "odds", "most")
+        check_numbers(self, "the reappearance model", positive=names)
 
-    def match(self, born: Tracks, lost: Tracks, *, time: float, motion: Motion, trunk: Bools) -> Integers:
+    def remembers(self, lost: Tracks, time: float) -> Bools:
+        """Return which lost tracks may still come back, (n,)."""
+        gone = time - lost.seen
+        kept = gone < np.where(lost.described > 0.0, max(self.looks_memory, self.memory), self.memory)
+        if kept.sum() > self.most:
+            kept[np.argsort(np.where(kept, gone, np.inf), kind="stable")[self.most :]] = False
+        return kept
+
+    def match(
+        self,
+        born: Tracks,
+        lost: Tracks,
+        *,
+        time: float,
+        motion: Motion,
+        trunk: Bools,
+        present: Tracks,
+        witnesses: Integers,
+        scale: AppearanceAffinity,
+    ) -> Integers:
         """Return the lost track that each new one continues, (n,); -1 for none.
 
         Args:
@@ -47,16 +78,24 @@ class Reappearance:
             time: seconds.
             motion: motion of people.
             trunk: joints of the trunk, (J,).
+            present: tracks that are followed.
+            witnesses: number of descriptors of each new track, (n,).
+            scale: scale of descriptor distances.
         """
         result = np.full(len(born), -1)
         if not len(lost) or not len(born):
             return result
-        cost = np.full((len(born), len(lost) + len(born)), self.gate)  # the last columns stand for nobody known
-        here, there = _center(born, trunk), _center(lost, trunk)
+        # Twice the negative logarithm of likelihoods; the last columns stand for nobody known.
+        cost = np.full((len(born), len(lost) + len(born)), self.gate)
+        here, there, gone = _center(born, trunk), _center(lost, trunk), time - lost.seen
+        looks = 2.0 * evidence_of_looks(born, lost, present, witnesses, scale)
+        anywhere = gone >= self.memory
+        prior = self.gate + 2.0 * np.log(self.odds * max(int(anywhere.sum()), 1))
         for k in range(len(lost)):
-            variance = transition(time - lost.seen[k], *motion.trunk)[2] + self.deviation**2
-            distance2 = ((here - there[k]) ** 2).sum(axis=1) / variance
-            cost[:, k] = np.where(distance2 < self.gate, distance2, 2.0 * self.gate)
+            variance = transition(gone[k], *motion.trunk)[2] + self.deviation**2
+            place = prior if anywhere[k] else ((here - there[k]) ** 2).sum(axis=1) / variance
+            value = place - looks[:, k]
+            cost[:, k] = np.where(value < self.gate, value, 2.0 * self.gate)
         for row, column in zip(*linear_sum_assignment(cost), strict=True):
             if column < len(lost) and cost[row, column] < self.gate:
                 result[row] = column

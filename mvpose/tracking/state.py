@@ -176,7 +176,8 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
         sizes = {"V": cameras, "k": waiting, "J": joints, "D": descriptor}
         _of(arrays, f"recent.{name}", tuple(sizes.get(size, size) for size in shape), kind)
     bones = _of(arrays, "tracks.length", (None, None)).shape[1]
-    like = Tracks.none(joints=joints, bones=bones, cameras=cameras)
+    dimensions = _of(arrays, "tracks.looks", (None, None)).shape[1]
+    like = Tracks.none(joints=joints, bones=bones, cameras=cameras, dimensions=dimensions)
     for group in _GROUPS:
         count = len(_of(arrays, f"{group}.ids", (None,), "i"))
         for field in fields(Tracks):

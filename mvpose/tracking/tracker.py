@@ -31,6 +31,7 @@ from mvpose.tracking.association import TrackAffinity
 from mvpose.tracking.bones import BonePrior, bone_prior
 from mvpose.tracking.existence import Clutter, Existence
 from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, repeats, report_tracks, update_tracks
+from mvpose.tracking.looks import learn_looks, nearest_rival, scale_of
 from mvpose.tracking.motion import JointMotion, Motion
 from mvpose.tracking.picture_times import FrameClock
 from mvpose.tracking.reappearance import Reappearance
@@ -158,6 +159,8 @@ class Tracker:
             of_use = pictures[ordered.view]
             chosen, ordered, rays = chosen[of_use], ordered.select(of_use), rays.select(of_use)
         affinity = self.pipeline.affinity(rig, ordered, rays)
+        if ordered.descriptors is not None:
+            self._see_looks(ordered.descriptors.shape[1])
         self._clock.take(times)
         tracks, vague = self._tracks, model.existence.vague
         known, all_known = predict_tracks(tracks.state, tracks.covariance, elapsed, *self.motion, 2.0 * vague)
@@ -181,13 +184,15 @@ class Tracker:
         since = self._recent.take(now, times.lead, pictures)
         span = model.existence.span(float(since.min(where=pictures, initial=np.inf)))
         if groups or first:
-            poses = self._give_birth(rays, detections.skeleton, fresh, owner, now, span)
+            poses = self._give_birth(rays, ordered, fresh, owner, now, span)
         shown_by, in_view = owner, ordered.view
         if self._recent.wait_for(now, pictures):
             partners, cameras = self._pair_with_recent(rig, ordered, lead, owner, now, span)
             shown_by, in_view = np.concatenate([owner, partners]), np.concatenate([in_view, cameras])
         self._recent.add(ordered, owner < 0)
         tracks, new = self._tracks, len(self._tracks) - count
+        if ordered.descriptors is not None:
+            learn_looks(tracks.looks, tracks.described, owner, ordered.descriptors, elapsed)
         odds, here, shown, followed, all_followed, false = judge_tracks(
             tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
             tracks.found, tracks.reported, new, shown_by, in_view, rig.packed, self._sizes, pictures, since,
@@ -297,10 +302,20 @@ class Tracker:
         self._bones: BonePrior = bones
         self._sigmas = self.model.noise.sigmas(skeleton)
 
+    def _see_looks(self, dimensions: int) -> None:
+        """Make room for descriptors of a length, or refuse another length than before."""
+        known = self._tracks.looks.shape[1]
+        if not known:
+            self._tracks, self._lost = self._tracks.widened(dimensions), self._lost.widened(dimensions)
+        elif dimensions not in (0, known):
+            raise ValueError(
+                f"descriptors must be (m, {known}) as in earlier frames, got (m, {dimensions}): start another tracker"
+            )
+
     def _give_birth(
         self,
         rays: Rays,
-        skeleton: Skeleton,
+        detections: Detections,
         fresh: Integers,
         owner: Integers,
         now: float,
@@ -312,7 +327,7 @@ class Tracker:
         A group that repeats the pose of a track is left out: its detections were torn from that person's. ``motion`` is
         the time, in seconds, in which people may have moved since the pictures.
         """
-        poses = self.pipeline.reconstruction(rays, fresh, skeleton)
+        poses = self.pipeline.reconstruction(rays, fresh, detections.skeleton)
         if not len(poses.joints):
             return poses
         if motion > 0.0:
@@ -322,11 +337,17 @@ class Tracker:
         new = ~repeats(poses.joints, tracks.state)
         born = Tracks.born(
             poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self.motion.speed,
-            bones=self._bones, cameras=cameras,
-        ).select(new)  # fmt: skip
+            bones=self._bones, cameras=cameras, dimensions=tracks.looks.shape[1],
+        )  # fmt: skip
+        witnesses = np.zeros(count, np.int64)
+        if detections.descriptors is not None and tracks.looks.shape[1]:
+            # For comparison; the frame counts with its time when it is known whose it is.
+            witnesses = learn_looks(born.looks, born.described, fresh, detections.descriptors, 0.0)
+        born = born.select(new)
         back = self.model.reappearance.match(
-            born, self._lost, time=now, motion=self.model.motion, trunk=self.motion.trunk
-        )
+            born, self._lost, time=now, motion=self.model.motion, trunk=self.motion.trunk, present=tracks,
+            witnesses=witnesses[new], scale=scale_of(self.pipeline.affinity),
+        )  # fmt: skip
         for k, lost in enumerate(back):
             if lost >= 0:
                 born.resume(k, self._lost, lost)
@@ -363,7 +384,7 @@ class Tracker:
         fresh[of_present] = np.searchsorted(people, labels[of_present])
         tracks = np.full(len(labels), -1)
         if len(people):
-            self._give_birth(rays, both.skeleton, fresh, tracks, now, span, motion)
+            self._give_birth(rays, both, fresh, tracks, now, span, motion)
         owner[alone[chosen[present]]] = tracks[present]
         earlier = ~present & (tracks >= 0)
         claimed = np.zeros(len(recent.rows["time"]), np.bool_)
@@ -376,10 +397,12 @@ class Tracker:
         tracks = self._tracks
         if not everyone:
             self._clutter.vanish(now - tracks.born_at[~followed])
-            self._lost = self._lost.join(tracks.select(~followed & tracks.reported))
-            self._tracks = tracks.select(followed)
+            gone = tracks.select(~followed & tracks.reported)
+            for others in (tracks, self._lost):
+                gone.rival = np.minimum(gone.rival, nearest_rival(gone, others))
+            self._lost, self._tracks = self._lost.join(gone), tracks.select(followed)
         if len(self._lost):
-            remembered = now - self._lost.seen < self.model.reappearance.memory
+            remembered = self.model.reappearance.remembers(self._lost, now)
             if not remembered.all():
                 self._lost = self._lost.select(remembered)
 

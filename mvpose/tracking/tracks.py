@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -31,6 +31,10 @@ class Tracks:
         absent: effective number of pictures that should have found the person since one last did, (n, V).
         found: time at which each camera last found the track, (n, V), seconds; -inf if none ever did.
         reported: whether the track has ever been reported as a person, (n,).
+        looks: mean of the unit descriptors of the track's detections, (n, D), zeros before there is any.
+        described: seconds of detections with descriptors in this mean, (n,), 0 for none.
+        rival: least distance to the descriptors of anybody else who was there at the same time, (n,), infinite where
+            nobody is known; see :mod:`mvpose.tracking.looks`.
     """
 
     ids: Integers
@@ -47,9 +51,12 @@ class Tracks:
     absent: Floats
     found: Floats
     reported: Bools
+    looks: Floats
+    described: Floats
+    rival: Floats
 
     @classmethod
-    def none(cls, *, joints: int, bones: int, cameras: int) -> Self:
+    def none(cls, *, joints: int, bones: int, cameras: int, dimensions: int = 0) -> Self:
         """Return an empty set of tracks."""
         real, truth = np.float64, np.bool_
         return cls(
@@ -67,6 +74,9 @@ class Tracks:
             absent=np.empty((0, cameras), real),
             found=np.empty((0, cameras), real),
             reported=np.empty(0, truth),
+            looks=np.empty((0, dimensions), real),
+            described=np.empty(0, real),
+            rival=np.empty(0, real),
         )
 
     @classmethod
@@ -80,6 +90,7 @@ class Tracks:
         speed: Floats,
         bones: BonePrior,
         cameras: int,
+        dimensions: int = 0,
     ) -> Self:
         """Return tracks of n people who are seen for the first time.
 
@@ -91,6 +102,7 @@ class Tracks:
             speed: standard deviation of a velocity component, (J,), m/s.
             bones: bones of the skeleton.
             cameras: number of cameras, V.
+            dimensions: length of descriptors, D.
         """
         joints = poses.joints
         n, count = joints.shape[:2]
@@ -112,6 +124,9 @@ class Tracks:
             absent=np.zeros((n, cameras)),
             found=np.full((n, cameras), -np.inf),
             reported=np.zeros(n, np.bool_),
+            looks=np.zeros((n, dimensions)),
+            described=np.zeros(n),
+            rival=np.full(n, np.inf),
         )
 
     @property
@@ -125,10 +140,13 @@ class Tracks:
         return np.sort(self.found, axis=1)[:, -2]
 
     def resume(self, k: int, lost: Tracks, other: int) -> None:
-        """Give track k the identity of a lost one, with the bone lengths that it had learned."""
+        """Give track k the identity of a lost one, with the bone lengths and the looks that it had learned."""
         self.ids[k] = lost.ids[other]
         self.length[k], self.variance[k] = lost.length[other], lost.variance[other]
         self.born_at[k], self.reported[k] = lost.born_at[other], lost.reported[other]
+        self.rival[k] = lost.rival[other]
+        if lost.described[other] > 0.0:
+            self.looks[k], self.described[k] = lost.looks[other], lost.described[other]
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -136,6 +154,10 @@ class Tracks:
     def select(self, which: Bools | Integers) -> Self:
         """Return copies of some tracks, given by a mask (n,) or by indices."""
         return type(self)(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def widened(self, dimensions: int) -> Self:
+        """Return these tracks, which have no descriptors, with room for some of this length."""
+        return replace(self, looks=np.zeros((len(self), dimensions)))
 
     def copy(self) -> Self:
         """Return copies of all tracks."""
