@@ -170,7 +170,7 @@ def _people_table(summaries: Mapping[str, Any]) -> Table:
 
 def _identities_table(summaries: Mapping[str, Any]) -> Table:
     table = _table("Identities of annotated people: PCP and people under their identity in %, MPJPE in mm", "variant")
-    for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "fragments"):
+    for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "interrupted"):
         table.add_column(column, justify="right")
     for name, scores in summaries.items():
         if tracking := scores.get("tracking"):
@@ -182,7 +182,7 @@ def _identities_table(summaries: Mapping[str, Any]) -> Table:
                 _number(tracking["mpjpe_tracked_mm"], 1),
                 _number(at["id_switches"], 0),
                 _number(at["switches_per_minute"], 2),
-                _number(at["fragmentations"], 0),
+                _number(at["interruptions"], 0),
             )
     return table
 

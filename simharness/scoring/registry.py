@@ -94,7 +94,7 @@ class ScoreGroup:
 
     Attributes:
         infos: their descriptions.
-        compute: function that returns their values by key.
+        compute: function that returns their values by key; it may return more.
         module: name of the module that registers them.
     """
 

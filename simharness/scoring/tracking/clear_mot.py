@@ -52,6 +52,18 @@ class ClearMot:
         return int(self.switched.sum())
 
     @property
+    def interruptions(self) -> int:
+        """Number of times that a person is paired again after frames in which it was there without a pair.
+
+        Unlike :attr:`fragmentations`, times of absence do not interrupt a track, and those without any estimate do.
+        """
+        count = 0
+        for person in self.track.T:
+            paired = person[person != ABSENT] >= 0
+            count += int((np.diff(np.flatnonzero(paired)) > 1).sum())
+        return count
+
+    @property
     def mota(self) -> float:
         """MOTA, at most 1: 1 - (missed + false + switches) / people; 0 without people or without estimates."""
         pairs = int((self.track >= 0).sum())

@@ -13,14 +13,15 @@ from simharness.scoring.tracking.tracked_frames import TrackedFrames
 Figures = dict[str, float | None]
 
 SHARES = ("hota", "deta", "assa", "loca", "idf1", "idp", "idr", "mota")
-COUNTS = ("id_switches", "fragmentations", "switches_per_minute")
+COUNTS = ("id_switches", "fragmentations", "interruptions", "switches_per_minute")
 
-OF_SOME_PEOPLE = ("idr", *COUNTS)
-"""Figures that hold where only some people are annotated: all others count the estimates of the rest as false."""
+OF_SOME_PEOPLE = ("idr", "id_switches", "interruptions", "switches_per_minute")
+"""Figures that hold where some people are annotated, in some frames: all others count the estimates of the rest as false,
+or the other frames as gaps."""
 
 
 def identity_figures(frames: TrackedFrames, time: Floats, *, distance: float) -> Figures:
-    """Return HOTA, DetA, AssA, LocA, IDF1, IDP, IDR and MOTA as shares; switches, fragmentations, switches a minute.
+    """Return HOTA, DetA, AssA, LocA, IDF1, IDP, IDR and MOTA as shares, and numbers of switches and gaps.
 
     All are None without true people; IDP without estimates, LocA without pairs, switches a minute with one frame alone.
 
@@ -47,5 +48,6 @@ def identity_figures(frames: TrackedFrames, time: Floats, *, distance: float) ->
         "mota": pairs.mota,
         "id_switches": float(pairs.switches),
         "fragmentations": float(pairs.fragmentations),
+        "interruptions": float(pairs.interruptions),
         "switches_per_minute": pairs.switches / minutes if minutes else None,
     }

@@ -74,7 +74,7 @@ def tracking_of_some(
         actors: indices of the people whose PCP is averaged; None: all.
 
     Returns:
-        ``mean_joint`` and ``root``, each with IDR, switches, fragmentations and switches a minute by distance;
+        ``mean_joint`` and ``root``, each with IDR, switches, interruptions and switches a minute by distance;
         ``pcp_tracked`` (percent) and ``mpjpe_tracked_mm``.
     """
     ids = ids_of(estimates)

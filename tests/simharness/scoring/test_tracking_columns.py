@@ -98,7 +98,7 @@ def test_people_who_are_not_annotated_cost_nothing():
     ghosts = tracking_of_some(truth, [with_ghost(each) for each in estimates], recording.time)
     assert ghosts == found
     at = found["mean_joint"]["0.5"]
-    assert set(at) == {"idr", "id_switches", "fragmentations", "switches_per_minute"}
+    assert set(at) == {"idr", "id_switches", "interruptions", "switches_per_minute"}
     assert (at["id_switches"], at["idr"]) == (1, pytest.approx(15 / 18))
     assert found["pcp_tracked"] == pytest.approx(100 * 15 / 18)
     assert tracking_of_some(truth, [replace(each, ids=None) for each in estimates], recording.time) is None

@@ -58,6 +58,7 @@ def test_gaps_and_absence():
     pairs = clear_mot(frames, distance=0.5)
     assert pairs.track.T.tolist() == [[0, MISSED, 0, 0, 0, 0], [1, 1, 1, ABSENT, 1, 1]]
     assert (pairs.fragmentations, pairs.switches, pairs.missed, pairs.false) == (2, 0, 1, 0)
+    assert pairs.interruptions == 1  # person 1 was absent, not missed
     assert frames.frames_of_people.tolist() == [6, 5]
 
 
