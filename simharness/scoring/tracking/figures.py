@@ -16,8 +16,8 @@ SHARES = ("hota", "deta", "assa", "loca", "idf1", "idp", "idr", "mota")
 COUNTS = ("id_switches", "fragmentations", "interruptions", "switches_per_minute")
 
 OF_SOME_PEOPLE = ("idr", "id_switches", "interruptions", "switches_per_minute")
-"""Figures that hold where some people are annotated, in some frames: all others count the estimates of the rest as false,
-or the other frames as gaps."""
+"""Figures that hold where some people are annotated, in some frames: all others count the estimates of the rest as
+false, or the other frames as gaps."""
 
 
 def identity_figures(frames: TrackedFrames, time: Floats, *, distance: float) -> Figures:

@@ -35,6 +35,14 @@ def ours(frames, distance):
     }
 
 
+def compare(frames, distance, name):
+    """Compare all scores, and return ours."""
+    expected, found = reference(frames, distance), ours(frames, distance)
+    for key, value in found.items():
+        np.testing.assert_allclose(value, expected[key], rtol=0, atol=1e-9, err_msg=f"{key} of {name}")
+    return found
+
+
 @pytest.mark.parametrize("place", PLACES)
 def test_scores_of_random_cases(place):
     """200 cases, a third of them at each distance."""
@@ -42,10 +50,7 @@ def test_scores_of_random_cases(place):
     for seed in range(200):
         truth, joints, ids = random_case(seed)
         frames = tracked_frames(truth, joints, ids, skeleton=COCO17, place=place)
-        distance = DISTANCES[seed % 3]
-        expected, found = reference(frames, distance), ours(frames, distance)
-        for key, value in found.items():
-            np.testing.assert_allclose(value, expected[key], rtol=0, atol=1e-9, err_msg=f"{key} of case {seed}")
+        found = compare(frames, DISTANCES[seed % 3], f"case {seed}")
         seen["no frames"] += not len(frames)
         seen["no people"] += not frames.frames_of_people.sum()
         seen["no estimates"] += not frames.frames_of_tracks.sum()
@@ -54,3 +59,37 @@ def test_scores_of_random_cases(place):
         seen["fragments"] += found["Frag"] > 0
         seen["ghosts"] += found["CLR_FP"] > 0
     assert min(seen.values()) >= 3, seen
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", PLACES)
+def test_scores_of_simulated_people(place, simulated):
+    """A tracker's people, and the same with pictures lost, identities exchanged and people absent."""
+    truth, estimates = simulated
+    joints, ids = [each.joints for each in estimates], [each.ids for each in estimates]
+    frames = tracked_frames(truth, joints, ids, skeleton=COCO17, place=place)
+    assert compare(frames, 0.5, "a tracker")["IDF1"] > 0.5
+    rng = np.random.default_rng(0)
+    truth = truth.copy()
+    truth[5:9, 0] = truth[:4, 1] = np.nan
+    kept = [rng.random(len(each)) < 0.8 for each in ids]
+    joints = [each[rows] for each, rows in zip(joints, kept, strict=True)]
+    ids = [
+        rng.permutation(each)[rows] if rng.random() < 0.3 else each[rows] for each, rows in zip(ids, kept, strict=True)
+    ]
+    frames = tracked_frames(truth, joints, ids, skeleton=COCO17, place=place)
+    for distance in DISTANCES:
+        assert compare(frames, distance, "a bad tracker")["IDSW"] > 0
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    """True joints of a second of a simulated scene, and the estimates of a tracker."""
+    import simharness
+    from mvpose import Pipeline
+    from mvpose.tracking import Tracker, track
+
+    scenario = simharness.load_scenario("quickstart", overrides=["duration=1", 'rendering.renderer="rays"'])
+    recording = simharness.run_trial(scenario, until="detect").recording
+    truth = np.stack([true.joints for true in recording.truth])
+    return truth, list(track(Tracker(Pipeline.preset("fast")), recording.rig, recording.detections))
