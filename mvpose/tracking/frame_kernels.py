@@ -49,7 +49,7 @@ def predict_tracks(state, covariance, elapsed, speed, time, trunk, vague):
 @njit(cache=True)
 def update_tracks(
     state, covariance, scores, length, variance, labels, groups, origins, directions, weights, pixel, lead, sigmas,
-    floor, speed, ends, elapsed, keep,
+    floor, speed, time, trunk, ends, elapsed, keep,
 ):  # fmt: skip
     """Update tracks by the detections that were matched with them, in place.
 
@@ -68,7 +68,9 @@ def update_tracks(
         lead: time from the frame to the picture of each detection, (m,), seconds.
         sigmas: standard deviation of a confident keypoint, (J,), metres.
         floor: likelihood of a wrong keypoint.
-        speed: standard deviation of a velocity component, (J,), m/s.
+        speed: as in :class:`mvpose.tracking.motion.JointMotion`, and so ``time`` and ``trunk``.
+        time: the same.
+        trunk: the same.
         ends: joints at the ends of the bones, (B, 2).
         elapsed: time since the previous frame, seconds.
         keep: share of its score that a joint keeps which no view supports.
@@ -79,8 +81,9 @@ def update_tracks(
     """
     supports = np.empty(scores.shape)
     update_people(
-        state, covariance, supports, labels, groups, origins, directions, weights, pixel, lead, sigmas, floor, speed
-    )
+        state, covariance, supports, labels, groups, origins, directions, weights, pixel, lead, sigmas, floor, speed,
+        time, trunk,
+    )  # fmt: skip
     for t in range(len(state)):
         for j in range(scores.shape[1]):
             faded = scores[t, j] * keep

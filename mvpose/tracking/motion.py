@@ -117,16 +117,9 @@ def predict(state, covariance, dt, speed, time, trunk):
         time: the same.
         trunk: the same.
     """
-    common, known, slowest = np.zeros(3), 0, 0
+    common, slowest = trunk_velocity(state, trunk), 0
     for j in range(len(state)):
-        if trunk[j]:
-            slowest = j
-            if not np.isnan(state[j, 0]):
-                known += 1
-                for r in range(3):
-                    common[r] += state[j, 3 + r]
-    for r in range(3):
-        common[r] /= max(known, 1)
+        slowest = j if trunk[j] else slowest
     trunk_reach, trunk_decay, trunk_xx, trunk_xv, trunk_vv = transition(dt, speed[slowest], time[slowest])
     for j in range(len(state)):
         reach, decay, q_xx, q_xv, q_vv = transition(dt, speed[j], time[j])
@@ -152,6 +145,20 @@ def predict(state, covariance, dt, speed, time, trunk):
             P[r, 3 + r] += q_xv
             P[3 + r, r] += q_xv
             P[3 + r, 3 + r] += q_vv
+
+
+@njit(cache=True)
+def trunk_velocity(state, trunk):
+    """Return the mean velocity of the joints of the trunk, (3,), m/s; 0 if none is known."""
+    common, known = np.zeros(3), 0
+    for j in range(len(state)):
+        if trunk[j] and not np.isnan(state[j, 0]):
+            known += 1
+            for r in range(3):
+                common[r] += state[j, 3 + r]
+    for r in range(3):
+        common[r] /= max(known, 1)
+    return common
 
 
 @njit(cache=True)

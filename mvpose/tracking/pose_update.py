@@ -14,7 +14,7 @@ import numpy as np
 from mvpose.kernels import njit
 from mvpose.reconstruction.likelihood import accumulate, log_likelihood, solve
 from mvpose.reconstruction.triangulation import consensus
-from mvpose.tracking.motion import carry, condition
+from mvpose.tracking.motion import carry, condition, transition, trunk_velocity
 
 _FREEDOM = 4.0  # degrees of freedom of the prediction's t distribution, a common choice for heavy tails
 _STEPS = 8
@@ -24,12 +24,15 @@ _UNKNOWN = 1.0  # m²: variance of a joint that is seen for the first time, befo
 
 @njit(cache=True)
 def update_people(
-    states, covariances, supports, labels, of_track, origins, directions, weights, pixel, lead, sigmas, floor, speed
+    states, covariances, supports, labels, of_track, origins, directions, weights, pixel, lead, sigmas, floor, speed,
+    time, trunk,
 ):  # fmt: skip
     """Update n tracked people by the rays of their detections, in place.
 
-    Pictures of other times than the states show where the joints were then, ``x + lead v``: the states are carried to
-    each of these times and back, so that velocities are corrected as well.
+    Pictures of other times than the states show where the joints were then: the states are carried to each of these
+    times and back, so that velocities are corrected as well. An Ornstein-Uhlenbeck process runs backwards as it runs
+    forwards, so a joint was at ``x - reach v`` (:func:`mvpose.tracking.motion.transition`), and what it did meanwhile
+    adds to the errors of the picture.
 
     Args:
         states: predicted positions and velocities, (n, J, 6); NaN for an unknown joint.
@@ -44,10 +47,15 @@ def update_people(
         lead: time from the states to the picture of each detection, (m,), seconds.
         sigmas: standard deviation of a confident keypoint, (J,), metres.
         floor: likelihood of a wrong keypoint.
-        speed: standard deviation of a velocity component, (J,), m/s, for joints that are seen for the first time.
+        speed: as in :class:`mvpose.tracking.motion.JointMotion`; also for joints that are seen for the first time.
+        time: the same.
+        trunk: the same.
     """
     m, joints = weights.shape
-    scratch, times = np.empty((8, 3)), np.unique(lead)
+    scratch, leads = np.empty((8, 3)), np.unique(lead)
+    slowest = 0
+    for j in range(joints):
+        slowest = j if trunk[j] else slowest
     for t in range(len(states)):
         supports[t] = 0.0
         views = 0
@@ -55,17 +63,19 @@ def update_people(
             views += of_track[t] >= 0 and labels[d] == of_track[t]
         if views == 0:
             continue
-        for time in times:
+        for shift in leads:
             n = 0
             for d in range(m):
-                n += labels[d] == of_track[t] and lead[d] == time
+                n += labels[d] == of_track[t] and lead[d] == shift
             if n == 0:
                 continue
+            common = trunk_velocity(states[t], trunk)
+            trunk_reach, _, trunk_noise, _, _ = transition(-shift, speed[slowest], time[slowest])
             centers, rays, scores, angles = np.empty((n, 3)), np.empty((n, 1, 3)), np.empty((n, 1)), np.empty(n)
             for j in range(joints):
                 seen, v = 0, 0
                 for d in range(m):
-                    if labels[d] != of_track[t] or lead[d] != time:
+                    if labels[d] != of_track[t] or lead[d] != shift:
                         continue
                     angles[v], scores[v, 0] = pixel[d], weights[d, j]
                     seen += weights[d, j] > 0.0
@@ -73,12 +83,20 @@ def update_people(
                         centers[v, r], rays[v, 0, r] = origins[d, r], directions[d, j, r]
                     v += 1
                 if seen:
-                    view = centers, rays, scores, angles, sigmas[j], floor
-                    carry(states[t, j], covariances[t, j], time)
+                    reach, noise, along = trunk_reach, trunk_noise, 0.0
+                    if not trunk[j]:
+                        reach, _, noise, _, _ = transition(-shift, speed[j], time[j])
+                        noise, along = noise + trunk_noise, trunk_reach - reach
+                    view = centers, rays, scores, angles, np.sqrt(sigmas[j] ** 2 + noise), floor
+                    carry(states[t, j], covariances[t, j], -reach)
+                    for r in range(3):
+                        states[t, j, r] -= along * common[r]
                     supports[t, j] += (
                         _update_joint(states[t, j], covariances[t, j], view, seen, speed[j], scratch) / views
                     )
-                    carry(states[t, j], covariances[t, j], -time)
+                    for r in range(3):
+                        states[t, j, r] += along * common[r]
+                    carry(states[t, j], covariances[t, j], reach)
 
 
 @njit(cache=True)

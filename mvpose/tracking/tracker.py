@@ -178,7 +178,7 @@ class Tracker:
         owner, fresh, groups = update_tracks(
             tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels[:m],
             labels[m:], rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas,
-            noise.floor, self.motion.speed, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
+            noise.floor, *self.motion, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
         )  # fmt: skip
         poses: Poses | None = None
         since = self._recent.take(now, times.lead, pictures)
