@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.affinity import Affinity, AppearanceAffinity, FusedAffinity, GeometricAffinity
+from mvpose.affinity import Affinity, AppearanceAffinity, FusedAffinity
 from mvpose.camera import Rig
 from mvpose.checks import seal
 from mvpose.detections import Detections
@@ -19,24 +19,8 @@ from mvpose.estimate import Estimate, Matching
 from mvpose.matching import Matcher
 from mvpose.ordering import number_views, restored_pairs
 from mvpose.rays import Rays, ordered_rays
-from mvpose.reconstruction import PictorialStructure, Poses, Triangulation, UnmatchedPictorialStructure
+from mvpose.reconstruction import PictorialStructure, Poses, UnmatchedPictorialStructure
 from mvpose.skeleton import Skeleton
-
-PRESETS: dict[str, str] = {
-    "full": "all cues (geometry, and appearance if descriptors are given), ADMM matching, 3DPS",
-    "appearance": "as full, with appearance as the only affinity; detections must carry descriptors",
-    "geometry": "as full, with geometry as the only affinity",
-    "hungarian": "as full, with Hungarian matching of each pair of views, without cycle consistency",
-    "no-3dps": "as full, with robust triangulation instead of 3DPS",
-    "no-matching": "3DPS on all detections at once, without matching",
-    "fast": "as full, with matching by clustering and robust triangulation",
-}
-
-NEED_DESCRIPTORS = frozenset({"appearance"})
-"""Presets that require detections with descriptors."""
-
-READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian"})
-"""Presets that use heat maps where detections carry them; the others use keypoints only."""
 
 
 class Estimator(Protocol):
@@ -44,6 +28,23 @@ class Estimator(Protocol):
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame; see :meth:`Pipeline.estimate`."""
+        ...
+
+
+@runtime_checkable
+class SequenceEstimator(Estimator, Protocol):
+    """Estimator with memory: the estimate of a frame depends on other frames of the recording.
+
+    Its ``estimate`` treats a frame alone.
+    """
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
+
+        Args:
+            rig: calibrated cameras.
+            frames: detections of each frame, in the order of time.
+        """
         ...
 
 
@@ -69,31 +70,31 @@ class Pipeline:
     duplicates: Callable[[Detections], NDArray[np.bool_]] = Duplicates()
 
     @staticmethod
-    def preset(name: str, *, appearance: AppearanceAffinity | None = None) -> Estimator:
-        """Return one of the presets in ``PRESETS``: the rows of the paper's ablation, and a fast one.
+    def preset(
+        name: str,
+        *,
+        appearance: AppearanceAffinity | None = None,
+        lag: float | None = None,
+        period: float | None = None,
+    ) -> Estimator:
+        """Return one of the presets in :data:`mvpose.presets.PRESETS`: the rows of the paper's ablation, a fast one,
+        and trackers.
 
         Args:
             name: name of the preset.
             appearance: scale of descriptor distances; for a re-ID network it is ``ReId.affinity``. The default is a
                 general scale.
+            lag: seconds of later frames that an estimate of a tracker waits for; by default that of
+                :class:`mvpose.tracking.TrackingPipeline`.
+            period: time between frames whose detections carry no time, seconds, for trackers; by default that of
+                :class:`mvpose.tracking.TrackingModel`.
 
         Raises:
-            ValueError: an unknown name.
+            ValueError: an unknown name, a negative lag, or a period that is not positive.
         """
-        appearance = appearance or AppearanceAffinity()
-        full = Pipeline(affinity=FusedAffinity(appearance=appearance))
-        variants: dict[str, Estimator] = {
-            "full": full,
-            "appearance": replace(full, affinity=appearance),
-            "geometry": replace(full, affinity=GeometricAffinity()),
-            "hungarian": replace(full, matching=Matcher(method="hungarian")),
-            "no-3dps": replace(full, reconstruction=Triangulation()),
-            "no-matching": UnmatchedPipeline(),
-            "fast": replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation()),
-        }
-        if name not in variants:
-            raise ValueError(f"unknown preset {name!r} of the pipeline; expected one of {', '.join(PRESETS)}")
-        return variants[name]
+        from mvpose.presets import preset  # it imports this module
+
+        return preset(name, appearance=appearance, lag=lag, period=period)
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
         """Estimate the people of one frame.

@@ -49,23 +49,31 @@ def evaluate_recording(
             "[dim]\\[default: full][/]",
         ),
     ] = None,
+    lag: Annotated[
+        float,
+        typer.Option(
+            metavar="S",
+            min=0.0,
+            help="Seconds of later frames that an estimate of track and track-fast waits for: 0 for none, inf for all.",
+        ),
+    ] = 0.2,
 ) -> None:
     """A recording (the word [cyan]recording[/] may be left out): PCP of its actors, and errors that PCP ignores."""
     with exit_on_error():
         start = perf_counter()
-        from mvpose.pipeline import NEED_DESCRIPTORS
+        from mvpose.presets import NEED_DESCRIPTORS
         from simharness.cli.evaluation_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
         from simharness.reality.recording_file import read_recording
         from simharness.runtime.progress import reporter
 
-        pipelines = {name: _estimator(name) for name in method or ["full"]}
+        data = read_recording(recording, folder, head=head.value)
+        pipelines = {name: _estimator(name, lag=lag, period=1.0 / data.rate) for name in method or ["full"]}
         if blind := NEED_DESCRIPTORS & pipelines.keys():
             raise ValueError(
                 f"--method {', '.join(blind)}: uses descriptors alone, and the detections of recordings carry none; "
                 "choose another variant"
             )
-        data = read_recording(recording, folder, head=head.value)
         with (
             run_errors_only(),
             reporter() as bars,
@@ -129,15 +137,14 @@ def evaluate_seeds(
     print_seed_evaluation(result, Console())
 
 
-def _estimator(name: str) -> Estimator:
+def _estimator(name: str, *, lag: float, period: float) -> Estimator:
     """Return a preset, or a user-defined estimator given as FILE.py:NAME."""
     from mvpose import Pipeline
-    from simharness.trial.stages.estimators import UserEstimator, load_estimator
+    from simharness.trial.stages.estimators import user_estimator
 
     if ":" not in name:
-        return Pipeline.preset(name)
-    load_estimator(name)  # so that errors appear before the first frame
-    return UserEstimator("--method", name)
+        return Pipeline.preset(name, lag=lag, period=period)
+    return user_estimator("--method", name)
 
 
 def _write(summary: dict[str, Any], path: Path, *, seeds: Iterable[int], variants: Iterable[str], start: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -92,6 +93,14 @@ class AnnotatedRecording:
         """Times of the frames, (F,), seconds, from frame 0 of the original sequence."""
         return self.frames / self.rate
 
+    @cached_property
+    def timed_detections(self) -> tuple[Detections, ...]:
+        """Detections of each frame with the time of each camera's picture; by default that of the frame."""
+        return tuple(
+            each if each.time is not None else replace(each, time=np.full(len(self.rig), time))
+            for each, time in zip(self.detections, self.time, strict=True)
+        )
+
     @property
     def segments(self) -> list[slice]:
         """Runs of frames without a gap in their numbers, as slices of rows, in order; together they are all rows."""
@@ -157,4 +166,5 @@ def _seen_by(detections: Detections, new: NDArray[np.int64]) -> Detections:
         detections.skeleton,
         None if detections.descriptors is None else detections.descriptors[kept],
         None if maps is None else Heatmaps(maps.values[kept], maps.origin[kept], maps.stride[kept]),
+        None if detections.time is None else detections.time[np.flatnonzero(new >= 0)[np.argsort(new[new >= 0])]],
     )

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mvpose import Estimate
-from mvpose.pipeline import Estimator
+from mvpose import Detections, Estimate
+from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.scoring.frame import score_frame
 from simharness.scoring.matching import count_violations
 from simharness.scoring.summary import VariantScores, summarize
 from simharness.scoring.tracking.summary import tracking_of_some
+from simharness.trial.stages.tracking import track_frames
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,9 @@ def evaluate(
 ) -> Evaluation:
     """Run methods on the frames of a recording and score them.
 
-    Frames without annotation are run and timed, but not scored, because they may contain people. Each method first runs
-    on the first frame once more, so that timings exclude compilation.
+    Frames without annotation are run and timed, but not scored, because they may contain people. Methods with memory
+    get all frames in order, with their times. Each method first runs on the first frame or frames once more, so that
+    timings exclude compilation.
 
     Args:
         recording: the recording.
@@ -80,17 +82,28 @@ def evaluate(
 
     Raises:
         ValueError: an unknown head mapping, or no frames.
+        RunError: a method with memory failed; the message names the frame.
     """
     if not len(recording):
         raise ValueError("no frames to evaluate")
     estimates: dict[str, list[Estimate]] = {}
     for number, (name, estimator) in enumerate(estimators.items()):
-        estimator.estimate(recording.rig, recording.detections[0])
-        estimates[name] = []
-        for frame, detections in enumerate(recording.detections, start=1):
-            estimates[name].append(estimator.estimate(recording.rig, detections))
+
+        def frames(before: int = number * len(recording)) -> Iterator[Detections]:
+            for frame, detections in enumerate(recording.timed_detections, start=before):
+                if progress is not None and frame > before:
+                    progress(frame, len(estimators) * len(recording))
+                yield detections
             if progress is not None:
-                progress(number * len(recording) + frame, len(estimators) * len(recording))
+                progress(before + len(recording), len(estimators) * len(recording))
+
+        if isinstance(estimator, SequenceEstimator):
+            for _ in estimator.track(recording.rig, recording.timed_detections[:3]):
+                pass
+            estimates[name] = track_frames(estimator, recording.rig, frames())
+        else:
+            estimator.estimate(recording.rig, recording.detections[0])
+            estimates[name] = [estimator.estimate(recording.rig, detections) for detections in frames()]
     return score_estimates(recording, estimates, head=head)
 
 

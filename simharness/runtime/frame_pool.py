@@ -1,4 +1,8 @@
-"""Map over frames in several processes, with results that do not depend on the number of processes."""
+"""Map over frames in several processes, with results that do not depend on the number of processes.
+
+:func:`map_frames` cuts frames into chunks that any process may take in any order; :func:`map_jobs` takes the ranges of
+frames from its caller, for work that needs its frames in one process.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,8 @@ from simharness.runtime.errors import RunError
 
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
+
+_Job = tuple[range, *tuple[Any, ...]]  # arguments of a call; the first are its frames
 
 _CHUNKS_PER_WORKER = 8  # many, so that a slow chunk delays little; few, so that sending them costs little
 
@@ -54,46 +60,69 @@ def map_frames(
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
-    chunks = list(_chunks(frames, workers))
-    if workers == 1 or len(chunks) < 2:
-        return list(_map_in_process(function, chunks, progress))
-    return _map_in_pool(function, chunks, min(workers, len(chunks)), progress)
+    return map_jobs(function, [(chunk,) for chunk in chunks_of(frames, workers)], workers=workers, progress=progress)
 
 
-def _chunks(frames: range, workers: int) -> Iterator[range]:
+def map_jobs(
+    function: Callable[..., Result],
+    jobs: Sequence[_Job],
+    *,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda frames: None,
+) -> list[Result]:
+    """Call ``function`` with the arguments of each job and return the results in the order of the jobs.
+
+    Args:
+        function: as :func:`map_frames`, with more arguments where the jobs have them.
+        jobs: arguments of each call; the first are its frames. Long jobs should come first.
+        workers: as :func:`map_frames`.
+        progress: called with the number of frames of each finished job.
+
+    Raises:
+        ValueError: as :func:`map_frames`.
+        RunError: as :func:`map_frames`.
+    """
+    if workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
+    if workers == 1 or len(jobs) < 2:
+        return list(_map_in_process(function, jobs, progress))
+    return _map_in_pool(function, jobs, min(workers, len(jobs)), progress)
+
+
+def chunks_of(frames: range, workers: int) -> list[range]:
+    """Return the frames in consecutive chunks, a few for each worker."""
     length = max(1, -(-len(frames) // (workers * _CHUNKS_PER_WORKER)))
-    for start in range(0, len(frames), length):
-        yield frames[start : start + length]
+    return [frames[start : start + length] for start in range(0, len(frames), length)]
 
 
 def _map_in_process(
-    function: FrameFunction[Result], chunks: Sequence[range], progress: Callable[[int], None]
+    function: Callable[..., Result], jobs: Sequence[_Job], progress: Callable[[int], None]
 ) -> Iterator[Result]:
     with threadpoolctl.threadpool_limits(1):
-        for chunk in chunks:
+        for job in jobs:
             try:
-                yield function(chunk)
+                yield function(*job)
             except RunError:
                 raise
             except Exception as error:
-                raise RunError(_failure(chunk, error)) from error
-            progress(len(chunk))
+                raise RunError(_failure(job[0], error)) from error
+            progress(len(job[0]))
 
 
 def _map_in_pool(
-    function: FrameFunction[Result], chunks: Sequence[range], workers: int, progress: Callable[[int], None]
+    function: Callable[..., Result], jobs: Sequence[_Job], workers: int, progress: Callable[[int], None]
 ) -> list[Result]:
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=spawn, initializer=_install, initargs=(function,)) as pool:
         futures: dict[Future[Result], range] = {}
         try:
-            for chunk in chunks:
-                futures[pool.submit(_call, chunk)] = chunk
+            for job in jobs:
+                futures[pool.submit(_call, job)] = job[0]
             for future in as_completed(futures):
                 future.result()
                 progress(len(futures[future]))
         except BrokenProcessPool as error:
-            span = _span(range(chunks[0].start, chunks[-1].stop))
+            span = _span(range(min(job[0].start for job in jobs), max(job[0].stop for job in jobs)))
             raise RunError(
                 f"a worker process died within {span}; it may have run out of memory: try fewer workers, "
                 "or --workers 1 to run in this process"
@@ -115,15 +144,15 @@ def _span(chunk: range) -> str:
     return f"frame {chunk.start}" if len(chunk) == 1 else f"frames {chunk.start} to {chunk.stop - 1}"
 
 
-_installed: FrameFunction[Any] | None = None  # function of a worker process; None in the parent
+_installed: Callable[..., Any] | None = None  # function of a worker process; None in the parent
 
 
-def _install(function: FrameFunction[Any]) -> None:
+def _install(function: Callable[..., Any]) -> None:
     global _installed  # noqa: PLW0603 (state set by the initializer)
     threadpoolctl.threadpool_limits(1)
     _installed = function
 
 
-def _call(frames: range) -> Any:
+def _call(job: _Job) -> Any:
     assert _installed is not None
-    return _installed(frames)
+    return _installed(*job)

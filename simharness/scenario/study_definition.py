@@ -187,7 +187,7 @@ def _check_variants(plan: Plan) -> None:
 
 def _without_descriptors(scenario: Scenario, plan: Plan) -> list[str]:
     """Return a message about variants that need descriptors in a scenario without them."""
-    from mvpose.pipeline import NEED_DESCRIPTORS
+    from mvpose.presets import NEED_DESCRIPTORS
 
     affected = NEED_DESCRIPTORS & set(scenario.method.variants)
     if not affected or scenario.appearance.source != "none":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mvpose.presets import TRACKING
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Setting, Study
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity
@@ -39,5 +40,9 @@ def plan(study: Study) -> list[PlannedTrial]:
 def _planned(study: Study, setting: Setting, seed: int, codes: Mapping[str, str]) -> PlannedTrial:
     scenario = study.at(setting, seed)
     trial = trial_identity(scenario)
-    entries = {variant: entry_identity(trial, variant, code) for variant, code in codes.items()}
+    lag = scenario.method.lag
+    entries = {
+        variant: entry_identity(trial, variant, code, lag=lag if variant in TRACKING else None)
+        for variant, code in codes.items()
+    }
     return PlannedTrial(setting, seed, scenario, trial, entries)

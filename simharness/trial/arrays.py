@@ -45,15 +45,18 @@ def rig_of_arrays(arrays: Arrays) -> Rig:
 
 def detection_arrays(detections: Sequence[Detections]) -> Arrays:
     """Return the detections of T frames: ``frames`` () is T, ``skeleton`` () its name, ``frame`` (n,), and the fields
-    of :class:`mvpose.Detections` with a row for each of the n detections; ``descriptors`` where all frames have them.
+    of :class:`mvpose.Detections` with a row for each of the n detections; ``descriptors``, and ``time`` (T, V), where
+    all frames have them.
     """
     described = all(each.descriptors is not None for each in detections)
     keys = (*_OF_DETECTIONS, "descriptors") if described else _OF_DETECTIONS
+    times = [each.time for each in detections if each.time is not None]
     return {
         "frames": np.array(len(detections)),
         "skeleton": np.array(detections[0].skeleton.name),
         "frame": _frame_index(map(len, detections)),
         **_joined(detections, keys),
+        **({"time": np.stack(times)} if len(times) == len(detections) else {}),
     }
 
 
@@ -69,8 +72,9 @@ def detections_of(arrays: Arrays) -> tuple[Detections, ...]:
             arrays["box_scores"][rows],
             skeleton,
             arrays["descriptors"][rows] if "descriptors" in arrays else None,
+            time=arrays["time"][index] if "time" in arrays else None,
         )
-        for rows in rows_of_frames(arrays["frame"], int(arrays["frames"]))
+        for index, rows in enumerate(rows_of_frames(arrays["frame"], int(arrays["frames"])))
     )
 
 
@@ -98,16 +102,18 @@ def truth_of(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
 
 def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:
     """Return the estimates of one variant over T frames: ``frame`` (k,), ``joints``, ``scores`` and, where all frames
-    have them, ``covariance`` and ``freedom`` of the k estimated people; ``labels`` (n,) of the detections;
-    ``iterations``, ``residuals``, ``objective`` and ``converged`` of the matching of each frame.
+    have them, ``covariance``, ``freedom`` and ``ids`` of the k estimated people; ``time`` (T,), NaN where it is not
+    known; ``labels`` (n,) of the detections; ``iterations``, ``residuals``, ``objective`` and ``converged`` of the
+    matching of each frame.
     """
-    optional = ("covariance", "freedom")
+    optional = ("covariance", "freedom", "ids")
     known = [key for key in optional if all(getattr(estimate, key) is not None for estimate in estimates)]
     keys = ("joints", "scores", *known)
     matchings = [estimate.matching for estimate in estimates]
     return {
         "frame": _frame_index(map(len, estimates)),
         **_joined(estimates, keys),
+        "time": np.array([np.nan if each.time is None else each.time for each in estimates], float),
         **_joined(matchings, ("labels",)),
         "iterations": np.array([each.iterations for each in matchings]),
         "residuals": np.array([each.residuals for each in matchings], float).reshape(-1, 2),
@@ -123,7 +129,8 @@ def estimates_of(
     """Restore the estimates of one variant from :func:`estimate_arrays`.
 
     Args:
-        arrays: the arrays; ``label_counts`` may be missing where every frame has a label for each detection.
+        arrays: the arrays; ``label_counts`` may be missing where every frame has a label for each detection, ``time``
+            where no frame has a time.
         detected: frame of each detection, (n,).
         timings: seconds by stage, for each frame; frames at the end may be missing.
     """
@@ -131,7 +138,8 @@ def estimates_of(
     counts = arrays.get("label_counts")
     labelled = detected if counts is None else np.repeat(np.arange(frames), counts)
     parts = zip(rows_of_frames(arrays["frame"], frames), rows_of_frames(labelled, frames), strict=True)
-    covariance, freedom = arrays.get("covariance"), arrays.get("freedom")
+    covariance, freedom, ids = arrays.get("covariance"), arrays.get("freedom"), arrays.get("ids")
+    time = arrays.get("time", np.full(frames, np.nan))
     for index, (people, labels) in enumerate(parts):
         primal, dual = arrays["residuals"][index]
         yield Estimate(
@@ -147,6 +155,8 @@ def estimates_of(
                 converged=bool(arrays["converged"][index]),
             ),
             timings=dict(timings[index]) if index < len(timings) else {},
+            ids=None if ids is None else ids[people],
+            time=None if np.isnan(time[index]) else float(time[index]),
         )
 
 

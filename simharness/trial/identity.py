@@ -4,8 +4,9 @@ A trial is a scenario at a seed. Its results are made in steps, and each step ha
 
 - detections and truth: the values of the resolved scenario with its seed, the content of the files that it names, the
   code of the folders in :data:`SIMULATION`, the versions of :data:`PACKAGES`;
-- estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose``; for a user-defined
-  estimator also its place and the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
+- estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose``; for presets that track
+  also ``method.lag`` (the time between frames is in the trial's identity); for a user-defined estimator also its place
+  and the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
 - scores: the identity of the estimates, and the code of the folders in :data:`SCORES`;
 - failures and the stage to blame: the identity of the estimates, and the code of the folders in :data:`FAILURES`.
 
@@ -97,17 +98,20 @@ def trial_identity(scenario: Scenario) -> str:
     return _digest({"scenario": values, "files": content, "code": code().simulation, "versions": _versions()})
 
 
-def entry_identity(trial: str, variant: str, estimator: str = "") -> str:
+def entry_identity(trial: str, variant: str, estimator: str = "", *, lag: float | None = None) -> str:
     """Return the identity of a variant's estimates in a trial, 32 hexadecimal digits.
 
     Args:
         trial: from :func:`trial_identity`.
         variant: name of the variant.
         estimator: from :func:`estimator_code`, of a user-defined estimator; "" for a preset.
+        lag: ``method.lag`` of the scenario, for presets that track; None for all others.
     """
     values: dict[str, Any] = {"trial": trial, "variant": variant, "code": code().method}
     if estimator:
         values["own"] = estimator
+    if lag is not None:
+        values["lag"] = lag
     return _digest(values)
 
 

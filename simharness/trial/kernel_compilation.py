@@ -7,14 +7,15 @@ disk, from which the processes that estimate load them.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from mvpose import COCO17, Camera, Detections, Pipeline, Rig
-from mvpose.pipeline import NEED_DESCRIPTORS
+from mvpose.pipeline import SequenceEstimator
+from mvpose.presets import NEED_DESCRIPTORS
 
 
 class Compilation:
@@ -51,5 +52,16 @@ def compile_kernels(variants: Iterable[str]) -> None:
     described = replace(bare, descriptors=np.ones((2, 8)))
     for variant in variants:
         for detections in (described,) if variant in NEED_DESCRIPTORS else (bare, described):
-            if len(Pipeline.preset(variant).estimate(rig, detections)) != 1:
+            estimator = Pipeline.preset(variant)
+            if len(estimator.estimate(rig, detections)) != 1:
                 raise RuntimeError(f"{variant}: expected one person from two perfect views, got another number")
+            if isinstance(estimator, SequenceEstimator):
+                for _ in estimator.track(rig, _coming_and_going(detections)):
+                    pass
+
+
+def _coming_and_going(detections: Detections) -> Iterator[Detections]:
+    """Yield the frames of somebody who stays for a while, leaves, and comes back."""
+    for time in (0.0, 0.04, 0.08, 1.0, 3.0, 5.0, 5.04, 5.08):
+        here = detections if time < 1.0 or time >= 5.0 else detections.select(np.zeros(len(detections), np.bool_))
+        yield replace(here, time=np.full(2, time))

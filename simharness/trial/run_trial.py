@@ -16,7 +16,8 @@ import polars as pl
 import threadpoolctl
 
 from mvpose import Estimate
-from mvpose.pipeline import PRESETS, Estimator
+from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.presets import PRESETS
 from simharness.failures.blame import blame_frames, failure_scores, failure_table
 from simharness.failures.classification import find_failures
 from simharness.runtime.progress import Reporter, Silence
@@ -35,7 +36,10 @@ from simharness.trial.variant_result import VariantResult
 from simharness.types.recording import Recording
 
 Goal = Literal["detect", "estimate", "score", "classify", "blame"]
-"""Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame."""
+"""Last requested stage of a trial. ``classify`` finds failures, ``blame`` the stage of the method to blame.
+
+Failures of variants with memory are classified and not blamed: their cause may lie in an earlier frame, which no
+substitution in the frame of the failure removes."""
 
 _GOALS: tuple[str, ...] = get_args(Goal)
 
@@ -216,7 +220,7 @@ def _find_failures(
         for variant, estimates in result.estimates.items():
             if variant in known:
                 tables[variant] = known[variant]
-            elif blamed:
+            elif blamed and not isinstance(pipelines[variant], SequenceEstimator):
                 inputs = EstimateFrames(result.detected.rig, result.detected.frames, pipelines)
                 blamed_failures = blame_frames(
                     result.recording, pipelines[variant], estimates, partial(inputs.input_of, variant=variant)

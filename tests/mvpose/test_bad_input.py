@@ -11,7 +11,7 @@ from people import crowd, look_at, ring
 from scipy.optimize import linear_sum_assignment
 
 from mvpose import COCO17, SHELF14, Camera, Detections, Pipeline, Rig
-from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.skeleton import PANOPTIC19
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")

@@ -8,7 +8,7 @@ from people import crowd, detect, look_at, ring
 
 from mvpose import Camera, Detections, Pipeline, Rig
 from mvpose.detections import MOST_DETECTIONS
-from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from mvpose import Camera, Detections, Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity, EpipolarAffinity, GeometricAffinity
 from mvpose.heatmaps import Heatmaps
-from mvpose.pipeline import PRESETS
+from mvpose.presets import PRESETS
 from mvpose.reconstruction import Noise, UnmatchedPictorialStructure
 
 

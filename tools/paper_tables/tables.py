@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mvpose.pipeline import NEED_DESCRIPTORS
+from mvpose.presets import NEED_DESCRIPTORS
 from simharness.reality.published_scores import ABLATION, COMPARISON
 from simharness.runtime.atomic_files import atomic_folder
 from simharness.trial.provenance import PROVENANCE

@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -59,6 +59,11 @@ class Method(Section):
         max_length=100,
         description="presets of mvpose.Pipeline, and names of method.estimators",
     )
+    lag: Annotated[float, Field(ge=0.0, le=36_000.0)] = Field(
+        0.2,
+        description="track and track-fast: time of later frames that an estimate waits for, seconds; 0: none; at least "
+        "the duration: the whole recording",
+    )
     estimators: Estimators = Field(
         Estimators(), description='user-defined estimators: name = "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE"'
     )
@@ -66,7 +71,7 @@ class Method(Section):
 
 def wrong_variants(method: Method) -> Iterator[tuple[str, str]]:
     """Yield the faulty keys of section [method], each with a message."""
-    from mvpose.pipeline import PRESETS  # only where a method is checked: it imports the whole method
+    from mvpose.presets import PRESETS  # only where a method is checked: it imports the whole method
 
     estimators = method.estimators.places
     for name in estimators:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from mvpose import Rig
 from mvpose.affinity import AppearanceAffinity
-from mvpose.pipeline import NEED_DESCRIPTORS, Estimator
+from mvpose.pipeline import Estimator
+from mvpose.presets import NEED_DESCRIPTORS
 from simharness.capture.rendering.renderer import Unavailable
 from simharness.detector.descriptors import DescriptorSettings
 from simharness.scenario.sections.scenario import Scenario
@@ -70,7 +71,7 @@ def build_variants(scenario: Scenario) -> dict[str, Estimator]:
     """
     described = scenario.appearance.source != "none"
     appearance = re_id(scenario).affinity if described else AppearanceAffinity()
-    pipelines = estimators_of(scenario.method, appearance=appearance)
+    pipelines = estimators_of(scenario.method, appearance=appearance, period=1.0 / scenario.rate)
     if not described and (unusable := NEED_DESCRIPTORS & pipelines.keys()):
         raise ValueError(
             f"method.variants: {', '.join(unusable)} needs descriptors, but detections have none; choose "

@@ -1,16 +1,23 @@
-"""Estimation stage: run every variant of the method on the detections of every frame."""
+"""Estimation stage: run every variant of the method on the detections of every frame.
+
+Variants without memory share the frames among all processes, in any order. A variant with memory
+(:class:`mvpose.pipeline.SequenceEstimator`) gets all frames in order in one process, beside the others.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
-from mvpose.pipeline import PRESETS, READ_HEATMAPS, Estimator
-from simharness.runtime.errors import naming_frame
-from simharness.runtime.frame_pool import map_frames
+from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.presets import PRESETS, READ_HEATMAPS
+from simharness.runtime.errors import RunError, naming_frame
+from simharness.runtime.frame_pool import chunks_of, map_jobs
 from simharness.runtime.stages import Stages
+from simharness.trial.stages.tracking import track_frames
 
 if TYPE_CHECKING:
     from simharness.detector.detect import Detected
@@ -31,12 +38,25 @@ class EstimateFrames:
     detected: tuple[Detected, ...]
     pipelines: Mapping[str, Estimator]
 
-    def __call__(self, frames: range) -> dict[str, list[Estimate]]:
-        """Return the estimates of each variant for these frames."""
-        self._warm_up()
-        estimates: dict[str, list[Estimate]] = {name: [] for name in self.pipelines}
-        for frame in frames:
-            for name, detections in self._inputs(frame, self.pipelines):
+    def __call__(self, frames: range, variants: Sequence[str] | None = None) -> dict[str, list[Estimate]]:
+        """Return the estimates of variants for these frames.
+
+        Args:
+            frames: the frames; all of them for variants with memory, because their past begins with the first.
+            variants: names; all by default.
+        """
+        names = tuple(self.pipelines) if variants is None else tuple(variants)
+        self._warm_up(names)
+        estimates: dict[str, list[Estimate]] = {name: [] for name in names}
+        alone = []
+        for name in names:
+            estimator = self.pipelines[name]
+            if isinstance(estimator, SequenceEstimator):
+                estimates[name] = track_frames(estimator, self.rig, self._sequence(name, frames))
+            else:
+                alone.append(name)
+        for frame in frames if alone else ():
+            for name, detections in self._inputs(frame, alone):
                 with naming_frame(frame):
                     estimates[name].append(self.pipelines[name].estimate(self.rig, detections))
         return estimates
@@ -55,13 +75,23 @@ class EstimateFrames:
         for name in names:
             yield name, plain if name in _IGNORE_HEATMAPS else mapped
 
-    def _warm_up(self) -> None:
+    def _sequence(self, variant: str, frames: Iterable[int]) -> Iterator[Detections]:
+        """Yield the detections of frames as a variant gets them."""
+        return (self.input_of(frame, variant) for frame in frames)
+
+    def _warm_up(self, names: Iterable[str]) -> None:
         """Run each variant once per process: compilation and loading are no part of the time of a frame."""
-        fresh = [name for name in self.pipelines if name not in _warm]
+        fresh = [name for name in names if name not in _warm]
         fullest = max(range(len(self.detected)), key=lambda frame: len(self.detected[frame].detections))
-        for name, detections in self._inputs(fullest, fresh):
-            with naming_frame(fullest):
-                self.pipelines[name].estimate(self.rig, detections)
+        around = range(len(self.detected))[max(fullest - 1, 0) : fullest + 2]
+        for name in fresh:
+            estimator = self.pipelines[name]
+            if isinstance(estimator, SequenceEstimator):
+                with contextlib.suppress(RunError):  # if it fails on the recording, too, that error has the right frame
+                    track_frames(estimator, self.rig, self._sequence(name, around))
+            else:
+                with naming_frame(fullest):
+                    estimator.estimate(self.rig, self.input_of(fullest, name))
         _warm.update(fresh)
 
 
@@ -84,14 +114,20 @@ def estimate_variants(
         pipelines: variants by name.
         stages: timer and reporter of the stage ``estimate``.
         known: estimates of variants that need not run again.
-        workers: number of processes that share the frames.
+        workers: number of processes that share the frames; a variant with memory takes one for all frames. Results do
+            not depend on it.
     """
     missing = {name: pipeline for name, pipeline in pipelines.items() if name not in known}
     estimates = {name: tuple(frames) for name, frames in known.items()}
     if missing:
         indices = range(len(detected.frames))
-        with stages.stage("estimate", len(indices)) as advance:
+        tracking = [name for name, each in missing.items() if isinstance(each, SequenceEstimator)]
+        alone = [name for name in missing if name not in tracking]
+        jobs: list[tuple[range, list[str]]] = [(indices, [name]) for name in tracking]
+        if alone:
+            jobs += [(chunk, alone) for chunk in chunks_of(indices, workers)]
+        with stages.stage("estimate", sum(len(frames) for frames, _ in jobs)) as advance:
             estimation = EstimateFrames(detected.rig, detected.frames, missing)
-            parts = map_frames(estimation, indices, workers=workers, progress=advance)
-            estimates |= {name: tuple(each for part in parts for each in part[name]) for name in missing}
+            parts = map_jobs(estimation, jobs, workers=workers, progress=advance)
+        estimates |= {name: tuple(each for part in parts for each in part.get(name, ())) for name in missing}
     return {name: estimates[name] for name in pipelines}

@@ -12,6 +12,9 @@ A user-defined estimator is any object with ``estimate(rig, detections) -> mvpos
 The name refers to such an object, or to a class or function that returns one when it is called without arguments. The
 object may be a :class:`mvpose.Pipeline` with custom stages. A file is loaded alone, not as part of a package, and each
 process that estimates loads it once. Frames come in any order, so an estimator must not depend on earlier frames.
+
+An estimator with memory, such as a tracker, has ``track(rig, frames)`` (:class:`mvpose.pipeline.SequenceEstimator`)
+instead or as well: it yields one estimate for each frame, and gets all frames of a trial in order in one process.
 """
 
 from __future__ import annotations
@@ -23,7 +26,8 @@ import importlib.util
 import sys
 import time
 import traceback
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -36,19 +40,25 @@ from mvpose import Detections, Estimate, Pipeline, Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.checks import as_array
 from mvpose.pipeline import Estimator
+from mvpose.skeleton import Skeleton
 from simharness.runtime.errors import RunError
 from simharness.scenario.sections.method import wrong_variants
 from simharness.scenario.sections.scenario import Method
+from simharness.trial.stages.tracking import track_frames
 
 _PROTOCOL = "estimate(rig, detections) -> mvpose.Estimate"
+_METHODS = ("estimate", "track")
 
 
-def estimators_of(method: Method, *, appearance: AppearanceAffinity | None = None) -> dict[str, Estimator]:
+def estimators_of(
+    method: Method, *, appearance: AppearanceAffinity | None = None, period: float | None = None
+) -> dict[str, Estimator]:
     """Return the variants of a scenario, by name.
 
     Args:
         method: section [method].
         appearance: affinity of descriptors, for presets.
+        period: time between frames, seconds, for presets with memory.
 
     Raises:
         ValueError: an unknown variant, or a user-defined estimator that cannot be loaded.
@@ -57,7 +67,9 @@ def estimators_of(method: Method, *, appearance: AppearanceAffinity | None = Non
         raise ValueError(f"method.{key}: {message}")
     places = method.estimators.places
     return {
-        name: _user_estimator(name, places[name]) if name in places else Pipeline.preset(name, appearance=appearance)
+        name: _user_estimator(name, places[name])
+        if name in places
+        else Pipeline.preset(name, appearance=appearance, lag=method.lag, period=period)
         for name in method.variants
     }
 
@@ -97,13 +109,79 @@ class UserEstimator:
         try:
             estimate = estimator.estimate(rig, detections)
         except Exception as error:
-            raise RunError(f"{self.name} ({self.place}): {_describe_error(error, _file_of(estimator))}") from error
+            raise self._failure(error) from error
         seconds = time.perf_counter() - start
         try:
-            _check(estimate, detections)
+            _check(estimate, len(detections), detections.skeleton)
         except ValueError as error:
             raise RunError(f"{self.name} ({self.place}): {error}") from None
         return replace(estimate, timings={**estimate.timings, "total": seconds})
+
+    def _failure(self, error: Exception) -> RunError:
+        return RunError(f"{self.name} ({self.place}): {_describe_error(error, _file_of(self.loaded))}")
+
+
+@dataclass(frozen=True)
+class UserTracker(UserEstimator):
+    """User-defined estimator with memory: an object with ``track``, which need not have ``estimate``."""
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Estimate the people of one frame alone; as :meth:`UserEstimator.estimate`."""
+        if callable(getattr(self.loaded, "estimate", None)):
+            return super().estimate(rig, detections)
+        (estimate,) = track_frames(self, rig, [detections])
+        return estimate
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimate of every frame, in order, and check it.
+
+        Raises:
+            RunError: the estimator raised an error, yielded an estimate before it took the frame, or yielded no valid
+                estimate of the frame's detections; the message names the frame.
+        """
+        estimator: Any = self.loaded
+        waiting: deque[tuple[int, Skeleton]] = deque()  # detections and skeleton of each frame without an estimate yet
+        taken = passed = 0  # frames
+
+        def feed() -> Iterator[Detections]:
+            nonlocal taken
+            for detections in frames:
+                waiting.append((len(detections), detections.skeleton))
+                taken += 1
+                yield detections
+
+        given = feed()
+        try:
+            for estimate in estimator.track(rig, given):
+                try:
+                    if not waiting:
+                        raise ValueError(f"track yielded {passed + 1} estimates after it took {taken} frames")
+                    _check(estimate, *waiting.popleft(), method="track")
+                except ValueError as error:
+                    raise RunError(f"frame {passed}: {self.name} ({self.place}): {error}") from None
+                yield estimate
+                passed += 1
+        except RunError:
+            raise
+        except Exception as error:
+            raise RunError(f"frame {max(taken - 1, 0)}: {self._failure(error)}") from error
+        for _ in given:  # frames that it did not take
+            pass
+        if waiting:
+            raise RunError(
+                f"frame {passed}: {self.name} ({self.place}): track yielded {passed} estimates for {taken} frames, "
+                "expected one for each frame, in order"
+            )
+
+
+def user_estimator(name: str, place: str) -> UserEstimator:
+    """Return the user-defined estimator at a place, with memory or without.
+
+    Raises:
+        ValueError: as :func:`load_estimator`.
+    """
+    tracks = callable(getattr(load_estimator(place), "track", None))
+    return UserTracker(name, place) if tracks else UserEstimator(name, place)
 
 
 def load_estimator(place: str) -> Estimator:
@@ -131,12 +209,10 @@ def sources_of(place: str) -> Mapping[str, bytes]:
 
 
 def _user_estimator(name: str, place: str) -> UserEstimator:
-    estimator = UserEstimator(name, place)
     try:
-        _ = estimator.loaded
+        return user_estimator(name, place)
     except ValueError as error:
         raise ValueError(f"method.estimators.{name}: {error}") from None
-    return estimator
 
 
 @functools.cache
@@ -165,12 +241,12 @@ def _loaded(source: str, attribute: str) -> Estimator:
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names) or 'no names'}"
         raise ValueError(f"{source} has no {attribute}; {hint}")
     value: Any = getattr(module, attribute)
-    if isinstance(value, type) or (callable(value) and not hasattr(value, "estimate")):
+    if isinstance(value, type) or (callable(value) and not any(hasattr(value, name) for name in _METHODS)):
         try:
             value = value()
         except Exception as error:
             raise ValueError(f"{source}: {attribute}() raised {_describe_error(error, module.__file__)}") from error
-    if not callable(getattr(value, "estimate", None)):
+    if not any(callable(getattr(value, name, None)) for name in _METHODS):
         raise ValueError(f"{source}: {attribute} is {type(value).__name__}, which has no {_PROTOCOL}")
     estimator: Estimator = value
     return estimator
@@ -207,18 +283,23 @@ def _module(source: str) -> ModuleType:
     return module
 
 
-def _check(estimate: object, detections: Detections) -> None:
+def _check(estimate: object, detections: int, skeleton: Skeleton, *, method: str = "estimate") -> None:
     """Check the return value of an estimator.
+
+    Args:
+        estimate: the value.
+        detections: number of detections of the frame.
+        skeleton: their skeleton.
+        method: method that returned or yielded it.
 
     Raises:
         ValueError: it is no estimate, or not a valid one of these detections.
     """
     if not isinstance(estimate, Estimate):
+        verb = "yielded" if method == "track" else "returned"
         raise ValueError(
-            f"estimate returned {type(estimate).__name__}, expected mvpose.Estimate: Estimate.of_joints(joints) "
-            "makes one"
+            f"{method} {verb} {type(estimate).__name__}, expected mvpose.Estimate: Estimate.of_joints(joints) makes one"
         )
-    skeleton = detections.skeleton
     joints = as_array(estimate.joints, ("n", len(skeleton), 3), f"joints ({skeleton.name})")
     if np.isinf(joints).any():
         raise ValueError("joints must be finite, or NaN for a joint that could not be placed, got infinite values")
@@ -226,7 +307,7 @@ def _check(estimate: object, detections: Detections) -> None:
         raise ValueError(
             "scores must be finite, and 0 for a joint that could not be placed, got NaN or infinite values"
         )
-    labels = estimate.matching.labels_of(len(detections))
+    labels = estimate.matching.labels_of(detections)
     if len(labels) and not -1 <= labels.min() <= labels.max() < len(joints):
         raise ValueError(
             f"labels must be -1, or 0 to n - 1 of n = {len(joints)} people, got {labels.min()} to {labels.max()}"

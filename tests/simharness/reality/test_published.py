@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from mvpose.pipeline import PRESETS
+from mvpose.presets import PRESETS
 from simharness.reality.published_scores import ABLATION, COMPARISON
 
 ROWS = [

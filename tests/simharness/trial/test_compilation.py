@@ -10,7 +10,7 @@ import pytest
 
 import mvpose
 from mvpose import Camera, Detections, Pipeline, Rig
-from mvpose.pipeline import NEED_DESCRIPTORS, PRESETS
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from simharness.trial.kernel_compilation import Compilation, compile_kernels
 
 

@@ -15,7 +15,7 @@ from trials import measured as measure
 from trials import simulated
 
 from mvpose import Pipeline
-from mvpose.pipeline import PRESETS
+from mvpose.presets import PRESETS
 from simharness.report.run.result_folder import run
 from simharness.report.study.digest import write_digest
 from simharness.report.study.page import write_report

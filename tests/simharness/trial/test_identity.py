@@ -49,11 +49,15 @@ NAMES = {"name", "description", "detector.name"}
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning:pydantic")  # changed values need not be of the right type
-def test_every_value_counts_except_names_and_variants(quickstart):
+def test_every_value_counts_except_names_and_the_method(quickstart):
     identities = {dotted: trial_identity(other) for dotted, other in changed(quickstart)}
     assert len(identities) > 150
     current = trial_identity(quickstart)
-    assert {dotted for dotted, each in identities.items() if each == current} == {*NAMES, "method.variants"}
+    assert {dotted for dotted, each in identities.items() if each == current} == {
+        *NAMES,
+        "method.variants",
+        "method.lag",
+    }
     others = [each for each in identities.values() if each != current]
     assert len(set(others)) == len(others)
 
@@ -246,3 +250,13 @@ def imported(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("simharness"):
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_the_lag_counts_for_presets_that_track_alone():
+    def entries(lag):
+        study = load_study(QUICKSTART, overrides=[f"method.lag={lag}"], variants=["full", "track", "track-fast"])
+        return plan(study)[0].entries
+
+    one, other = entries(0.2), entries(0.4)
+    assert {name for name in one if one[name] != other[name]} == {"track", "track-fast"}
+    assert one == entries(0.2)

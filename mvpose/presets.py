@@ -1,0 +1,61 @@
+"""Presets: the variants of the method by name; :meth:`mvpose.Pipeline.preset` makes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mvpose.affinity import AppearanceAffinity, FusedAffinity, GeometricAffinity
+from mvpose.matching import Matcher
+from mvpose.pipeline import Estimator, Pipeline, UnmatchedPipeline
+from mvpose.reconstruction import Triangulation
+from mvpose.tracking.tracker import TrackingModel
+from mvpose.tracking.tracking_pipeline import TrackingPipeline
+
+PRESETS: dict[str, str] = {
+    "full": "all cues (geometry, and appearance if descriptors are given), ADMM matching, 3DPS",
+    "appearance": "as full, with appearance as the only affinity; detections must carry descriptors",
+    "geometry": "as full, with geometry as the only affinity",
+    "hungarian": "as full, with Hungarian matching of each pair of views, without cycle consistency",
+    "no-3dps": "as full, with robust triangulation instead of 3DPS",
+    "no-matching": "3DPS on all detections at once, without matching",
+    "fast": "as full, with matching by clustering and robust triangulation",
+    "track": "the stages of full, through time: people keep their identities",
+    "track-fast": "the stages of fast, through time: people keep their identities",
+}
+
+NEED_DESCRIPTORS = frozenset({"appearance"})
+"""Presets that require detections with descriptors."""
+
+READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian", "track"})
+"""Presets that use heat maps where detections carry them; the others use keypoints only."""
+
+TRACKING = frozenset({"track", "track-fast"})
+"""Presets that are a :class:`mvpose.pipeline.SequenceEstimator`: frames come in order."""
+
+
+def preset(
+    name: str, *, appearance: AppearanceAffinity | None = None, lag: float | None = None, period: float | None = None
+) -> Estimator:
+    """Return one of :data:`PRESETS`; see :meth:`mvpose.Pipeline.preset`."""
+    appearance = appearance or AppearanceAffinity()
+    full = Pipeline(affinity=FusedAffinity(appearance=appearance))
+    fast = replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation())
+    tracking = TrackingPipeline(full)
+    if period is not None:
+        tracking = replace(tracking, model=TrackingModel(period=period))
+    if lag is not None:
+        tracking = replace(tracking, lag=lag)
+    variants: dict[str, Estimator] = {
+        "full": full,
+        "appearance": replace(full, affinity=appearance),
+        "geometry": replace(full, affinity=GeometricAffinity()),
+        "hungarian": replace(full, matching=Matcher(method="hungarian")),
+        "no-3dps": replace(full, reconstruction=Triangulation()),
+        "no-matching": UnmatchedPipeline(),
+        "fast": fast,
+        "track": tracking,
+        "track-fast": replace(tracking, pipeline=fast),
+    }
+    if name not in variants:
+        raise ValueError(f"unknown preset {name!r} of the pipeline; expected one of {', '.join(PRESETS)}")
+    return variants[name]
