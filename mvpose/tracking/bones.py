@@ -57,7 +57,7 @@ def bone_prior(skeleton: Skeleton) -> BonePrior:
     return prior
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def learn_lengths(length, variance, state, covariance, ends, dt):
     """Update the bone lengths (B,) and their variances (B,) of one person by its joints, in place.
 
@@ -97,8 +97,15 @@ def constrain(joints, covariance, state, state_covariance, ends, length, varianc
         variance: square metres, (B,).
     """
     count = len(state)
-    inverses, along = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    A, b, inverse, target, zero = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3), np.zeros(3)
+    inverses, along, work = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((9, 3))
+    _constrain(joints, covariance, state, state_covariance, ends, length, variance, inverses, along, work)
+
+
+@njit(cache=True, borrows=True)
+def _constrain(joints, covariance, state, state_covariance, ends, length, variance, inverses, along, work):
+    """Constrain joints as :func:`constrain`, with working memory."""
+    count = len(state)
+    A, inverse, b, target, zero = work[:3], work[3:6], work[6], work[7], work[8]
     for j in range(count):
         for r in range(3):
             joints[j, r] = state[j, r]
@@ -134,7 +141,7 @@ def constrain(joints, covariance, state, state_covariance, ends, length, varianc
             break
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _add_bones(A, b, j, joints, covariance, ends, length, variance):
     """Add the bones that end in a joint, linearised; the uncertainty of the other end adds to that of the length."""
     for k in range(len(ends)):
@@ -162,7 +169,7 @@ def _add_bones(A, b, j, joints, covariance, ends, length, variance):
         b[2] += weight * z * at
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _along(P, x, y, z):
     """Return the variance of a position along a unit vector."""
     return max(

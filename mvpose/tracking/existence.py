@@ -95,7 +95,7 @@ class Existence:
         return float(np.clip(dt, _SHORTEST, _LONGEST))
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def log_odds(span, origin, hits, misses, clutter, flashes, rates):
     """Return the logarithm of the odds that a track is a person.
 
@@ -140,7 +140,7 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
     return person - most - np.log(np.exp(chance - most) + np.exp(flash - most) + np.exp(statue - most))
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def log_presence(absent, since, departures, found, seeable):
     """Return the log-odds that a person is still here, and not gone since a picture last found the person.
 
@@ -232,7 +232,7 @@ def gather_evidence(
                 absent[t, v] += 0.0 if seen[t] else step
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _depth(camera, point):
     """Return the distance of a point along the optical axis."""
     depth = 0.0
@@ -241,7 +241,7 @@ def _depth(camera, point):
     return depth
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _beside(camera, point, nearer):
     """Return the distance of a nearer point from the line of sight to a point."""
     square, along, reach = 0.0, 0.0, 0.0
@@ -253,7 +253,7 @@ def _beside(camera, point, nearer):
     return np.sqrt(max(square - along * along / max(reach, 1e-12), 0.0))
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _in_image(camera, size, state):
     """Return whether most joints of a person lie in the image; distortion is left out."""
     inside, known = 0, 0

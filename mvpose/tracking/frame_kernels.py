@@ -193,7 +193,7 @@ def judge_tracks(
     return odds, here, shown, followed, everyone, false
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _latest_two(times):
     """Return the greatest and the second greatest time."""
     latest, second = -np.inf, -np.inf
@@ -258,7 +258,7 @@ def vagueness(state, covariance):
     return least
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def vagueness_of(state, covariance):
     """Return the standard deviation along an axis of the best-known joint of one track, metres."""
     least = np.inf
@@ -291,7 +291,7 @@ def repeats(joints, state):
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _mean_distance(one, other):
     """Return the mean distance of the joints that two poses (J, 3 or more) have; infinite if there are none."""
     total, count = 0.0, 0

@@ -88,7 +88,7 @@ def _of_joints(motion: Motion, skeleton: Skeleton) -> JointMotion:
     return JointMotion(speed, time, inner)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def transition(dt, speed, time):
     """Return the transition of one axis over ``dt`` seconds: reach, decay, and the three terms of the process noise.
 
@@ -161,7 +161,7 @@ def trunk_velocity(state, trunk):
     return common
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def carry(state, covariance, lead):
     """Move one joint along its velocity by ``lead`` seconds, which may be negative, without process noise, in place.
 
@@ -182,8 +182,8 @@ def carry(state, covariance, lead):
             covariance[r, c] += lead * covariance[r, 3 + c]
 
 
-@njit(cache=True)
-def condition(state, covariance, position, inverse, posterior):
+@njit(cache=True, borrows=True)
+def condition(state, covariance, position, inverse, posterior, scratch):
     """Condition one joint on a posterior of its position, in place.
 
     The velocity follows through its covariance with the position; the result is exact for Gaussian evidence on the
@@ -195,10 +195,12 @@ def condition(state, covariance, position, inverse, posterior):
         position: mean of the position afterwards, (3,), metres.
         inverse: inverse of the covariance of the position before, (3, 3).
         posterior: covariance of the position afterwards, (3, 3).
+        scratch: working memory, (6, 3).
     """
-    gain, change = np.zeros((3, 3)), np.zeros((3, 3))
+    gain, change = scratch[:3], scratch[3:]
     for r in range(3):
         for c in range(3):
+            gain[r, c] = 0.0
             for k in range(3):
                 gain[r, c] += covariance[3 + r, k] * inverse[k, c]
             change[r, c] = covariance[r, c] - posterior[r, c]

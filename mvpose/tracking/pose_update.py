@@ -102,9 +102,15 @@ def update_people(
 @njit(cache=True)
 def _update_joint(state, covariance, view, seen, speed, scratch):
     """Update one joint, in place; return the support of the rays."""
+    return _fit_joint(state, covariance, view, seen, speed, scratch, np.empty((19, 3)))
+
+
+@njit(cache=True, borrows=True)
+def _fit_joint(state, covariance, view, seen, speed, scratch, work):
+    """Update one joint as :func:`_update_joint`, with ``work`` (19, 3) as working memory."""
     origins, directions, weights, pixel, sigma, floor = view
-    point, start, b, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    A, inverse, prior = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    point, start, b, step = work[0], work[1], work[2], work[3]
+    A, inverse, prior = work[4:7], work[7:10], work[10:13]
     agreed = seen >= 2 and consensus(start, view, scratch)[0] > 0.0
     if np.isnan(state[0]):
         if not agreed:
@@ -139,11 +145,11 @@ def _update_joint(state, covariance, view, seen, speed, scratch):
             point[r] += step[r]
         if moved < _CONVERGED:
             break
-    condition(state, covariance, point, prior, inverse)
+    condition(state, covariance, point, prior, inverse, work[13:])
     return support
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _mahalanobis2(point, center, inverse):
     total = 0.0
     for r in range(3):
@@ -152,7 +158,7 @@ def _mahalanobis2(point, center, inverse):
     return max(total, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _log_posterior(point, state, prior, view):
     origins, directions, weights, pixel, sigma, floor = view
     value = log_likelihood(point, origins, directions, weights, pixel, sigma, floor)

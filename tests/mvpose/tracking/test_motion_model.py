@@ -72,7 +72,9 @@ def test_conditioning_on_a_measured_position_is_the_kalman_update():
     gain = covariance @ H.T @ np.linalg.inv(H @ covariance @ H.T + noise)
     mean = state + gain @ (measured - state[:3])
     expected = (np.eye(6) - gain @ H) @ covariance
-    condition(state, covariance, mean[:3].copy(), np.linalg.inv(covariance[:3, :3]), expected[:3, :3].copy())
+    condition(
+        state, covariance, mean[:3].copy(), np.linalg.inv(covariance[:3, :3]), expected[:3, :3].copy(), np.empty((6, 3))
+    )
     np.testing.assert_allclose(state, mean, atol=1e-12)
     np.testing.assert_allclose(covariance, expected, atol=1e-12)
 

@@ -25,7 +25,7 @@ def test_smoothed_states_are_those_of_the_joint_gaussian():
         prior = np.linalg.inv(covariance[0, :3, :3])
         posterior = np.linalg.inv(prior + np.eye(3) / noise)
         mean = posterior @ (prior @ state[0, :3] + measured[k] / noise)
-        condition(state[0], covariance[0], mean, prior, posterior)
+        condition(state[0], covariance[0], mean, prior, posterior, np.empty((6, 3)))
         filtered.append((state[0].copy(), covariance[0].copy()))
     after, after_covariance = filtered[-1]
     for k in range(4, -1, -1):
