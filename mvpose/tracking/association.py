@@ -83,8 +83,15 @@ def _join(
         views[d] = view[d]
         last = max(last, view[d])
     cost, vagueness = np.empty(n), np.empty(n)
+    known = np.empty((n, joints, 3))  # of each joint: certainty, its root and its logarithm
     for t in range(n):
         views[m + t] = last + 1
+        for j in range(joints):
+            spread = 0.0
+            for r in range(3):
+                spread += covariance[t, j, r, r]
+            certainty = keypoint * keypoint / (keypoint * keypoint + spread / 3.0)
+            known[t, j, 0], known[t, j, 1], known[t, j, 2] = certainty, np.sqrt(certainty), np.log(certainty)
     for d in range(m):
         least_vague = np.inf
         for t in range(n):
@@ -92,17 +99,15 @@ def _join(
             for j in range(joints):
                 if not (weights[d, j] > 0.0) or np.isnan(state[t, j, 0]):
                     continue
-                along, square, spread = 0.0, 0.0, 0.0
+                along, square = 0.0, 0.0
                 for r in range(3):
                     offset = state[t, j, r] + lead[d] * state[t, j, 3 + r] - origins[d, r]
                     along += offset * directions[d, j, r]
                     square += offset * offset
-                    spread += covariance[t, j, r, r]
                 distance = np.sqrt(max(square - along * along, 0.0)) if along > 0.0 else np.sqrt(square)
-                certainty = keypoint * keypoint / (keypoint * keypoint + spread / 3.0)
-                weight = weights[d, j] * certainty  # a joint that is known only roughly says less about who this is
-                total += weight * min(distance * np.sqrt(certainty), saturation)
-                vague -= weight * np.log(certainty)
+                weight = weights[d, j] * known[t, j, 0]  # a joint known only roughly says less about who this is
+                total += weight * min(distance * known[t, j, 1], saturation)
+                vague -= weight * known[t, j, 2]
                 mass += weight
                 count += 1
             cost[t] = total / mass if count >= least else np.inf
