@@ -29,6 +29,7 @@ class Bug:
             change; ``"equivalent"``: no correct result changes.
         why: reason of an effect that is not real.
         measured: measured effect on the scores of the suite; "" where it was not measured.
+        suite: shipped suite of the gate that has to notice it.
 
     Raises:
         ValueError: no edits or no tests, an unknown effect, or an effect that is not real without a reason.
@@ -42,6 +43,7 @@ class Bug:
     effect: Effect
     why: str = ""
     measured: str = ""
+    suite: str = "ci"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "edits", tuple((str(text), str(other)) for text, other in self.edits))

@@ -1,4 +1,4 @@
-"""The gate as shipped, run on the suite ``ci`` with a bug planted, against a baseline of the same copy without bugs."""
+"""The gate as shipped, run on a suite with a bug planted, against a baseline of the same copy without bugs."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ from benchmarks.planted_bugs.catalogue import Bug
 from benchmarks.planted_bugs.checkout import Checkout, Finished
 from benchmarks.planted_bugs.records import Outcome
 from benchmarks.planted_bugs.simulations import First, first_stage
-
-SUITE = "ci"
-"""Name of the shipped suite."""
 
 _PASSED, _REGRESSION = 0, 1
 _VERDICT = re.compile(r"^(?:worse|unexpected|failed)\b.*", re.MULTILINE)

@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.planted_bugs.catalogue import Bug
+from benchmarks.planted_bugs.catalogue import Bug, read_catalogue
 from benchmarks.planted_bugs.checkout import Checkout
 from benchmarks.planted_bugs.effects import effect, fresh_seeds, read_scores
-from benchmarks.planted_bugs.gate import SUITE, Gate, write_suite
+from benchmarks.planted_bugs.gate import Gate, write_suite
 from benchmarks.planted_bugs.near_tests import run_tests
 from benchmarks.planted_bugs.records import Outcome, Records
 from benchmarks.planted_bugs.simulations import first_stage
@@ -80,16 +80,25 @@ class Bench:
         return self._outcomes("tests", bugs, run)
 
     def gate(self, bugs: Iterable[Bug]) -> dict[str, Outcome]:
-        """Run the gate with each bug planted, against a baseline without bugs."""
-        gate = self._gate(SUITE)
-        return self._outcomes("gate", bugs, lambda bug: gate.check_bug(self._clean, bug, limit=self._limit))
+        """Run the gate with each bug planted, on the suite of the bug, against a baseline without bugs."""
+        bugs = list(bugs)
+        gates = {suite: self._gate(suite) for suite in _suites(bugs)}
+        return self._outcomes("gate", bugs, lambda bug: gates[bug.suite].check_bug(self._clean, bug, limit=self._limit))
 
     def effects(self, bugs: Iterable[Bug], *, seeds: int) -> dict[str, str]:
-        """Measure the effect of each bug on the scores of the suite with fresh seeds, as text."""
-        suite = self._folder / f"fresh-{seeds}.toml"
-        few = self._folder / f"fresh-{min(seeds, _SIMULATED)}.toml"
+        """Measure the effect of each bug on the scores of its suite with fresh seeds, as text."""
+        bugs = list(bugs)
+        values: dict[str, str] = {}
+        for suite in _suites(bugs):
+            values |= self._effects(suite, [bug for bug in bugs if bug.suite == suite], seeds)
+        return {bug.id: values[bug.id] for bug in bugs}
+
+    def _effects(self, name: str, bugs: list[Bug], seeds: int) -> dict[str, str]:
+        """Measure the effects of bugs on the scores of one suite."""
+        suite = self._folder / f"fresh-{name}-{seeds}.toml"
+        few = self._folder / f"fresh-{name}-{min(seeds, _SIMULATED)}.toml"
         for path, count in ((suite, seeds), (few, min(seeds, _SIMULATED))):
-            write_suite(path, suite=SUITE, seeds=fresh_seeds(count))
+            write_suite(path, suite=name, seeds=fresh_seeds(count))
         gate = self._gate(str(suite))
         before = read_scores(gate.baseline)
 
@@ -109,17 +118,21 @@ class Bench:
         return {name: value["text"] for name, value in values.items()}
 
     def clean_runs(self, count: int) -> dict[str, Outcome]:
-        """Run the gate on the code without bugs, each time with another noise of the detector."""
-        gate = self._gate(SUITE)
+        """Run each suite on the code without bugs, each time with another noise of the detector."""
         changes = [
             replace(
                 NEUTRAL,
-                id=f"neutral-{n}",
+                id=f"{suite}-{n}",
                 edits=tuple((text, other.replace("{n}", str(n))) for text, other in NEUTRAL.edits),
+                suite=suite,
             )
+            for suite in _suites(read_catalogue().values())
             for n in range(1, count + 1)
         ]
-        return self._outcomes("clean", changes, lambda bug: gate.check_bug(self._clean, bug, limit=self._limit))
+        gates = {suite: self._gate(suite) for suite in _suites(changes)}
+        return self._outcomes(
+            "clean", changes, lambda bug: gates[bug.suite].check_bug(self._clean, bug, limit=self._limit)
+        )
 
     def _gate(self, suite: str) -> Gate:
         """Return the gate of a suite, with a baseline of this code; it is made where it is missing."""
@@ -190,6 +203,11 @@ class Bench:
                 _say(f"{what} {done}/{len(left)} {bug.id}: {shown} ({value['seconds']:.0f} s)")
         results = {bug.id: self._records.value(what, bug.id, bug.digest) for bug in bugs}
         return {name: value for name, value in results.items() if value is not None}
+
+
+def _suites(bugs: Iterable[Bug]) -> list[str]:
+    """Return the suites that have to notice some bugs."""
+    return list(dict.fromkeys(bug.suite for bug in bugs))
 
 
 def _say(text: str) -> None:

@@ -27,6 +27,8 @@ TIME = "time_ratio"
 
 KEPT = (*GATED, FRAMES, TIME)
 
+_ADDED = ("hota", "idf1")  # scores that baselines of version 0.1 lack
+
 _LARGEST = 64 * MIB  # bytes of a baseline; 200,000 trials
 _DIGITS = 4  # decimals: finer than any tolerance, short enough to read in a diff
 _HEAD = ("suite", "fingerprint", "code", "processor")
@@ -156,7 +158,7 @@ def _row(row: Any) -> tuple[TrialKey, dict[str, float | None]]:
     trial = TrialKey(row["case"], row["seed"], row["variant"])
     if not (isinstance(trial.case, str) and isinstance(trial.seed, int) and isinstance(trial.variant, str)):
         raise TypeError(f"trials: expected case, seed and variant, got {shown(list(trial))}")
-    scores = {key: row[key] for key in KEPT}
+    scores = {key: row.get(key) if key in _ADDED else row[key] for key in KEPT}
     for key, value in scores.items():
         number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
         if value is not None and not number:

@@ -31,6 +31,8 @@ class Tolerance(Section):
     map: Percent = Field(0.5, description="percentage points; sees the order of the scores of people")
     coverage_90: Percent = Field(1.0, description="percentage points further from 90 %")
     score_brier: Size = Field(0.005, description="mean squared error of joint scores as probabilities")
+    hota: Percent = Field(1.0, description="percentage points; of variants that give identities")
+    idf1: Percent = Field(1.0, description="percentage points; of variants that give identities")
 
 
 class Improvement(Section):
@@ -50,6 +52,8 @@ class Improvement(Section):
     map: Percent | None = Field(None, description="percentage points")
     coverage_90: Percent | None = Field(None, description="percentage points, in either direction")
     score_brier: Size | None = Field(None, description="mean squared error of joint scores as probabilities")
+    hota: Percent | None = Field(None, description="percentage points")
+    idf1: Percent | None = Field(None, description="percentage points")
 
 
 class Gate(Section):
