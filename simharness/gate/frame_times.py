@@ -5,20 +5,25 @@ before each estimate, so that both meet the same state of the machine. Of the re
 counts. Times are processor times of this process, in which waiting for a busy machine does not count: at a load of ten
 processes on two cores, the wall-clock time of the kernel varied by a factor of 38 (0.8 to 30 ms in 98 % of the calls),
 its processor time by a factor of 1.2. What other processes or a graphics card do for an estimator is not measured.
+
+A variant with memory gets frames in order, because its time depends on the people whom it follows.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mvpose.pipeline import SequenceEstimator
 from simharness.gate.reference_kernel import reference_work
 from simharness.trial.stages.estimation import EstimateFrames
 
 if TYPE_CHECKING:
+    from mvpose import Detections, Rig
+    from mvpose.arrays import Floats
     from mvpose.pipeline import Estimator
     from simharness.trial.stages.detected_sequence import DetectedSequence
 
@@ -27,6 +32,9 @@ REPETITIONS = 3
 
 FRAMES = 5
 """Largest number of frames that are timed, spread evenly over the sequence."""
+
+TRACKED_FRAMES = 20
+"""Largest number of frames that are timed of a variant with memory: the first ones."""
 
 
 def relative_times(
@@ -48,17 +56,52 @@ def relative_times(
     """
     inputs = EstimateFrames(detected.rig, detected.frames, pipelines)
     timed = np.unique(np.linspace(0, len(detected.frames) - 1, frames).round().astype(int))
+    first = range(min(len(detected.frames), TRACKED_FRAMES))
+    times = {}
+    for name, pipeline in pipelines.items():
+        if isinstance(pipeline, SequenceEstimator):
+            given = [inputs.input_of(frame, name) for frame in first]
+            method, reference = _times_in_order(pipeline, detected.rig, given, repetitions)
+        else:
+            given = [inputs.input_of(int(frame), name) for frame in timed]
+            method, reference = _times_of_frames(pipeline, detected.rig, given, repetitions)
+        times[name] = float(method / reference)
+    return times
+
+
+def _times_of_frames(
+    pipeline: Estimator, rig: Rig, frames: Sequence[Detections], repetitions: int
+) -> tuple[float, float]:
+    """Return the time of single frames, and that of the reference kernel as many times, seconds."""
     work = reference_work()
-    method = {name: np.full((len(timed), repetitions), np.inf) for name in pipelines}
-    reference = np.full((len(timed), repetitions * len(pipelines)), np.inf)
-    for row, frame in enumerate(timed):
-        for place, (name, pipeline) in enumerate(pipelines.items()):
-            detections = inputs.input_of(int(frame), name)
-            for repetition in range(repetitions):
-                reference[row, place * repetitions + repetition] = _seconds(work)
-                method[name][row, repetition] = _seconds(lambda: pipeline.estimate(detected.rig, detections))  # noqa: B023
-    total = reference.min(axis=1).sum()
-    return {name: float(times.min(axis=1).sum() / total) for name, times in method.items()}
+    method, reference = np.empty((2, len(frames), repetitions))
+    for row, detections in enumerate(frames):
+        for repetition in range(repetitions):
+            reference[row, repetition] = _seconds(work)
+            method[row, repetition] = _seconds(lambda: pipeline.estimate(rig, detections))  # noqa: B023
+    return float(method.min(axis=1).sum()), float(reference.min(axis=1).sum())
+
+
+def _times_in_order(
+    pipeline: SequenceEstimator, rig: Rig, frames: Sequence[Detections], repetitions: int
+) -> tuple[float, float]:
+    """Return the time of a sequence of frames, and that of the reference kernel once for each, seconds."""
+    work = reference_work()
+    method, reference = np.empty(repetitions), np.empty((len(frames), repetitions))
+    for repetition in range(repetitions):
+        feed = _beside_reference(frames, work, reference[:, repetition])
+        total = _seconds(lambda: list(pipeline.track(rig, feed)))  # noqa: B023
+        method[repetition] = total - reference[:, repetition].sum()
+    return float(method.min()), float(reference.min(axis=1).sum())
+
+
+def _beside_reference(
+    frames: Sequence[Detections], work: Callable[[], object], seconds: Floats
+) -> Iterator[Detections]:
+    """Yield frames, and write the time of the reference kernel before each, (T,)."""
+    for index, detections in enumerate(frames):
+        seconds[index] = _seconds(work)
+        yield detections
 
 
 def _seconds(work: Callable[[], object]) -> float:

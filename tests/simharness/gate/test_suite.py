@@ -60,6 +60,23 @@ def test_times_are_in_units_of_the_reference_on_any_machine(study):
     assert times["six"] / times["three"] == pytest.approx(2.0, rel=0.25)
 
 
+class BusyInOrder(Busy):
+    """The same with memory: it answers for all frames together, after the last one."""
+
+    def track(self, rig, frames):
+        taken = list(frames)
+        for _ in taken:
+            self.estimate(rig, None)
+        yield from taken
+
+
+def test_times_of_variants_with_memory_are_in_units_of_the_reference(study):
+    detected = run_trial(study.at(study.settings[0], 0), until="detect").detected
+    times = relative_times(detected, {"one": BusyInOrder(1), "three": BusyInOrder(3)}, repetitions=5)
+    assert times["one"] == pytest.approx(1.0, rel=0.25)
+    assert times["three"] == pytest.approx(3.0, rel=0.25)
+
+
 class TestFingerprint:
     def test_changes_with_settings_seeds_and_variants(self, study):
         path, one = study.path, fingerprint(study)
