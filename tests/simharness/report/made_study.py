@@ -52,7 +52,9 @@ def make_study(
         scenario = Scenario(name="made", seed=seed).model_dump_json()
         for variant in variants:
             rng = stream(seed, "made study", variant, number)
-            scores: dict[str, float | None] = {key: float(rng.uniform(1, 2)) for key in SCORES}
+            scores: dict[str, float | None] = {
+                key: float(stream(seed, "made scores", variant, number, key).uniform(1, 2)) for key in SCORES
+            }
             scores["pcp"] = pcp_of(variant, setting, seed, slope)
             trials.append(
                 {"trial": trial, "case": case, "varied": varied, "seed": seed, "variant": variant}
