@@ -129,7 +129,7 @@ def _people(trial: Trial) -> list[dict[str, Any]]:
             "stature": _short(body.stature),
             "mass": _short(body.mass),
         }
-        for person, (role, body) in enumerate(zip(roles(scenario.people), trial.scene.bodies, strict=True))
+        for person, (role, body) in enumerate(zip(roles(scenario), trial.scene.bodies, strict=True))
     ]
 
 

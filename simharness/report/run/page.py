@@ -106,7 +106,7 @@ def _parts_table(variants: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _people_table(record: Record, variant: str) -> list[dict[str, Any]]:
     """Return the table of people: a row with the scores of each true person."""
     errors, parts = person_errors(record.scores, variant), _parts(record.scores, variant)
-    doing = roles(record.scenario.people)
+    doing = roles(record.scenario)
     rows = []
     for person in range(errors.shape[1]):
         person_error, counted = errors[:, person], parts[:, person] != Part.UNDEFINED

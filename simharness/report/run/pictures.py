@@ -17,7 +17,7 @@ from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic
 from simharness.report.figures.overlay import COCO17_BODY, Overlay
 from simharness.report.figures.palette import TRUTH, UNMATCHED, Color, person_color
-from simharness.scenario.sections.people import People
+from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record
 from simharness.trial.stages.build_trial import Trial
 from simharness.trial.stages.capture import picture_source_of
@@ -143,7 +143,7 @@ def draw_frame(
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
     titles = [rig[view].name for view in views]
     if explained:
-        tiles.append(legend(_legend_entries(trial.scenario.people), size=rig[0].size, title="Legend"))
+        tiles.append(legend(_legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
         titles.append("")
     return mosaic(tiles, titles)
 
@@ -207,10 +207,10 @@ def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, ass
     overlay.skeleton(detections.keypoints[index], color=color, edges=(), dots=2.6, outline=0.9)
 
 
-def _legend_entries(people: People) -> list[tuple[Mark, Color, str]]:
+def _legend_entries(scenario: Scenario) -> list[tuple[Mark, Color, str]]:
     named: Sequence[tuple[Mark, Color, str]] = [
         ("limbs", person_color(person), f"estimate of person {person} ({role})")
-        for person, role in enumerate(roles(people)[:MAX_NAMED])
+        for person, role in enumerate(roles(scenario)[:MAX_NAMED])
     ]
     return [
         ("skeleton", TRUTH, "true skeleton"),

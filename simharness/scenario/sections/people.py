@@ -29,6 +29,10 @@ ActivityName = Literal[
     "hug",
     "hand_over",
     "table",
+    "cross",
+    "swap",
+    "hide",
+    "visit",
     "mocap",
 ]
 
@@ -48,6 +52,19 @@ class Mocap(Section):
     def tracks(self) -> bool:
         """Whether the file holds joint tracks, which people re-enact."""
         return self.file.lower().endswith(".npz")
+
+
+class Traffic(Section):
+    """People who come and go: through doors in the walls, or over the edge of a room without walls."""
+
+    entering: Share = Field(
+        0.0, description="share of the people who are not there from the beginning; drawn for each person"
+    )
+    leaving: Share = Field(0.0, description="share of the people who leave before the end; drawn for each person")
+    away: Span = Field(
+        0.0, description="time after which those who left come back through the same door, seconds; 0: they stay away"
+    )
+    doors: int = Field(2, ge=1, le=8, description="number of doors, which everyone uses")
 
 
 class People(Section):
@@ -70,6 +87,18 @@ class People(Section):
         description="radius around the origin that people keep free, metres; the first object of [clutter] is there",
     )
     spacing: Length = Field(0.8, description="smallest distance between the pelvises of two people, metres")
+    passing: float = Field(0.5, ge=0.4, le=3.0, description='distance between the lanes of "cross" and "swap", metres')
+    group: int = Field(
+        2, ge=2, le=40, description='number of people who do "cross" or "swap" together, half of them in each direction'
+    )
+    hidden: float = Field(
+        3.0,
+        ge=1.0,
+        le=600.0,
+        description='time in the booth of "hide", in which no camera sees the person, seconds; at least the time that '
+        "the person needs to walk through it",
+    )
+    traffic: Traffic = Traffic()
     children: Share = Field(0.0, description="probability that a person is a child of 5 to 12 years")
     look_alike: Share = Field(
         0.0, description="similarity of clothes; 0: all people are dressed differently; 1: all wear one uniform"

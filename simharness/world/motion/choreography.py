@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose.arrays import Floats
-from simharness.scenario.sections.scenario import People, Scenario
+from mvpose.arrays import Bools, Floats
+from simharness.scenario.sections.scenario import Scenario
 from simharness.types.random_streams import stream
 from simharness.world.motion.contact import ContactModel, SampledBody
 from simharness.world.motion.motion import Motion
@@ -18,9 +18,18 @@ from simharness.world.motion.paths import Loop, RecordedPath, Spot, Track, rotat
 from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.presence import ALWAYS, Presence
-from simharness.world.motion.registry import Activity, activities, solo
-from simharness.world.motion.track_planning import LoopRequest, RecordedRequest, SpotRequest, TrackRequest, plan_tracks
+from simharness.world.motion.registry import Activity, configured_activities, solo
+from simharness.world.motion.routes import Route
+from simharness.world.motion.track_planning import (
+    LoopRequest,
+    RecordedRequest,
+    SpotRequest,
+    TrackRequest,
+    VisitRequest,
+    plan_tracks,
+)
 from simharness.world.motion.trajectory import Trajectory
+from simharness.world.motion.visits import Door, Visitor, draw_doors
 
 _PACE = (1.05, 1.25)  # steps in a room are short and quick
 _GRAVITY = 9.81
@@ -28,6 +37,8 @@ _RUNNING = 0.7  # speed over sqrt(g x leg length) at which people change from wa
 _DEEPEST = 0.01  # metres: largest penetration of people of different groups
 _BESIDE = 0.3  # metres: least distance of a pelvis from the footprint of another group's prop
 _CHECKS = 3  # every third time of a motion planned at ``RATE`` is checked for contact
+_STAYING = ("mocap", "hide")  # activities of one person who never becomes a visitor
+_NO_CAMERAS = np.zeros((0, 3))
 _ORIGIN = Spot(place=np.zeros(2), bearing=0.0)
 
 
@@ -42,7 +53,7 @@ class Choreography:
 
 @dataclass(frozen=True)
 class Group:
-    """Performers of one activity: one person, or two.
+    """Performers of one activity: one person, two, or more.
 
     Attributes:
         people: indices of the people.
@@ -54,7 +65,12 @@ class Group:
 
 
 def choreograph(
-    scenario: Scenario, cast: Sequence[Kinematics], time: Floats, *, widest: float | None = None
+    scenario: Scenario,
+    cast: Sequence[Kinematics],
+    time: Floats,
+    *,
+    widest: float | None = None,
+    cameras: Floats = _NO_CAMERAS,
 ) -> Choreography:
     """Plan the motions and props of all people.
 
@@ -69,6 +85,7 @@ def choreograph(
         time: times in seconds at which motions are planned, (N,), see ``motion_clock``.
         widest: largest ``people.area`` that the room allows, metres: what a recorded path may use that does not fit
             into ``people.area``; None: ``people.area``.
+        cameras: positions of the cameras, (V, 3) metres, of which doors keep clear.
 
     Raises:
         ValueError: people do not fit; the message names the keys of the scenario to change.
@@ -76,7 +93,7 @@ def choreograph(
     people = scenario.people
     if people.motion.tracks:
         return Choreography(_reenacted(scenario, cast, time), props=(), presence=(ALWAYS,) * len(cast))
-    known = dict(activities())
+    known = configured_activities(people)
     if "mocap" in people.activities:
         known["mocap"] = _recorded(scenario)
     missing = [name for name in people.activities if name not in known]
@@ -85,8 +102,10 @@ def choreograph(
             f"people.activities: no module registers the activity {missing[0]!r}; registered are "
             f"{', '.join(sorted(known))}"
         )
-    groups = assign_activities([known[name] for name in people.activities], people.count, fallback=known["stand"])
-    stage = _Stage(scenario.seed, groups, cast, time, people.spacing)
+    groups = _groups(scenario, known)
+    visitors = any(group.activity.track is Route for group in groups)
+    doors = draw_doors(scenario.seed, people.traffic, scenario.room, cameras) if visitors else ()
+    stage = _Stage(scenario, groups, cast, time, doors)
     plan_tracks(
         scenario.seed,
         stage.requests,
@@ -100,7 +119,10 @@ def choreograph(
     )
     return Choreography(
         motions=tuple(motion for performance in stage.performances for motion in performance.motions),
-        props=tuple(prop for performance in stage.performances for prop in performance.props),
+        props=(
+            *(prop for performance in stage.performances for prop in performance.props),
+            *(door.prop for door in doors if scenario.room.walls),
+        ),
         presence=tuple(each for performance in stage.performances for each in performance.presence),
     )
 
@@ -111,25 +133,47 @@ def assign_activities(activities: Sequence[Activity], count: int, *, fallback: A
     Args:
         activities: activities in their order, repeated after the last one.
         count: number of people.
-        fallback: activity of the last person, if the one in turn needs a partner and none is left.
+        fallback: activity of a person, if too few are left for the one in turn.
     """
     groups: list[Group] = []
     first = 0
     while first < count:
         activity = activities[len(groups) % len(activities)]
-        if first + activity.performers > count:
-            activity = fallback
-        groups.append(Group(tuple(range(first, first + activity.performers)), activity))
-        first += activity.performers
+        performers = min(activity.performers, count - first)
+        if performers < (activity.fewest or activity.performers):
+            activity, performers = fallback, fallback.performers
+        groups.append(Group(tuple(range(first, first + performers)), activity))
+        first += performers
     return tuple(groups)
 
 
-def roles(people: People) -> tuple[str, ...]:
+def roles(scenario: Scenario) -> tuple[str, ...]:
     """Return the name of the activity of each person of a scenario."""
-    known = dict(activities())
+    known = configured_activities(scenario.people)
     known["mocap"] = replace(known["stand"], name="mocap")
-    groups = assign_activities([known[name] for name in people.activities], people.count, fallback=known["stand"])
+    groups = _groups(scenario, known)
     return tuple(group.activity.name for group in groups for _ in group.people)
+
+
+def _groups(scenario: Scenario, known: Mapping[str, Activity]) -> tuple[Group, ...]:
+    """Return the groups of a scenario; a person who does something alone and enters or leaves is a visitor."""
+    people = scenario.people
+    groups = assign_activities([known[name] for name in people.activities], people.count, fallback=known["stand"])
+    return tuple(
+        replace(group, activity=known["visit"])
+        if group.activity.performers == 1
+        and group.activity.name not in _STAYING
+        and any(_traffic(scenario, group.people[0]))
+        else group
+        for group in groups
+    )
+
+
+def _traffic(scenario: Scenario, person: int) -> tuple[bool, bool]:
+    """Return whether a person enters after the beginning and leaves before the end, drawn from the person's stream."""
+    traffic = scenario.people.traffic
+    enters, leaves = stream(scenario.seed, "people", person, "traffic").uniform(size=2)
+    return bool(enters < traffic.entering), bool(leaves < traffic.leaving)
 
 
 def _recorded(scenario: Scenario) -> Activity:
@@ -179,14 +223,21 @@ class _Stage:
     """
 
     def __init__(
-        self, seed: int, groups: Sequence[Group], cast: Sequence[Kinematics], time: Floats, spacing: float
+        self,
+        scenario: Scenario,
+        groups: Sequence[Group],
+        cast: Sequence[Kinematics],
+        time: Floats,
+        doors: tuple[Door, ...],
     ) -> None:
-        self._groups, self._cast, self._time, self._spacing = groups, cast, time, spacing
+        seed = scenario.seed
+        self._scenario, self._doors, self._spacing = scenario, doors, scenario.people.spacing
+        self._groups, self._cast, self._time = groups, cast, time
         self._contacts = ContactModel(cast)
         self._checks = time[::_CHECKS]
         self._performing: list[partial[Performance]] = []
         self._at_origin: dict[int, Performance] = {}
-        self._placed: dict[int, tuple[Performance, list[SampledBody]]] = {}  # of the groups that have a track
+        self._placed: dict[int, tuple[Performance, list[_Present]]] = {}  # of the groups that have a track
         self.requests: list[TrackRequest] = []
         for index, group in enumerate(groups):
             manner = stream(seed, "people", group.people[0], "gait")
@@ -203,13 +254,16 @@ class _Stage:
         """Accept a track unless its group would touch another one, or one would obstruct the props of the other."""
         for group in set(self._placed) - set(before):  # groups of an abandoned plan
             del self._placed[group]
-        if isinstance(track, Loop):
+        if isinstance(track, Loop | Route):
             performance = self._performing[index](track)
         else:
             spot = track.spot if isinstance(track, RecordedPath) else track
             performance = move_to(self._origin(index), spot)
-        movers = zip(self._groups[index].people, performance.motions, strict=True)
-        bodies = [self._contacts.sample(person, motion, self._checks) for person, motion in movers]
+        movers = zip(self._groups[index].people, performance.motions, performance.presence, strict=True)
+        bodies = [
+            _Present(self._contacts.sample(person, motion, self._checks), presence.at(self._checks))
+            for person, motion, presence in movers
+        ]
         if self._collides(performance, bodies):
             return False
         self._placed[index] = (performance, bodies)
@@ -229,8 +283,11 @@ class _Stage:
     def _request(self, index: int, activity: Activity, mover: Kinematics, froude: float) -> TrackRequest:
         if activity.name == "mocap":
             return RecordedRequest(activity.name, self._time, self._origin(index).motions[0].root[:, :2])
+        if activity.track is Route:
+            return VisitRequest(activity.name, self._visitor(index, mover, froude))
         if activity.track is not Loop:
-            return SpotRequest(activity.name, activity.clearance, activity.performers > 1)
+            people = len(self._groups[index].people)
+            return SpotRequest(activity.name, activity.clearance, people > 1, people)
         unit = np.sqrt(_GRAVITY * mover.leg_length)
         slowest, fastest = (unit * limit for limit in activity.froude)
         running = activity.froude[1] > _RUNNING
@@ -238,18 +295,48 @@ class _Stage:
             slowest = min(slowest, unit * _RUNNING)
         return LoopRequest(activity.name, unit * froude, slowest, fastest, running)
 
-    def _collides(self, performance: Performance, bodies: Sequence[SampledBody]) -> bool:
+    def _visitor(self, index: int, mover: Kinematics, froude: float) -> Visitor:
+        """Return the plan of a visitor; without people.traffic every visitor comes and goes."""
+        traffic = self._scenario.people.traffic
+        entering, leaving = _traffic(self._scenario, self._groups[index].people[0])
+        always = not (traffic.entering or traffic.leaving)
+        return Visitor(
+            entering=entering or always,
+            leaving=leaving or always,
+            away=traffic.away,
+            speed=float(np.sqrt(_GRAVITY * mover.leg_length)) * froude,
+            doors=self._doors,
+            room=self._scenario.room,
+            duration=self._scenario.duration,
+        )
+
+    def _collides(self, performance: Performance, bodies: Sequence[_Present]) -> bool:
         """Return whether a performance comes too near to those of other groups."""
         others = [presence for _, others in self._placed.values() for presence in others]
         for one in bodies:
             for other in others:
-                apart = np.linalg.norm(one.motion.root[:, :2] - other.motion.root[:, :2], axis=1)
-                if apart.min() < self._spacing or self._contacts.penetration(one, other).max() > _DEEPEST:
+                both = one.here & other.here
+                apart = np.linalg.norm(one.motion.root[:, :2] - other.motion.root[:, :2], axis=1)[both]
+                if apart.min(initial=np.inf) < self._spacing:
+                    return True
+                if both.any() and self._contacts.penetration(one.body, other.body)[both].max() > _DEEPEST:
                     return True
         before = [prop for earlier, _ in self._placed.values() for prop in earlier.props]
         return any(obstructs(prop, one.motion) for prop in before for one in bodies) or any(
             obstructs(prop, other.motion) for prop in performance.props for other in others
         )
+
+
+@dataclass(frozen=True)
+class _Present:
+    """Sampled body of a person, and whether the person is in the scene at these times, (N,)."""
+
+    body: SampledBody
+    here: Bools
+
+    @property
+    def motion(self) -> Motion:
+        return self.body.motion
 
 
 def move_to(performance: Performance, spot: Spot) -> Performance:

@@ -1,4 +1,7 @@
-"""Tracks of people on the floor: spots, smooth closed loops to walk or run round, and recorded paths."""
+"""Tracks of people on the floor: spots, smooth closed loops to walk or run round, and recorded paths.
+
+Routes, which people walk with stops, are in :mod:`simharness.world.motion.routes`.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from mvpose.arrays import Floats
+from simharness.world.motion.routes import Route
 
 SWAY = 0.05  # metres: largest distance of a pelvis from its track, due to sway, weight shifts and reaching
 _TIGHTEST = 0.8  # metres: smallest turning radius where there is room
@@ -103,7 +107,7 @@ class RecordedPath:
         return self.spot.place + path @ rotation_2d(self.spot.bearing).T
 
 
-Track = Spot | Loop | RecordedPath
+Track = Spot | Loop | RecordedPath | Route
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from simharness.world.motion.motion import Motion
 from simharness.world.motion.presence import ALWAYS, Presence
 from simharness.world.motion.trajectory import Trajectory
 
-PropKind = Literal["chair", "table", "box", "step", "bottle"]
+PropKind = Literal["chair", "table", "box", "step", "bottle", "booth", "door"]
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,12 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from mvpose.arrays import Floats
-from simharness.scenario.sections.people import ActivityName
+from simharness.scenario.sections.people import ActivityName, People
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop, Spot, Track
 from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.routes import Route
 
 _PACKAGES = ("simharness.world.motion.activities", "simharness.world.motion.interactions")
 _STROLL = (0.28, 0.39)  # Froude numbers: people stroll in a room; 0.42 is comfortable outdoors
@@ -54,9 +55,9 @@ class Activity:
 
     Attributes:
         name: name in scenario files.
-        performers: number of people that it takes, 1 or 2.
-        track: kind of track: a :class:`Loop` to walk or run round, or a :class:`Spot`. Two performers share a spot: its
-            place is midway between them, and its bearing points from the first to the second.
+        performers: number of people that it takes.
+        track: kind of track: a :class:`Loop` to walk or run round, a :class:`Spot`, or the :class:`Route` of a visitor.
+            Performers share a spot: its place is in the middle, and its bearing points from the first to the second.
         clearance: radius in metres around the track's position that the performers' pelvises may use; their arms may
             reach beyond. Tracks of other people stay ``people.spacing`` further away.
         froude: lowest and highest speed over sqrt(g x leg length), for activities on a loop.
@@ -64,23 +65,30 @@ class Activity:
             to plan (ascending, at ``RATE``), with the keywords ``rng`` (random generator for the manner) and ``pace``
             (cadence relative to the usual one); returns a :class:`Performance`. Apart from its ends, the result must
             not depend on the length of ``time``.
+        fewest: least number of people that it takes, where fewer are left; 0: ``performers``.
+        configured: function of the activity and the section ``[people]`` of a scenario that returns the activity with
+            the parameters of the scenario.
     """
 
     name: str
     performers: int
-    track: type[Loop] | type[Spot]
+    track: type[Loop] | type[Spot] | type[Route]
     clearance: float
     perform: Callable[..., Performance]
     froude: tuple[float, float] = _STROLL
+    fewest: int = 0
+    configured: Callable[[Activity, People], Activity] = lambda each, people: each
 
 
 def activity(
     name: str,
     *,
     performers: int = 1,
-    track: type[Loop] | type[Spot] = Spot,
+    track: type[Loop] | type[Spot] | type[Route] = Spot,
     clearance: float = 0.0,
     froude: tuple[float, float] = _STROLL,
+    fewest: int = 0,
+    configured: Callable[[Activity, People], Activity] = lambda each, people: each,
 ) -> Callable[[Perform], Perform]:
     """Register the decorated function as an activity; the arguments are the attributes of :class:`Activity`.
 
@@ -90,7 +98,7 @@ def activity(
     def register(perform: Perform) -> Perform:
         if name in _registered:
             raise ValueError(f"the activity {name!r} is registered twice: choose another name for one of them")
-        _registered[name] = Activity(name, performers, track, clearance, perform, froude)
+        _registered[name] = Activity(name, performers, track, clearance, perform, froude, fewest, configured)
         return perform
 
     return register
@@ -99,7 +107,7 @@ def activity(
 def solo_activity(
     name: str,
     *,
-    track: type[Loop] | type[Spot] = Spot,
+    track: type[Loop] | type[Spot] | type[Route] = Spot,
     clearance: float = 0.0,
     froude: tuple[float, float] = _STROLL,
 ) -> Callable[[Move], Move]:
@@ -147,3 +155,8 @@ def activities() -> Mapping[str, Activity]:
             "ActivityName in simharness/scenario/sections/people.py"
         )
     return MappingProxyType({name: _registered[name] for name in names if name in _registered})
+
+
+def configured_activities(people: People) -> dict[str, Activity]:
+    """Return all registered activities by name, with the parameters of a scenario."""
+    return {name: each.configured(each, people) for name, each in activities().items()}

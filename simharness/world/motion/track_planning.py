@@ -19,6 +19,8 @@ from simharness.world.motion.paths import (
     draw_spot,
     loop_limits,
 )
+from simharness.world.motion.routes import Route
+from simharness.world.motion.visits import Visitor
 
 _NARROWEST = 0.45  # metres: half side of the smallest square to walk round in
 _ALONE = (0.7, -0.2)  # fraction of the draws before a person may follow another on the same loop; less with each plan
@@ -28,8 +30,10 @@ _ROUND_RATIOS = np.array([1.0, 2.0, 0.5, 1.5, 2 / 3])  # ratios of round times: 
 _STARTS = 6  # start positions tried on each loop
 _TRIES = 300  # draws for each group before the plan starts over
 _REFUSALS = 25  # rejected tracks of one group before the plan starts over: ``admit`` is slow
+_VISIT_TRIES = 40  # draws for each visitor: each tries many ways
 _PLANS = 10  # plans before giving up; later ones let people follow each other sooner
 _COARSE, _FINE = 0.25, 1 / 32  # seconds between distance checks: everywhere, and where the distance may be too small
+_FREE, _FREE_MARGIN = 0.1, 0.05  # seconds between checks of a visitor's way, and metres that may be missed between two
 _SCREEN = 16  # every sixteenth coarse check comes first: most draws fail there
 
 
@@ -59,12 +63,14 @@ class SpotRequest:
     Attributes:
         activity: name of the activity.
         clearance: radius around the spot that the performers use, metres.
-        together: whether the spot is the midpoint between two people.
+        together: whether the spot is the midpoint between people.
+        people: number of people who use it; 0: two if ``together``, else one.
     """
 
     activity: str
     clearance: float = 0.0
     together: bool = False
+    people: int = 0
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,15 @@ class RecordedRequest:
     offset: Floats
 
 
-TrackRequest = LoopRequest | SpotRequest | RecordedRequest
+@dataclass(frozen=True)
+class VisitRequest:
+    """Request for the route of a visitor."""
+
+    activity: str
+    visitor: Visitor
+
+
+TrackRequest = LoopRequest | SpotRequest | RecordedRequest | VisitRequest
 Admit = Callable[[int, Track, Sequence[int]], bool]
 """Condition on tracks: (index of the request, its track, indices of the requests that have one) to accepted or not."""
 
@@ -96,7 +110,8 @@ def plan_tracks(
     """Find a track for every request that stays in the area and away from all other tracks at all times.
 
     Two tracks keep ``spacing`` plus both clearances apart. Requests are served one after another with separate random
-    streams, so that one more leaves the earlier tracks where they are. If a request finds no track, the whole plan
+    streams, so that one more leaves the earlier tracks where they are; visitors, who find their way round the others,
+    are last. If a request finds no track, the whole plan
     starts over with other draws; then requests that need most room are served first, and spots are placed in corners
     and close to each other.
 
@@ -127,6 +142,7 @@ def plan_tracks(
         order = list(range(len(requests)))
         if plan:
             order.sort(key=lambda index: _urgency(requests[index], movers_first=plan % 2 == 0))
+        order.sort(key=lambda index: isinstance(requests[index], VisitRequest))
         for index in order:
             rng = stream(seed, "people", people[index], "track", plan)
             square = _square(requests[index], half, limit, plan)
@@ -159,6 +175,8 @@ def _place(
         _draw(rng, request, board, half=half, wide=wide, following=_FOLLOWING if attempt >= alone else 0.0)
         for attempt in range(_TRIES)
     )
+    if isinstance(request, VisitRequest):
+        drawn = (_draw_visit(rng, request, board, half=half) for _ in range(_VISIT_TRIES))
     candidates: Iterable[Track] = (track for tracks in drawn for track in tracks if board.apart(track, request))
     if plan and isinstance(request, SpotRequest):
         candidates = sorted(candidates, key=lambda track: board.elbow_room(track, request, half))
@@ -184,13 +202,18 @@ class _Board:
         self._taken = np.empty((0, len(self._time), 2))
 
     @property
+    def start(self) -> float:
+        """First time of the plan, seconds."""
+        return float(self._time[0])
+
+    @property
     def loops(self) -> list[Loop]:
         return [track for track in self.tracks.values() if isinstance(track, Loop)]
 
     def add(self, index: int, track: Track, request: TrackRequest) -> None:
         self.tracks[index] = track
         self._needs.append(_clearance(request))
-        self._taken = np.concatenate([self._taken, track.position(self._time)[None]])
+        self._taken = np.concatenate([self._taken, _places(track, self._time)[None]])
 
     def apart(self, track: Track, request: TrackRequest) -> bool:
         """Return whether a track keeps its distance from the centre and, at all times, from all other tracks."""
@@ -200,9 +223,9 @@ class _Board:
             return True
         least = self._spacing + 2 * SWAY + _clearance(request) + np.array(self._needs)[:, None]
         screen = self._time[::_SCREEN]
-        if (_distance(track.position(screen), self._taken[:, ::_SCREEN]) < least).any():
+        if (_distance(_places(track, screen), self._taken[:, ::_SCREEN]) < least).any():
             return False
-        slack = _distance(track.position(self._time), self._taken) - least
+        slack = _distance(_places(track, self._time), self._taken) - least
         if (slack < 0).any():
             return False
         # Between two checks two people approach by at most the paths that both cover in half of that time.
@@ -212,7 +235,18 @@ class _Board:
         between = np.arange(-step / 2, step / 2, _FINE)
         for k in np.flatnonzero((slack < closing).any(axis=1)):
             times = (self._time[slack[k] < closing[k]][:, None] + between).clip(self._time[0], self._time[-1])
-            if (_distance(track.position(times), others[k].position(times)) < least[k]).any():
+            if (_distance(_places(track, times), _places(others[k], times)) < least[k]).any():
+                return False
+        return True
+
+    def free(self, route: Route, start: float, end: float) -> bool:
+        """Return whether a route keeps its distance from all tracks between two times, checked coarsely."""
+        times = np.arange(start, end + _FREE, _FREE)
+        places = _places(route, times)
+        if (np.hypot(*places.T) < self._around + SWAY).any() and self._around:
+            return False
+        for other, need in zip(self.tracks.values(), self._needs, strict=True):
+            if (_distance(places, _places(other, times)) < self._spacing + 2 * SWAY + need + _FREE_MARGIN).any():
                 return False
         return True
 
@@ -234,6 +268,13 @@ class _Board:
         return float(np.minimum(others, half - _clearance(request) - np.abs(place)).sum())
 
 
+def _places(track: Track, time: Floats) -> Floats:
+    """Return the positions of a track at times (...), (..., 2) metres; NaN, which is near nobody, while absent."""
+    if not isinstance(track, Route) or track.presence.always:
+        return track.position(time)
+    return np.where(track.presence.at(time)[..., None], track.position(time), np.nan)
+
+
 def _distance(one: Floats, other: Floats) -> Floats:
     return np.hypot(other[..., 0] - one[..., 0], other[..., 1] - one[..., 1])
 
@@ -248,7 +289,9 @@ def _urgency(request: TrackRequest, *, movers_first: bool) -> tuple[bool, float]
 
 
 def _people(request: TrackRequest) -> int:
-    return 2 if isinstance(request, SpotRequest) and request.together else 1
+    if not isinstance(request, SpotRequest):
+        return 1
+    return request.people or (2 if request.together else 1)
 
 
 def _limits(request: LoopRequest, half: float) -> LoopLimits:
@@ -266,6 +309,7 @@ def _draw(
     if isinstance(request, RecordedRequest):
         recorded = draw_recorded(rng, half=half, time=request.time, offset=request.offset)
         return [] if recorded is None else [recorded]
+    assert isinstance(request, LoopRequest)  # visitors have :func:`_draw_visit`
     limits = _limits(request, half)
     follows, which = rng.uniform(size=2)
     starts = rng.uniform(size=_STARTS)
@@ -284,6 +328,12 @@ def _draw(
         fit = speeds[(limits.slowest <= speeds) & (speeds <= limits.fastest)]
         loop = replace(loop, speed=float(fit[0])) if len(fit) else loop
     return [replace(loop, start=float(start) * loop.length) for start in starts]
+
+
+def _draw_visit(rng: np.random.Generator, request: VisitRequest, board: _Board, *, half: float) -> Sequence[Track]:
+    """Draw a route of a visitor round the other tracks, possibly none."""
+    route = request.visitor.draw(rng, half=half, start=board.start, free=board.free)
+    return [] if route is None else [route]
 
 
 def _square(request: TrackRequest, half: float, limit: float, plan: int) -> float:

@@ -96,7 +96,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
     bodies = tuple(dress(make_body(shape), look) for shape, look in zip(_shapes(scenario), looks, strict=True))
     cast = [Kinematics(body) for body in bodies]
-    plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario))
+    plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario), cameras=rig.centers)
     props = tuple(make_prop(prop, name=f"prop{k} {prop.kind}") for k, prop in enumerate(plan.props))
     motions = plan.motions
     present = [presence.at(clock) for presence in plan.presence]

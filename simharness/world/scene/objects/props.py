@@ -20,6 +20,9 @@ Size = tuple[float, float, float]
 _STILL = 1e-9  # metres and quaternion units: smaller changes are no motion
 _GLASS = np.array([[0.24, 0.46, 0.36], [0.30, 0.42, 0.62], [0.62, 0.30, 0.26]])
 _LABEL = np.array([0.93, 0.92, 0.86])
+_BOARD, _FOLDS = 0.03, 14  # metres: thickness of the walls of a booth; folds of a curtain
+_POST = 0.07  # metres: width of the frame of a door
+_CORRIDOR = np.array([0.09, 0.09, 0.10])
 _CAP = np.array([0.85, 0.85, 0.84])
 
 
@@ -65,6 +68,36 @@ def _bottle(size: Size, tint: int) -> ObjectModel:
     return Assembly().mesh(lathe(profile, colors, sides=14)).model()
 
 
+def _booth(size: Size, tint: int) -> ObjectModel:
+    """Return a closed booth: walls on both sides, a roof, and curtains in folds at both ends of its x axis."""
+    depth, width, height = size
+    side = np.array([[0.78, 0.76, 0.72], [0.66, 0.70, 0.74], [0.74, 0.70, 0.62]])[tint % 3]
+    curtain = np.array([[0.46, 0.16, 0.18], [0.16, 0.26, 0.42], [0.20, 0.36, 0.26]])[tint % 3]
+    made = Assembly()
+    for y in (-1, 1):
+        made.box((0, y * (width / 2 - _BOARD / 2), height / 2), (depth, _BOARD, height), side)
+    made.box((0, 0, height - _BOARD / 2), (depth, width - 2 * _BOARD, _BOARD), 0.8 * side)
+    inner = width - 2 * _BOARD
+    fold = inner / _FOLDS
+    for x in (-1, 1):
+        for k in range(_FOLDS):
+            y = (k + 0.5) * fold - inner / 2
+            shade = curtain * (1.0 if k % 2 else 0.75)
+            back = 0.012 * (k % 2)
+            made.box((x * (depth / 2 - 0.03 - back), y, (height - _BOARD) / 2), (0.02, fold, height - _BOARD), shade)
+    return made.model()
+
+
+def _door(size: Size, tint: int) -> ObjectModel:
+    """Return an open doorway to a dark corridor: an unlit panel in a frame, thin enough to lie on a wall."""
+    depth, width, height = size
+    frame = np.array([[0.86, 0.84, 0.80], [0.62, 0.50, 0.38], [0.50, 0.52, 0.55]])[tint % 3]
+    made = Assembly().box((0, 0, (height - _POST) / 2), (depth / 2, width - 2 * _POST, height - _POST), _CORRIDOR)
+    for y in (-1, 1):
+        made.box((0, y * (width - _POST) / 2, height / 2), (depth, _POST, height), frame)
+    return made.box((0, 0, height - _POST / 2), (depth, width - 2 * _POST, _POST), frame).model()
+
+
 _SHAPES: MappingProxyType[str, Callable[[Size, int], ObjectModel]] = MappingProxyType(
     {
         "chair": lambda size, tint: chair(size, tint=tint),
@@ -72,5 +105,7 @@ _SHAPES: MappingProxyType[str, Callable[[Size, int], ObjectModel]] = MappingProx
         "box": _box,
         "step": _step,
         "bottle": _bottle,
+        "booth": _booth,
+        "door": _door,
     }
 )

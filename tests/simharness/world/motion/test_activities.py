@@ -15,6 +15,7 @@ from simharness.world.motion.paths import SWAY, Loop, Spot, make_loop
 from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.registry import activities, solo_activity
+from simharness.world.motion.routes import Itinerary, Route
 from simharness.world.motion.trajectory import motion_clock
 
 SOLO = {name: each for name, each in activities().items() if each.performers == 1}
@@ -29,7 +30,7 @@ TOUCHING = 0.0015  # metres above the floor, or over the block of "step"
 class Done:
     name: str
     kinematics: Kinematics
-    track: Loop | Spot
+    track: Loop | Spot | Route
     performance: Performance
     joints: np.ndarray  # (T, 17, 3)
     skins: np.ndarray  # (T / 3, n, 3), every third instant
@@ -39,9 +40,13 @@ class Done:
         return self.performance.motions[0]
 
 
-def some_track(name: str, kinematics: Kinematics) -> Loop | Spot:
+def some_track(name: str, kinematics: Kinematics) -> Loop | Spot | Route:
     if SOLO[name].track is Spot:
         return Spot(np.array([0.6, -0.4]), 0.9)
+    if SOLO[name].track is Route:
+        speed = 0.33 * np.sqrt(9.81 * kinematics.leg_length)
+        walker = Itinerary(np.array([-1.0, 0.5]), 0.4, speed, -0.5).walk(2.0).turn(3.0).stand(0.4).walk(0.7)
+        return walker.turn(0.4 + np.pi, sense=-1).walk_to([1.5, -1.0]).route()
     around = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     egg = np.stack([1.7 * np.cos(around), (1.3 + 0.2 * np.cos(around)) * np.sin(around)], axis=-1)
     return make_loop(egg, speed=np.mean(SOLO[name].froude) * np.sqrt(9.81 * kinematics.leg_length), start=0.3)

@@ -16,6 +16,7 @@ from simharness.world.motion.registry import activities
 from simharness.world.motion.trajectory import RATE
 
 PAIRED = {name: each for name, each in activities().items() if each.performers == 2}
+PASSING = ("cross", "swap")  # people walk past each other: test_passing.py
 TIME = np.arange(-1.0, 7.0, 1 / RATE)
 SPOT = Spot(np.array([0.4, -0.3]), 0.8)
 TOUCHING = 0.002  # metres above the floor
@@ -66,7 +67,7 @@ def test_joints_keep_their_limits_and_do_not_jump(played):
         assert (motion.angles <= high + 1e-9).all()
         joints = mover.joints(motion)
         velocity = np.diff(joints, axis=0) * RATE
-        assert np.linalg.norm(velocity, axis=-1).max() < 3.5
+        assert np.linalg.norm(velocity, axis=-1).max() < (6.0 if played.name in PASSING else 3.5)
         assert np.linalg.norm(np.diff(velocity, axis=0), axis=-1).max() * RATE < 60.0
 
 
@@ -82,6 +83,8 @@ def test_pelvises_keep_within_the_clearance(played):
 
 
 def test_first_and_second_face_each_other_along_the_bearing(played):
+    if played.name in PASSING:
+        return
     first, second = (motion.root[:, :2] for motion in played.performance.motions)
     way = second - first
     along = way @ [np.cos(SPOT.bearing), np.sin(SPOT.bearing)]
