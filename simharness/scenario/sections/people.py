@@ -125,6 +125,13 @@ class People(Section):
             raise ValueError(
                 'the activity "mocap" and people.motion = { file = "..." } to go together: give both or neither'
             )
+        if self.playback == "dynamic" and (
+            {"hide", "visit"} & set(self.activities) or self.traffic.entering or self.traffic.leaving
+        ):
+            raise ValueError(
+                'people.playback = "kinematic" with the activities "hide" and "visit" and with people.traffic, because '
+                "simulated contacts stop people at curtains and doors"
+            )
         if self.motion.tracks and set(self.activities) != {"mocap"}:
             raise ValueError(
                 'people.activities = ["mocap"] with the joint tracks of people.motion.file, because every person '

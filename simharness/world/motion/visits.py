@@ -29,9 +29,10 @@ _APART = 1.5  # metres between the middles of two doors in one wall
 _FROM_CAMERA = 0.8  # metres from the passage to a camera
 _DOOR_TRIES = 400
 _ENTRY = (0.05, 0.5)  # shares of the duration in which people come
-_SOON = (0.02, 0.25)  # the same for those who are to leave, too
+_SOON = (0.02, 0.2)  # the same for those who are to leave, too
 _GONE_BY = (0.55, 0.95)  # shares of the duration by which people are gone, if the way to the door takes no longer
-_ENTRIES = 8  # times and doors that are tried to come in
+_NEAR = 4  # places of which the one nearest to both doors is the first of a person who comes and goes
+_ENTRIES = 12  # times and doors that are tried to come in
 _ASIDE = 1.2  # metres along x and y that people make way
 _STAY = (0.4, 2.5)  # seconds of standing at a place
 _PLACES = 16  # places that are tried for each leg
@@ -114,8 +115,11 @@ class Visitor:
         """
         gone, turned = rng.uniform(*_GONE_BY) * self.duration, float(rng.uniform(-np.pi, np.pi))
         entries = rng.uniform(*(_SOON if self.leaving else _ENTRY), _ENTRIES) * self.duration
-        which, places = rng.integers(len(self.doors), size=(_ENTRIES, 2)), rng.uniform(-half, half, (_ENTRIES, 2))
-        for entry, used, place in zip(entries, which, places, strict=True):
+        which = rng.integers(len(self.doors), size=(_ENTRIES, 2))
+        choice = rng.uniform(-half, half, (_ENTRIES, _NEAR, 2))
+        for entry, used, places in zip(entries, which, choice, strict=True):
+            ways = [sum(np.hypot(*(self.doors[k].place - place)) for k in used) for place in places]
+            place = places[int(np.argmin(ways)) if self.leaving else 0]  # who is to leave has no time for a long way
             if self.entering:
                 walker = self._enter(self.doors[used[0]], place, float(entry))
             else:
@@ -131,12 +135,13 @@ class Visitor:
                 return None
             if exit_door is None:
                 break
-            if not self._go_out(walker, rng, exit_door, half=half, free=free):
+            used_door = self._go_out(walker, rng, exit_door, half=half, free=free)
+            if used_door is None:
                 return None
-            if not self.away:
+            if not self.away or walker.time >= end:
                 break
             begun = walker.time
-            walker.stand(self.away).walk_to(exit_door.straight(walker.place))
+            walker.stand(self.away).walk_to(used_door.straight(walker.place))
             if not free(self._route(walker), begun, walker.time + _AHEAD):
                 return None
             gone = walker.time + rng.uniform(0.2, 0.6) * self.duration
@@ -193,20 +198,22 @@ class Visitor:
         way = float(np.hypot(*(door.place - place))) + _OUTSIDE
         return 1.5 * turning_time(np.pi) + walking_time(way, self.speed)
 
-    def _go_out(self, walker: Itinerary, rng: np.random.Generator, door: Door, *, half: float, free: FreeWay) -> bool:
-        """Walk to a door and out; wait before it for as long as the way is not free."""
+    def _go_out(
+        self, walker: Itinerary, rng: np.random.Generator, door: Door, *, half: float, free: FreeWay
+    ) -> Door | None:
+        """Walk to a door and out, or to another one where the way is not free; wait where none is.
 
-        def leave(way: Itinerary) -> Itinerary:
-            if not door.faces(way.place):
-                way.walk_to(door.straight(door.place))
-            return way.walk_to(door.beyond(way.place))
-
+        Returns:
+            The door; None where the person can neither leave nor wait.
+        """
+        doors = [door, *(other for other in self.doors if other is not door)]
         while walker.time < self.duration + _LAST:
-            if walker.attempt(leave, self._free(free)):
-                return True
+            for each in doors:
+                if walker.attempt(partial(_leave, door=each), self._free(free)):
+                    return each
             if not self._make_way(walker, rng, half=half, free=free):
-                return False
-        return True
+                return None
+        return door
 
     def _free(self, free: FreeWay) -> Callable[[Itinerary, float, float], bool]:
         """Return the condition on an itinerary; it asks for time at the end in which to get out of the way."""
@@ -229,6 +236,12 @@ class Visitor:
 
 def _go_and_stay(walker: Itinerary, *, place: Floats, stay: float) -> Itinerary:
     return walker.walk_to(place).stand(stay)
+
+
+def _leave(walker: Itinerary, *, door: Door) -> Itinerary:
+    if not door.faces(walker.place):
+        walker.walk_to(door.straight(door.place))
+    return walker.walk_to(door.beyond(walker.place))
 
 
 def _wait(walker: Itinerary) -> Itinerary:
@@ -286,7 +299,7 @@ def _clear(door: Door, others: Sequence[Door], cameras: Floats) -> bool:
     across = np.abs(along @ [-door.inward[1], door.inward[0]])
     ahead = along @ door.inward
     blocked = (across < _FROM_CAMERA) & (ahead < _INSIDE + _FROM_CAMERA)
-    return min(apart, default=np.inf) >= _APART and not blocked.any()
+    return bool(min(apart, default=np.inf) >= _APART and not blocked.any())
 
 
 def _bearing(direction: Floats) -> float:

@@ -19,7 +19,8 @@ from simharness.world.motion.registry import Activity, activity
 from simharness.world.motion.routes import Itinerary, turning_time
 from simharness.world.motion.trajectory import Trajectory
 
-_DEPTH, _WIDTH = 1.1, 1.1  # metres: size of the booth, along the way and across
+_DEPTH, _WIDTH = 1.4, 1.1  # metres: size of the booth, along the way and across
+_STRIDE = 0.3  # metres from the pelvis to the foremost part of a walking body, which must be behind the curtain
 _OVER_HEAD = 0.25  # metres between the top of the head and the roof
 _ENDS = 1.45  # metres from the middle of the booth to the places where people turn
 _FROUDE = 0.33
@@ -52,10 +53,11 @@ def _perform(
     speed = _FROUDE * float(np.sqrt(_GRAVITY * mover.leg_length))
     offset, sense = rng.uniform(), rng.choice([-1.0, 1.0])
     rests = stream(int(rng.integers(1 << 31)), "hide")  # a longer time takes more draws, and changes no other
-    inside = (_ENDS - _DEPTH / 2, _ENDS + _DEPTH / 2, hidden)
+    inside = (_ENDS - _DEPTH / 2 + _STRIDE, _ENDS + _DEPTH / 2 - _STRIDE, hidden)
     walker = Itinerary(spot_to_world(spot, [-_ENDS, 0.0]), spot.bearing, speed)
     walker.time = -2.0 - offset * (hidden + turning_time(np.pi) + 2.0)
-    start, ends = walker.time, []
+    start = walker.time
+    ends: list[float] = []
     while walker.time < time[-1] or not ends:
         walker.walk(2 * _ENDS, slow=inside).turn(spot.bearing + (len(ends) + 1) * np.pi, sense=sense)
         ends.append(walker.time)

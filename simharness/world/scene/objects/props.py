@@ -74,17 +74,17 @@ def _booth(size: Size, tint: int) -> ObjectModel:
     side = np.array([[0.78, 0.76, 0.72], [0.66, 0.70, 0.74], [0.74, 0.70, 0.62]])[tint % 3]
     curtain = np.array([[0.46, 0.16, 0.18], [0.16, 0.26, 0.42], [0.20, 0.36, 0.26]])[tint % 3]
     made = Assembly()
-    for y in (-1, 1):
-        made.box((0, y * (width / 2 - _BOARD / 2), height / 2), (depth, _BOARD, height), side)
+    for end in (-1, 1):
+        made.box((0, end * (width / 2 - _BOARD / 2), height / 2), (depth, _BOARD, height), side)
     made.box((0, 0, height - _BOARD / 2), (depth, width - 2 * _BOARD, _BOARD), 0.8 * side)
     inner = width - 2 * _BOARD
     fold = inner / _FOLDS
-    for x in (-1, 1):
+    for end in (-1, 1):
         for k in range(_FOLDS):
             y = (k + 0.5) * fold - inner / 2
             shade = curtain * (1.0 if k % 2 else 0.75)
             back = 0.012 * (k % 2)
-            made.box((x * (depth / 2 - 0.03 - back), y, (height - _BOARD) / 2), (0.02, fold, height - _BOARD), shade)
+            made.box((end * (depth / 2 - 0.03 - back), y, (height - _BOARD) / 2), (0.02, fold, height - _BOARD), shade)
     return made.model()
 
 

@@ -12,6 +12,8 @@ SIZES = {
     "box": (0.35, 0.45, 0.30),
     "step": (0.4, 0.9, 0.18),
     "bottle": (0.08, 0.08, 0.26),
+    "booth": (1.4, 1.1, 2.02),
+    "door": (0.06, 1.1, 2.15),
 }
 
 
@@ -29,8 +31,8 @@ def test_props_have_their_size(kind):
     assert low[2] == pytest.approx(0, abs=1e-6)
     depth, width, height = SIZES[kind]
     assert high[1] - low[1] == pytest.approx(width, rel=0.03)
-    top = Rays([solid]).distance(np.array([0.004, 0.003, 2]), np.array([[0.004, 0.003, 0.001]]))[0] * 1.999
-    assert 2 - top == pytest.approx(height, abs=1e-3)
+    top = Rays([solid]).distance(np.array([0.004, 0.003, 3]), np.array([[0.004, 0.003, 0.001]]))[0] * 2.999
+    assert 3 - top == pytest.approx(height, abs=1e-3)
     if kind == "chair":
         assert high[0] == pytest.approx(depth / 2, abs=0.01)
         assert high[2] > height + 0.3
@@ -60,3 +62,13 @@ def test_a_carried_prop_moves():
     held = standing((0.0, 0.0)).pose.copy()
     held[0, 2] = 0.7
     assert make_prop(Prop("box", SIZES["box"], Trajectory(np.zeros(1), held)), "prop 3").trajectory is not None
+
+
+def test_nothing_in_a_booth_is_seen_from_outside():
+    solid = make_prop(Prop("booth", SIZES["booth"], standing()), "booth 0")
+    rng = np.random.default_rng(0)
+    inside = rng.uniform([-0.6, -0.45, 0.05], [0.6, 0.45, 1.9], (200, 3))
+    for bearing in np.linspace(0.0, 2 * np.pi, 12, endpoint=False):
+        eye = np.array([3.0 * np.cos(bearing), 3.0 * np.sin(bearing), 2.6])
+        share = Rays([solid]).distance(eye, inside)
+        assert (share < 1.0).all()
