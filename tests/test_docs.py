@@ -48,10 +48,10 @@ ALONE = {
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
-    "simharness render passage --video": PICTURES,
     "simharness scenarios": "",
     "simharness schema": "",
     "simharness show FILE": "",
+    "simharness show passage": "",
     "simharness show quickstart": "",
 }
 # Commands that read a file of the user, which the test makes.
