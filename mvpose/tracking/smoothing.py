@@ -9,17 +9,18 @@ lag never is.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy as shallow_copy
 
 import numpy as np
 
+from mvpose.arrays import Floats, Integers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.kernels import njit
 from mvpose.tracking.existence import FLASH
-from mvpose.tracking.frame_kernels import vagueness
+from mvpose.tracking.frame_kernels import vagueness_of
 from mvpose.tracking.motion import transition
 from mvpose.tracking.tracker import Moment, Tracker
 
@@ -48,7 +49,7 @@ def track(tracker: Tracker, rig: Rig, frames: Iterable[Detections], *, lag: floa
         if lag == np.inf:
             continue
         if _is_due(waiting, lag):
-            smoothed = deque(_smooth(tracker, waiting) if lag > 0.0 else waiting)
+            smoothed = deque(_smooth(tracker, waiting, remember=True))
             while _is_due(waiting, lag):
                 waiting.popleft()
                 yield tracker.report(smoothed.popleft())
@@ -63,79 +64,99 @@ def _is_due(waiting: deque[Moment], lag: float) -> bool:
     return len(waiting) > _FASTEST * lag + 1.0 or not waiting[-1].time - waiting[0].time < lag
 
 
-def _smooth(tracker: Tracker, moments: Iterable[Moment]) -> list[Moment]:
-    """Return moments improved by all later ones."""
+def _smooth(tracker: Tracker, moments: Sequence[Moment], *, remember: bool = False) -> list[Moment]:
+    """Return moments improved by all later ones.
+
+    Args:
+        tracker: their tracker.
+        moments: in the order of time.
+        remember: whether the gains are kept for another call with the same moments.
+    """
     result: list[Moment] = []
-    for moment in reversed(list(moments)):
-        result.append(_improved(tracker, moment, result[-1]) if result else moment)
+    for moment in reversed(moments):
+        result.append(_improved(tracker, moment, result[-1], remember) if result else moment)
     return result[::-1]
 
 
-def _improved(tracker: Tracker, moment: Moment, later: Moment) -> Moment:
+def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -> Moment:
     """Return a moment improved by the next one, which is improved already."""
-    tracks, after = moment.tracks, later.tracks
-    match = (tracks.ids[:, None] == after.ids) if len(after) else np.zeros((len(tracks), 1), np.bool_)
-    row = np.where(match.any(axis=1), match.argmax(axis=1), -1)
-    assert later.predicted is not None, "moments to smooth are kept"
-    smoothed = replace(tracks, state=tracks.state.copy(), covariance=tracks.covariance.copy())
-    _smooth_people(
-        smoothed.state, smoothed.covariance, row, *later.predicted, after.state, after.covariance, later.elapsed,
-        tracker.motion.speed, tracker.motion.time,
-    )  # fmt: skip
-    odds = np.where(row >= 0, np.maximum(moment.odds, later.odds[row]), moment.odds) if len(after) else moment.odds
-    # A track that ends within half a second of its birth was a ghost, unless nobody looked for longer.
-    ended = (row < 0) & (moment.time - tracks.born_at < FLASH) & (later.elapsed < FLASH)
-    odds = np.where(ended, -np.inf, odds)
-    if len(after):
-        odds = np.where((row >= 0) & np.isneginf(later.odds[row]), -np.inf, odds)
     if moment.poses is not None:
         return moment
-    presence = (
-        np.where(row >= 0, np.maximum(moment.presence, later.presence[row]), moment.presence)
-        if len(after)
-        else moment.presence
-    )
-    shown = (
-        (odds > 0.0)
-        & (presence > 0.0)
-        & (vagueness(smoothed.state, smoothed.covariance) < tracker.model.existence.vague)
-    )
-    return replace(moment, tracks=smoothed, odds=odds, presence=presence, shown=shown)
+    tracks, after = moment.tracks, later.tracks
+    assert later.predicted is not None, "moments to smooth are kept"
+    row, gain = moment.link or _link(tracker, moment, later)
+    if remember:
+        moment.link = row, gain
+    state, covariance, odds, presence, shown = _improve(
+        tracks.state, tracks.covariance, moment.odds, moment.presence, tracks.born_at, moment.time, row, gain,
+        *later.predicted, after.state, after.covariance, later.odds, later.presence, later.elapsed,
+        tracker.model.existence.vague,
+    )  # fmt: skip
+    improved, smoothed = shallow_copy(moment), shallow_copy(tracks)
+    smoothed.state, smoothed.covariance = state, covariance
+    improved.tracks, improved.odds, improved.presence, improved.shown = smoothed, odds, presence, shown
+    return improved
+
+
+def _link(tracker: Tracker, moment: Moment, later: Moment) -> tuple[Integers, Floats]:
+    """Return the row of each track in the next moment, and the gains of its joints; see :func:`_gains`."""
+    assert later.predicted is not None, "moments to smooth are kept"
+    tracks, motion = moment.tracks, tracker.motion
+    return _gains(
+        tracks.ids, tracks.state, tracks.covariance, later.tracks.ids, *later.predicted, later.elapsed,
+        motion.speed, motion.time,
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def _smooth_people(states, covariances, row, predicted, predicted_covariance, after, after_covariance, dt, speed, time):
-    """Smooth the states of n tracks, in place; see :func:`_smooth_joint`."""
-    for t in range(len(states)):
-        if row[t] < 0:
-            continue
-        for j in range(states.shape[1]):
-            k = row[t]
-            if np.isnan(states[t, j, 0]) or np.isnan(predicted[k, j, 0]) or np.isnan(after[k, j, 0]):
-                continue
-            reach, decay, _, _, _ = transition(dt, speed[j], time[j])
-            _smooth_joint(
-                states[t, j], covariances[t, j], predicted[k, j], predicted_covariance[k, j],
-                after[k, j], after_covariance[k, j], reach, decay,
-            )  # fmt: skip
-
-
-@njit(cache=True)
-def _smooth_joint(state, covariance, predicted, predicted_covariance, after, after_covariance, reach, decay):
-    """Smooth position and velocity of one joint, in place.
+def _gains(ids, state, covariance, later_ids, predicted, predicted_covariance, elapsed, speed, time):
+    """Return the row of each track in the next moment, (n,), -1 for none, and gains (n, J, 6, 6), NaN for none.
 
     Args:
-        state: filtered, (6,).
-        covariance: filtered, (6, 6).
-        predicted: for the next moment, before its update, (6,).
-        predicted_covariance: its covariance, (6, 6).
-        after: smoothed at the next moment, (6,).
-        after_covariance: its covariance, (6, 6).
+        ids: identities, (n,).
+        state: filtered states, (n, J, 6).
+        covariance: their covariances, (n, J, 6, 6).
+        later_ids: identities in the next moment, (k,).
+        predicted: states predicted for the next moment, (k, J, 6).
+        predicted_covariance: their covariances, (k, J, 6, 6).
+        elapsed: time to the next moment, seconds.
+        speed: as in :class:`mvpose.tracking.motion.JointMotion`.
+        time: the same.
+    """
+    n, joints = state.shape[:2]
+    row, gain, scratch = np.full(n, -1), np.empty((n, joints, 6, 6)), np.empty((7, 6))
+    for t in range(n):
+        for k in range(len(later_ids)):
+            if row[t] < 0 and later_ids[k] == ids[t]:
+                row[t] = k
+        for j in range(joints):
+            known = row[t] >= 0 and not np.isnan(state[t, j, 0]) and not np.isnan(predicted[row[t], j, 0])
+            if known:
+                reach, decay, _, _, _ = transition(elapsed, speed[j], time[j])
+                known = smoother_gain(
+                    gain[t, j], covariance[t, j], predicted_covariance[row[t], j], reach, decay, scratch
+                )
+            if not known:
+                gain[t, j, 0, 0] = np.nan
+    return row, gain
+
+
+@njit(cache=True, borrows=True)
+def smoother_gain(gain, covariance, predicted_covariance, reach, decay, scratch):
+    """Write the gain P Fᵀ S⁻¹ of one joint, with F the transition and S the predicted covariance, as its transpose.
+
+    Args:
+        gain: output, (6, 6).
+        covariance: P, filtered, (6, 6).
+        predicted_covariance: S, for the next moment, before its update, (6, 6).
         reach: reach of the velocity, :func:`mvpose.tracking.motion.transition`.
         decay: decay of the velocity.
+        scratch: working memory, (7, 6).
+
+    Returns:
+        Whether S is positive definite.
     """
-    # gain = P Fᵀ S⁻¹, with F the transition and S the predicted covariance: solve S gainᵀ = F P by Cholesky
-    L, gain = np.zeros((6, 6)), np.empty((6, 6))
+    L, y = scratch[:6], scratch[6]  # solve S gainᵀ = F P by Cholesky
     for r in range(6):
         for c in range(r + 1):
             rest = predicted_covariance[r, c]
@@ -143,12 +164,11 @@ def _smooth_joint(state, covariance, predicted, predicted_covariance, after, aft
                 rest -= L[r, k] * L[c, k]
             if r == c:
                 if not rest > 0.0:
-                    return
+                    return False
                 L[r, r] = np.sqrt(rest)
             else:
                 L[r, c] = rest / L[c, c]
-    y = np.empty(6)
-    for column in range(6):  # a row of the gain
+    for column in range(6):
         for r in range(6):
             value = (
                 covariance[column, r] + reach * covariance[column, r + 3] if r < 3 else decay * covariance[column, r]
@@ -159,19 +179,84 @@ def _smooth_joint(state, covariance, predicted, predicted_covariance, after, aft
         for r in range(5, -1, -1):
             value = y[r]
             for k in range(r + 1, 6):
-                value -= L[k, r] * gain[column, k]
-            gain[column, r] = value / L[r, r]
-    change = np.empty((6, 6))
+                value -= L[k, r] * gain[k, column]
+            gain[r, column] = value / L[r, r]
+    return True
+
+
+@njit(cache=True)
+def _improve(
+    state, covariance, odds, presence, born_at, time, row, gain, predicted, predicted_covariance,
+    after, after_covariance, later_odds, later_presence, elapsed, vague,
+):  # fmt: skip
+    """Return the smoothed states of n tracks, their covariances, odds and presence, and whether each is shown.
+
+    Args:
+        state: filtered, (n, J, 6).
+        covariance: their covariances, (n, J, 6, 6).
+        odds: log-odds that each track is a person, (n,).
+        presence: log-odds that this person is still here, (n,).
+        born_at: time of birth, (n,), seconds.
+        time: time of the moment, seconds.
+        row: row of each track in the next moment, (n,), or -1.
+        gain: transposed gains, (n, J, 6, 6).
+        predicted: for the next moment, before its update, (k, J, 6).
+        predicted_covariance: their covariances, (k, J, 6, 6).
+        after: smoothed at the next moment, (k, J, 6).
+        after_covariance: their covariances, (k, J, 6, 6).
+        later_odds: as ``odds``, at the next moment, (k,).
+        later_presence: as ``presence``, at the next moment, (k,).
+        elapsed: time to the next moment, seconds.
+        vague: standard deviation of the best-known joint above which nobody is reported, metres.
+    """
+    state, covariance, odds, presence = state.copy(), covariance.copy(), odds.copy(), presence.copy()
+    shown, scratch = np.empty(len(state), np.bool_), np.empty((12, 6))
+    for t in range(len(state)):
+        k = row[t]
+        for j in range(state.shape[1]):
+            if k >= 0 and not np.isnan(gain[t, j, 0, 0]) and not np.isnan(after[k, j, 0]):
+                smooth_joint(
+                    state[t, j], covariance[t, j], predicted[k, j], predicted_covariance[k, j],
+                    after[k, j], after_covariance[k, j], gain[t, j], scratch,
+                )  # fmt: skip
+        if k >= 0:
+            odds[t] = max(odds[t], later_odds[k]) if later_odds[k] > -np.inf else -np.inf
+            presence[t] = max(presence[t], later_presence[k])
+        elif time - born_at[t] < FLASH and elapsed < FLASH:
+            # A track that ends within half a second of its birth was a ghost, unless nobody looked for longer.
+            odds[t] = -np.inf
+        shown[t] = odds[t] > 0.0 and presence[t] > 0.0 and vagueness_of(state[t], covariance[t]) < vague
+    return state, covariance, odds, presence, shown
+
+
+@njit(cache=True, borrows=True)
+def smooth_joint(state, covariance, predicted, predicted_covariance, after, after_covariance, gain, scratch):
+    """Smooth position and velocity of one joint, in place.
+
+    Args:
+        state: filtered, (6,).
+        covariance: filtered, (6, 6).
+        predicted: for the next moment, before its update, (6,).
+        predicted_covariance: its covariance, (6, 6).
+        after: smoothed at the next moment, (6,).
+        after_covariance: its covariance, (6, 6).
+        gain: transposed, of :func:`smoother_gain`, (6, 6).
+        scratch: working memory, (12, 6).
+    """
+    change, half = scratch[:6], scratch[6:]
+    for k in range(6):
+        difference = after[k] - predicted[k]
+        for r in range(6):
+            state[r] += gain[k, r] * difference
+            change[k, r] = after_covariance[k, r] - predicted_covariance[k, r]
+    # The innermost loops run along rows, which processors do several columns at a time.
     for r in range(6):
         for c in range(6):
-            state[r] += gain[r, c] * (after[c] - predicted[c])
-            change[r, c] = after_covariance[r, c] - predicted_covariance[r, c]
-    half = np.zeros((6, 6))
+            half[r, c] = 0.0
+        for k in range(6):
+            for c in range(6):
+                half[r, c] += gain[k, r] * change[k, c]
     for r in range(6):
-        for c in range(6):
-            for k in range(6):
-                half[r, c] += gain[r, k] * change[k, c]
-    for r in range(6):
-        for c in range(6):
-            for k in range(6):
-                covariance[r, c] += half[r, k] * gain[c, k]
+        for k in range(6):
+            for c in range(6):
+                covariance[r, c] += half[r, k] * gain[k, c]

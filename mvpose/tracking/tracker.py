@@ -85,6 +85,7 @@ class Moment:
         detections: number of detections of the frame.
         poses: poses of the tracks as the pipeline gives them, where the frame is the first.
         timings: seconds by stage.
+        link: row of each track in the next moment and the gains of the smoother, where they are known already.
     """
 
     time: float
@@ -99,6 +100,7 @@ class Moment:
     detections: int
     poses: Poses | None
     timings: dict[str, float]
+    link: tuple[Integers, Floats] | None = None
 
 
 class Tracker:
@@ -201,7 +203,7 @@ class Tracker:
         )  # fmt: skip
         self._clutter.count(false, pictures, since, elapsed)
         if before is not None:
-            tracks, before = tracks.copy(), (_with_nan(before[0], new), _with_nan(before[1], new))
+            tracks, before = tracks.snapshot(), (_with_nan(before[0], new), _with_nan(before[1], new))
         moment = Moment(
             now,
             elapsed,

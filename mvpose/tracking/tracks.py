@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy as shallow_copy
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -159,9 +160,12 @@ class Tracks:
         """Return these tracks, which have no descriptors, with room for some of this length."""
         return replace(self, looks=np.zeros((len(self), dimensions)))
 
-    def copy(self) -> Self:
-        """Return copies of all tracks."""
-        return type(self)(*(getattr(self, field.name).copy() for field in fields(self)))
+    def snapshot(self) -> Self:
+        """Return these tracks with copies of what an estimate needs; later frames change all else."""
+        kept = shallow_copy(self)
+        for name in ("state", "covariance", "scores", "length", "variance"):
+            setattr(kept, name, getattr(self, name).copy())
+        return kept
 
     def join(self, others: Self) -> Self:
         """Return these tracks followed by others."""

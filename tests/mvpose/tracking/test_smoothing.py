@@ -7,7 +7,7 @@ from walking_people import film, identities
 from mvpose import Pipeline
 from mvpose.tracking import Tracker, TrackingModel, track
 from mvpose.tracking.motion import condition, predict, transition
-from mvpose.tracking.smoothing import _smooth_joint
+from mvpose.tracking.smoothing import smooth_joint, smoother_gain
 
 SPEED, TIME, TRUNK = np.array([0.7]), np.array([0.8]), np.array([True])
 
@@ -31,7 +31,9 @@ def test_smoothed_states_are_those_of_the_joint_gaussian():
     for k in range(4, -1, -1):
         now, now_covariance = filtered[k]
         reach, decay, *_ = transition(times[k + 1] - times[k], 0.7, 0.8)
-        _smooth_joint(now, now_covariance, *predicted[k + 1], after, after_covariance, reach, decay)
+        gain = np.empty((6, 6))
+        assert smoother_gain(gain, now_covariance, predicted[k + 1][1], reach, decay, np.empty((7, 6)))
+        smooth_joint(now, now_covariance, *predicted[k + 1], after, after_covariance, gain, np.empty((12, 6)))
         after, after_covariance = now, now_covariance
     expected, expected_covariance = _batch(times, measured, noise)
     np.testing.assert_allclose(after, expected[:6], atol=1e-9)
