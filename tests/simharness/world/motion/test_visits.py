@@ -46,6 +46,16 @@ def test_visitors_come_and_go_through_doors(seed):
     assert away[beyond.max(axis=1) > 0].max() < 1.0  # and nowhere else behind a wall
 
 
+def test_a_room_without_walls_ends_at_its_edge():
+    open_room = Room(size=(8.0, 7.0, 3.0), walls=False)
+    route = drawn(2, room=open_room)
+    ((came, went),) = route.presence.intervals
+    beyond = (np.abs(route.position([came, went])) - [4.0, 3.5]).max(axis=1)
+    np.testing.assert_allclose(beyond, 0.0, atol=0.03)
+    time = np.arange(came + 0.05, went - 0.05, 0.05)
+    assert (np.abs(route.position(time)) < [4.0, 3.5]).all()
+
+
 def test_who_does_not_enter_is_there_and_who_does_not_leave_stays():
     stays = drawn(3, entering=False, leaving=False).presence
     assert stays.always
