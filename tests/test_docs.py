@@ -96,7 +96,13 @@ PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
 SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
     f"python -m {name}"
-    for name in ("benchmarks.method", "benchmarks.simulator", "benchmarks.planted_bugs", "tools.reid")
+    for name in (
+        "benchmarks.method",
+        "benchmarks.simulator",
+        "benchmarks.tracking",
+        "benchmarks.planted_bugs",
+        "tools.reid",
+    )
 )
 BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
 KNOWN = {
