@@ -9,6 +9,7 @@ import pytest
 
 from mvpose.skeleton import SHELF14
 from simharness import load_scenario
+from simharness.capture.ray_casting import RayCaster
 from simharness.reality.annotation import annotate_simulation
 from simharness.runtime.progress import Silence
 from simharness.runtime.stages import Stages
@@ -66,6 +67,20 @@ def test_views_without_an_absent_person_are_those_of_a_scene_without_the_person(
     assert (left.visibility[GONE:, :, 1] == Visibility.OUTSIDE).all()
     assert not left.boxes[GONE:, :, 1].any()
     assert (both.visibility[GONE:, :, 1] != Visibility.OUTSIDE).any()  # otherwise nothing was tested
+
+
+def test_an_absent_person_stops_no_ray():
+    trial = trial_of(2, "rays")
+    camera = trial.exposures.true_rig[0]
+    owners = []
+    for each in (trial, leaving(trial)):
+        state = Playback(each.scene).at(GONE / 10)
+        caster = RayCaster(each.scene)
+        caster.place(state)
+        behind = state.joints[1] + 0.3 * (state.joints[1] - camera.center)
+        owners.append(caster.cast(camera, behind)[0])
+    assert (owners[0] == 1).sum() > 10
+    assert not (owners[1] == 1).any()
 
 
 def test_pictures_do_not_show_an_absent_person_nor_a_shadow():
