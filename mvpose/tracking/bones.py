@@ -23,6 +23,8 @@ from mvpose.skeleton import Skeleton
 _DEFINITION2 = 0.02**2  # m²: variance of the distance of two joints as detectors define them, in one pose
 _INDEPENDENT = 1.0  # seconds: poses that are apart as long show the definition of the joints from another side
 _LEAST_VARIANCE = 0.01**2  # m²: joints are not points of the body, so no bone is known better
+_LEAST_BONES = 5  # whose median ratio is the size of a person
+_SIZES = (0.5, 1.25)  # sizes of people by that of the mean adult: from two years of age to 2.1 m
 _SWEEPS = 6
 _CONVERGED = 1e-6  # m²
 
@@ -55,6 +57,25 @@ def bone_prior(skeleton: Skeleton) -> BonePrior:
     prior = BonePrior(ends, values[:, 0].copy(), values[:, 1].copy())
     seal(*prior)
     return prior
+
+
+def scaled_lengths(joints: Floats, prior: BonePrior) -> Floats:
+    """Return the lengths, (n, B), metres, from which tracks start: those of adults, scaled to the size of each person.
+
+    The size is the median over the bones of what is measured by what is published, so that children are not stretched.
+
+    Args:
+        joints: joints of n people, (n, J, 3), metres; NaN for an unknown joint.
+        prior: bones.
+    """
+    result = np.tile(prior.length, (len(joints), 1))
+    if prior.length.size:
+        measured = np.linalg.norm(joints[:, prior.ends[:, 0]] - joints[:, prior.ends[:, 1]], axis=2)
+        for person, ratio in enumerate(measured / prior.length):
+            known = ratio[np.isfinite(ratio)]
+            if len(known) >= _LEAST_BONES:
+                result[person] *= np.clip(np.median(known), *_SIZES)
+    return result
 
 
 @njit(cache=True, borrows=True)

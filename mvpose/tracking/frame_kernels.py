@@ -49,7 +49,7 @@ def predict_tracks(state, covariance, elapsed, speed, time, trunk, vague):
 @njit(cache=True)
 def update_tracks(
     state, covariance, scores, length, variance, labels, groups, origins, directions, weights, pixel, lead, sigmas,
-    floor, speed, time, trunk, ends, elapsed, keep,
+    floor, speed, time, trunk, of_pose, places, spreads, confidences, factor, ends, elapsed, keep,
 ):  # fmt: skip
     """Update tracks by the detections that were matched with them, in place.
 
@@ -71,6 +71,11 @@ def update_tracks(
         speed: as in :class:`mvpose.tracking.motion.JointMotion`, and so ``time`` and ``trunk``.
         time: the same.
         trunk: the same.
+        of_pose: as in :func:`mvpose.tracking.pose_update.update_people`, and so the next four.
+        places: the same.
+        spreads: the same.
+        confidences: the same.
+        factor: the same.
         ends: joints at the ends of the bones, (B, 2).
         elapsed: time since the previous frame, seconds.
         keep: share of its score that a joint keeps which no view supports.
@@ -82,7 +87,7 @@ def update_tracks(
     supports = np.empty(scores.shape)
     update_people(
         state, covariance, supports, labels, groups, origins, directions, weights, pixel, lead, sigmas, floor, speed,
-        time, trunk,
+        time, trunk, of_pose, places, spreads, confidences, factor,
     )  # fmt: skip
     for t in range(len(state)):
         for j in range(scores.shape[1]):
@@ -94,6 +99,32 @@ def update_tracks(
         if groups[t] >= 0:
             learn_lengths(length[t], variance[t], state[t], covariance[t], ends, elapsed)
     return _owners(labels, groups)
+
+
+@njit(cache=True)
+def number_people(labels, groups, lead, of_pose, people):
+    """Number the tracks that several cameras saw at the time of the frame, in place.
+
+    Args:
+        labels: group of each detection, (m,), or -1.
+        groups: group of each track, (n,), or -1.
+        lead: time from the frame to the picture of each detection, (m,), seconds.
+        of_pose: output, (n,): number of the track; -1 stays where fewer than two cameras saw it, or at other times.
+        people: output, (m,): number of the track of each detection.
+    """
+    count = 0
+    for t in range(len(groups)):
+        seen, late = 0, False
+        for d in range(len(labels)):
+            if groups[t] >= 0 and labels[d] == groups[t]:
+                seen += 1
+                late = late or lead[d] != 0.0
+        if seen >= 2 and not late:
+            of_pose[t] = count
+            for d in range(len(labels)):
+                if labels[d] == groups[t]:
+                    people[d] = count
+            count += 1
 
 
 @njit(cache=True)

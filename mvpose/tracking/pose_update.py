@@ -5,6 +5,10 @@ Two kinds of evidence meet in the normal equations of a joint: the rays, with th
 :mod:`mvpose.reconstruction.likelihood`, and the prediction, as a multivariate t distribution, because people sometimes
 move as no model expects. The maximum of their product is found from two starts, the prediction and the point on which
 the rays agree.
+
+Where the stages of a frame place a whole body (3DPS, with the lengths and directions of its bones), the pose of a
+person whom several cameras saw at once is the evidence instead of the rays, except for joints that fewer than two of
+them saw.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ _UNKNOWN = 1.0  # m²: variance of a joint that is seen for the first time, befo
 @njit(cache=True)
 def update_people(
     states, covariances, supports, labels, of_track, origins, directions, weights, pixel, lead, sigmas, floor, speed,
-    time, trunk,
+    time, trunk, of_pose, places, spreads, confidences, factor,
 ):  # fmt: skip
     """Update n tracked people by the rays of their detections, in place.
 
@@ -50,6 +54,11 @@ def update_people(
         speed: as in :class:`mvpose.tracking.motion.JointMotion`; also for joints that are seen for the first time.
         time: the same.
         trunk: the same.
+        of_pose: row of each track in the poses, (n,); -1 for a track whose rays are the evidence.
+        places: joints of the poses, (k, J, 3), metres; NaN for an unknown joint.
+        spreads: their covariances, (k, J, 3, 3).
+        confidences: their scores, (k, J).
+        factor: factor of these covariances, at least 1.
     """
     m, joints = weights.shape
     scratch, leads = np.empty((8, 3)), np.unique(lead)
@@ -82,7 +91,11 @@ def update_people(
                     for r in range(3):
                         centers[v, r], rays[v, 0, r] = origins[d, r], directions[d, j, r]
                     v += 1
-                if seen:
+                k = of_pose[t]
+                placed = k >= 0 and seen >= 2 and confidences[k, j] > 0.0 and not np.isnan(states[t, j, 0])
+                if placed and _update_by_place(states[t, j], covariances[t, j], places[k, j], spreads[k, j], factor):
+                    supports[t, j] = confidences[k, j]
+                elif seen:
                     reach, noise, along = trunk_reach, trunk_noise, 0.0
                     if not trunk[j]:
                         reach, _, noise, _, _ = transition(-shift, speed[j], time[j])
@@ -97,6 +110,32 @@ def update_people(
                     for r in range(3):
                         states[t, j, r] += along * common[r]
                     carry(states[t, j], covariances[t, j], reach)
+
+
+@njit(cache=True)
+def _update_by_place(state, covariance, place, spread, factor):
+    """Update one joint by a place with a covariance, in place; return whether that was possible."""
+    A, b, step, point = np.empty((3, 3)), np.zeros(3), np.empty(3), np.empty(3)
+    prior, evidence, both, inverse = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for r in range(3):
+        for c in range(3):
+            A[r, c] = factor * spread[r, c]
+            both[r, c] = covariance[r, c] + A[r, c]
+    if not (
+        solve(A, b, evidence, step) and solve(covariance[:3, :3], b, prior, step) and solve(both, b, inverse, step)
+    ):
+        return False
+    weight = min((_FREEDOM + 3.0) / (_FREEDOM + _mahalanobis2(place, state, inverse)), 1.0)
+    for r in range(3):
+        for c in range(3):
+            A[r, c] = evidence[r, c] + weight * prior[r, c]
+            b[r] += evidence[r, c] * (place[c] - state[c])
+    if not solve(A, b, inverse, step):
+        return False
+    for r in range(3):
+        point[r] = state[r] + step[r]
+    condition(state, covariance, point, prior, inverse, np.empty((6, 3)))
+    return True
 
 
 @njit(cache=True)

@@ -26,11 +26,19 @@ from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import SHARED
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses
+from mvpose.reconstruction.triangulation import Triangulation
 from mvpose.skeleton import Skeleton
 from mvpose.tracking.association import TrackAffinity
 from mvpose.tracking.bones import BonePrior, bone_prior
 from mvpose.tracking.existence import Clutter, Existence
-from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, repeats, report_tracks, update_tracks
+from mvpose.tracking.frame_kernels import (
+    judge_tracks,
+    number_people,
+    predict_tracks,
+    repeats,
+    report_tracks,
+    update_tracks,
+)
 from mvpose.tracking.looks import learn_looks, nearest_rival, scale_of
 from mvpose.tracking.motion import JointMotion, Motion
 from mvpose.tracking.picture_times import FrameClock
@@ -52,6 +60,7 @@ class TrackingModel:
         existence: how often people come, and how often people and ghosts are found.
         reappearance: how people who were lost come back.
         noise: error model of keypoints.
+        correlation: time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s.
         period: time between frames whose detections carry no time, seconds.
     """
 
@@ -60,11 +69,23 @@ class TrackingModel:
     existence: Existence = Existence()
     reappearance: Reappearance = Reappearance()
     noise: Noise = Noise()
+    correlation: float = 0.2
     period: float = 0.04
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.correlation < np.inf:
+            raise ValueError(f"correlation must be 0 s or more and finite, got {self.correlation}")
         if not 0.0 < self.period < np.inf:
             raise ValueError(f"period must be above 0 s and finite, got {self.period}")
+
+
+def repetition(since: float, correlation: float) -> float:
+    """Return the factor of the variance of errors that repeat those of ``since`` seconds ago.
+
+    Errors with the correlation ``exp(-t / correlation)`` average out over many frames like independent ones of
+    ``coth(since / (2 correlation))`` times the variance.
+    """
+    return 1.0 / math.tanh(since / (2.0 * correlation)) if since > 0.0 and correlation > 0.0 else 1.0
 
 
 @dataclass
@@ -176,11 +197,12 @@ class Tracker:
         compared = clock.perf_counter()
         labels = self.pipeline.matching(joined, views).labels
         matched = clock.perf_counter()
+        placed = self._place(rays, detections.skeleton, labels[: len(ordered)], labels[len(ordered) :], lead, elapsed)
         m, noise, bones = len(ordered), model.noise, self._bones
         owner, fresh, groups = update_tracks(
             tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels[:m],
             labels[m:], rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas,
-            noise.floor, *self.motion, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
+            noise.floor, *self.motion, *placed, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
         )  # fmt: skip
         poses: Poses | None = None
         since = self._recent.take(now, times.lead, pictures)
@@ -313,6 +335,23 @@ class Tracker:
             raise ValueError(
                 f"descriptors must be (m, {known}) as in earlier frames, got (m, {dimensions}): start another tracker"
             )
+
+    def _place(
+        self, rays: Rays, skeleton: Skeleton, labels: Integers, groups: Integers, lead: Floats, elapsed: float
+    ) -> tuple[Integers, Floats, Floats, Floats, float]:
+        """Return the poses of tracked people as the stages of a frame place them, for :func:`update_tracks`.
+
+        Triangulation uses each joint's rays alone, which the update does better: it then gets no pose.
+        """
+        count, joints = len(groups), len(skeleton)
+        of_pose, people = np.full(count, -1), np.full(len(labels), -1)
+        if not isinstance(self.pipeline.reconstruction, Triangulation):
+            number_people(labels, groups, lead, of_pose, people)
+        if not (people >= 0).any():
+            return of_pose, np.empty((0, joints, 3)), np.empty((0, joints, 3, 3)), np.empty((0, joints)), 1.0
+        poses = self.pipeline.reconstruction(rays, people, skeleton)
+        factor = repetition(elapsed, self.model.correlation)
+        return of_pose, poses.joints, poses.covariance, poses.scores, factor
 
     def _give_birth(
         self,

@@ -10,7 +10,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.reconstruction.poses import Poses
-from mvpose.tracking.bones import BonePrior
+from mvpose.tracking.bones import BonePrior, scaled_lengths
 
 
 @dataclass
@@ -115,7 +115,7 @@ class Tracks:
             state=np.concatenate([joints, np.where(np.isnan(joints), np.nan, 0.0)], axis=2),
             covariance=moments,
             scores=poses.scores.copy(),
-            length=np.tile(bones.length, (n, 1)),
+            length=scaled_lengths(joints, bones),
             variance=np.tile(bones.variance, (n, 1)),
             span=np.full(n, span),
             born_at=np.full(n, time),

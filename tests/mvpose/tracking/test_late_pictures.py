@@ -10,6 +10,8 @@ SPEED, TIME, SIGMA = np.array([1.0, 1.3]), np.array([1.6, 0.15]), np.array([0.01
 TRUNK = np.array([True, False])
 CENTERS = np.array([[4.0, 0.0, 1.0], [0.0, 4.0, 1.5], [-3.0, -3.0, 2.0]])
 
+NO_POSES = np.full(1, -1), np.empty((0, 2, 3)), np.empty((0, 2, 3, 3)), np.empty((0, 2)), 1.0
+
 
 def _moved(rng, velocity, shift, joint):
     """Places and velocities after ``shift`` seconds of a simulated Ornstein-Uhlenbeck velocity, (n, 3) each."""
@@ -40,7 +42,7 @@ def test_errors_after_a_late_picture_are_as_large_as_their_covariance_says(shift
         rays /= np.linalg.norm(rays, axis=2, keepdims=True)
         update_people(
             state, covariance, np.empty((1, 2)), np.zeros(3, np.int64), np.zeros(1, np.int64), CENTERS, rays,
-            np.ones((3, 2)), np.zeros(3), np.full(3, -shift), SIGMA, 1e-6, SPEED, TIME, TRUNK,
+            np.ones((3, 2)), np.zeros(3), np.full(3, -shift), SIGMA, 1e-6, SPEED, TIME, TRUNK, *NO_POSES,
         )  # fmt: skip
         for joint in range(2):
             error = state[0, joint, :3] - place[joint]
@@ -59,6 +61,7 @@ def test_backwards_a_joint_moves_as_it_does_forwards():
     update_people(
         state, covariance, np.empty((1, 1)), np.zeros(3, np.int64), np.zeros(1, np.int64), CENTERS, rays,
         np.ones((3, 1)), np.zeros(3), np.full(3, -shift), SIGMA[:1] * 1e-3, 1e-6, SPEED[:1], TIME[:1], TRUNK[:1],
+        *NO_POSES,
     )  # fmt: skip
     reach, *_ = transition(shift, SPEED[0], TIME[0])
     np.testing.assert_allclose(state[0, 0], [*reach * velocity, *velocity], atol=1e-3)
