@@ -37,6 +37,8 @@ class Camera(Sealed):
         distortion: k1, k2, p1, p2, k3 in the order of OpenCV, (5,); zeros for a pinhole.
         size: width and height of the image in pixels.
         name: name of the camera in reports and messages.
+        readout: seconds from the exposure of the first row to that of the last, 0 for a global shutter; the time of a
+            picture is that of its middle row.
 
     Raises:
         ValueError: a wrong shape, a value that is not finite or exceeds 1e9, an invalid intrinsic matrix K, an R that
@@ -49,6 +51,7 @@ class Camera(Sealed):
     distortion: Floats = field(default_factory=lambda: np.zeros(5))
     size: tuple[int, int] = (0, 0)
     name: str = ""
+    readout: float = 0.0
 
     def __post_init__(self) -> None:
         camera = f"camera {self.name!r}"
@@ -70,6 +73,8 @@ class Camera(Sealed):
                 f"{camera}: size must be the image's width and height, two positive numbers of pixels, got {self.size}"
             )
         object.__setattr__(self, "size", (int(size[0]), int(size[1])))
+        if not 0.0 <= self.readout < np.inf:
+            raise ValueError(f"{camera}: readout must be 0 s or more and finite, got {self.readout}")
 
     @cached_property
     def P(self) -> Floats:

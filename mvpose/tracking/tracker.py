@@ -44,6 +44,7 @@ from mvpose.tracking.motion import JointMotion, Motion
 from mvpose.tracking.picture_times import FrameClock
 from mvpose.tracking.reappearance import Reappearance
 from mvpose.tracking.recent_pictures import RecentPictures
+from mvpose.tracking.rolling_shutter import readouts, undo_rolling
 from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
 from mvpose.tracking.tracks import Tracks
 
@@ -197,8 +198,8 @@ class Tracker:
         compared = clock.perf_counter()
         labels = self.pipeline.matching(joined, views).labels
         matched = clock.perf_counter()
-        placed = self._place(rays, detections.skeleton, labels[: len(ordered)], labels[len(ordered) :], lead, elapsed)
-        m, noise, bones = len(ordered), model.noise, self._bones
+        m, noise, bones, rays = len(ordered), model.noise, self._bones, self._at_once(ordered, rays, labels)
+        placed = self._place(rays, detections.skeleton, labels[:m], labels[m:], lead, elapsed)
         owner, fresh, groups = update_tracks(
             tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels[:m],
             labels[m:], rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas,
@@ -322,9 +323,21 @@ class Tracker:
             check_serves(self._layout, rig, skeleton)
         self._rig, self._skeleton = rig, skeleton
         self._sizes = np.array([camera.size for camera in rig], float)
+        self._readout = readouts(rig)
         self.motion: JointMotion = self.model.motion.of_joints(skeleton)
         self._bones: BonePrior = bones
         self._sigmas = self.model.noise.sigmas(skeleton)
+
+    def _at_once(self, ordered: Detections, rays: Rays, labels: Integers) -> Rays:
+        """Return viewing rays as if all rows of a picture were exposed at once."""
+        if self._readout is None:
+            return rays
+        m = len(ordered)
+        directions = undo_rolling(
+            self._readout, ordered.view, ordered.keypoints, rays.origins, rays.directions, rays.weights, labels[:m],
+            labels[m:], self._tracks.state,
+        )  # fmt: skip
+        return Rays(rays.view, rays.origins, directions, rays.weights, rays.pixel, rays.modes)
 
     def _see_looks(self, dimensions: int) -> None:
         """Make room for descriptors of a length, or refuse another length than before."""
