@@ -31,6 +31,7 @@ NAMES: Mapping[str, str] = MappingProxyType(
         "faults.translation": "error of camera positions",
         "faults.translation_drift": "drift of camera positions",
         "people.count": "people",
+        "people.hidden": "time hidden from all cameras",
         "people.look_alike": "similarity of clothes, 1: one uniform",
     }
 )

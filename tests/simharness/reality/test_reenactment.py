@@ -102,7 +102,7 @@ def made(reenacted):
 
 
 def test_bodies_are_within_centimetres_of_the_people(made, people):
-    np.testing.assert_array_equal(made.present, people.present)
+    np.testing.assert_array_equal(made.sequence.present, people.present)
     away = np.linalg.norm(made.joints - people.joints, axis=-1)[..., LIMB_JOINTS]
     np.testing.assert_array_equal(np.isnan(away).all(axis=-1), ~people.present)
     away = away[people.present]
