@@ -166,3 +166,47 @@ def test_the_order_of_detections_does_not_matter():
         assert _bytes(permuted)[:3] == _bytes(given)[:3]
         np.testing.assert_array_equal(permuted.ids, given.ids)
         np.testing.assert_array_equal(permuted.matching.labels, given.matching.labels[order])
+
+
+def _wild_stream(seed, count=150):
+    """Frames of people, with gaps, jumps, repeats, late, lost and missing pictures, and wrong keypoints."""
+    rng = np.random.default_rng(seed)
+    steps = rng.choice([0.04, 0.0, 1e-9, 0.5, 3.0, 20.0, 4000.0], count, p=[0.8, 0.06, 0.03, 0.05, 0.03, 0.02, 0.01])
+    rig, frames, _ = film(PATHS, np.arange(count) / RATE % 2.0, noise=5.0, seed=seed)
+    result, now = [], 0.0
+    for frame, step in zip(frames, steps, strict=True):
+        now += step
+        time = now - rng.choice([0.0, 0.03, 0.4], 5, p=[0.7, 0.25, 0.05])
+        time[rng.random(5) < 0.2] = np.nan
+        if rng.random() < 0.05:
+            time[:] = np.nan
+        if not np.isnan(time).all():
+            time += now - np.nanmax(time)  # so that times never go back
+        seen = ~np.isnan(time)[frame.view] & (rng.random(len(frame)) < 0.85)
+        keypoints = np.where(rng.random((len(frame), 1, 1)) < 0.1, rng.uniform(0, 900, (len(frame), 17, 2)), np.nan)
+        given = np.where(np.isnan(keypoints), frame.keypoints, keypoints)
+        scores = np.where(rng.random((len(frame), 17)) < 0.2, 0.0, rng.random((len(frame), 17)))
+        kept = Detections.from_keypoints(frame.view[seen], given[seen], scores[seen])
+        result.append(_at(kept, time))
+    return rig, result
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.3, np.inf])
+@pytest.mark.parametrize("preset", ["fast", "full"])
+def test_whatever_comes_estimates_are_finite_and_in_order(preset, lag):
+    for seed in range(3):
+        rig, frames = _wild_stream(seed)
+        estimates = list(track(_tracker(preset), rig, frames, lag=lag))
+        assert len(estimates) == len(frames)
+        times = [each.time for each in estimates if each.time is not None]
+        assert (np.diff(times) >= 0.0).all()
+        for frame, estimate in zip(frames, estimates, strict=True):
+            known = estimate.scores > 0.0
+            assert np.isfinite(estimate.joints[known]).all()
+            assert np.isfinite(estimate.covariance[known]).all()
+            assert np.isnan(estimate.joints[~known]).all()
+            assert (np.linalg.eigvalsh(estimate.covariance[known]) > 0.0).all()
+            assert len(set(estimate.ids.tolist())) == len(estimate)
+            assert estimate.matching.labels.shape == (len(frame),)
+            assert estimate.matching.labels.max(initial=-1) < len(estimate)
+        assert max(map(len, estimates)) <= 6
