@@ -93,7 +93,7 @@ def find_failures(recording: Recording, estimates: Sequence[Estimate]) -> list[F
     """
     if len(estimates) != len(recording.truth):
         raise ValueError(f"estimates must be {len(recording.truth)}, one for each frame, got {len(estimates)}")
-    frames = zip(recording.detections, recording.truth, estimates, strict=True)
+    frames = zip(recording.detections, recording.at_times_of(estimates).truth, estimates, strict=True)
     return [
         failure
         for frame, (detections, truth, estimate) in enumerate(frames)

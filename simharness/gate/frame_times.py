@@ -46,7 +46,8 @@ def relative_times(
 ) -> dict[str, float]:
     """Return the time of each variant for a frame, divided by the time of the reference kernel.
 
-    Numerator and denominator are sums over the timed frames, so that every timed frame counts.
+    Numerator and denominator are sums over the timed frames, so that every timed frame counts. Of a variant with
+    memory, the same number of frames at the start of the sequence are timed together.
 
     Args:
         detected: the detections of all frames.
@@ -102,6 +103,11 @@ def _beside_reference(
     for index, detections in enumerate(frames):
         seconds[index] = _seconds(work)
         yield detections
+
+
+def _exhaust(estimator: SequenceEstimator, rig: Rig, frames: list[Detections]) -> None:
+    for _ in estimator.track(rig, frames):
+        pass
 
 
 def _seconds(work: Callable[[], object]) -> float:

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 from numba.core.registry import cpu_target
 from threadpoolctl import threadpool_limits
 
+from mvpose.presets import TRACKING
 from simharness.gate.baseline import FRAMES, TIME, Measurement
 from simharness.gate.frame_times import relative_times
 from simharness.gate.gate_result import FailedCase
 from simharness.gate.trial_command import TrialKey, setting_name, settings_at_seeds
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.version import code_version
-from simharness.scenario.sections.scenario import Scenario
+from simharness.scenario.sections.scenario import Method, Scenario
 from simharness.scenario.study_definition import Study
 from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.study.scheduler import TrialSuccess, Unit, run_units
@@ -122,6 +123,9 @@ def fingerprint(study: Study) -> str:
         "seeds": study.seeds,
         "variants": study.variants,
     }
+    lags = {setting.scenario.method.lag for setting in study.settings}
+    if TRACKING.intersection(study.variants) and lags != {Method().lag}:
+        values["lags"] = [setting.scenario.method.lag for setting in study.settings]
     text = json.dumps(values, sort_keys=True)
     digest = hashlib.blake2b(digest_size=5)
     for file in sorted({file for setting in study.settings for file in setting.scenario.files}):

@@ -62,7 +62,7 @@ class Assessment:
 
 
 def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
-    """Score one variant on a recording.
+    """Score one variant on a recording, with the true joints at the times of the estimates where they have times.
 
     Args:
         recording: the input of the variant, and the truth.
@@ -73,6 +73,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
     """
     if len(estimates) != len(recording):
         raise ValueError(f"a recording of {len(recording)} frames needs as many estimates, got {len(estimates)}")
+    recording = recording.at_times_of(estimates)
     variant = score_variant(recording, estimates)
     summary = variant.summary()
     groups = _groups(recording, estimates)

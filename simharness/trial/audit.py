@@ -12,7 +12,7 @@ import numpy as np
 from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.runtime.errors import RunError
-from simharness.scenario.sections.scenario import Faults, Scenario
+from simharness.scenario.sections.scenario import Cameras, Faults, Scenario
 from simharness.trial.stages.capture import picture_source_of
 from simharness.types.random_streams import stream
 from simharness.types.sequence import Sequence
@@ -51,7 +51,7 @@ def audit(scenario: Scenario, scene: Scene, exposures: ExposureSchedule, sequenc
     Raises:
         AuditError: a failed check, with its place, the expected and the actual value.
     """
-    check_clocks(scenario.faults, exposures, sequence.time)
+    check_clocks(scenario.faults, exposures, sequence.time, cameras=scenario.cameras, period=1.0 / scenario.rate)
     check_calibration(scenario.faults, exposures)
     playback = Playback(scene)
     frames = np.unique(np.linspace(0, len(views) - 1, min(len(views), _FRAMES)).astype(int))
@@ -70,27 +70,47 @@ def sampled_pictures(exposures: ExposureSchedule, seed: int) -> list[tuple[int, 
     return [(int(frame), int(view)) for frame, view in delivered[np.sort(chosen)]]
 
 
-def check_clocks(faults: Faults, exposures: ExposureSchedule, time: Floats) -> None:
-    """Check that the time of every picture agrees with the parameters of section [faults].
+def check_clocks(
+    faults: Faults,
+    exposures: ExposureSchedule,
+    time: Floats,
+    *,
+    cameras: Cameras | None = None,
+    period: float = 0.0,
+) -> None:
+    """Check that the time of every picture agrees with the parameters of sections [faults] and [cameras].
+
+    Args:
+        faults: section [faults].
+        exposures: time of every picture.
+        time: time of every frame, (T,), seconds.
+        cameras: section [cameras]; by default all cameras are triggered together.
+        period: time between frames, seconds.
 
     Raises:
         AuditError: a picture at another time, a dead camera that delivers, a frozen picture of a later time.
     """
+    cameras = cameras or Cameras()
     taken = exposures.delivered
     nominal = time[np.where(taken, exposures.source, 0)]
     late = np.where(taken, exposures.time - nominal, 0.0)
-    allowed = _SIGMAS * (faults.clock_offset + faults.clock_jitter) + 1e-9
+    free = 0.5 * period if cameras.trigger == "free" else 0.0
+    allowed = free + _SIGMAS * (faults.clock_offset + faults.clock_jitter) + 1e-9
     if np.abs(late).max(initial=0.0) > allowed:
         frame, view = map(int, np.unravel_index(np.abs(late).argmax(), late.shape))
         raise AuditError(
             f"clocks: the picture of view {view} in frame {frame} is {1000 * late[frame, view]:.3f} ms late; "
-            f"faults.clock_offset and faults.clock_jitter allow {1000 * allowed:.3f} ms"
+            f"faults.clock_offset, faults.clock_jitter and cameras.trigger allow {1000 * allowed:.3f} ms"
         )
     if (exposures.source > np.arange(len(time))[:, None]).any():
         raise AuditError("clocks: a camera delivers a picture before it is taken")
     frozen = taken & (exposures.source != np.arange(len(time))[:, None])
     for expected, present, keys in (
-        (faults.dropped > 0 or bool(faults.dead), not taken.all(), "faults.dropped or faults.dead"),
+        (
+            faults.dropped > 0 or bool(faults.dead) or max(cameras.every, default=1) > 1,
+            not taken.all(),
+            "faults.dropped, faults.dead or cameras.every",
+        ),
         (faults.frozen > 0, bool(frozen.any()), "faults.frozen"),
     ):
         if present and not expected:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose import COCO17, Detections, Rig
+from mvpose import COCO17, Detections, Estimate, Rig
+from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from simharness.types.truth import Truth
+
+_SAME_TIME = 1e-6  # seconds: nobody moves a hundredth of a millimetre in it
+_BEYOND = 1.0  # seconds before the first frame or after the last, at most
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,54 @@ class Recording:
         """T, the number of frames."""
         return len(self.time)
 
+    def at_times_of(self, estimates: Sequence[Estimate]) -> Recording:
+        """Return the recording with the true joints at the times of estimates, T, that are not those of the frames.
+
+        Pictures that come with times of their own (``Detections.time``) give people at other times than the frames',
+        such as that of the latest picture. The joints are interpolated by a cubic through the four frames around; by a
+        line, or not at all, where there are fewer frames with the person. Pixels and visibility stay those of the
+        frame. Estimates without a time, or of detections without times, are those of the frame.
+        """
+        shifted = [
+            frame
+            for frame, (given, estimate) in enumerate(zip(self.detections, estimates, strict=True))
+            if given.time is not None
+            and estimate.time is not None
+            and abs(estimate.time - self.time[frame]) > _SAME_TIME
+        ]
+        if not shifted or len(self) == 1:
+            return self
+        joints = np.stack([each.joints for each in self.truth])
+        truth = list(self.truth)
+        for frame in shifted:
+            moved = _interpolated(joints, self.time, float(estimates[frame].time or 0.0), frame)
+            truth[frame] = replace(truth[frame], joints=moved)
+        return replace(self, truth=tuple(truth))
+
     @property
     def people(self) -> int:
         """P, the number of people."""
         return len(self.truth[0].joints)
+
+
+def _interpolated(joints: Floats, time: Floats, when: float, frame: int) -> Floats:
+    """Return true joints (P, J, 3) at a time; those of ``frame`` for people who are absent in a frame next to it.
+
+    Args:
+        joints: of all frames, (T, P, J, 3), metres; NaN for absent people.
+        time: times of the frames, (T,), seconds.
+        when: the time, seconds.
+        frame: frame to which the time belongs.
+    """
+    when = float(np.clip(when, time[0] - _BEYOND, time[-1] + _BEYOND))
+    before = int(np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2))
+    result = joints[frame]
+    for nodes in (range(before, before + 2), range(before - 1, before + 3)):
+        inside = time[0] <= when <= time[-1] and nodes.start >= 0 and nodes.stop <= len(time)
+        if len(nodes) == 2 or inside:
+            t = time[list(nodes)]
+            weights = [np.prod([(when - b) / (a - b) for b in t if b != a]) for a in t]
+            moved = np.einsum("n,npjc->pjc", weights, joints[list(nodes)])
+            absent = np.isnan(moved) | np.isnan(joints[frame])
+            result = np.where(absent, result, moved)
+    return result

@@ -88,6 +88,17 @@ class Cameras(Section):
     aim_jitter: Spread = Field(
         0.0, description="standard deviation of the points looked at along each axis, metres; not of preset and file"
     )
+    trigger: Literal["common", "free"] = Field(
+        "common",
+        description="common: all cameras take their pictures at the times of the frames; free: each at its own phase "
+        "within half a frame before or after, drawn uniformly and known to the method",
+    )
+    every: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field(
+        (),
+        max_length=MOST_CAMERAS,
+        description="numbers that the cameras take in turn, for cameras of different rates: 2 is a camera with a "
+        "picture in every second frame; empty: a picture in every frame",
+    )
     preset: Preset | None = Field(None, description="layout preset: the published rig")
     file: str = Field(
         "",
@@ -122,6 +133,11 @@ class Faults(Section):
     )
     clock_offset: Span = Field(0.0, description="standard deviation of the cameras' clocks, seconds; at most 0.9")
     clock_jitter: Span = Field(0.0, description="standard deviation of the time of each single picture, seconds")
+    clocks_known: bool = Field(
+        False,
+        description="the method is given the true times of pictures, as where clocks have been compared; else those at "
+        "which they should have been taken",
+    )
     dropped: Share = Field(0.0, description="probability that a picture never arrives")
     frozen: Share = Field(0.0, description="probability that a camera repeats its last picture")
     dead: tuple[View, ...] = Field(

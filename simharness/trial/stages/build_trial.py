@@ -16,7 +16,7 @@ from simharness.trial.stages.capture import renderer_of
 from simharness.trial.stages.estimators import estimators_of
 from simharness.trial.stages.networks import descriptor_settings, pose_head, re_id
 from simharness.world.rigs.exposure_schedule import ExposureSchedule
-from simharness.world.rigs.faults import schedule_exposures
+from simharness.world.rigs.faults import camera_phases, schedule_exposures
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import Scene, build
 
@@ -58,7 +58,10 @@ def build_trial(scenario: Scenario) -> Trial:
             raise ValueError(f"rendering.renderer: {error}") from None
     rig = true_rig(scenario)
     scene = build(scenario, rig)
-    exposures = schedule_exposures(rig, scenario.faults, scene.time, seed=scenario.seed)
+    phases = camera_phases(scenario.cameras, len(rig), period=1.0 / scenario.rate, seed=scenario.seed)
+    exposures = schedule_exposures(
+        rig, scenario.faults, scene.time, seed=scenario.seed, phases=phases, every=scenario.cameras.every
+    )
     return Trial(scenario, scene, exposures, pipelines, descriptors)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from simharness.detector.detect import detect
 from simharness.runtime.frame_pool import map_frames
@@ -53,6 +53,8 @@ def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: C
 def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) -> DetectedSequence:
     """Detect people in the captured frames; networks of the scenario read its pictures.
 
+    The detections carry the times of the pictures as the method is given them.
+
     Args:
         simulation: from :func:`capture_trial`.
         stages: timer and reporter of the stages ``detect`` and ``read``.
@@ -75,4 +77,8 @@ def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) ->
             reading = ReadFrames(scenario, trial.scene, exposures, tuple(detected))
             parts = map_frames(reading, frames, workers=workers, progress=advance)
             detected = [each for part in parts for each in part]
+    detected = [
+        replace(each, detections=replace(each.detections, time=time))
+        for each, time in zip(detected, exposures.known_time, strict=True)
+    ]
     return DetectedSequence(sequence.time, exposures.believed_rig, tuple(detected))

@@ -28,20 +28,23 @@ class ExposureSchedule:
             seconds; if nothing arrives, the time at which it would have been taken.
         source: frame in which that picture was taken, (T, V): the frame itself, an earlier one if the camera repeats
             its last picture, -1 if nothing arrives.
+        known_time: time of that picture as the method is given it, (T, V), seconds; NaN if nothing arrives.
         camera_of_view: index of the true camera that takes the pictures of each view, (V,).
         rotation_rate: drift of the true cameras about their own x, y, z axes, (V, 3), rad/s.
         velocity: drift of the centres of the true cameras, (V, 3), m/s.
         readout: seconds from the first to the last row of a picture.
 
     Raises:
-        ValueError: a wrong shape, a time or drift that is not finite, a source later than its frame, a camera_of_view
-            that does not name each camera once, or a negative readout.
+        ValueError: a wrong shape, a time or drift that is not finite, a source later than its frame, a known time
+            without a picture or the reverse, a camera_of_view that does not name each camera once, or a negative
+            readout.
     """
 
     believed_rig: Rig
     true_cameras: Rig
     time: Floats
     source: Integers
+    known_time: Floats
     camera_of_view: Integers
     rotation_rate: Floats
     velocity: Floats
@@ -53,12 +56,15 @@ class ExposureSchedule:
             raise ValueError(f"expected as many true cameras as believed ones, {views}, got {len(self.true_cameras)}")
         time = as_array(self.time, ("T", views), "time")
         source = as_array(self.source, (len(time), views), "source", np.int64)
+        known_time = as_array(self.known_time, time.shape, "known_time")
         camera_of_view = as_array(self.camera_of_view, (views,), "camera_of_view", np.int64)
         rotation_rate = as_array(self.rotation_rate, (views, 3), "rotation_rate")
         velocity = as_array(self.velocity, (views, 3), "velocity")
         for name, values in (("time", time), ("rotation_rate", rotation_rate), ("velocity", velocity)):
             if not np.isfinite(values).all():
                 raise ValueError(f"{name} must be finite, but has values that are not")
+        if not np.array_equal(np.isfinite(known_time), source >= 0):
+            raise ValueError("known_time must be finite where a picture arrives, and NaN elsewhere")
         if (source < -1).any() or (source > np.arange(len(time))[:, None]).any():
             raise ValueError("source must be -1 or a frame that is not later than the frame of its row")
         if sorted(camera_of_view) != list(range(views)):
@@ -68,6 +74,7 @@ class ExposureSchedule:
         for name, array in (
             ("time", time),
             ("source", source),
+            ("known_time", known_time),
             ("camera_of_view", camera_of_view),
             ("rotation_rate", rotation_rate),
             ("velocity", velocity),
@@ -84,6 +91,7 @@ class ExposureSchedule:
             true_cameras=rig,
             time=np.broadcast_to(time[:, None], shape),
             source=np.broadcast_to(np.arange(len(time))[:, None], shape),
+            known_time=np.broadcast_to(time[:, None], shape),
             camera_of_view=np.arange(len(rig)),
             rotation_rate=np.zeros((len(rig), 3)),
             velocity=np.zeros((len(rig), 3)),

@@ -9,6 +9,7 @@ others.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 from mvpose.arrays import Floats, Integers
 from mvpose.camera import Camera, Rig
 from mvpose.checks import as_array
-from simharness.scenario.sections.scenario import Faults
+from simharness.scenario.sections.scenario import Cameras, Faults
 from simharness.types.random_streams import stream
 from simharness.world.rigs.exposure_schedule import ExposureSchedule, moved
 
@@ -25,7 +26,32 @@ MAX_CLOCK_ERROR = 0.9  # seconds from a frame to its picture: motions are planne
 _MINUTE = 60.0
 
 
-def schedule_exposures(rig: Rig, faults: Faults, time: ArrayLike, *, seed: int) -> ExposureSchedule:
+def camera_phases(cameras: Cameras, views: int, *, period: float, seed: int) -> Floats:
+    """Return the time from each frame to the picture of each camera, (V,), seconds, without faults of its clock.
+
+    A camera that is not triggered takes its pictures at any time. The picture of a frame is the nearest one, within
+    half a frame before or after.
+
+    Args:
+        cameras: section [cameras].
+        views: number of cameras, V.
+        period: time between frames, seconds.
+        seed: seed of the scenario.
+    """
+    if cameras.trigger == "common":
+        return np.zeros(views)
+    return period * np.array([stream(seed, "cameras", "phase", view).random() - 0.5 for view in range(views)])
+
+
+def schedule_exposures(
+    rig: Rig,
+    faults: Faults,
+    time: ArrayLike,
+    *,
+    seed: int,
+    phases: ArrayLike | None = None,
+    every: Sequence[int] = (),
+) -> ExposureSchedule:
     """Return the exposure schedule of a sequence with the faults of a scenario.
 
     Spreads are standard deviations of normal draws over cameras:
@@ -36,9 +62,10 @@ def schedule_exposures(rig: Rig, faults: Faults, time: ArrayLike, *, seed: int) 
       centre;
     - ``rotation_drift``, ``translation_drift``: each true camera turns and moves at a constant speed from time 0 on;
     - ``clock_offset`` (per camera) and ``clock_jitter`` (per picture) are added to the time of a picture; their sum is
-      clipped to 0.9 s;
+      clipped to 0.9 s, with the phase. The method is given the times without these two, unless ``clocks_known``;
     - ``dropped`` and ``frozen`` are chances per picture. A frozen camera repeats its last picture that arrived; if none
-      has arrived yet, it delivers a new one. A dropped picture does not arrive, frozen or not;
+      has arrived yet, it delivers a new one. The method is given the time of a new picture. A dropped picture does not
+      arrive, frozen or not;
     - ``dead`` cameras deliver nothing; two ``swapped`` cameras each deliver the pictures of the other.
 
     Args:
@@ -46,20 +73,26 @@ def schedule_exposures(rig: Rig, faults: Faults, time: ArrayLike, *, seed: int) 
         faults: parameters of the faults.
         time: times of the frames, (T,), seconds.
         seed: seed of the scenario.
+        phases: from :func:`camera_phases`, (V,), seconds; by default 0.
+        every: numbers that the cameras take in turn; of number n, a camera delivers a picture in every n-th frame.
 
     Raises:
         ValueError: ``dead`` or ``swapped`` name a camera that is not in the rig, a camera is swapped twice or with
             itself, or two cameras with pictures of different sizes are swapped.
     """
     time = as_array(time, ("T",), "time")
+    phases = np.zeros(len(rig)) if phases is None else as_array(phases, (len(rig),), "phases")
     camera_of_view = _cameras_of_views(faults, rig)
     dead = _dead(faults, rig)
     if not len(time):
         ideal = ExposureSchedule.ideal(rig, time)
         return replace(ideal, believed_rig=_believed(rig, faults, seed), camera_of_view=camera_of_view)
-    source = np.stack([_sources(faults, len(time), seed, view) for view in range(len(rig))], axis=1)
+    turns = [every[view % len(every)] if every else 1 for view in range(len(rig))]
+    source = np.stack([_sources(faults, len(time), seed, view, turns[view]) for view in range(len(rig))], axis=1)
     source[:, dead] = -1
-    clock = np.stack([_clock(faults, time, seed, view) for view in range(len(rig))], axis=1)
+    clock = np.stack([_clock(faults, time, seed, view, phases[view]) for view in range(len(rig))], axis=1)
+    known = clock if faults.clocks_known else time[:, None] + np.clip(phases, -MAX_CLOCK_ERROR, MAX_CLOCK_ERROR)
+    known = np.where(source < 0, np.nan, known)
     taken_in = np.where(source < 0, np.arange(len(time))[:, None], source)
     taken_at = np.take_along_axis(clock, taken_in, axis=0)
     return ExposureSchedule(
@@ -67,6 +100,7 @@ def schedule_exposures(rig: Rig, faults: Faults, time: ArrayLike, *, seed: int) 
         true_cameras=rig,
         time=taken_at[:, camera_of_view],
         source=source[:, camera_of_view],
+        known_time=known[:, camera_of_view],
         camera_of_view=camera_of_view,
         rotation_rate=np.radians(faults.rotation_drift) / _MINUTE * _normals(seed, "rotation drift", len(rig)),
         velocity=faults.translation_drift / _MINUTE * _normals(seed, "translation drift", len(rig)),
@@ -103,16 +137,17 @@ def _normals(seed: int, fault: str, views: int, count: int = 3) -> Floats:
     return np.stack([stream(seed, "faults", fault, view).standard_normal(count) for view in range(views)])
 
 
-def _clock(faults: Faults, time: Floats, seed: int, view: int) -> Floats:
+def _clock(faults: Faults, time: Floats, seed: int, view: int, phase: float) -> Floats:
     """Return the times at which one camera takes the pictures of the frames, (T,) seconds."""
     offset = faults.clock_offset * stream(seed, "faults", "clock offset", view).standard_normal()
     jitter = faults.clock_jitter * stream(seed, "faults", "clock jitter", view).standard_normal(len(time))
-    return time + np.clip(offset + jitter, -MAX_CLOCK_ERROR, MAX_CLOCK_ERROR)
+    return time + np.clip(phase + offset + jitter, -MAX_CLOCK_ERROR, MAX_CLOCK_ERROR)
 
 
-def _sources(faults: Faults, frames: int, seed: int, view: int) -> Integers:
+def _sources(faults: Faults, frames: int, seed: int, view: int, every: int) -> Integers:
     """Return the frame of the picture that one camera delivers in every frame, (T,); -1 for none."""
     dropped = stream(seed, "faults", "dropped", view).random(frames) < faults.dropped
+    dropped |= np.arange(frames) % every > 0
     frozen = stream(seed, "faults", "frozen", view).random(frames) < faults.frozen
     fresh = ~dropped & ~frozen
     # The first picture that arrives has none to repeat: it is new whether the camera froze or not.
