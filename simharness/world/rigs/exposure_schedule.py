@@ -63,10 +63,10 @@ class ExposureSchedule:
         for name, values in (("time", time), ("rotation_rate", rotation_rate), ("velocity", velocity)):
             if not np.isfinite(values).all():
                 raise ValueError(f"{name} must be finite, but has values that are not")
-        if not np.array_equal(np.isfinite(known_time), source >= 0):
-            raise ValueError("known_time must be finite where a picture arrives, and NaN elsewhere")
         if (source < -1).any() or (source > np.arange(len(time))[:, None]).any():
             raise ValueError("source must be -1 or a frame that is not later than the frame of its row")
+        if not np.array_equal(np.isfinite(known_time), source >= 0):
+            raise ValueError("known_time must be finite where a picture arrives, and NaN elsewhere")
         if sorted(camera_of_view) != list(range(views)):
             raise ValueError(f"camera_of_view must name each of {views} cameras once, got {camera_of_view.tolist()}")
         if not 0.0 <= self.readout < np.inf:

@@ -30,6 +30,7 @@ def test_the_ideal_schedule_has_every_picture_at_its_frame():
         ({"time": np.full((4, 3), np.nan)}, "time must be finite"),
         ({"source": np.ones((4, 3), int)}, "source must be -1 or a frame that is not later"),
         ({"source": np.full((4, 3), -2)}, "source must be -1 or a frame that is not later"),
+        ({"known_time": np.full((4, 3), np.nan)}, "known_time must be finite where a picture arrives, and NaN"),
         ({"camera_of_view": [0, 1, 1]}, "camera_of_view must name each of 3 cameras once"),
         ({"rotation_rate": np.zeros((2, 3))}, "rotation_rate must be"),
         ({"velocity": np.full((3, 3), np.inf)}, "velocity must be finite"),
