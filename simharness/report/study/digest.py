@@ -17,7 +17,7 @@ import polars as pl
 from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
-from simharness.report.study.digest_text import HEADS, PRINTED, markdown
+from simharness.report.study.digest_text import HEADS, HEADS_OVER_TIME, PRINTED, markdown
 from simharness.report.study.failure_rates import failure_rates
 from simharness.report.study.page import THRESHOLDS
 from simharness.runtime.atomic_files import atomic_folder
@@ -26,8 +26,8 @@ from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results
 from simharness.trial.provenance import PROVENANCE
 
-SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
-"""Scores of a digest."""
+_SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
+_OVER_TIME = tuple(dict.fromkeys((*HEADS_OVER_TIME, *tables.OVER_TIME)))  # where a variant tracks people
 
 _CURVES = (("pcp", "map"), ("recall", "ghosts"))  # two scores in each row of the picture
 _MAX_COLUMNS = 3  # panels of cases in a row
@@ -74,6 +74,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
     cases = cases_of(results)
+    scored = (*_SCORED, *(_OVER_TIME if tables.tracks_people(trials) else ()))
     return {
         "name": info["name"],
         "description": info["description"],
@@ -81,10 +82,10 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
         "seconds": round(float(trials["seconds"].sum()), 1),  # the run's time leaves out trials of earlier runs
         "trials": info["trials"],
         "one_at_a_time": info["one_at_a_time"],
-        "means": _means(trials, names),
-        "cases": {case: _means(trials.filter(pl.col("case") == case), names) for case in cases},
-        **_swept(factors(results), names, thresholds),
-        "by_case": {case: _swept(factors(results, case), names, thresholds) for case in cases},
+        "means": _means(trials, names, scored),
+        "cases": {case: _means(trials.filter(pl.col("case") == case), names, scored) for case in cases},
+        **_swept(factors(results), names, thresholds, scored),
+        "by_case": {case: _swept(factors(results, case), names, thresholds, scored) for case in cases},
         "failures": {variant: failure_rates(results, variant) for variant in names},
         "time_ms": {variant: _times(trials.filter(pl.col("variant") == variant)) for variant in names},
     }
@@ -141,10 +142,12 @@ def _notes(factor: Factor) -> list[str]:
     return [text for text in (along if factor.along else "", plots.mean_over(factor.over)) if text]
 
 
-def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[str, float]) -> dict[str, Any]:
+def _swept(
+    swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[str, float], scored: Sequence[str]
+) -> dict[str, Any]:
     """Return factors with their scores, and the breaking points."""
     return {
-        "factors": [_factor(factor, names) for factor in swept],
+        "factors": [_factor(factor, names, scored) for factor in swept],
         "breaking": [
             {
                 "factor": each.factor,
@@ -165,7 +168,7 @@ def _swept(swept: Sequence[Factor], names: Sequence[str], thresholds: Mapping[st
     }
 
 
-def _means(trials: pl.DataFrame, names: Sequence[str]) -> dict[str, dict[str, Any]]:
+def _means(trials: pl.DataFrame, names: Sequence[str], scored: Sequence[str]) -> dict[str, dict[str, Any]]:
     return {
         name: {
             score: _ends(
@@ -174,20 +177,20 @@ def _means(trials: pl.DataFrame, names: Sequence[str]) -> dict[str, dict[str, An
                     unit=SCORES[score].unit,
                 )
             )
-            for score in SCORED
+            for score in scored
         }
         for name in names
     }
 
 
-def _factor(factor: Factor, names: Sequence[str]) -> dict[str, Any]:
+def _factor(factor: Factor, names: Sequence[str], scored: Sequence[str]) -> dict[str, Any]:
     return {
         "key": factor.key,
         "along": list(factor.along),
         "over": {key: list(values) for key, values in factor.over.items()},
         "values": list(factor.values),
         "scores": {
-            name: {score: [_ends(each) for each in factor.line(name, score)] for score in SCORED} for name in names
+            name: {score: [_ends(each) for each in factor.line(name, score)] for score in scored} for name in names
         },
     }
 

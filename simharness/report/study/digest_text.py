@@ -8,6 +8,7 @@ from typing import Any
 from simharness.report.documents import markdown_table, provenance_sentence
 from simharness.report.study.factor_names import NAMES, axis_label
 from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS, mean_over, short
+from simharness.report.study.tables import OVER_TIME
 from simharness.runtime.number_text import fixed
 from simharness.runtime.progress import duration
 from simharness.scoring.catalogue import AP_MM, SCORES, ScoreInfo
@@ -16,6 +17,8 @@ HEADS = ("pcp", "recall", "precision", "mpjpe_mm", "map", "match_f1", "ghosts")
 """Scores of the first table of a digest."""
 PRINTED = (*(f"ap{limit}" for limit in AP_MM), "map", "recall", "mpjpe_mm", "pcp", "ghosts")
 """Scores of one variant at every value of a factor, in the order in which papers print them for Panoptic."""
+HEADS_OVER_TIME = ("hota", "assa", "idf1", "pcp_tracked", "switches_per_minute", "fragmentations", "jerk_ratio")
+"""Scores of the second table, of studies with a variant that tracks people."""
 COMPARED = ("pcp", "map", "ghosts")
 """Scores of all variants at every value of a factor."""
 
@@ -65,8 +68,14 @@ def _means(digest: Mapping[str, Any]) -> Iterator[str]:
             yield f"\nCase {case}:\n"
         rows = [[name, *(_interval(means[name][key], SCORES[key]) for key in HEADS)] for name in names]
         yield from markdown_table(["variant", *(_head(key) for key in HEADS)], rows)
+        tracked = "hota" in means[names[0]]
+        if tracked:
+            yield ""
+            rows = [[name, *(_interval(means[name][key], SCORES[key]) for key in HEADS_OVER_TIME)] for name in names]
+            yield from markdown_table(["variant", *(_head(key) for key in HEADS_OVER_TIME)], rows)
         if not case:
-            yield "\n" + _listed({SCORES[key].title: SCORES[key].about for key in HEADS})
+            described = (*HEADS, *HEADS_OVER_TIME) if tracked else HEADS
+            yield "\n" + _listed({SCORES[key].title: SCORES[key].about for key in described})
 
 
 def _factor(key: str, parts: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> Iterator[str]:
@@ -79,7 +88,8 @@ def _factor(key: str, parts: Mapping[str, Mapping[str, Any]], names: Sequence[st
         notes += [mean_over(factor["over"])] if factor["over"] else []
         note = f" ({'; '.join(notes)})" if notes else ""
         values = [short(value) for value in factor["values"]]
-        for score in COMPARED:
+        known = factor["scores"][names[0]]
+        for score in (*COMPARED, *(key for key in OVER_TIME if key in known)):
             yield f"\n{_head(score)}, against {where}{note}:\n"
             rows = [
                 [value, *(_interval(factor["scores"][name][score][row], SCORES[score]) for name in names)]

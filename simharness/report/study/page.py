@@ -25,7 +25,7 @@ THRESHOLDS: Mapping[str, float] = {"pcp": 90.0, "precision": 90.0}
 """Default thresholds of the breaking points. Ghosts do not lower PCP; they lower precision."""
 
 CURVES = ("pcp", "recall", "mpjpe_mm", "ghosts")
-"""Scores with robustness curves."""
+"""Scores with robustness curves, besides :data:`simharness.report.study.tables.OVER_TIME` where people are tracked."""
 
 _STAGES = ("affinity", "matching", "reconstruction")
 _MAX_ERRORS = 20  # failed trials in the list on the page
@@ -93,6 +93,7 @@ def render_study(
     variants = [name for name in info["variants"] if name in set(trials["variant"])]
     swept = factors_by_case(results) if variants else {}
     seeds = trials["seed"].n_unique()
+    drawn = (*CURVES, *(tables.OVER_TIME if tables.tracks_people(trials) else ()))
     return fill_template(
         "study.html",
         info=info,
@@ -106,15 +107,15 @@ def render_study(
         compared=tables.differences(trials, variants) if len(variants) > 1 and seeds > 1 else {},
         every=tables.all_scores(trials, variants),
         cases=tables.cases(trials, variants),
-        tabs=[SCORES[key] for key in CURVES],
+        tabs=[SCORES[key] for key in drawn],
         curves=[
             curve
             for index, by_case in enumerate(panels(swept).values())
-            for curve in _curves(index, by_case, variants, thresholds)
+            for curve in _curves(index, by_case, variants, thresholds, drawn)
         ],
         factors=len(panels(swept)),
-        heats=_heats(swept, variants, one_at_a_time=info["one_at_a_time"]),
-        threshold_drawn=any(score in thresholds for score in CURVES),
+        heats=_heats(swept, variants, drawn, one_at_a_time=info["one_at_a_time"]),
+        threshold_drawn=any(score in thresholds for score in drawn),
         breaking=_breaking(swept, variants, thresholds),
         failures=_failures(results, variants),
         shown=shown,
@@ -167,7 +168,11 @@ def _span(numbers: Sequence[int]) -> str:
 
 
 def _curves(
-    index: int, by_case: Mapping[str, Factor], variants: Sequence[str], thresholds: Mapping[str, float]
+    index: int,
+    by_case: Mapping[str, Factor],
+    variants: Sequence[str],
+    thresholds: Mapping[str, float],
+    drawn: Sequence[str],
 ) -> list[dict[str, Any]]:
     """Return the plots of a factor and their numbers by score, for each case; all cases have one scale."""
     curves: list[dict[str, Any]] = [
@@ -181,7 +186,7 @@ def _curves(
         }
         for case, factor in by_case.items()
     ]
-    for score in CURVES:
+    for score in drawn:
         info = SCORES[score]
         lines = {case: {each: factor.line(each, score) for each in variants} for case, factor in by_case.items()}
         every = [line for each in lines.values() for line in each.values()]
@@ -205,7 +210,7 @@ def _curves(
 
 
 def _heats(
-    swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], *, one_at_a_time: bool
+    swept: Mapping[str, Sequence[Factor]], variants: Sequence[str], drawn: Sequence[str], *, one_at_a_time: bool
 ) -> list[dict[str, Any]]:
     """Return heat maps by score for a grid of two factors, for the first two variants in each case; else nothing."""
     if one_at_a_time or not swept or any(len(factors) != 2 for factors in swept.values()):
@@ -215,7 +220,7 @@ def _heats(
         {"variant": variant, "case": case, "down": down.key, "along": along.key, "plots": {}}
         for case, down, along, variant in shown
     ]
-    for score in CURVES:
+    for score in drawn:
         means = [grid(down, along, variant, score) for _, down, along, variant in shown]
         whole = [each for each in means if each is not None]
         if len(whole) < len(means):

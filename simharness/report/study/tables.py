@@ -22,6 +22,9 @@ COLUMNS: tuple[ScoreInfo, ...] = tuple(
 )
 """Scores of the headline table."""
 
+OVER_TIME = ("hota", "idf1", "switches_per_minute", "jerk_ratio")
+"""Scores over time with curves, of studies with a variant that tracks people."""
+
 SIGNIFICANT = 0.05
 """Adjusted p value below which a difference is significant."""
 
@@ -42,6 +45,11 @@ class Cell:
     text: str
     small: str = ""
     strong: bool = False
+
+
+def tracks_people(trials: pl.DataFrame) -> bool:
+    """Return whether a variant of a study gives identities; tables of earlier versions have no column of them."""
+    return "hota" in trials.columns and trials["hota"].is_not_null().any()
 
 
 def by_seed(rows: pl.DataFrame, score: str) -> dict[int, float]:

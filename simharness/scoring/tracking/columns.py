@@ -35,13 +35,16 @@ _ERRORS = (
 
 _IDENTITIES = (*(ScoreInfo(key, title, "%", about, "higher", 1) for key, (title, about) in _SHARES.items()), *_ERRORS)
 
+IDENTITY_SCORES = tuple(info.key for info in _IDENTITIES)
+"""Keys of the scores that only variants with identities have."""
+
 
 @scores(*_IDENTITIES)
 def identity_columns(given: ScoreInput) -> Mapping[str, float | None]:
     """Return the scores of identities; all None without identities."""
     ids = ids_of(given.estimates)
     if ids is None:
-        return dict.fromkeys(info.key for info in _IDENTITIES)
+        return dict.fromkeys(IDENTITY_SCORES)
     joints = [estimate.joints for estimate in given.estimates]
     frames = tracked_frames(given.truth, joints, ids, skeleton=COCO17)
     figures = identity_figures(frames, given.recording.time, distance=DISTANCE)

@@ -12,6 +12,7 @@ import polars as pl
 from simharness.failures.blame import FAILURE_SCHEMA
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.catalogue import SCORES
+from simharness.scoring.tracking.columns import IDENTITY_SCORES
 from simharness.study.result_folder import Results
 from simharness.types.random_streams import stream
 
@@ -38,7 +39,10 @@ def make_study(
     failed: tuple[dict[str, Any], ...] = (),
     **info: Any,
 ) -> Results:
-    """Return a study of a grid, or of one factor at a time, where each factor's first value is the base."""
+    """Return a study of a grid, or of one factor at a time, where each factor's first value is the base.
+
+    Only variants whose names begin with ``track`` have scores of identities.
+    """
     factors = {"cameras.count": [2, 3, 5]} if factors is None else factors
     keys = list(factors)
     if one_at_a_time:
@@ -55,6 +59,8 @@ def make_study(
             scores: dict[str, float | None] = {
                 key: float(stream(seed, "made scores", variant, number, key).uniform(1, 2)) for key in SCORES
             }
+            if not variant.startswith("track"):
+                scores |= dict.fromkeys(IDENTITY_SCORES)
             scores["pcp"] = pcp_of(variant, setting, seed, slope)
             trials.append(
                 {"trial": trial, "case": case, "varied": varied, "seed": seed, "variant": variant}

@@ -310,3 +310,17 @@ class TestFiles:
         result = CliRunner().invoke(app, ["report", str(tmp_path), "--digest", "a", "--rerun", "b"])
         assert result.exit_code == 2
         assert "--rerun and --digest" in result.stderr
+
+
+def test_scores_over_time_are_there_where_a_variant_tracks_people(study, tmp_path):
+    tracked = make_study(tmp_path, factors={"cameras.count": COUNTS}, variants=("full", "track"))
+    numbers, plain = digest(tracked), digest(study)
+    for key in ("hota", "idf1", "pcp_tracked", "switches_per_minute"):
+        assert numbers["means"]["track"][key][0] == pytest.approx(1.5, abs=0.5)
+        assert numbers["means"]["full"][key] is None
+        assert numbers["factors"][0]["scores"]["full"][key] == [None] * 3
+        assert key not in plain["means"]["full"]
+    text = markdown(numbers)
+    assert "| variant | HOTA, % | AssA, % |" in text
+    assert "HOTA, %, against `cameras.count`:" in text
+    assert "HOTA" not in markdown(plain)

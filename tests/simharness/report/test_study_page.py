@@ -63,14 +63,14 @@ def test_the_headline_is_the_mean_over_everything(tmp_path):
 
 
 def test_every_score_that_applies_has_its_mean(tmp_path):
-    results = make_study(tmp_path, factors={"cameras.count": [2, 3]})
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3]}, variants=("full", "track"))
     trials = results.trials.with_columns(pl.lit(None, pl.Float64).alias("phantoms_pruned"))
     results = dataclasses.replace(results, trials=trials)
     page = render_study(results)
     table = page[page.index('class="panel every"') :]
     rows = 0
     for key, info in SCORES.items():
-        values = results.trials.filter(pl.col("variant") == "fast")[key].drop_nulls()
+        values = results.trials.filter(pl.col("variant") == "track")[key].drop_nulls()
         title = f"{info.title}, {info.unit}" if info.unit else info.title
         row = re.search(rf'<th scope="row">{re.escape(title)}<span.*?</tr>', table, re.DOTALL)
         assert (row is not None) == bool(len(values))
@@ -269,3 +269,12 @@ class TestCommand:
 
     def test_a_trial_without_a_recording(self, ran):
         assert "add --rerun FILE" in self.refused(ran.folder, "--trial", "0")
+
+
+def test_a_variant_that_tracks_people_has_curves_over_time(tmp_path):
+    """Other variants have no line there, and heat maps without numbers; studies without such a variant have no tab."""
+    page = render_study(make_study(tmp_path, factors=GRID, variants=("full", "track")))
+    for key in ("hota", "idf1", "switches_per_minute", "jerk_ratio"):
+        assert f'id="tab-{key}"' in page
+        assert page.count(f'class="of of-{key}"') == 2 * 2 + 2  # plots and numbers of two factors, two heat maps
+    assert 'id="tab-hota"' not in render_study(make_study(tmp_path, factors=GRID))
