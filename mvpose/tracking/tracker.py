@@ -61,7 +61,8 @@ class TrackingModel:
         existence: how often people come, and how often people and ghosts are found.
         reappearance: how people who were lost come back.
         noise: error model of keypoints.
-        correlation: time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s.
+        correlation: time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s,
+            others change faster.
         period: time between frames whose detections carry no time, seconds.
     """
 
@@ -70,7 +71,7 @@ class TrackingModel:
     existence: Existence = Existence()
     reappearance: Reappearance = Reappearance()
     noise: Noise = Noise()
-    correlation: float = 0.2
+    correlation: float = 0.15
     period: float = 0.04
 
     def __post_init__(self) -> None:
