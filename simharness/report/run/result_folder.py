@@ -89,9 +89,10 @@ def _record(result: TrialResult, about: Mapping[str, Any]) -> Record:
     scenario, recording = result.scenario, result.recording
     scores = {variant: assessment.variant_scores for variant, assessment in result.assessments.items()}
     if any(ids_of(estimates) is not None for estimates in result.estimates.values()):
-        truth = np.stack([true.joints for true in recording.truth])
         for variant, scored in scores.items():
-            over_time = tracking_summary(truth, result.estimates[variant], recording.time)
+            timed = recording.at_times_of(result.estimates[variant])
+            truth = np.stack([true.joints for true in timed.truth])
+            over_time = tracking_summary(truth, result.estimates[variant], timed.time)
             scores[variant] = replace(scored, tracking=over_time)
     summary = summarize(
         scenario.name,
