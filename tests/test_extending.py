@@ -80,6 +80,7 @@ def test_every_extension_is_used():
         "A score",
         "A plot",
         "A matching method",
+        "A tracker",
     ]
     for name, text in SECTIONS.items():
         python = blocks("python", text)
