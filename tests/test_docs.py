@@ -67,6 +67,7 @@ NAMES = ("simharness check", "simharness export", "simharness fit-detector", "si
 CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2",
     "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
+    "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2",
 )
 SHELF = (
     "simharness evaluate shelf FOLDER",

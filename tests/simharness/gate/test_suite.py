@@ -8,6 +8,7 @@ import pytest
 from suites import SMALL, remember_scenes
 from trials import Recorder
 
+from mvpose.presets import TRACKING
 from simharness.gate import suite
 from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import relative_times
@@ -35,6 +36,15 @@ def test_the_shipped_suite_is_small_and_has_enough_seeds():
     assert {setting.scenario.rendering.renderer for setting in ci.settings} == {"rays"}
     whole, condition = (len(ci.variants) * (len(GATED) + 1) for _ in range(2))  # a fault that changes every score
     assert max(whole, condition) * least_corrected_p(len(ci.seeds), cases=len(ci.settings)) < ci.gate.level
+
+
+def test_the_suite_of_tracking_has_enough_seeds_and_only_variants_with_memory():
+    study = load_study(Path(__file__).parents[3] / "scenarios" / "ci_tracking.toml")
+    assert len(study.seeds) >= 12
+    assert set(study.variants) == TRACKING
+    assert max(setting.scenario.duration for setting in study.settings) <= 5.0
+    tests = len(study.variants) * (len(GATED) + 1)
+    assert tests * least_corrected_p(len(study.seeds), cases=len(study.settings)) < study.gate.level
 
 
 def test_the_work_of_the_reference_is_always_the_same():
