@@ -77,7 +77,7 @@ class Pipeline:
         lag: float | None = None,
         period: float | None = None,
     ) -> Estimator:
-        """Return one of the presets in :data:`mvpose.presets.PRESETS`: the rows of the paper's ablation, a fast one,
+        """Return one of the presets in ``mvpose.presets.PRESETS``: the rows of the paper's ablation, a fast one,
         and trackers.
 
         Args:

@@ -36,7 +36,7 @@ TRACKING = frozenset({"track", "track-fast"})
 def preset(
     name: str, *, appearance: AppearanceAffinity | None = None, lag: float | None = None, period: float | None = None
 ) -> Estimator:
-    """Return one of :data:`PRESETS`; see :meth:`mvpose.Pipeline.preset`."""
+    """Return one of ``PRESETS``; see :meth:`mvpose.Pipeline.preset`."""
     appearance = appearance or AppearanceAffinity()
     full = Pipeline(affinity=FusedAffinity(appearance=appearance))
     fast = replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation())

@@ -32,7 +32,7 @@ class ClearMot:
     """Pairs of people and identities in each frame, and what they count.
 
     Attributes:
-        track: index into :attr:`TrackedFrames.ids` of the identity that each true person is paired with, (T, P);
+        track: index into ``TrackedFrames.ids`` of the identity that each true person is paired with, (T, P);
             :data:`MISSED` where it has none, :data:`ABSENT` where the person is not there.
         switched: where a person's identity is another one than the last time, (T, P).
         fragmentations: how often people are paired again after frames without a pair.

@@ -1,7 +1,7 @@
 """HOTA: higher order tracking accuracy (Luiten et al., IJCV 2021), with its parts DetA, AssA and LocA.
 
 At each of 19 thresholds of similarity, 0.05 to 0.95, people and estimates of a frame are paired one to one. DetA is the
-Jaccard index of people and estimates, |TP| / (|TP| + |FN| + |FP|). AssA is the mean over all pairs, each of a person
+Jaccard index of people and estimates, ``TP / (TP + FN + FP)``. AssA is the mean over all pairs, each of a person
 and an identity, of the Jaccard index of the frames of both; frames where they are paired are common. HOTA is the
 geometric mean of DetA and AssA, and LocA the mean similarity of pairs. Scores are means over the thresholds.
 

@@ -23,7 +23,7 @@ class IdentityScores:
     """Identities of the true people over the whole sequence.
 
     Attributes:
-        track: index into :attr:`TrackedFrames.ids` of the identity of each true person, (P,); -1 for none.
+        track: index into ``TrackedFrames.ids`` of the identity of each true person, (P,); -1 for none.
         right: number of frames in which the estimate of a person's identity is within the distance (IDTP).
         missed: number of all other frames of true people (IDFN).
         false: number of all other estimates (IDFP).
