@@ -279,12 +279,15 @@ class Clutter:
 
     Attributes:
         density: false detections in a picture of each view, (V,), a mean over the latest seconds.
+        watched: time that the mean is over, (V,), seconds; before the first picture that of the low number with which
+            it starts.
         counts: weighted number of groups that vanished as soon as they came, and of seconds, (2,).
     """
 
     def __init__(self, model: Existence, cameras: int) -> None:
         self._least = model.least_clutter
         self.density = np.full(cameras, model.least_clutter)
+        self.watched = np.full(cameras, model.independent)
         self.counts = np.array([_FLASHES * _WEIGHT, _WEIGHT])
 
     @property
@@ -305,7 +308,7 @@ class Clutter:
                 nobody is known yet.
             elapsed: time since the previous frame, seconds.
         """
-        _count(self.density, self.counts, unclaimed, pictures, since, self._least, elapsed)
+        _count(self.density, self.watched, self.counts, unclaimed, pictures, since, self._least, elapsed)
 
     def vanish(self, ages: Floats) -> None:
         """Count the tracks that ended at these ages, in seconds."""
@@ -313,11 +316,13 @@ class Clutter:
 
 
 @njit(cache=True)
-def _count(density, counts, unclaimed, pictures, since, least, elapsed):
+def _count(density, watched, counts, unclaimed, pictures, since, least, elapsed):
     keep = np.exp(-elapsed / _FLASH_MEMORY)
     for v in range(len(density)):
         if pictures[v] and since[v] < np.inf:
-            share = 1.0 - np.exp(-since[v] / _DENSITY_MEMORY)
+            # A plain mean until it is over the memory, so that a scene full of false detections is known at once.
+            share = 1.0 - np.exp(-since[v] / min(watched[v] + since[v], _DENSITY_MEMORY))
             density[v] = max((1.0 - share) * density[v] + share * unclaimed[v], least)
+            watched[v] = min(watched[v] + since[v], _DENSITY_MEMORY)
     counts[0] = keep * counts[0] + (1.0 - keep) * _FLASHES * _WEIGHT
     counts[1] = keep * counts[1] + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes

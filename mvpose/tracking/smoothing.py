@@ -80,8 +80,6 @@ def _smooth(tracker: Tracker, moments: Sequence[Moment], *, remember: bool = Fal
 
 def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -> Moment:
     """Return a moment improved by the next one, which is improved already."""
-    if moment.poses is not None:
-        return moment
     tracks, after = moment.tracks, later.tracks
     assert later.predicted is not None, "moments to smooth are kept"
     row, gain = moment.link or _link(tracker, moment, later)
@@ -95,6 +93,7 @@ def _improved(tracker: Tracker, moment: Moment, later: Moment, remember: bool) -
     improved, smoothed = shallow_copy(moment), shallow_copy(tracks)
     smoothed.state, smoothed.covariance = state, covariance
     improved.tracks, improved.odds, improved.presence, improved.shown = smoothed, odds, presence, shown
+    improved.poses = None  # the first frame has a future, so it is no longer that of the pipeline alone
     return improved
 
 

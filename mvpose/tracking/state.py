@@ -160,7 +160,7 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
         raise ValueError(f"version of the layout must be {VERSION}, got {version[0]}: track the recording again")
     tracks = [f"{name}.{field.name}" for name in _GROUPS for field in fields(Tracks)]
     names = {
-        "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", *_SINGLE, *tracks,
+        "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", "watched", *_SINGLE, *tracks,
         *(f"recent.{name}" for name in _RECENT),
     }  # fmt: skip
     if names != set(arrays):
@@ -169,6 +169,7 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
     _of(arrays, "rig.sizes", (cameras, 2), "i")
     _of(arrays, "skeleton.edges", (None, 2), "i")
     _of(arrays, "density", (cameras,))
+    _of(arrays, "watched", (cameras,))
     for name, size in _SINGLE.items():
         _of(arrays, name, (size,), "i" if name == "born" else "f")
     waiting, descriptor = len(_of(arrays, "recent.time", (None,))), len(arrays["recent.descriptors"].T)

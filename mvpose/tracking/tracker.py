@@ -285,6 +285,7 @@ class Tracker:
                 "clock": np.array([watch.interval, watch.time, watch.pictured]),
                 "born": np.array([self._born]),
                 "density": clutter.density,
+                "watched": clutter.watched,
                 "clutter": clutter.counts,
                 **of_tracks(self._tracks, self._lost),
                 **{f"recent.{name}": array for name, array in self._recent.state().items()},
@@ -308,6 +309,7 @@ class Tracker:
         tracker._born = int(arrays["born"][0])
         tracker._clutter = Clutter(tracker.model.existence, len(arrays["density"]))
         tracker._clutter.density, tracker._clutter.counts = arrays["density"].copy(), arrays["clutter"].copy()
+        tracker._clutter.watched = arrays["watched"].copy()
         tracker._tracks, tracker._lost = state.group("tracks"), state.group("lost")
         tracker._recent = RecentPictures.restored(state.recent)
         return tracker

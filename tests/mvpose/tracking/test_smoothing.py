@@ -81,6 +81,16 @@ def test_later_frames_make_estimates_better_and_smoother():
     assert bends[1] < 0.6 * bends[0]
 
 
+def test_a_lag_also_corrects_the_first_frame():
+    paths, errors = [(-1.0, 0.0, 0.5, 0.0), (1.0, 1.0, 0.0, 0.0)], []
+    for seed in range(4):
+        rig, frames, truth = film(paths, np.arange(15) / 25.0, noise=6.0, seed=seed)
+        firsts = [next(track(Tracker(Pipeline.preset("fast")), rig, frames, lag=lag)) for lag in (0.0, 0.4)]
+        errors.append([np.linalg.norm(np.sort(first.joints, axis=0) - np.sort(truth[0], axis=0)) for first in firsts])
+    alone, corrected = np.mean(errors, axis=0)
+    assert corrected < 0.8 * alone
+
+
 def test_without_a_lag_estimates_are_those_of_the_tracker():
     rig, frames, _ = film(PATHS, np.arange(6) / 25)
     tracker = Tracker(Pipeline.preset("fast"))

@@ -9,7 +9,7 @@ from mvpose import Detections, Pipeline, Rig
 from mvpose.rays import viewing_rays
 from mvpose.tracking import Tracker, TrackingModel
 from mvpose.tracking.association import TrackAffinity
-from mvpose.tracking.existence import Existence, log_odds
+from mvpose.tracking.existence import Clutter, Existence, log_odds
 
 RATE = 25.0
 
@@ -23,6 +23,18 @@ def test_lasting_false_detections_agree_anew_as_rarely_as_people_come():
     # At the start all those who came in the latest minute are there, but only as many false detections as ever.
     start = log_odds(60.0, both, hits, misses, clutter, 1e-12, rates)
     assert start - rare == pytest.approx(np.log(60.0 / (Existence().memory / 2.0)), abs=0.02)
+
+
+def test_a_scene_full_of_false_detections_is_known_after_a_second():
+    clutter = Clutter(Existence(), 2)
+    every, step = np.ones(2, np.bool_), np.full(2, 0.1)
+    for _ in range(10):
+        clutter.count(np.array([4.0, 0.0]), every, step, 0.1)
+    assert clutter.density[0] == pytest.approx(4.0, rel=0.25)  # that of the plain mean with the prior: 4 x 1.0 / 1.2 s
+    assert clutter.density[1] == Existence().least_clutter
+    for _ in range(300):
+        clutter.count(np.array([1.0, 0.0]), every, step, 0.1)
+    assert clutter.density[0] == pytest.approx(1.0, rel=0.02)  # the memory is bounded: what was is forgotten
 
 
 def test_a_vague_track_does_not_take_a_person_from_a_certain_one():
