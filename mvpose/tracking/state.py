@@ -160,7 +160,8 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
         raise ValueError(f"version of the layout must be {VERSION}, got {version[0]}: track the recording again")
     tracks = [f"{name}.{field.name}" for name in _GROUPS for field in fields(Tracks)]
     names = {
-        "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", "watched", *_SINGLE, *tracks,
+        "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", "watched", *_SINGLE,
+        *tracks,
         *(f"recent.{name}" for name in _RECENT),
     }  # fmt: skip
     if names != set(arrays):
