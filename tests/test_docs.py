@@ -48,6 +48,7 @@ ALONE = {
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
+    "simharness run passage": RAYS,
     "simharness scenarios": "",
     "simharness schema": "",
     "simharness show FILE": "",
@@ -67,8 +68,8 @@ NAMES = ("simharness check", "simharness export", "simharness fit-detector", "si
 CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2",
     "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
-    "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2",
 )
+CHECK_OF_TRACKING = "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2"
 SHELF = (
     "simharness evaluate shelf FOLDER",
     "simharness evaluate twin shelf FOLDER",
@@ -111,6 +112,7 @@ KNOWN = {
     *USER_FILES.values(),
     *NAMES,
     *CHECKS,
+    CHECK_OF_TRACKING,
     *SHELF,
     OWN_RECORDING,
     *OWN_STUDY,
@@ -285,6 +287,10 @@ def test_the_check(easy_workplace):
     assert "no regression" in done(full, "--workers 1")
     assert (easy_workplace / "junit.xml").read_text().startswith("<?xml")
     assert (easy_workplace / "summary.md").read_text().startswith("## easy: no regression")
+
+
+def test_the_check_of_tracking():
+    assert "Usage" in done(CHECK_OF_TRACKING, "--help")
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from simharness.gate.baseline import FRAMES, GATED, KEPT, TIME
 from simharness.gate.frame_times import relative_times
 from simharness.gate.reference_kernel import reference_work
 from simharness.gate.required_seeds import least_corrected_p
+from simharness.gate.runner import baseline_of
 from simharness.gate.suite import fingerprint, run_suite
 from simharness.runtime.errors import RunError
 from simharness.scenario.study_definition import load_study
@@ -45,6 +46,14 @@ def test_the_suite_of_tracking_has_enough_seeds_and_only_variants_with_memory():
     assert max(setting.scenario.duration for setting in study.settings) <= 5.0
     tests = len(study.variants) * (len(GATED) + 1)
     assert tests * least_corrected_p(len(study.seeds), cases=len(study.settings)) < study.gate.level
+
+
+@pytest.mark.parametrize("name", ["ci", "ci_tracking"])
+def test_a_committed_baseline_is_of_the_shipped_suite(name):
+    root = Path(__file__).parents[3]
+    study = load_study(root / "scenarios" / f"{name}.toml")
+    baseline = baseline_of(study, root / "results" / "baselines" / f"{name}.json")
+    assert len(baseline.scores) == study.trials * len(study.variants)
 
 
 def test_the_work_of_the_reference_is_always_the_same():
