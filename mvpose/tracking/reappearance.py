@@ -19,8 +19,10 @@ from mvpose.tracking.tracks import Tracks
 class Reappearance:
     """Model of where people who were lost come back, and of how they look then.
 
-    The trunk of a person who is lost moves on as the motion model says, a random walk after a while. Somebody new is
-    taken for the lost person whom that motion makes likeliest, one to one; if it makes none likely, for nobody known.
+    The trunk of a person who is lost moves on as the motion model says, a random walk after a while. Somebody who
+    appears is taken for the lost person whom that motion makes likeliest, one to one, unless it is likelier that
+    somebody new has come: lost people come back at a rate of their own, near the place that the motion predicts, and
+    new ones at another, anywhere in the room.
     Where detections carry descriptors, the likelihood of the looks (:mod:`mvpose.tracking.looks`) counts as well. It
     alone decides when the place says nothing more, and only if it outweighs the chance that somebody new is seen.
 
@@ -29,6 +31,9 @@ class Reappearance:
             metres are anywhere in it after ten seconds of walking. Who has no descriptors is forgotten then.
         gate: largest squared distance from the place where the person was lost, in variances of the motion model; a
             person stays within 9 in 97 of 100 cases (chi-square of three degrees of freedom).
+        returns: rate at which a lost person comes back, per second: people are hidden for a few seconds.
+        arrivals: people who come, per second, as in :class:`mvpose.tracking.existence.Existence`.
+        room: area in which they may appear, square metres.
         deviation: standard deviation of the trunk's position in one frame, metres.
         looks_memory: time after which a lost person with descriptors is forgotten, seconds. Clothes are worn for hours;
             but so many other people pass in hours that one of them looks alike, and all of them must be kept.
@@ -41,13 +46,16 @@ class Reappearance:
 
     memory: float = 10.0
     gate: float = 9.0
+    returns: float = 0.3
+    arrivals: float = 0.1
+    room: float = 50.0
     deviation: float = 0.1
     looks_memory: float = 600.0
     odds: float = 9.0
     most: int = 200
 
     def __post_init__(self) -> None:
-        names = ("memory", "gate", "deviation", "looks_memory", "odds", "most")
+        names = ("memory", "gate", "returns", "arrivals", "room", "deviation", "looks_memory", "odds", "most")
         check_numbers(self, "the reappearance model", positive=names)
 
     def remembers(self, lost: Tracks, time: float) -> Bools:
@@ -93,13 +101,25 @@ class Reappearance:
         prior = self.gate + 2.0 * np.log(self.odds * max(int(anywhere.sum()), 1))
         for k in range(len(lost)):
             variance = transition(gone[k], *motion.trunk)[2] + self.deviation**2
-            place = prior if anywhere[k] else ((here - there[k]) ** 2).sum(axis=1) / variance
+            place = prior if anywhere[k] else self._place(((here - there[k]) ** 2).sum(axis=1), variance)
             value = place - looks[:, k]
             cost[:, k] = np.where(value < self.gate, value, 2.0 * self.gate)
         for row, column in zip(*linear_sum_assignment(cost), strict=True):
             if column < len(lost) and cost[row, column] < self.gate:
                 result[row] = column
         return result
+
+    def _place(self, distance2: Floats, variance: float) -> Floats:
+        """Return twice the negative log-likelihood ratio of a return against an arrival, plus :attr:`gate`.
+
+        A person appears on the floor: the densities are of two dimensions.
+
+        Args:
+            distance2: squared distances from the predicted place, (n,), square metres.
+            variance: variance of the predicted place along an axis, square metres.
+        """
+        ratio = self.returns / (2.0 * np.pi * variance) / (self.arrivals / self.room)
+        return distance2 / variance + self.gate - min(2.0 * np.log(ratio), self.gate)
 
 
 def _center(tracks: Tracks, trunk: Bools) -> Floats:

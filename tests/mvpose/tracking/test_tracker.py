@@ -176,3 +176,23 @@ def test_another_rig_is_refused():
     tracker.estimate(rig, frames[0])
     with pytest.raises(ValueError, match="one rig and one skeleton"):
         tracker.estimate(ring(6), frames[0])
+
+
+def test_a_stranger_far_from_where_somebody_was_lost_is_somebody_new():
+    """Two seconds of motion may lead 3 m away, but that somebody new has come is likelier."""
+    paths = [(-1.0, 0.0, 0.5, 0.0), (3.9, 0.0, -0.2, 0.0), (0.0, -2.0, 0.2, 0.0)]
+    gone, came = 1.0, 3.0
+
+    def hidden(stranger):
+        return lambda frame, view, person: (
+            (person == 0 and frame / 25.0 >= gone and (stranger or frame / 25.0 < came))
+            or (person == 1 and (not stranger or frame / 25.0 < came))
+        )
+
+    for stranger in (False, True):
+        rig, frames, truth = film(paths, np.arange(100) / 25.0, hidden=hidden(stranger))
+        ids = identities(_run(rig, frames), truth)
+        assert len(set(ids[:25, 0]) - {-1}) == 1
+        seen = 1 if stranger else 0
+        assert (ids[-1, seen] == ids[20, 0]) == (not stranger)
+        assert ids[-1, seen] >= 0
