@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from mvpose.tracking.tracks import Tracks
 VERSION = 1
 """Version of the layout; a change of the fields of :class:`mvpose.tracking.tracks.Tracks` needs another."""
 
+_LARGEST = 1 << 28  # bytes of a file: a state with hundreds of people has less than one in a hundred of it
 _SINGLE = {"clock": 3, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
 _GROUPS = ("tracks", "lost")
 _RECENT: dict[str, tuple[tuple[Any, ...], str]] = {  # fields of RecentPictures, their shapes and kinds
@@ -96,13 +97,20 @@ class TrackerState:
             OSError: a file that cannot be read.
         """
         try:
-            file = np.load(path, allow_pickle=False)
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise ValueError("not an npz file")
-            with file:
+            _check_size(Path(path))
+            with np.load(path, allow_pickle=False) as file:
                 return cls(dict(file))
         except (ValueError, BadZipFile, EOFError) as error:
             raise ValueError(f"{path}: expected the state of a tracker (TrackerState.save): {error}") from None
+
+
+def _check_size(path: Path) -> None:
+    """Refuse what is no archive of a reasonable size, such as a device or a small file that unpacks to gigabytes."""
+    if path.exists() and not path.is_file():
+        raise ValueError("not a regular file")
+    with ZipFile(path) as archive:
+        if sum(each.file_size for each in archive.infolist()) > _LARGEST:
+            raise ValueError(f"its arrays have more than {_LARGEST} bytes")
 
 
 def layout(rig: Rig, skeleton: Skeleton) -> dict[str, NDArray[Any]]:

@@ -67,13 +67,16 @@ def evaluate_recording(
         from simharness.reality.recording_file import read_recording
         from simharness.runtime.progress import reporter
 
-        data = read_recording(recording, folder, head=head.value)
-        pipelines = {name: _estimator(name, lag=lag, period=1.0 / data.rate) for name in method or ["full"]}
-        if blind := NEED_DESCRIPTORS & pipelines.keys():
+        names = method or ["full"]
+        if blind := NEED_DESCRIPTORS & set(names):
             raise ValueError(
                 f"--method {', '.join(blind)}: uses descriptors alone, and the detections of recordings carry none; "
                 "choose another variant"
             )
+        for name in names:  # report a wrong one before the recording is read
+            _estimator(name, lag=lag, period=1.0)
+        data = read_recording(recording, folder, head=head.value)
+        pipelines = {name: _estimator(name, lag=lag, period=1.0 / data.rate) for name in names}
         with (
             run_errors_only(),
             reporter() as bars,

@@ -17,7 +17,7 @@ from simharness.world.humans.body import make_body
 from simharness.world.humans.population import draw_shape
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import Activity, activities
+from simharness.world.motion.registry import Activity, activities_in_place
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 6.0  # seconds of every motion
@@ -52,7 +52,7 @@ def sample_joints(seed: int, *, bodies: int, frames: int) -> Floats:
     for number in range(bodies):
         shape = draw_shape(stream(seed, "poses", "body", number), child=number < _CHILDREN * bodies)
         mover = Kinematics(make_body(shape))
-        parts += [_perform(mover, activity, seed, number, frames) for activity in activities().values()]
+        parts += [_perform(mover, activity, seed, number, frames) for activity in activities_in_place()]
     return np.concatenate(parts)
 
 

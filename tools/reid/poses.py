@@ -18,7 +18,7 @@ from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.shape import Shape
 from simharness.world.motion.paths import Loop, Spot, Track, draw_loop
 from simharness.world.motion.poses.kinematics import Kinematics
-from simharness.world.motion.registry import Activity, activities
+from simharness.world.motion.registry import Activity, activities_in_place
 from simharness.world.motion.trajectory import motion_clock
 
 _DURATION = 4.0  # duration of every motion, seconds
@@ -51,7 +51,7 @@ def plan_poses(seed: int, *, frames: int = 40, takes: int = 2) -> Poses:
     mover = Kinematics(make_body(Shape()))
     turns = [
         _level(_sample_take(mover, activity, seed, take, frames))
-        for activity in activities().values()
+        for activity in activities_in_place()
         for take in range(takes)
     ]
     return Poses(np.concatenate(turns))

@@ -26,7 +26,7 @@ from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results
 from simharness.trial.provenance import PROVENANCE
 
-_SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
+SCORED = tuple(dict.fromkeys(HEADS + PRINTED))
 _OVER_TIME = tuple(dict.fromkeys((*HEADS_OVER_TIME, *tables.OVER_TIME)))  # where a variant tracks people
 
 _CURVES = (("pcp", "map"), ("recall", "ghosts"))  # two scores in each row of the picture
@@ -74,7 +74,7 @@ def digest(results: Results, *, thresholds: Mapping[str, float] = THRESHOLDS) ->
     info, trials = results.info, results.trials
     names: list[str] = info["variants"]
     cases = cases_of(results)
-    scored = (*_SCORED, *(_OVER_TIME if tables.tracks_people(trials) else ()))
+    scored = (*SCORED, *(_OVER_TIME if tables.tracks_people(trials) else ()))
     return {
         "name": info["name"],
         "description": info["description"],

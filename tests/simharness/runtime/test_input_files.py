@@ -102,6 +102,7 @@ AROUND = {
     "mvpose/networks/card_file.py": "mvpose stands alone; the file is checked before",
     "mvpose/networks/session.py": "the digest of an ONNX file, read in blocks",
     "mvpose/networks/card.py": "text within an ONNX file",
+    "mvpose/tracking/state.py": "mvpose stands alone; kind and size of the file are checked before",
     "mvpose/kernels.py": "code",
     "simharness/runtime/input_files.py": "the reader",
     "simharness/runtime/archives.py": "bytes that were read",
