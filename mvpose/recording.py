@@ -1,0 +1,175 @@
+"""People of a whole recording as arrays over time: what writers, skeleton fits and pages take.
+
+A tracker answers frame by frame with :class:`mvpose.Estimate`; files and plots need each person through time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.checks import Sealed, as_array, seal
+from mvpose.estimate import Estimate
+from mvpose.skeleton import COCO17, Skeleton
+
+PERIOD = 0.04
+"""Time between frames where nothing states it, seconds: that of trackers (:class:`mvpose.tracking.TrackingModel`)."""
+
+
+@dataclass(frozen=True)
+class People(Sealed):
+    """Joints of n people in T frames.
+
+    A joint that was not estimated is NaN in all three coordinates and has score 0. Both are set where either is given,
+    and its covariance becomes NaN.
+
+    Attributes:
+        times: time of each frame, (T,), seconds, increasing.
+        ids: identity of each person, (n,), all different.
+        joints: (T, n, J, 3), metres, z up; NaN where absent.
+        scores: confidence, 0 to 1, (T, n, J); 0 where absent.
+        covariance: covariance of the error of each joint, (T, n, J, 3, 3), square metres, or None.
+        skeleton: the J joints.
+
+    Raises:
+        ValueError: a wrong shape, times that do not increase, repeated ids, or scores outside 0..1.
+    """
+
+    times: Floats
+    ids: Integers
+    joints: Floats
+    scores: Floats
+    covariance: Floats | None = None
+    skeleton: Skeleton = COCO17
+
+    def __post_init__(self) -> None:
+        times, ids = as_array(self.times, ("T",), "times"), as_array(self.ids, ("n",), "ids", np.int64)
+        if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
+            bad = int(np.flatnonzero(~np.append(True, np.diff(times) > 0) | ~np.isfinite(times))[0])
+            raise ValueError(f"times of frames must be finite and increase, got {times[bad]:.6g} s in frame {bad}")
+        if len(np.unique(ids)) != len(ids):
+            raise ValueError(f"ids must be different for different people, got {ids.tolist()}")
+        shape = len(times), len(ids), len(self.skeleton)
+        joints, scores = as_array(self.joints, (*shape, 3), "joints"), as_array(self.scores, shape, "scores")
+        if ((scores < 0) | (scores > 1)).any():
+            raise ValueError(f"scores must lie in 0..1, got {np.nanmin(scores):.6g} to {np.nanmax(scores):.6g}")
+        present = np.isfinite(joints).all(axis=-1) & (scores > 0)
+        joints, scores = np.where(present[..., None], joints, np.nan), np.where(present, scores, 0.0)
+        seal(joints, scores)
+        covariance = self.covariance
+        if covariance is not None:
+            covariance = as_array(covariance, (*shape, 3, 3), "covariance")
+            covariance = np.where(present[..., None, None], covariance, np.nan)
+            seal(covariance)
+        for key, value in (
+            ("times", times), ("ids", ids), ("joints", joints), ("scores", scores), ("covariance", covariance),
+        ):  # fmt: skip
+            object.__setattr__(self, key, value)
+
+    @classmethod
+    def of_estimates(
+        cls,
+        estimates: Iterable[Estimate],
+        skeleton: Skeleton = COCO17,
+        period: float = PERIOD,
+        *,
+        untracked: bool = False,
+    ) -> Self:
+        """Collect the estimates of a recording.
+
+        Args:
+            estimates: estimate of every frame in the order of time; ids as a tracker gives them.
+            skeleton: the joints of the estimates.
+            period: time between frames, seconds. Where no estimate has a time, frame k is at ``k * period``; a frame
+                without a time among frames that have one lies between its neighbours.
+            untracked: take estimates without ids as well. A person's id is then its row in each frame, which does not
+                say who it is in the next frame.
+
+        Returns:
+            People in the order of their ids; those without a joint in any frame are left out. Covariances are None
+            where any estimate with people has none.
+
+        Raises:
+            ValueError: estimates without ids, of another number of joints, with repeated ids in a frame, with scores
+                outside 0..1, or with times that do not increase.
+        """
+        frames = list(estimates)
+        rows = [_ids(k, frame, untracked) for k, frame in enumerate(frames)]
+        for k, frame in enumerate(frames):
+            if len(frame) and frame.joints.shape[1] != len(skeleton):
+                raise ValueError(
+                    f"frame {k} has {frame.joints.shape[1]} joints, but the skeleton {skeleton.name!r} has "
+                    f"{len(skeleton)}; pass the skeleton of the detections"
+                )
+        seen = [
+            row[np.isfinite(frame.joints).all(axis=-1).any(axis=-1)] for row, frame in zip(rows, frames, strict=True)
+        ]
+        ids = np.unique(np.concatenate(seen)) if seen else np.zeros(0, np.int64)
+        shape = len(frames), len(ids), len(skeleton)
+        joints, scores = np.full((*shape, 3), np.nan), np.zeros(shape)
+        known = all(frame.covariance is not None for frame in frames if len(frame)) and len(ids) > 0
+        covariance = np.full((*shape, 3, 3), np.nan) if known else None
+        for k, (row, frame) in enumerate(zip(rows, frames, strict=True)):
+            kept = np.isin(row, ids)
+            columns = np.searchsorted(ids, row[kept])
+            joints[k, columns], scores[k, columns] = frame.joints[kept], frame.scores[kept]
+            if covariance is not None and frame.covariance is not None:
+                covariance[k, columns] = frame.covariance[kept]
+        return cls(_times(frames, period), ids, joints, scores, covariance, skeleton)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def frames(self) -> int:
+        """Number T of frames."""
+        return len(self.times)
+
+    @property
+    def present(self) -> Bools:
+        """Mask of joints that were estimated, (T, n, J)."""
+        return self.scores > 0
+
+    @property
+    def rate(self) -> float:
+        """Frames per second: one over the median time between frames; that of :data:`PERIOD` for a single frame."""
+        return float(1.0 / np.median(np.diff(self.times))) if self.frames > 1 else 1.0 / PERIOD
+
+    def span(self, person: int) -> slice:
+        """Return the frames from the first to the last in which a person (its row) has any joint."""
+        seen = np.flatnonzero(self.present[:, person].any(axis=1))
+        return slice(int(seen[0]), int(seen[-1]) + 1) if len(seen) else slice(0, 0)
+
+
+def _ids(k: int, frame: Estimate, untracked: bool) -> Integers:
+    """Return the identity of each person of frame k, (n,)."""
+    if frame.ids is None:
+        if len(frame) and not untracked:
+            raise ValueError(
+                f"the people of frame {k} have no ids; estimate with a tracker (Pipeline.preset('track').track), or "
+                "pass untracked=True to number the people of each frame"
+            )
+        return np.arange(len(frame))
+    if len(np.unique(frame.ids)) != len(frame.ids):
+        raise ValueError(f"ids of frame {k} must be different for different people, got {frame.ids.tolist()}")
+    return frame.ids
+
+
+def _times(frames: list[Estimate], period: float) -> Floats:
+    """Return the time of each frame, (T,), seconds."""
+    if not 0.0 < period < np.inf:
+        raise ValueError(f"period must be above 0 s and finite, got {period}")
+    given = np.array([np.nan if frame.time is None else frame.time for frame in frames], float)
+    known = np.flatnonzero(np.isfinite(given))
+    numbers = np.arange(len(frames))
+    if not len(known):
+        return numbers * period
+    first, last = known[0], known[-1]
+    times = np.interp(numbers, known, given[known])
+    times[:first] = given[first] + (numbers[:first] - first) * period
+    times[last + 1 :] = given[last] + (numbers[last + 1 :] - last) * period
+    return times
