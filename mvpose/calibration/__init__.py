@@ -1,0 +1,8 @@
+"""The doctor: what is wrong with a rig, from the people in its pictures, and the repair.
+
+The input is a calibration and detections over time; no calibration board and no markers.
+"""
+
+from mvpose.calibration.findings import Diagnosis, Finding
+
+__all__ = ["Diagnosis", "Finding"]

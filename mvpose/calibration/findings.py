@@ -1,0 +1,195 @@
+"""Findings of the doctor: one fault of a rig each, with its probability, its size and what mends it.
+
+A finding is an *alarm* where the calibration, the clocks or the pictures are wrong by more than good ones are; a *note*
+where a difference is measured that good rigs have as well; and *unknown* where the recording does not determine it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from mvpose.camera import Rig
+from mvpose.checks import Sealed, as_array
+
+Severity = Literal["alarm", "note", "unknown"]
+Verdict = Literal["fine", "faults", "cannot tell"]
+
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        # wrong files (conventions.py)
+        "extrinsics-inverted": "the extrinsics are those from camera to world, expected from world to camera",
+        "rotation-transposed": "the rotation is transposed; the position of the camera is right",
+        "translation-is-center": "the translation holds the position of the camera",
+        "wrong-unit": "the translations are in centimetres, millimetres or another unit that is not the metre",
+        "image-size": "the intrinsics are those of pictures of another resolution",
+        "image-cropped": "the intrinsics are those of pictures before they were cropped",
+        "axes-swapped": "x and y of the pictures are exchanged (rotated or transposed pictures)",
+        "axis-flipped": "an axis of the camera or of the picture points the other way",
+        "cameras-swapped": "two cameras have the calibration of each other",
+        "distortion-ignored": "the pictures are distorted, and the calibration has no distortion",
+        "distortion-model": "the distortion is of another model, sign or order of terms, or was removed already",
+        # cameras (cameras.py)
+        "moved-camera": "a camera stands or looks elsewhere than its calibration has it",
+        "drifting-camera": "a camera moves away from its calibration during the recording",
+        "focal-length": "the focal length of a camera is wrong",
+        "principal-point": "the principal point of a camera is wrong",
+        # clocks (clocks.py)
+        "clock-offset": "the pictures of a camera are taken earlier or later than their times say",
+        "dropped-pictures": "pictures of a camera are missing",
+        "repeated-pictures": "a camera delivers the same picture again",
+        # views (views.py)
+        "mirrored-view": "the pictures of a camera are mirrored",
+        "left-right-exchanged": "the detector names left and right joints of a view the wrong way round",
+        "other-people": "a camera sees other people than the rest",
+        "silent-view": "a camera contributes nothing, because there are no or nearly no detections in its pictures",
+        # what the recording does not determine
+        "cannot-tell": "the recording does not determine whether the calibration is right",
+    }
+)
+"""Kinds of findings, and what each states."""
+
+_SEVERITIES, _VERDICTS = get_args(Severity), get_args(Verdict)
+_RANK = {"alarm": 0, "unknown": 1, "note": 2}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault, of the whole rig or of one camera.
+
+    Attributes:
+        kind: one of :data:`KINDS`.
+        text: one sentence for the user.
+        severity: ``"alarm"``, ``"note"`` or ``"unknown"``.
+        probability: probability that the fault is there, 0 to 1.
+        camera: name of the camera; None for the whole rig.
+        view: index of the camera; None for the whole rig.
+        size: size of the fault, by names that end in the unit: ``{"degrees": 1.1, "metres": 0.05, "since_s": 4.0}``.
+        interval: lowest and highest value of 90 % of the probability, for names of ``size``.
+        cost: expected loss if nothing is mended: metres that joints are off because of the fault, times its
+            probability. Findings are in its order.
+        mend: command or lines of Python that mend it, or what to record or to check.
+
+    Raises:
+        ValueError: an unknown kind or severity, a probability outside of 0..1, a cost below 0, or an interval without a
+            size.
+    """
+
+    kind: str
+    text: str
+    severity: Severity = "alarm"
+    probability: float = 1.0
+    camera: str | None = None
+    view: int | None = None
+    size: Mapping[str, float] = field(default_factory=dict)
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    cost: float = 0.0
+    mend: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"kind of a finding must be one of {', '.join(KINDS)}, got {self.kind!r}")
+        if self.severity not in _SEVERITIES:
+            raise ValueError(f"severity must be one of {', '.join(_SEVERITIES)}, got {self.severity!r}")
+        if not 0.0 <= self.probability <= 1.0:
+            raise ValueError(f"{self.kind}: probability must lie in 0..1, got {self.probability}")
+        if not self.cost >= 0.0:
+            raise ValueError(f"{self.kind}: cost must be 0 or more, got {self.cost}")
+        unsized = [name for name in self.interval if name not in self.size]
+        if unsized:
+            raise ValueError(f"{self.kind}: interval of {unsized[0]!r}, which size does not have: {list(self.size)}")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the finding as values that ``json.dumps`` writes."""
+        return {
+            "kind": self.kind,
+            "camera": self.camera,
+            "view": self.view,
+            "severity": self.severity,
+            "probability": round(self.probability, 4),
+            "size": {name: _number(value) for name, value in self.size.items()},
+            "interval": {name: [_number(low), _number(high)] for name, (low, high) in self.interval.items()},
+            "cost": _number(self.cost),
+            "text": self.text,
+            "mend": self.mend,
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis(Sealed):
+    """Answer of the doctor about one recording.
+
+    Attributes:
+        findings: worst first: alarms, then what is unknown, then notes, each by cost.
+        verdict: ``"faults"`` with at least one alarm, ``"cannot tell"`` without any but with something unknown of the
+            whole rig, else ``"fine"``.
+        evidence: lines of text with the numbers on which the verdict rests.
+        cameras: names of the cameras, V.
+        residuals: median distance of each camera's keypoints from the people that the other cameras see, (V,), pixels;
+            NaN where a camera shares nobody with the others.
+
+    Raises:
+        ValueError: another verdict, or residuals of another number of cameras.
+    """
+
+    findings: tuple[Finding, ...]
+    verdict: Verdict
+    evidence: tuple[str, ...]
+    cameras: tuple[str, ...]
+    residuals: Floats
+
+    def __post_init__(self) -> None:
+        for key in ("findings", "evidence", "cameras"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))
+        if self.verdict not in _VERDICTS:
+            raise ValueError(f"verdict must be one of {', '.join(_VERDICTS)}, got {self.verdict!r}")
+        object.__setattr__(self, "residuals", as_array(self.residuals, (len(self.cameras),), "residuals"))
+
+    @classmethod
+    def of(
+        cls, findings: Sequence[Finding], *, evidence: Sequence[str], cameras: Sequence[str], residuals: Floats
+    ) -> Diagnosis:
+        """Return the diagnosis of findings in any order, with the verdict that follows from them."""
+        ordered = sorted(findings, key=lambda each: (_RANK[each.severity], -each.cost, -each.probability, each.kind))
+        verdict: Verdict = "fine"
+        if any(each.severity == "alarm" for each in ordered):
+            verdict = "faults"
+        elif any(each.severity == "unknown" and each.kind == "cannot-tell" for each in ordered):
+            verdict = "cannot tell"
+        return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals)
+
+    @property
+    def alarms(self) -> tuple[Finding, ...]:
+        """Findings that are alarms, worst first."""
+        return tuple(each for each in self.findings if each.severity == "alarm")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the diagnosis as values that ``json.dumps`` writes."""
+        return {
+            "verdict": self.verdict,
+            "findings": [each.to_json() for each in self.findings],
+            "evidence": list(self.evidence),
+            "residuals_px": {
+                name: _number(value) for name, value in zip(self.cameras, self.residuals.tolist(), strict=True)
+            },
+        }
+
+
+def camera_names(rig: Rig) -> tuple[str, ...]:
+    """Return a name for each camera that no other has: its own, or ``camera 0`` and so on."""
+    names = [camera.name for camera in rig]
+    return tuple(
+        name if name and names.count(name) == 1 else f"camera {view}" if not name else f"{name} ({view})"
+        for view, name in enumerate(names)
+    )
+
+
+def _number(value: float) -> float | None:
+    """Return a number of six digits for JSON; None where it is not finite."""
+    return float(np.format_float_positional(value, 6, fractional=False)) if math.isfinite(value) else None

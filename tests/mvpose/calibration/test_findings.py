@@ -1,0 +1,79 @@
+"""Findings and diagnoses: their order, their verdict, and what they write as JSON."""
+
+import copy
+import itertools
+import json
+
+import numpy as np
+import pytest
+
+from mvpose import Camera, Rig
+from mvpose.calibration.findings import KINDS, Diagnosis, Finding, camera_names
+
+
+def diagnosis(*findings):
+    return Diagnosis.of(findings, evidence=["e"], cameras=["a", "b"], residuals=np.array([1.0, np.nan]))
+
+
+def test_findings_are_in_the_same_order_however_they_come():
+    findings = [
+        Finding("moved-camera", "m", cost=0.1, camera="a", view=0),
+        Finding("focal-length", "f", cost=0.3, camera="b", view=1),
+        Finding("cannot-tell", "c", severity="unknown", cost=9.0),
+        Finding("moved-camera", "n", severity="note", cost=5.0),
+    ]
+    for order in itertools.permutations(findings):
+        assert [each.text for each in diagnosis(*order).findings] == ["f", "m", "c", "n"]
+
+
+@pytest.mark.parametrize(
+    ("severities", "verdict"),
+    [
+        ([], "fine"),
+        (["note"], "fine"),
+        (["unknown"], "cannot tell"),
+        (["unknown", "alarm"], "faults"),
+        (["note", "alarm"], "faults"),
+    ],
+)
+def test_the_verdict_follows_from_the_severities(severities, verdict):
+    assert diagnosis(*(Finding("cannot-tell", "x", severity=each) for each in severities)).verdict == verdict
+
+
+def test_json_holds_no_number_that_json_lacks():
+    finding = Finding("moved-camera", "m", size={"degrees": np.nan}, interval={"degrees": (0.0, np.inf)})
+    written = json.loads(json.dumps(diagnosis(finding).to_json(), allow_nan=False))
+    assert written["findings"][0]["interval"] == {"degrees": [0.0, None]}
+    assert written["residuals_px"] == {"a": 1.0, "b": None}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"kind": "other"}, "kind of a finding must be one of"),
+        ({"severity": "bad"}, "severity must be one of alarm"),
+        ({"probability": 1.1}, "probability must lie in 0..1"),
+        ({"cost": -1.0}, "cost must be 0 or more"),
+        ({"interval": {"ms": (0.0, 1.0)}}, "which size does not have"),
+    ],
+)
+def test_wrong_findings_are_refused(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        Finding(**{"kind": "clock-offset", "text": "t", **wrong})
+
+
+def test_a_diagnosis_can_be_copied_and_every_kind_is_explained():
+    again = copy.deepcopy(diagnosis(Finding("moved-camera", "m")))
+    assert again.findings[0].kind == "moved-camera"
+    assert all(KINDS.values())
+
+
+def test_names_of_cameras_differ():
+    def camera(name, x):
+        return Camera(np.diag([500.0, 500.0, 1.0]), np.eye(3), np.array([x, 0.0, 0.0]), size=(640, 480), name=name)
+
+    rig = Rig([camera("a", 0.0), camera("", 1.0), camera("a", 2.0), camera("b", 3.0)])
+    names = camera_names(rig)
+    assert len(set(names)) == 4
+    assert names[1] == "camera 1"
+    assert names[3] == "b"
