@@ -169,7 +169,7 @@ def _times(frames: list[Estimate], period: float) -> Floats:
     if not len(known):
         return numbers * period
     first, last = known[0], known[-1]
-    times = np.interp(numbers, known, given[known])
+    times: Floats = np.interp(numbers, known, given[known])
     times[:first] = given[first] + (numbers[:first] - first) * period
     times[last + 1 :] = given[last] + (numbers[last + 1 :] - last) * period
     return times
