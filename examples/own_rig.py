@@ -10,7 +10,7 @@ import numpy as np
 
 import simharness
 from mvpose import Camera, Rig
-from simharness.formats.calibration.opencv import write_calibration
+from mvpose.formats.calibration.opencv import write_calibration
 
 
 def camera(name: str, position: tuple[float, float, float]) -> Camera:

@@ -22,8 +22,8 @@ import pytest
 from typer.testing import CliRunner
 
 import simharness
+from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
-from simharness.formats.calibration.voxelpose import write_calibration
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.study_definition import load_study
 

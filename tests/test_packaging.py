@@ -65,7 +65,8 @@ class TestPyproject:
     def test_a_requirement_is_written_once(self):
         ours, its = names(SIMHARNESS["tool"]["simharness"]["dependencies"]), names(MVPOSE["project"]["dependencies"])
         assert its == {"numpy", "scipy", "numba", "threadpoolctl"}
-        assert not ours & its
+        extras = MVPOSE["project"]["optional-dependencies"]
+        assert not ours & its.union(*(names(each) for each in extras.values()))
 
 
 def test_only_compiled_functions_go_without_types():
@@ -131,7 +132,7 @@ class TestWheels:
 
     def test_simharness_requires_mvpose_of_its_version(self, metadata):
         (required,) = (each for each in metadata["simharness"].requires_dist if each.name == "mvpose")
-        assert str(required) == f"mvpose[networks]=={metadata['simharness'].version}"
+        assert str(required) == f"mvpose[networks,recordings]=={metadata['simharness'].version}"
 
     @pytest.mark.parametrize("name", ["mvpose", "simharness"])
     def test_a_wheel_holds_its_package_and_nothing_else(self, wheels, name):

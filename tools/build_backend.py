@@ -18,7 +18,7 @@ import setuptools
 from setuptools import build_meta
 
 _PACKAGES = ("simharness", "simharness.*")
-_EXTRA = "networks"  # extra of mvpose: the simulator runs pose and re-ID networks
+_EXTRAS = ("networks", "recordings")  # of mvpose: the simulator runs networks, and reads what mvpose reads
 
 
 class _Backend(build_meta._BuildMetaBackend):  # type: ignore[misc, name-defined, unused-ignore]
@@ -35,9 +35,10 @@ class _Backend(build_meta._BuildMetaBackend):  # type: ignore[misc, name-defined
 def _editable() -> dict[str, Any]:
     """Return setup arguments for both packages, taken from the checkout."""
     mvpose = _read("mvpose/pyproject.toml")["project"]
+    extras = [each for extra in _EXTRAS for each in mvpose["optional-dependencies"][extra]]
     return {
         "packages": setuptools.find_packages(include=(*_PACKAGES, "mvpose", "mvpose.*")),
-        "install_requires": _requirements() + mvpose["dependencies"] + mvpose["optional-dependencies"][_EXTRA],
+        "install_requires": _requirements() + mvpose["dependencies"] + extras,
     }
 
 
@@ -48,7 +49,7 @@ def _wheel() -> dict[str, Any]:
     return {
         "packages": [*setuptools.find_packages(include=_PACKAGES), "simharness.scenarios"],
         "package_dir": {"simharness.scenarios": "scenarios"},
-        "install_requires": [*_requirements(), f"mvpose[{_EXTRA}]=={version.strip()}"],
+        "install_requires": [*_requirements(), f"mvpose[{','.join(_EXTRAS)}]=={version.strip()}"],
     }
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from simharness.runtime.atomic_files import write_atomic
+from mvpose.files.atomic_files import write_atomic
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial import run_trial

@@ -30,7 +30,7 @@ def exit_on_error() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        from simharness.runtime.message_text import one_line
+        from mvpose.files.message_text import one_line
 
         console.print(Text.assemble(("error: ", "bold red"), one_line(str(error))), soft_wrap=True)
         raise typer.Exit(BAD_INPUT) from None
@@ -70,7 +70,7 @@ def write_json(summary: dict[str, Any], path: Path) -> None:
     Raises:
         ValueError: the file cannot be written.
     """
-    from simharness.runtime.atomic_files import write_atomic
+    from mvpose.files.atomic_files import write_atomic
 
     try:
         write_atomic(path, (json.dumps(summary, indent=2, allow_nan=False) + "\n").encode())

@@ -122,7 +122,7 @@ def _prepare(folder: Path) -> None:
 
 
 def _write(page: str, path: Path) -> None:
-    from simharness.runtime.atomic_files import write_atomic
+    from mvpose.files.atomic_files import write_atomic
 
     try:
         write_atomic(path, page.encode())

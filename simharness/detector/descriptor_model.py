@@ -26,9 +26,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from mvpose.arrays import Floats
+from mvpose.files.message_text import one_line
 from mvpose.networks.card_file import read_card_file
 from mvpose.networks.session import check_content
-from simharness.runtime.message_text import one_line
 from simharness.types.random_streams import stream
 
 _FEWEST, _MOST = 6, 256  # dimensions

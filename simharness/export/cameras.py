@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mvpose import Rig
-from simharness.formats.calibration.panoptic import write_calibration
+from mvpose.formats.calibration.panoptic import write_calibration
 
 _HD = re.compile(r"00_\d\d")
 

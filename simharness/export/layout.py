@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from simharness.runtime.input_files import TABLE, read_json
+from mvpose.files.input_files import TABLE, read_json
 
 FORMAT = "simharness export"
 """Value of ``format`` in the manifest of an export."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from mvpose.formats.joint_names import BODY_25
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
-from simharness.formats.joint_names import BODY_25
 from simharness.formats.panoptic_poses import CONFIDENCES
 from simharness.trial.provenance import provenance
 from simharness.trial.stages.build_trial import Trial

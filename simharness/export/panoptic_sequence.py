@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Rig
+from mvpose.files.atomic_files import atomic_folder
+from mvpose.formats.openpose import people_file
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.cameras import hd_names, renamed, write_cameras
 from simharness.export.layout import Layout, check_place
 from simharness.export.manifest import manifest
 from simharness.export.recording_description import write_description
-from simharness.formats.openpose import people_file
 from simharness.formats.panoptic_poses import body_scene, confidences
-from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario

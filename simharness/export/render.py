@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
+from mvpose.files.atomic_files import atomic_folder
 from simharness.capture.picture import PictureSource
 from simharness.report.figures.mosaic import mosaic
 from simharness.report.run.pictures import annotate
-from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_trial import Goal, run_trial

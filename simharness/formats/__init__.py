@@ -1,1 +1,1 @@
-"""Readers and writers of the file formats of the field."""
+"""Readers of the true joints of recordings; :mod:`mvpose.formats` reads calibrations and detections."""

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from mvpose.files.archives import MOST
+from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import one_line
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
 from simharness.formats.matlab5 import read_variable
-from simharness.runtime.archives import MOST
-from simharness.runtime.input_files import read_bytes
-from simharness.runtime.message_text import one_line
 
 _JOINTS = 14
 _WHAT = "the truth of Shelf or Campus: a MATLAB 5 file with actor3D, for each actor a cell of frames of joints x 3"

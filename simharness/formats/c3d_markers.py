@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import read_bytes
+from mvpose.files.message_text import one_line, shown
 from simharness.formats.joint_tracks import METRES, UP, JointTracks, TrackFiles, joined
-from simharness.runtime.input_files import read_bytes
-from simharness.runtime.message_text import one_line, shown
 
 _WHAT = "a C3D file of motion capture"
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.checks import as_array
-from simharness.formats.joint_names import JointNames
+from mvpose.formats.joint_names import JointNames
 
 UP = {"z": np.eye(3), "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])}
 """Axes of files in ours, (3, 3): ours = UP @ theirs. With y up, x of the file is our y, as in OpenSim and Pose2Sim."""

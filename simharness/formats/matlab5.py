@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.runtime.archives import MOST
-from simharness.runtime.input_files import megabytes
-from simharness.runtime.message_text import shown
+from mvpose.files.archives import MOST
+from mvpose.files.input_files import megabytes
+from mvpose.files.message_text import shown
 
 _HEADER, _TAG = 128, 8  # bytes
 _ARRAY, _COMPRESSED = 14, 15  # types of elements: an array, and another element deflated
@@ -39,7 +39,7 @@ def read_variable(content: bytes, name: str) -> NDArray[Any] | None:
 
     Raises:
         ValueError: no MATLAB 5 file, or a truncated or damaged one; or the variable has text, structures or complex
-            numbers, or is larger than :data:`simharness.runtime.archives.MOST` bytes.
+            numbers, or is larger than :data:`mvpose.files.archives.MOST` bytes.
     """
     order = {b"IM": "<", b"MI": ">"}.get(content[_HEADER - 2 : _HEADER])
     if not content.startswith(b"MATLAB 5.0") or order is None:

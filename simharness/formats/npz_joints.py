@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mvpose.files.archives import arrays_of
+from mvpose.files.input_files import read_bytes
 from simharness.formats.joint_tracks import UP, JointTracks, TrackFiles
-from simharness.runtime.archives import arrays_of
-from simharness.runtime.input_files import read_bytes
 
 _WHAT = "a NumPy archive with joints (T, P, J, 3) in metres, names (J,) and frames (T,)"
 

@@ -1,7 +1,7 @@
 """True poses in the format of the CMU Panoptic dataset: ``body3DScene`` files with ``joints19`` (older: ``joints15``).
 
 Centimetres, y down: (X, Y, Z) = 100 (x, -z, y) of our metres, z up, as in the calibrations of
-:mod:`simharness.formats.calibration.panoptic`. The name of a file ends in the number of its frame. Simulated joints are
+:mod:`mvpose.formats.calibration.panoptic`. The name of a file ends in the number of its frame. Simulated joints are
 always defined, even where they are hidden; the dataset's mark of an undefined joint (0 0 0 -1) is never written. A
 person who is absent in a frame has no body in its file.
 """
@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose import COCO17
+from mvpose.files.input_files import read_json_object
+from mvpose.files.message_text import one_line
+from mvpose.formats.joint_names import KNOWN
 from mvpose.skeleton import PANOPTIC19
-from simharness.formats.joint_names import KNOWN
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
-from simharness.runtime.input_files import read_json_object
-from simharness.runtime.message_text import one_line
 from simharness.types.views import Visibility
 
 VERSION = 0.7  # of the dataset's files

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mvpose.formats.joint_names import KNOWN, JointNames
 from simharness.formats import actors_mat, c3d_markers, npz_joints, panoptic_poses, trc
-from simharness.formats.joint_names import KNOWN, JointNames
 from simharness.formats.joint_tracks import ReadTracks
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.arrays import Floats
+from mvpose.files.input_files import read_bytes
 from simharness.formats.joint_tracks import METRES, UP, JointTracks, TrackFiles, joined
-from simharness.runtime.input_files import read_bytes
 
 _WHAT = "a TRC file: a header with Units, a line 'Frame# Time MARKER ...', and a line for each frame"
 

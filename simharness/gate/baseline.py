@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import MIB, parse_json, read_bytes
+from mvpose.files.message_text import one_line, shown
 from simharness.gate.trial_command import TrialKey
-from simharness.runtime.atomic_files import write_atomic
-from simharness.runtime.input_files import MIB, parse_json, read_bytes
-from simharness.runtime.message_text import one_line, shown
 from simharness.scenario.sections.gate import Tolerance
 
 GATED = tuple(Tolerance.model_fields)

@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from mvpose import Rig
+from mvpose.files.message_text import all_in_one_line, one_line
+from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.detection_files import DetectionFiles
+from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
+from mvpose.formats.joint_names import JointNames, to_shelf14
 from mvpose.skeleton import HeadMapping
-from simharness.formats.calibration.registry import read_calibration
-from simharness.formats.detection_files import DetectionFiles
-from simharness.formats.detection_formats import FORMATS as DETECTION_FORMATS
-from simharness.formats.joint_names import JointNames, to_shelf14
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
 from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.recording_keys import CalibrationKeys, DeclaredSkeleton, RecordingKeys, TruthKeys
-from simharness.runtime.message_text import all_in_one_line, one_line
 from simharness.scenario.shipped import shipped_folder
 from simharness.scenario.toml_files import read_toml
 from simharness.scenario.validation_messages import explain_all

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
-from simharness.formats.detection_formats import FORMATS as DETECTION_FORMATS
-from simharness.formats.joint_names import KNOWN, JointNames, known_skeleton
+from mvpose.formats.detection_formats import FORMATS as DETECTION_FORMATS
+from mvpose.formats.joint_names import KNOWN, JointNames, known_skeleton
 from simharness.formats.track_formats import FORMATS as TRACK_FORMATS
 from simharness.reality.annotated_recording import DetectorKind
 from simharness.scenario.sections.section import Section

@@ -17,8 +17,8 @@ import numpy as np
 
 from mvpose import COCO17, Detections, Rig
 from mvpose.arrays import Bools, Floats
+from mvpose.formats.calibration.opencv import write_calibration
 from simharness.detector.detect import detect
-from simharness.formats.calibration.opencv import write_calibration
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.people_tracks import TrackedPeople
 from simharness.runtime.progress import Silence

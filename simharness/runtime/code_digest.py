@@ -14,16 +14,20 @@ DIGEST_SIZE = 16  # bytes of a digest, so that no two codes share one by chance
 _GENERATED = ("__pycache__", "build", "dist")
 
 
-def digest_of_folders(root: Path, folders: Iterable[str]) -> str:
+def digest_of_folders(root: Path, folders: Iterable[str], *, without: Iterable[str] = ()) -> str:
     """Return the digest of all code and data in some folders of a package, hexadecimal.
 
     Args:
         root: folder of the package.
         folders: folders relative to it; "" for all of it.
+        without: folders and modules in them, relative to ``root``, that do not count.
     """
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
+    left_out = [root / each for each in without]
     files = {file for folder in folders for file in files_of(root / folder)}
     for file in sorted(files):
+        if any(file.is_relative_to(each) for each in left_out):
+            continue
         stat = file.stat()
         content = _meaning(file, stat.st_size, stat.st_mtime_ns)
         digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())

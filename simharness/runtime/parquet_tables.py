@@ -6,7 +6,7 @@ import io
 
 import polars as pl
 
-from simharness.runtime.message_text import one_line
+from mvpose.files.message_text import one_line
 
 
 def table_of(content: bytes) -> pl.DataFrame:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simharness.runtime.input_files import parse_toml
-from simharness.runtime.message_text import one_line, shown
+from mvpose.files.input_files import parse_toml
+from mvpose.files.message_text import one_line, shown
 from simharness.scenario.layers import Key, Origins, leaves, set_origin
 from simharness.scenario.named_files import locate_files
 from simharness.scenario.presets import KINDS, merge_with_presets

@@ -18,8 +18,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from simharness.runtime.input_files import SETTINGS, read_bytes
-from simharness.runtime.message_text import all_in_one_line, listed, shown
+from mvpose.files.input_files import SETTINGS, read_bytes
+from mvpose.files.message_text import all_in_one_line, listed, shown
 from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
 from simharness.scenario.sections.cameras import Cameras

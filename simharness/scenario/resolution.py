@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from simharness.runtime.message_text import all_in_one_line, shown
+from mvpose.files.message_text import all_in_one_line, shown
 from simharness.scenario.document import Document, read_document
 from simharness.scenario.layers import Origins, leaves, merge, nested, set_origin
 from simharness.scenario.presets import KINDS, Presets, merge_with_presets

@@ -13,8 +13,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from simharness.runtime.input_files import SETTINGS, parse_toml, read_bytes
-from simharness.runtime.message_text import listed, one_line
+from mvpose.files.input_files import SETTINGS, parse_toml, read_bytes
+from mvpose.files.message_text import listed, one_line
 from simharness.scenario.layers import is_range
 from simharness.scenario.sections.scenario import Scenario
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from simharness.runtime.message_text import shown
+from mvpose.files.message_text import shown
 from simharness.scenario.file_model import ScenarioFile
 from simharness.scenario.sections.section import Elements
 

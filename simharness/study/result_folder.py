@@ -30,8 +30,8 @@ from typing import Any
 
 import polars as pl
 
-from simharness.runtime.input_files import read_bytes, read_json_object
-from simharness.runtime.message_text import one_line
+from mvpose.files.input_files import read_bytes, read_json_object
+from mvpose.files.message_text import one_line
 from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.trial_store import parquet

@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from simharness.runtime.atomic_files import atomic_folder
+from mvpose.files.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Study, Value

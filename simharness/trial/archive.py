@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mvpose import Estimate
+from mvpose.files.archives import arrays_of
 from simharness.detector.detect import Detected
 from simharness.detector.heatmaps import Peaks
-from simharness.runtime.archives import arrays_of
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.arrays import (
     Arrays,

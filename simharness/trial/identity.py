@@ -3,10 +3,11 @@
 A trial is a scenario at a seed. Its results are made in steps, and each step has an identity:
 
 - detections and truth: the values of the resolved scenario with its seed, the content of the files that it names, the
-  code of the folders in :data:`SIMULATION`, the versions of :data:`PACKAGES`;
-- estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose``; for presets that track
-  also ``method.lag`` (the time between frames is in the trial's identity); for a user-defined estimator also its place
-  and the sources that :func:`simharness.trial.stages.estimators.sources_of` finds;
+  code of the folders in :data:`SIMULATION` and :data:`CALIBRATION`, the versions of :data:`PACKAGES`;
+- estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose`` without
+  :data:`BESIDE_THE_METHOD`; for presets that track also ``method.lag`` (the time between frames is in the trial's
+  identity); for a user-defined estimator also its place and the sources that
+  :func:`simharness.trial.stages.estimators.sources_of` finds;
 - scores: the identity of the estimates, and the code of the folders in :data:`SCORES`;
 - failures and the stage to blame: the identity of the estimates, and the code of the folders in :data:`FAILURES`.
 
@@ -39,8 +40,14 @@ from simharness.trial.stages.estimators import sources_of
 PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "pyrender2", "pillow")
 """Distributions whose versions are part of a trial's identity."""
 
-SIMULATION = ("types", "scenario/sections", "formats", "world", "capture", "detector", "trial/stages")
+SIMULATION = ("types", "scenario/sections", "world", "capture", "detector", "trial/stages")
 """Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
+
+CALIBRATION = ("formats/calibration",)
+"""Folders of ``mvpose`` that read the rigs of simulations."""
+
+BESIDE_THE_METHOD = ("cli", "files", "formats", "recording.py", "report", "skeleton_fit")
+"""Folders and modules of ``mvpose`` that make no estimates: readers, writers, the command line, pages."""
 
 SCORES = ("types", "pairing", "scoring")
 """Folders of ``simharness`` that score estimates."""
@@ -56,8 +63,8 @@ class Code:
     """Digests of the code that makes results, hexadecimal.
 
     Attributes:
-        simulation: of the folders :data:`SIMULATION`.
-        method: of ``mvpose``.
+        simulation: of the folders :data:`SIMULATION` and :data:`CALIBRATION`.
+        method: of ``mvpose`` without :data:`BESIDE_THE_METHOD`.
         scores: of the folders :data:`SCORES`.
         failures: of the folders :data:`FAILURES`.
     """
@@ -71,12 +78,13 @@ class Code:
 @functools.cache
 def code() -> Code:
     """Return the digests of the code on disk at the first call in this process."""
-    root = Path(simharness.__file__).parent
-    parts = {name: digest_of_folders(root, folders) for name, folders in _FOLDERS.items()}
-    return Code(method=digest_of_folders(Path(mvpose.__file__).parent, ("",)), **parts)
-
-
-_FOLDERS = {"simulation": SIMULATION, "scores": SCORES, "failures": FAILURES}
+    ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
+    return Code(
+        simulation=digest_of_folders(ours, SIMULATION) + digest_of_folders(its, CALIBRATION),
+        method=digest_of_folders(its, ("",), without=BESIDE_THE_METHOD),
+        scores=digest_of_folders(ours, SCORES),
+        failures=digest_of_folders(ours, FAILURES),
+    )
 
 
 def versions() -> dict[str, str]:

@@ -48,9 +48,9 @@ from numpy.typing import NDArray
 from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate
-from simharness.runtime.archives import arrays_of
-from simharness.runtime.input_files import read_bytes, read_json_object
-from simharness.runtime.message_text import one_line
+from mvpose.files.archives import arrays_of
+from mvpose.files.input_files import read_bytes, read_json_object
+from mvpose.files.message_text import one_line
 from simharness.runtime.parquet_tables import table_of
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mvpose.files.atomic_files import atomic_folder
 from mvpose.presets import NEED_DESCRIPTORS
 from simharness.reality.published_scores import ABLATION, COMPARISON
-from simharness.runtime.atomic_files import atomic_folder
 from simharness.trial.provenance import PROVENANCE
 from tools.paper_tables.text import markdown
 

@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
+from mvpose.files.atomic_files import write_atomic
 from simharness.report.documents import fill_template
 from simharness.report.figures.overlay import COCO17_BODY
 from simharness.report.figures.palette import TRUTH, css, person_color
 from simharness.report.run.pictures import Picture
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView
-from simharness.runtime.atomic_files import write_atomic
 from simharness.trial.run_folder import Record, read_run
 from simharness.trial.stages.build_trial import build_trial
 from simharness.trial.stages.capture import picture_source_of

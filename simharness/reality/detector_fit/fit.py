@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mvpose.files.atomic_files import write_atomic
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation import AnnotationFit, fit_annotation
 from simharness.reality.detector_fit.calibration import calibrate
@@ -18,7 +19,6 @@ from simharness.reality.detector_fit.profile import as_toml, settings
 from simharness.reality.detector_fit.sample import Sample, sample_of
 from simharness.reality.people_tracks import TrackedPeople, track_people
 from simharness.reality.reenactment import Film, film
-from simharness.runtime.atomic_files import write_atomic
 from simharness.scenario.sections.detector import KIND_OF_JOINT, KINDS, Detector
 
 _TWINS = 2  # simulated in each round of the calibration

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from mvpose.files.atomic_files import atomic_folder
 from simharness.report.run.film import animate, animated_frames
 from simharness.report.run.pictures import draw_pictures, outlines
-from simharness.runtime.atomic_files import atomic_folder
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
 from simharness.scenario.load import fingerprint

@@ -14,13 +14,13 @@ from typing import Any
 
 import polars as pl
 
+from mvpose.files.atomic_files import atomic_folder
 from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
 from simharness.report.study.digest_text import HEADS, HEADS_OVER_TIME, PRINTED, markdown
 from simharness.report.study.failure_rates import failure_rates
 from simharness.report.study.page import THRESHOLDS
-from simharness.runtime.atomic_files import atomic_folder
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval, mean_interval
 from simharness.study.result_folder import Results

@@ -10,12 +10,12 @@ import numpy as np
 import polars as pl
 from markupsafe import Markup
 
+from mvpose.files.atomic_files import write_atomic
 from simharness.report.documents import fill_template
 from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, factor_breaking_points, factors_by_case, grid, panels
 from simharness.report.study.worst_frames import WorstFramePictures, show, worst_frames
-from simharness.runtime.atomic_files import write_atomic
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
 from simharness.scoring.catalogue import SCORES

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera, Rig
-from simharness.formats.calibration.registry import read_calibration
+from mvpose.formats.calibration.registry import read_calibration
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.random_streams import stream
 from simharness.world.rigs.camera_positions import camera_positions

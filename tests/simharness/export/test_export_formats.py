@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17
+from mvpose.formats.openpose import people_file, read_people
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.cameras import hd_names
-from simharness.formats.openpose import people_file, read_people
 from simharness.formats.panoptic_poses import body_scene, confidences
 from simharness.types.views import Visibility
 

@@ -14,10 +14,10 @@ import pytest
 from trials import simulated
 
 from mvpose import COCO17
+from mvpose.formats.calibration.panoptic import read_calibration
+from mvpose.formats.openpose import read_frame
 from mvpose.skeleton import PANOPTIC19
 from simharness.export.panoptic_sequence import ExportPlan, export_sequence
-from simharness.formats.calibration.panoptic import read_calibration
-from simharness.formats.openpose import read_frame
 from simharness.runtime.errors import RunError
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras, Faults, People, Room

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from simharness.formats.joint_names import KNOWN
+from mvpose.formats.joint_names import KNOWN
 from simharness.formats.joint_tracks import JointTracks, TrackFiles
 from simharness.formats.track_formats import FORMATS
 

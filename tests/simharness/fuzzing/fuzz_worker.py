@@ -18,7 +18,7 @@ from pathlib import Path
 from file_mutations import KINDS, mutate
 from reader_cases import CASES
 
-from simharness.runtime.message_text import LONGEST
+from mvpose.files.message_text import LONGEST
 
 MEMORY = 3 * 2**30  # bytes that a reader may take
 

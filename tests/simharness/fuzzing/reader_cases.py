@@ -20,13 +20,13 @@ from test_store import make_record
 from test_track_formats import cells, tracks, write_c3d, write_mat, write_trc
 
 from mvpose import Camera, Rig
+from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
+from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.detection_files import DetectionFiles
+from mvpose.formats.detection_formats import FORMATS as DETECTIONS
 from mvpose.networks import Session
 from simharness.detector.descriptor_model import DescriptorModel
 from simharness.export.layout import check_place
-from simharness.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
-from simharness.formats.calibration.registry import read_calibration
-from simharness.formats.detection_files import DetectionFiles
-from simharness.formats.detection_formats import FORMATS as DETECTIONS
 from simharness.formats.joint_tracks import TrackFiles
 from simharness.formats.npz_joints import write_tracks
 from simharness.formats.panoptic_poses import body_scene

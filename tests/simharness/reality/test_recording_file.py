@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mvpose import COCO17, SHELF14, Camera, Rig
+from mvpose.formats.calibration.panoptic import write_calibration as write_panoptic
+from mvpose.formats.calibration.voxelpose import write_calibration as write_voxelpose
+from mvpose.formats.joint_names import BODY_25
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.formats.calibration.panoptic import write_calibration as write_panoptic
-from simharness.formats.calibration.voxelpose import write_calibration as write_voxelpose
-from simharness.formats.joint_names import BODY_25
 from simharness.reality.recording_file import find_recording, read_recording, shipped_recordings
 from simharness.scenario.toml_files import dumps_keys
 

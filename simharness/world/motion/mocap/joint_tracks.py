@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
+from mvpose.files.archives import arrays_of
+from mvpose.files.input_files import read_bytes
 from mvpose.skeleton import COCO17
-from simharness.runtime.archives import arrays_of
-from simharness.runtime.input_files import read_bytes
 from simharness.scenario.sections.people import People
 from simharness.world.humans.body_size import body_lengths
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-from simharness.runtime.input_files import MIB, read_bytes
+from mvpose.files.input_files import MIB, read_bytes
 
 _MOST = 64 * MIB  # bytes of a file: an hour of motion at 120 frames per second
 _LARGEST = 1e6  # larger than any length in any unit or angle of a person

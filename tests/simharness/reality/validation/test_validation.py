@@ -9,8 +9,8 @@ from turning_people import walkers
 from typer.testing import CliRunner
 
 from mvpose import COCO17, SHELF14
+from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
-from simharness.formats.calibration.voxelpose import write_calibration
 from simharness.reality.validation import prediction
 from simharness.reality.validation import validation as validation_module
 from simharness.reality.validation.prediction import halves

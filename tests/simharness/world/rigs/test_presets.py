@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mvpose import Rig
-from simharness.formats.calibration import panoptic, voxelpose
+from mvpose.formats.calibration import panoptic, voxelpose
 from simharness.scenario.sections.cameras import Preset
 from simharness.scenario.sections.scenario import Cameras
 from simharness.world.rigs.layouts import build_rig

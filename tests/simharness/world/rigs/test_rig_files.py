@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from mvpose.camera import Camera, Rig
-from simharness.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
-from simharness.formats.calibration.file_storage import write_storage
-from simharness.formats.calibration.registry import read_calibration
+from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
+from mvpose.formats.calibration.file_storage import write_storage
+from mvpose.formats.calibration.registry import read_calibration
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Cameras
 from simharness.world.rigs.layouts import aligned, build_rig, look_at

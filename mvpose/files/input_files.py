@@ -1,0 +1,188 @@
+"""Reading of input files: regular files of bounded size; whatever is wrong ends in one ValueError that names the file.
+
+Every reader of the package takes the bytes of a file from :func:`read_bytes`, and JSON and TOML from the functions of
+this module, so that a pipe, a device, an enormous or a deeply nested file is refused in the same way everywhere.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from mvpose.files.message_text import one_line, shown
+
+MIB = 2**20
+SETTINGS = MIB
+"""Largest file of settings, bytes: scenarios, recordings, profiles, rigs. Shipped ones have a few kilobytes."""
+CALIBRATION = 4 * MIB
+"""Largest calibration, bytes: the 511 cameras of the Panoptic Studio have half a megabyte."""
+TABLE = 512 * MIB
+"""Largest file of detections, joints, scores or motion, bytes: hours of one camera."""
+
+_BITS_OF_FLOATS = 1000  # whole numbers that fit a float
+_DEEPEST = 64  # lists and tables in each other; the formats of the field need six
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+_LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){64}""")
+
+
+def read_bytes(path: Path, *, what: str, most: int = TABLE) -> bytes:
+    """Return the content of a regular file.
+
+    Args:
+        path: the file.
+        what: the expected content and its origin, for the message.
+        most: largest size that is read, bytes.
+
+    Raises:
+        ValueError: the file does not exist, cannot be read, is larger than ``most``, or is no regular file: reading a
+            pipe or a device could wait for ever.
+    """
+    name = one_line(str(path), 200)
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # a pipe would block the opening
+    except FileNotFoundError:
+        raise ValueError(f"{name}: no such file; expected {what}. Copy it there or correct the path") from None
+    except OSError as error:
+        raise ValueError(f"{name}: cannot be read ({error.strerror}); expected {what}") from None
+    except ValueError as error:  # a zero byte in the path
+        raise ValueError(f"{name}: cannot be a path ({error}); expected {what}") from None
+    try:
+        about = os.fstat(handle)
+        kind = stat.S_IFMT(about.st_mode)
+        if kind != stat.S_IFREG:
+            raise ValueError(f"{name}: is {_KINDS.get(kind, 'no file')}, not a regular file; expected {what}")
+        if about.st_size > most:
+            raise ValueError(f"{name}: is larger than {megabytes(most)}, the most that is read of {what}")
+        with os.fdopen(handle, "rb", closefd=False) as opened:
+            content = opened.read(about.st_size + 1)
+    except OSError as error:
+        raise ValueError(f"{name}: cannot be read ({error.strerror}); expected {what}") from None
+    finally:
+        os.close(handle)
+    if len(content) > about.st_size:
+        raise ValueError(f"{name}: is being written, or is no file of a disk; expected {what}. Copy it first")
+    return content
+
+
+def read_json(path: Path, *, what: str, most: int = TABLE) -> Any:
+    """Return the JSON value in a file: an object, a list, text, a number.
+
+    Args:
+        path: the file.
+        what: the expected content, for the message.
+        most: largest size that is read, bytes.
+
+    Raises:
+        ValueError: see :func:`read_bytes`, and :func:`parse_json`.
+    """
+    content = read_bytes(path, what=what, most=most)
+    try:
+        return parse_json(content)
+    except ValueError as error:
+        raise ValueError(
+            f"{one_line(str(path), 200)}: broken or truncated JSON ({error}; the file has {len(content)} bytes); "
+            f"expected {what}. It was probably cut off: copy or download it again"
+        ) from None
+
+
+def read_json_object(path: Path, *, what: str, most: int = TABLE) -> dict[str, Any]:
+    """Return the JSON object in a file.
+
+    Raises:
+        ValueError: see :func:`read_json`; or another JSON value.
+    """
+    value = read_json(path, what=what, most=most)
+    if not isinstance(value, dict):
+        raise ValueError(
+            f"{one_line(str(path), 200)}: expected {what}, which is a JSON object, got a {type(value).__name__}"
+        )
+    return value
+
+
+def parse_json(content: bytes | str) -> Any:
+    """Return the value of a JSON text, with or without a byte order mark.
+
+    Raises:
+        ValueError: not JSON, nested deeply, or with a number or text that nothing else could take; see
+            :func:`check_values`.
+    """
+    try:
+        value = json.loads(content.removeprefix(b"\xef\xbb\xbf") if isinstance(content, bytes) else content)
+    except RecursionError:
+        raise ValueError(_too_deep()) from None
+    check_values(value)
+    return value
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises:
+        tomllib.TOMLDecodeError: not TOML; the message ends in the place.
+        ValueError: as :func:`parse_json`.
+    """
+    if _LONG_KEY.search(text):  # the parser's time grows with the square of the parts of a key
+        raise ValueError(_too_deep())
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(_too_deep()) from None
+    check_values(tables, bits=_BITS_OF_FLOATS)
+    return tables
+
+
+def check_values(value: Any, *, bits: int = 64) -> None:
+    """Check that a parsed value can be processed: its nesting, its text, and that whole numbers fit ``bits`` bits.
+
+    Raises:
+        ValueError: nested more than 64 deep, a whole number of more bits, or text with half a surrogate pair.
+    """
+    level, largest = [value], 2 ** (bits - 1)
+    for _ in range(_DEEPEST):
+        if not level:
+            return
+        deeper: list[Any] = []
+        for each in level:
+            if isinstance(each, dict):
+                _check_texts(each)
+            for inner in each.values() if isinstance(each, dict) else each if isinstance(each, list) else (each,):
+                kind = type(inner)
+                if kind is float:
+                    continue
+                if kind is dict or kind is list:
+                    deeper.append(inner)
+                elif kind is int and not -largest <= inner < largest:
+                    raise ValueError(f"a whole number of more than {bits} bits")
+                elif kind is str and not inner.isascii():
+                    _check_texts((inner,))
+        level = deeper
+    if level:
+        raise ValueError(_too_deep())
+
+
+def _check_texts(texts: Any) -> None:
+    for text in texts:
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise ValueError(f"{shown(text)} is not valid Unicode") from None
+
+
+def _too_deep() -> str:
+    return f"nested more than {_DEEPEST} deep"
+
+
+def megabytes(size: int) -> str:
+    """Return a size in bytes as text, for messages."""
+    return f"{size / MIB:.3g} MiB"

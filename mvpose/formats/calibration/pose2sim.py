@@ -1,0 +1,113 @@
+"""Pose2Sim calibrations (``Calib.toml``); Anipose and caliscope write almost the same.
+
+One section for each camera with ``name size matrix distortions rotation translation fisheye``: ``rotation`` is a
+Rodrigues vector, ``x_cam = R X + T``, metres, z up. Pose2Sim itself writes four distortion terms, k1 k2 p1 p2, without
+k3; files with five terms are read, too.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose import Camera, Rig
+from mvpose.files.input_files import CALIBRATION, parse_toml, read_bytes
+from mvpose.files.message_text import one_line, shown
+from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.entries import camera, check_names, image_size
+
+_KEYS = ("size", "matrix", "distortions", "rotation", "translation")
+_METADATA = "metadata"
+_EXPECTS = "a section for each camera, with " + ", ".join(_KEYS)
+_WHAT = f"a Pose2Sim calibration (TOML): {_EXPECTS}"
+
+
+def read_calibration(path: str | Path) -> Rig:
+    """Read a Pose2Sim calibration file.
+
+    Returns:
+        The cameras in the order of the file; their names are the key ``name``, or else the name of the section.
+
+    Raises:
+        ValueError: the file does not exist or is not TOML, a camera lacks a key, has a value of a wrong shape or a
+            fisheye lens, or the cameras make no rig.
+    """
+    path = Path(path)
+    content = read_bytes(path, what=_WHAT, most=CALIBRATION)
+    try:
+        sections = parse_toml(content.decode("utf-8-sig"))
+    except ValueError as error:
+        raise ValueError(f"{path}: not TOML ({one_line(str(error), 160)}); expected {_WHAT}") from None
+    try:
+        return Rig([_camera(name, entry) for name, entry in sections.items() if name != _METADATA])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def write_calibration(path: str | Path, rig: Rig) -> None:
+    """Write a rig as a Pose2Sim calibration, with four distortion terms, or five where k3 is not 0.
+
+    Raises:
+        ValueError: camera names that are missing or not distinct, or a camera called "metadata", the name of another
+            section.
+    """
+    check_names(rig)
+    lines = []
+    for each in rig:
+        if each.name == _METADATA:
+            raise ValueError(f"a Pose2Sim calibration cannot hold a camera called {_METADATA!r}: give it another name")
+        terms = each.distortion if each.distortion[4] else each.distortion[:4]
+        lines += [
+            f"[{_quoted(each.name)}]",
+            f"name = {_quoted(each.name)}",
+            f"size = {[float(side) for side in each.size]}",
+            f"matrix = {each.K.tolist()}",
+            f"distortions = {terms.tolist()}",
+            f"rotation = {Rotation.from_matrix(each.R).as_rotvec().tolist()}",
+            f"translation = {each.t.tolist()}",
+            "fisheye = false",
+            "",
+        ]
+    Path(path).write_text(
+        "\n".join([*lines, f"[{_METADATA}]", "adjusted = false", "error = 0.0", ""]), encoding="utf-8"
+    )
+
+
+def _recognises(file: CalibrationFile) -> bool:
+    return any(isinstance(entry, dict) and "matrix" in entry for entry in (file.toml or {}).values())
+
+
+def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
+    return read_calibration(path)
+
+
+FORMAT = CalibrationFormat("Pose2Sim (TOML)", _EXPECTS, _recognises, _read, write_calibration)
+
+
+def _quoted(text: str) -> str:
+    # JSON and TOML share their escapes, except for one control character that JSON leaves as it is.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _camera(section: str, entry: Any) -> Camera:
+    if not isinstance(entry, dict):
+        raise ValueError(f"{section!r} must be a section with {', '.join(_KEYS)}, got {shown(entry)}")
+    missing = [key for key in _KEYS if key not in entry]
+    if missing:
+        raise ValueError(f"camera {section!r} lacks {', '.join(missing)}; expected {', '.join(_KEYS)}")
+    if entry.get("fisheye"):
+        raise ValueError(f"camera {section!r} has a fisheye lens; calibrate it as a pinhole with k1 k2 p1 p2")
+    name = str(entry.get("name", section))
+    return camera(
+        name,
+        K=np.asarray(entry["matrix"], dtype=object),
+        R=entry["rotation"],
+        t=entry["translation"],
+        terms=entry["distortions"],
+        size=image_size(entry["size"], f"camera {name!r}: size"),
+    )
