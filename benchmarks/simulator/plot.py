@@ -16,7 +16,7 @@ from benchmarks.method.published import RELEASED, Comparison
 from benchmarks.simulator.result import SWEPT, Result, read
 from benchmarks.simulator.table import markdown
 from mvpose.files.atomic_files import write_atomic
-from simharness.report.figures.svg_plots import INK, STAGE_COLORS, Color, legend_above, plot_sheet, svg_plot
+from mvpose.report.svg_plots import INK, STAGE_COLORS, Color, legend_above, plot_sheet, svg_plot
 
 _SIZE = (4.5, 3.9)  # inches of 72 px
 _RELEASED_COLOR, _PAPER_COLOR = "#d9643a", "#8a63c9"

@@ -6,27 +6,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
+from mvpose.report import documents
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 
 def fill_template(template: str, /, *, folder: Path = TEMPLATES, **values: Any) -> str:
-    """Return the text of a template filled with values. Every value is escaped except ``Markup``.
-
-    Args:
-        template: file name in ``folder``.
-        folder: folder of the template and of the files that it includes.
-        values: values by the names that the template uses; a missing name is an error.
-    """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(template).render(values)
+    """Return a filled template of this package or of ``folder``; see :func:`mvpose.report.documents.fill_template`."""
+    return documents.fill_template(template, folder=folder, program="simharness", **values)
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mvpose import Detections
-from simharness.report.figures.palette import css, person_color
+from mvpose.report.palette import css, person_color
 from simharness.report.run.result_folder import run
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from simharness.report.figures.svg_plots import VARIANT_COLORS
+from mvpose.report.svg_plots import VARIANT_COLORS
 
 Point = tuple[float, float]
 

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.arrays import Floats
 from mvpose.files.atomic_files import write_atomic
+from mvpose.report.limbs import COCO17_BODY
+from mvpose.report.palette import TRUTH, css, person_color
 from simharness.report.documents import fill_template
-from simharness.report.figures.overlay import COCO17_BODY
-from simharness.report.figures.palette import TRUTH, css, person_color
 from simharness.report.run.pictures import Picture
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.report.palette import PAPER, Color
 from simharness.report.figures.overlay import Overlay, text_mask
-from simharness.report.figures.palette import PAPER, Color
 
 Mark = Literal["skeleton", "limbs", "box", "none"]
 

@@ -15,21 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simharness.report.figures.palette import INK, OUTLINE, PAPER, Color
+from mvpose.report.limbs import COCO17_LIMBS, Edges
+from mvpose.report.palette import INK, OUTLINE, PAPER, Color
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
-
-Edges = Sequence[tuple[int, int]]
-
-# Limbs as drawn, which differ from the tree of the pictorial structure: both sides of the trunk, no line through it.
-COCO17_FACE: Edges = ((0, 1), (0, 2), (1, 3), (2, 4))
-COCO17_BODY: Edges = (
-    *((5, 6), (5, 11), (6, 12), (11, 12)),  # trunk
-    *((5, 7), (7, 9), (6, 8), (8, 10)),  # arms
-    *((11, 13), (13, 15), (12, 14), (14, 16)),  # legs
-)
-COCO17_LIMBS: Edges = (*COCO17_FACE, *COCO17_BODY)
 
 _FINER = 4  # mask pixels for each pixel of the picture, in each direction
 _SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates

@@ -7,7 +7,7 @@ How to add a figure:
        @figure("Detections", "Number of detections in each frame.")
        def detections_over_time(record: Record, variant: str) -> str | None: ...
 
-   It returns the SVG text, made with :func:`simharness.report.figures.svg_plots.svg_plot`, or None without data. The
+   It returns the SVG text, made with :func:`mvpose.report.svg_plots.svg_plot`, or None without data. The
    caption may contain ``{variant}``.
 2. Add the name of the module to :data:`MODULES`.
 """

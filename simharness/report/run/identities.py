@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mvpose import COCO17, Estimate
 from mvpose.arrays import Floats
-from simharness.report.figures.palette import UNMATCHED, css, identity_color
-from simharness.report.figures.svg_plots import Color
+from mvpose.report.palette import UNMATCHED, css, identity_color
+from mvpose.report.svg_plots import Color
 from simharness.scoring.tracking.clear_mot import ClearMot, clear_mot
 from simharness.scoring.tracking.columns import DISTANCE
 from simharness.scoring.tracking.identity_scores import identity_scores

@@ -11,8 +11,8 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.report.figures.palette import UNMATCHED, css
-from simharness.report.figures.svg_plots import FAINT, INK, legend_above, svg_plot
+from mvpose.report.palette import UNMATCHED, css
+from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
 from simharness.report.run.identities import Identities, runs_of
 from simharness.scoring.tracking.clear_mot import ABSENT, MISSED
 

@@ -11,10 +11,10 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.report.palette import line_color
 from mvpose.skeleton import COCO17
 from simharness.pairing.pairing import pair
 from simharness.report.documents import fill_template
-from simharness.report.figures.palette import line_color
 from simharness.report.run import plots
 from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Animation

@@ -12,11 +12,12 @@ import polars as pl
 from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
+from mvpose.report.limbs import COCO17_BODY
+from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.capture.picture import PictureSource
 from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic
-from simharness.report.figures.overlay import COCO17_BODY, Overlay
-from simharness.report.figures.palette import TRUTH, UNMATCHED, Color, person_color
+from simharness.report.figures.overlay import Overlay
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record
 from simharness.trial.stages.build_trial import Trial

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from simharness.report.figures.svg_plots import (
+from mvpose.report.rig_plots import camera_from_above
+from mvpose.report.svg_plots import (
     FAINT,
     INK,
     LINE,
     STAGE_COLORS,
     VARIANT_COLORS,
-    VISIBILITY_COLORS,
     Color,
     legend_above,
     svg_plot,
 )
+
+VISIBILITY_COLORS: tuple[Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
 
 
 def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) -> str:
@@ -137,8 +137,7 @@ def floor_plan(
         for outline in things:
             axes.add_patch(Polygon(outline, fc=LINE, ec=FAINT, lw=0.8))
         for camera in rig:
-            tangent = camera.size[0] / 2 / camera.K[0, 0]
-            _camera(axes, camera.center[:2], camera.R[2][:2], tangent=tangent, name=camera.name)
+            camera_from_above(axes, camera)
         for person in range(paths.shape[1]):
             axes.plot(
                 *paths[:, person].T,
@@ -159,17 +158,3 @@ def floor_plan(
         axes.spines[:].set_visible(False)
         legend_above(axes, columns=min(5, paths.shape[1] + 1))
     return written[0]
-
-
-def _camera(axes: Axes, center: Floats, forward: Floats, *, tangent: float, name: str) -> None:
-    length = float(np.linalg.norm(forward))
-    if length < 1e-6:  # the camera looks straight down
-        axes.plot(*center, "s", color=INK, ms=4)
-        return
-    bearing = math.atan2(forward[1], forward[0])
-    side = math.atan(tangent)
-    ends = [center + 1.2 * np.array([math.cos(bearing + turn), math.sin(bearing + turn)]) for turn in (side, -side)]
-    axes.add_patch(Polygon(np.array([center, *ends]), fc=FAINT, ec="none", alpha=0.18, zorder=1))
-    axes.plot(*center, "o", color=INK, ms=3.5, zorder=4)
-    aside = center + 0.3 * np.array([-forward[1], forward[0]]) / length
-    axes.text(float(aside[0]), float(aside[1]), name, ha="center", va="center", fontsize=8, color=FAINT)

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 
 from mvpose.arrays import Floats
-from simharness.report.figures.palette import line_color
+from mvpose.report.palette import line_color
 from simharness.report.run import plots
 from simharness.report.run.figures import figure
 from simharness.trial.run_folder import Record

@@ -15,7 +15,7 @@ from typing import Any
 import polars as pl
 
 from mvpose.files.atomic_files import atomic_folder
-from simharness.report.figures.svg_plots import plot_sheet
+from mvpose.report.svg_plots import plot_sheet
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, cases_of, factor_breaking_points, factors, factors_by_case, panels
 from simharness.report.study.digest_text import HEADS, HEADS_OVER_TIME, PRINTED, markdown

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
-from simharness.report.figures.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
+from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.report.study.factor_names import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo

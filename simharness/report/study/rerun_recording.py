@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
-from simharness.report.figures.overlay import COCO17_LIMBS
-from simharness.report.figures.palette import TRUTH, Color, person_color
+from mvpose.report.limbs import COCO17_LIMBS
+from mvpose.report.palette import TRUTH, Color, person_color
 
 if TYPE_CHECKING:
     from simharness.report.study.replay import Replay

@@ -13,8 +13,8 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike
 
 from mvpose.arrays import Floats
-from simharness.report.figures.overlay import COCO17_LIMBS
-from simharness.report.figures.palette import css, person_color
+from mvpose.report.limbs import COCO17_LIMBS
+from mvpose.report.palette import css, person_color
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView, camera_pyramid
 

@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from mvpose.arrays import Floats
+from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.reality.validation.dose import Response
 from simharness.reality.validation.evidence import Compared
 from simharness.reality.validation.scores import JointDifficulty
 from simharness.reality.validation.subsets import SubsetComparison
 from simharness.reality.validation.treatments import KINDS
 from simharness.reality.validation.verdicts import BOUNDS
-from simharness.report.figures.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 
 REAL_COLOR: Color = "#8b93a1"
 TWIN_COLOR: Color = "#3b82c4"

@@ -11,8 +11,8 @@ import pytest
 from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
+from mvpose.report.svg_plots import plot_sheet
 from simharness.cli import app
-from simharness.report.figures.svg_plots import plot_sheet
 from simharness.report.study.digest import PRINTED, curves, digest, markdown, write_digest
 from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS
 from simharness.scoring.catalogue import SCORES

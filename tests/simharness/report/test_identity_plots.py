@@ -9,7 +9,7 @@ import pytest
 from test_page import make_record
 
 from mvpose import Estimate, Matching
-from simharness.report.figures.palette import UNMATCHED, css, identity_color, line_color
+from mvpose.report.palette import UNMATCHED, css, identity_color, line_color
 from simharness.report.run.identities import identities_of, runs_of
 from simharness.report.run.identity_plots import timeline, trajectories
 from simharness.report.run.page import render

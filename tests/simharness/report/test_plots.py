@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from simharness.report.figures.svg_plots import STAGE_COLORS
+from mvpose.report.svg_plots import STAGE_COLORS
 from simharness.report.run import plots
 from simharness.report.study import plots as study_plots
 from simharness.scenario.sections.scenario import Cameras

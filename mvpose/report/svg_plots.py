@@ -25,7 +25,6 @@ SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable o
 _SHEET_GAP = 14.0  # points between the plots of a sheet, and around them
 _SHEET_SCALE = 1.3  # plots have the width of a phone; a sheet is shown on wider screens
 
-VISIBILITY_COLORS: tuple[Color, ...] = ("#2e9e6b", "#d9a514", "#d9643a", "#8a63c9", "#8b93a1")
 STAGE_COLORS: Mapping[str, Color] = {
     "affinity": "#3b82c4",
     "matching": "#d9a514",

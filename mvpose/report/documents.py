@@ -1,0 +1,29 @@
+"""HTML pages from templates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+TEMPLATES = Path(__file__).parent / "templates"
+"""Templates of this package; those of other packages may extend ``page.html`` and include ``base.css``."""
+
+
+def fill_template(template: str, /, *, folder: Path = TEMPLATES, **values: Any) -> str:
+    """Return the text of a template filled with values. Every value is escaped except ``Markup``.
+
+    Args:
+        template: file name in ``folder``.
+        folder: folder of the template; the files that it extends or includes are there or in :data:`TEMPLATES`.
+        values: values by the names that the template uses; a missing name is an error.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([folder, TEMPLATES]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(values)

@@ -1,0 +1,50 @@
+"""Cameras from above, on the axes of a plot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from mvpose.arrays import Floats
+from mvpose.camera import Camera
+from mvpose.report.svg_plots import FAINT, INK, Color
+
+_LEVEL = 1e-6  # horizontal part of a viewing direction below which the camera looks straight down
+
+
+def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: float = 1.2, name: bool = True) -> None:
+    """Draw a camera from above: its centre, the cone of its horizontal field of view, and its name behind it.
+
+    Args:
+        axes: plot in metres, x and y of the world.
+        camera: the camera.
+        color: colour of the centre.
+        reach: length of the cone, metres.
+        name: write the name of the camera.
+    """
+    center, forward = camera.center[:2], camera.R[2, :2]
+    if np.linalg.norm(forward) < _LEVEL:
+        axes.plot(*center, "s", color=color, ms=4)
+        return
+    axes.add_patch(Polygon(cone_from_above(camera, reach), fc=FAINT, ec="none", alpha=0.18, zorder=1))
+    axes.plot(*center, "o", color=color, ms=3.5, zorder=4)
+    if name:
+        aside = center + 0.3 * np.array([-forward[1], forward[0]]) / np.linalg.norm(forward)
+        axes.text(
+            float(aside[0]), float(aside[1]), camera.name, ha="center", va="center", fontsize=8, color=FAINT, zorder=4
+        )
+
+
+def cone_from_above(camera: Camera, reach: float) -> Floats:
+    """Return the centre and the two far corners of the horizontal field of view, (3, 2), metres."""
+    forward = camera.R[2]
+    bearing = math.atan2(forward[1], forward[0])
+    side = math.atan(camera.size[0] / 2 / camera.K[0, 0])
+    ends = [
+        camera.center[:2] + reach * np.array([math.cos(bearing + turn), math.sin(bearing + turn)])
+        for turn in (side, -side)
+    ]
+    return np.array([camera.center[:2], *ends])
