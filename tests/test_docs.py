@@ -106,6 +106,7 @@ MODULES = tuple(
         "tools.reid",
     )
 )
+ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
 BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
 KNOWN = {
     *ALONE,
@@ -120,6 +121,7 @@ KNOWN = {
     *IN_PARTS,
     *MAKE,
     *MODULES,
+    ON_SHELF,
     BAKE,
     CI,
     *PYTEST,

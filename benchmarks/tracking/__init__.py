@@ -1,1 +1,1 @@
-"""Benchmark of the tracker, what it costs and its memory over hours: ``python -m benchmarks.tracking``."""
+"""Benchmark of the tracker: its time, its memory over hours, lost pictures: ``python -m benchmarks.tracking``."""
