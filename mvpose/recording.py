@@ -165,7 +165,7 @@ def _times(frames: list[Estimate], period: float) -> Floats:
         raise ValueError(f"period must be above 0 s and finite, got {period}")
     given = np.array([np.nan if frame.time is None else frame.time for frame in frames], float)
     known = np.flatnonzero(np.isfinite(given))
-    numbers = np.arange(len(frames))
+    numbers = np.arange(len(frames), dtype=np.float64)
     if not len(known):
         return numbers * period
     first, last = known[0], known[-1]

@@ -233,7 +233,7 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 6, "toml": 7, "yaml": 1}
+    assert languages == {"python": 7, "toml": 7, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -522,3 +522,12 @@ def test_the_block_of_the_tracker_runs():
     assert len(names["smooth"]) == len(recording.detections)
     assert names["estimate"].ids.tolist() == names["smooth"][-1].ids.tolist()
     assert len(names["estimate"]) == 4
+
+
+def test_the_block_of_people_files_runs(tmp_path):
+    scenario = simharness.load_scenario("quickstart", overrides=["duration=0.4", 'rendering.renderer="rays"'])
+    recording = simharness.simulate(scenario)
+    (block,) = [block for block in blocks("python") if "write_people(" in block]
+    exec(block, {"rig": recording.rig, "frames": recording.detections, "folder": tmp_path})
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"poses.parquet", "person_0.trc", "person_0.c3d"} <= names
