@@ -34,6 +34,8 @@ class People(Sealed):
         scores: confidence, 0 to 1, (T, n, J); 0 where absent.
         covariance: covariance of the error of each joint, (T, n, J, 3, 3), square metres, or None.
         skeleton: the J joints.
+        freedom: degrees of freedom of the error of each joint as in :class:`mvpose.Estimate`, (T, n, J); NaN where not
+            known. None: known of no joint.
 
     Raises:
         ValueError: a wrong shape, times that do not increase, repeated ids, or scores outside 0..1.
@@ -45,6 +47,7 @@ class People(Sealed):
     scores: Floats
     covariance: Floats | None = None
     skeleton: Skeleton = COCO17
+    freedom: Floats | None = None
 
     def __post_init__(self) -> None:
         times, ids = as_array(self.times, ("T",), "times"), as_array(self.ids, ("n",), "ids", np.int64)
@@ -65,6 +68,8 @@ class People(Sealed):
             covariance = as_array(covariance, (*shape, 3, 3), "covariance")
             covariance = np.where(present[..., None, None], covariance, np.nan)
             seal(covariance)
+        if self.freedom is not None:
+            object.__setattr__(self, "freedom", as_array(self.freedom, shape, "freedom"))
         for key, value in (
             ("times", times), ("ids", ids), ("joints", joints), ("scores", scores), ("covariance", covariance),
         ):  # fmt: skip
@@ -113,13 +118,16 @@ class People(Sealed):
         joints, scores = np.full((*shape, 3), np.nan), np.zeros(shape)
         known = all(frame.covariance is not None for frame in frames if len(frame)) and len(ids) > 0
         covariance = np.full((*shape, 3, 3), np.nan) if known else None
+        freedom = np.full(shape, np.nan) if any(frame.freedom is not None for frame in frames) else None
         for k, (row, frame) in enumerate(zip(rows, frames, strict=True)):
             kept = np.isin(row, ids)
             columns = np.searchsorted(ids, row[kept])
             joints[k, columns], scores[k, columns] = frame.joints[kept], frame.scores[kept]
             if covariance is not None and frame.covariance is not None:
                 covariance[k, columns] = frame.covariance[kept]
-        return cls(_times(frames, period), ids, joints, scores, covariance, skeleton)
+            if freedom is not None and frame.freedom is not None:
+                freedom[k, columns] = frame.freedom[kept]
+        return cls(_times(frames, period), ids, joints, scores, covariance, skeleton, freedom)
 
     def __len__(self) -> int:
         return len(self.ids)

@@ -1,0 +1,1 @@
+"""Real error of estimates beside the one that their covariances lead one to expect."""
