@@ -4,5 +4,6 @@ The input is a calibration and detections over time; no calibration board and no
 """
 
 from mvpose.calibration.findings import Diagnosis, Finding
+from mvpose.calibration.sightings import Sightings, gather
 
-__all__ = ["Diagnosis", "Finding"]
+__all__ = ["Diagnosis", "Finding", "Sightings", "gather"]

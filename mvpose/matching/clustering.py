@@ -45,6 +45,18 @@ def contract(affinity: NDArray[np.float64], view: NDArray[np.int64], *, alpha: f
     return _contract_pairs(read_only(affinity, np.float64), read_only(view, np.int64), float(alpha))
 
 
+def join_by_gains(gains: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Partition n objects by greedy contraction: the two parts with the greatest sum of gains are joined first.
+
+    Args:
+        gains: gain of putting two objects into one part, (n, n), symmetric; -inf where they must be apart.
+
+    Returns:
+        Part of every object, (n,): arbitrary numbers below n.
+    """
+    return _contract(np.array(gains, np.float64))
+
+
 @njit(cache=True)
 def _cluster(affinity, view, order, alpha):
     """Partition the detections in an order by view, (m,); see :func:`cluster`."""
