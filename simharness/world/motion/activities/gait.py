@@ -19,7 +19,9 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
+from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.poses.foot_roll import FootRoll
+from simharness.world.motion.poses.inverse_kinematics import Pelvis
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.timing import smoothstep
 
@@ -34,9 +36,12 @@ _KNEE += ((0.65, 53), (0.72, 62), (0.8, 50), (0.88, 24), (0.95, 7))
 _ANKLE: Knots = ((0.0, 0), (0.06, -5), (0.12, -2), (0.2, 4), (0.3, 7), (0.4, 10), (0.47, 11), (0.53, 5), (0.58, -7))
 _ANKLE += ((0.63, -16), (0.7, -9), (0.78, -1), (0.86, 2), (0.94, 1.5))
 _WALK_RATIO = 0.0065  # step length over steps per minute, m min: Sekiya et al., J. Hum. Mov. Stud. 30, 1996
+_LEG = 0.835  # metres from hip to ankle of an adult of 1.7 m: Winter
 _VIGOUR = (0.3, 1.6)  # range of amplitudes, relative to the curves, in which a stride is sought
+# Amplitudes of the pelvis at full vigour, after Perry and Burnfield.
+_PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
 
-_FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at heel rise
+FOOT_FLAT, _HEEL_RISE = 0.1, 0.45  # fractions of the stride at foot flat and at heel rise
 _STIFF_TOES = np.radians(
     250.0
 )  # toes do not bend in this model: a heel that rose fully over their tips would lift the leg
@@ -113,27 +118,62 @@ class Gait:
         pitch = CubicSpline(self.phase, np.append(self.pitch[:-1], self.pitch[0]), bc_type="periodic")
         return pitch, PchipInterpolator(self.phase, self.lift), PchipInterpolator(self.phase, self.progress)
 
+    def pelvis(self, place: Floats, heading: Floats, phase: Floats, *, amplitude: Floats | float = 1.0) -> Pelvis:
+        """Return the motion of the pelvis of a walking person.
+
+        Args:
+            place: position on the way, (T, 2) metres.
+            heading: mean facing direction, (T,) radians from the x axis.
+            phase: number of strides of the left foot so far, (T,).
+            amplitude: amplitude relative to that of the walk, (T,) or constant; 0: the person stands.
+        """
+        cycle = 2 * np.pi * phase
+        aside = _PELVIS_SWAY * amplitude * np.sin(cycle - 0.05 * np.pi)  # towards the standing foot
+        return Pelvis(
+            ground=place + aside[:, None] * leftward(heading),
+            bob=-self.bob * amplitude * np.cos(2 * cycle),  # lowest when a heel strikes
+            bearing=heading + self.pelvis_turn(phase, amplitude=amplitude),
+            lean=np.full(len(phase), np.radians(1.0)),
+            list=_PELVIS_LIST * self.vigour * amplitude * np.cos(cycle - 0.30 * np.pi),  # the swinging side is lower
+        )
+
+    def pelvis_turn(self, phase: Floats, *, amplitude: Floats | float = 1.0) -> Floats:
+        """Return the turn of the pelvis to the left, (T,) radians: the swinging side moves forward."""
+        return -_PELVIS_TURN * self.vigour * amplitude * np.cos(2 * np.pi * phase)
+
     def leg(self, phase: Floats) -> Floats:
         """Return hip flexion, knee flexion and ankle dorsiflexion on a straight path, (..., 3) radians."""
         return self.vigour * normative_angles(phase)
 
 
-def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0) -> Gait:
+def similar_walk_ratio(leg_length: float) -> float:
+    """Return the walk ratio, in m min, of a person with legs of a length in metres.
+
+    Dynamic similarity: steps are in proportion to the legs, and their duration to the square root of that (A. L. Hof,
+    "Scaling gait data to body size", Gait & Posture 4, 1996). Children of seven years, with legs of about 0.57 m, have
+    0.0034 (D. H. Sutherland et al., "The development of mature gait", J. Bone Joint Surg. 62-A, 1980), and here
+    0.0037.
+    """
+    return _WALK_RATIO * (leg_length / _LEG) ** 1.5
+
+
+def make_gait(kinematics: Kinematics, *, speed: float, pace: float = 1.0, walk_ratio: float = _WALK_RATIO) -> Gait:
     """Return the gait of a body at a speed: the normative curves with a fitted amplitude.
 
     Args:
         kinematics: body.
         speed: speed in metres per second; the walk ratio divides it into stride length and cadence.
         pace: cadence relative to the walk ratio's at the same stride; above 1 for quick short steps.
+        walk_ratio: step length over steps per minute, m min.
 
     Raises:
         ValueError: this body does not walk at this speed.
     """
     rolling = kinematics.rolling
-    stride = float(np.sqrt(240.0 * _WALK_RATIO * speed / pace))
+    stride = float(np.sqrt(240.0 * walk_ratio * speed / pace))
     least, most = (_play(kinematics, rolling, vigour).stride for vigour in _VIGOUR)
     if not least < stride < most:
-        low, high = (length**2 * pace / (240.0 * _WALK_RATIO) for length in (least, most))
+        low, high = (length**2 * pace / (240.0 * walk_ratio) for length in (least, most))
         raise ValueError(
             f"a person {kinematics.body.stature:.2f} m tall walks at {low:.2f} to {high:.2f} m/s, not at {speed:g} m/s"
         )
@@ -187,7 +227,7 @@ def _play(kinematics: Kinematics, rolling: FootRoll, vigour: float) -> _Played:
     hip, knee, ankle = curves.T
     pitch = hip - knee + ankle
     pitch = np.where(pitch < 0, pitch / (1 - pitch / _STIFF_TOES), pitch)
-    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=_FLAT, up=_HEEL_RISE), pitch)
+    pitch = np.where(phase < FOOT_OFF, flatten_stance(pitch, phase, down=FOOT_FLAT, up=_HEEL_RISE), pitch)
     print_x = place[:, 0] - rolling.at(pitch)[0]
     # From the strike of a foot to that of the other the pelvis moves by half a stride over it. By the curves its speed
     # would vary a little; the mean gives the constant speed that the pelvis has here.

@@ -10,7 +10,7 @@ import numpy as np
 
 from simharness.scenario.sections.people import People
 from simharness.types.random_streams import stream
-from simharness.world.motion.activities.route_walking import walk_route
+from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance, Prop
 from simharness.world.motion.poses.foot_placement import spot_to_world
@@ -56,14 +56,12 @@ def _perform(
     inside = (_ENDS - _DEPTH / 2 + _STRIDE, _ENDS + _DEPTH / 2 - _STRIDE, hidden)
     walker = Itinerary(spot_to_world(spot, [-_ENDS, 0.0]), spot.bearing, speed)
     walker.time = -2.0 - offset * (hidden + turning_time(np.pi) + 2.0)
-    start = walker.time
-    ends: list[float] = []
-    while walker.time < time[-1] or not ends:
-        walker.walk(2 * _ENDS, slow=inside).turn(spot.bearing + (len(ends) + 1) * np.pi, sense=sense)
-        ends.append(walker.time)
+    legs = 0
+    while walker.time < time[-1] + LOOKAHEAD:
+        legs += 1
+        walker.walk(2 * _ENDS, slow=inside).turn(spot.bearing + legs * np.pi, sense=sense)
         walker.stand(rests.uniform(*_REST))
-    first = np.arange(start - 1.0, ends[0] + 0.3, 0.05)
-    motion = walk_route(mover, walker.route(), time, rng=rng, pace=pace, fit=first)
+    motion = walk_route(mover, walker.route(), time, rng=rng, pace=pace)
     half = spot.bearing / 2
     pose = np.array([[*spot.place, 0.0, np.cos(half), 0.0, 0.0, np.sin(half)]])
     size = (_DEPTH, _WIDTH, round(mover.body.stature + _OVER_HEAD, 2))

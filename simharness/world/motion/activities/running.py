@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.activities.gait import Gait, Knots, flatten_stance, periodic, pin_ends
 from simharness.world.motion.activities.walking import footsteps, laps
 from simharness.world.motion.motion import Motion
@@ -62,10 +63,9 @@ def run(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gene
     def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         cycle = 2 * np.pi * phase
         heading = loop.heading(time)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
         aside = 0.012 * np.sin(cycle + 0.1 * np.pi)
         pelvis = Pelvis(
-            ground=loop.position(time) + aside[:, None] * left,
+            ground=loop.position(time) + aside[:, None] * leftward(heading),
             bob=-stride.bob * np.cos(2 * (cycle - 2 * np.pi * _MIDSTANCE)),
             bearing=heading - np.radians(6.0) * vigour * np.cos(cycle),
             lean=np.full(len(time), np.radians(4.0 + 3.0 * upright)),

@@ -8,6 +8,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activities.footprints import leftward
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Spot, Track
 from simharness.world.motion.performance import Performance, Prop
@@ -69,9 +70,8 @@ def turn(kinematics: Kinematics, spot: Spot, time: Floats, *, rng: np.random.Gen
     def stances(u: Floats) -> tuple[Pelvis, dict[str, Foot]]:
         bearing = facing(u)
         aside = _over_standing_foot(u, steps, by=0.022)
-        left = np.stack([-np.sin(bearing), np.cos(bearing)], axis=-1)
         pelvis = Pelvis(
-            ground=spot_to_world(spot, aside[:, None] * left),
+            ground=spot_to_world(spot, aside[:, None] * leftward(bearing)),
             bob=np.zeros(len(u)),
             bearing=spot.bearing + bearing,
             lean=np.full(len(u), np.radians(1.0)),

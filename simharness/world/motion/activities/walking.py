@@ -6,6 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
+from simharness.world.motion.activities.footprints import Footprints
 from simharness.world.motion.activities.gait import Gait, make_gait
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
@@ -18,9 +19,7 @@ _STRAIGHTEST = np.radians(4.0)
 _TOE_OUT = np.radians(7.0)
 _STEP_WIDTH = 0.55  # lateral distance of the feet relative to the neutral stance
 _EVERY, _SHIFTS = 0.03, 9  # seconds between samples of the loop, and number of stride phases at each
-# Amplitudes at full vigour: pelvis after Perry and Burnfield, "Gait Analysis", 2010; arms (degrees) after Murray, Sepic
-# and Barnard, Phys. Ther. 47, 1967.
-_PELVIS_TURN, _PELVIS_LIST, _PELVIS_SWAY = np.radians(5.0), np.radians(3.5), 0.018
+# Degrees at full vigour, after Murray, Sepic and Barnard, Phys. Ther. 47, 1967.
 _ARM_SWING = 19.0
 _ELBOW_SWING = 13.0
 
@@ -48,16 +47,7 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     width = _STEP_WIDTH * kinematics.legs["left"].end[1]
 
     def stances(time: Floats, phase: Floats) -> tuple[Pelvis, dict[str, Foot]]:
-        heading, cycle = loop.heading(time), 2 * np.pi * phase
-        aside = _PELVIS_SWAY * np.sin(cycle - 0.05 * np.pi)  # towards the standing foot
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-        pelvis = Pelvis(
-            ground=loop.position(time) + aside[:, None] * left,
-            bob=-gait.bob * np.cos(2 * cycle),  # lowest when a heel strikes
-            bearing=heading - _PELVIS_TURN * gait.vigour * np.cos(cycle),  # the swinging side moves forward
-            lean=np.full(len(time), np.radians(1.0)),
-            list=_PELVIS_LIST * gait.vigour * np.cos(cycle - 0.30 * np.pi),  # the swinging side is lower
-        )
+        pelvis = gait.pelvis(loop.position(time), loop.heading(time), phase)
         feet = {
             side: footsteps(loop, gait, side, phase - late, time, width=width, toe_out=_TOE_OUT)
             for side, late in zip(SIDES, (0.0, 0.5), strict=True)
@@ -67,8 +57,8 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
     pelvis, feet = stances(time, phase)
     cycle = 2 * np.pi * phase
     bank = np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.25, 0.25)  # into the bend
-    turned, listed = -_PELVIS_TURN * gait.vigour * np.cos(cycle), pelvis.list
-    counter = 2.0 * np.degrees(turned)  # the thorax rotates opposite to the pelvis
+    listed = pelvis.list
+    counter = 2.0 * np.degrees(gait.pelvis_turn(phase))  # the thorax rotates opposite to the pelvis
     forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # each arm swings with the opposite leg
     look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
     angles = pose_angles(
@@ -119,19 +109,13 @@ def footsteps(loop: Loop, gait: Gait, side: str, phase: Floats, time: Floats, *,
     stride = np.floor(phase)
     struck = time - (phase - stride) / gait.frequency
 
-    def prints(when: Floats) -> tuple[Floats, Floats]:
-        """Return ankle (T, 2), as if the foot lay flat, and bearing (T,) of the footprint of a landing at ``when``."""
+    def prints(when: Floats) -> Footprints:
+        """Return the footprint of a landing at ``when``."""
         passed = when + gait.lead / loop.speed  # the pelvis is over the print
-        heading = loop.heading(passed)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-        return loop.position(passed) + outward * width * left, heading + outward * toe_out
+        return Footprints.beside(
+            loop.position(passed), loop.heading(passed), left=outward * width, toes_left=outward * toe_out
+        )
 
-    previous, bearing = prints(struck)
-    following, following_bearing = prints(struck + 1.0 / gait.frequency)
     pitch, lift, progress = gait.foot(phase)
-    swung = np.angle(np.exp(1j * (following_bearing - bearing)))
-    bearing = bearing + progress * swung
-    ahead, height = gait.rolling.at(pitch)
-    toes = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    ground = previous + progress[:, None] * (following - previous) + ahead[:, None] * toes
-    return Foot(ankle=np.column_stack([ground, height + lift]), bearing=bearing, pitch=pitch)
+    following = prints(struck + 1.0 / gait.frequency)
+    return prints(struck).to(following, progress=progress, pitch=pitch, lift=lift, rolling=gait.rolling)

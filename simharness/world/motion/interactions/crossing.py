@@ -16,7 +16,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.scenario.sections.people import People
 from simharness.types.random_streams import stream
-from simharness.world.motion.activities.route_walking import walk_route
+from simharness.world.motion.activities.route_walking import LOOKAHEAD, walk_route
 from simharness.world.motion.paths import Spot
 from simharness.world.motion.performance import Performance
 from simharness.world.motion.poses.foot_placement import spot_to_world
@@ -89,7 +89,7 @@ def _perform(
     offset, *uneven = rng.uniform(-1.0, 1.0, count + 1)
     sense = rng.choice([-1.0, 1.0], count)
     rests = stream(int(rng.integers(1 << 31)), name)  # a longer time takes more draws, and changes no other
-    meetings = _meetings(max(durations), (offset + 1.0) / 2, float(time[-1]), _REST[name], rests)
+    meetings = _meetings(max(durations), (offset + 1.0) / 2, float(time[-1]) + LOOKAHEAD, _REST[name], rests)
     yielded = float(np.clip((_WIDE - passing) / (_WIDE - _NARROW), 0.0, 1.0))
     motions = []
     for k, (mover, lane) in enumerate(zip(performers, _lanes(count, passing), strict=True)):
@@ -105,8 +105,7 @@ def _perform(
             near = 1.0 - ease((np.abs(along) - _ABREAST) / _TURNED)
             return yielded * near * np.sign(np.cos(route.heading(time) - bearing))
 
-        first = np.arange(meetings[0] - durations[k], meetings[0] + durations[k] + turning_time(np.pi), 0.05)
-        motions.append(walk_route(mover, route, time, rng=rng, pace=pace, yielding=yielding, fit=first))
+        motions.append(walk_route(mover, route, time, rng=rng, pace=pace, yielding=yielding))
     return Performance(tuple(motions))
 
 
