@@ -7,6 +7,7 @@ and ``bbox``, which is optional, x, y, width, height in pixels. People of all fr
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -40,11 +41,11 @@ def read_detections(files: DetectionFiles) -> tuple[Detections, ...]:
         path = files.path / f"{camera}.json"
         found = set()
         for index, entry in enumerate(_entries(path)):
-            frame = _frame(path, index, entry)
+            frame = frame_of(path, index, entry)
             found.add(frame)
             if frame in wanted:
-                _check_box(path, index, entry)
-                frames[frame].append((view, entry, _keypoints(path, index, entry, skeleton)))
+                box_of(path, index, entry)
+                frames[frame].append((view, entry, keypoints_of(path, index, entry, skeleton)))
         if found and not found & wanted:
             raise ValueError(
                 f"{path}: has image_id {min(found)} to {max(found)}, none of the requested frames {min(wanted)} to "
@@ -60,7 +61,15 @@ def _entries(path: Path) -> list[Mapping[str, Any]]:
     return entries
 
 
-def _frame(path: Path, index: int, entry: Mapping[str, Any]) -> int:
+def frame_of(path: Path, index: int, entry: Mapping[str, Any]) -> int:
+    """Return the frame of an entry: the number ``image_id``, or the last number in it where it is a file's name.
+
+    Raises:
+        ValueError: no number.
+    """
+    image = entry.get("image_id")
+    if isinstance(image, str) and (digits := re.findall(r"\d+", Path(image).stem)):
+        return int(digits[-1])
     try:
         return int(entry["image_id"])
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -69,25 +78,30 @@ def _frame(path: Path, index: int, entry: Mapping[str, Any]) -> int:
         ) from None
 
 
-def _check_box(path: Path, index: int, entry: Mapping[str, Any]) -> None:
-    """Check the box and the score of an entry, both optional.
+def box_of(path: Path, index: int, entry: Mapping[str, Any]) -> tuple[list[float] | None, float | None]:
+    """Return the box (``bbox``, or ``box`` of AlphaPose) and the score of an entry; None where it has none.
 
     Raises:
         ValueError: a box that is not four numbers, or a score that is no number.
     """
-    box, score = entry.get("bbox"), entry.get("score")
+    box, score = entry.get("bbox", entry.get("box")), entry.get("score")
     if box is not None and not (isinstance(box, list) and len(box) == 4 and all(map(_is_number, box))):
         raise ValueError(f"{path}: entry {index}: bbox must be x, y, width, height in pixels, got {shown(box)}")
     if score is not None and not _is_number(score):
         raise ValueError(f"{path}: entry {index}: score must be a number, got {shown(score)}")
+    return box, score
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _keypoints(path: Path, index: int, entry: Mapping[str, Any], skeleton: JointNames) -> Floats:
-    """Return the keypoints and scores of an entry, (J, 3)."""
+def keypoints_of(path: Path, index: int, entry: Mapping[str, Any], skeleton: JointNames) -> Floats:
+    """Return the keypoints and scores of an entry, (J, 3).
+
+    Raises:
+        ValueError: no numbers, or those of another number of joints.
+    """
     try:
         values = np.asarray(entry["keypoints"], float).ravel()
     except (KeyError, TypeError, ValueError):

@@ -66,6 +66,8 @@ _FEET6 = (
 )
 _WHOLEBODY133 = (*COCO17.joints, *_FEET6, *(f"face_{k}" for k in range(68)),
                  *(f"left_hand_{k}" for k in range(21)), *(f"right_hand_{k}" for k in range(21)))
+_HALPE136 = (*_HALPE26, *(f"face_{k}" for k in range(68)),
+             *(f"left_hand_{k}" for k in range(21)), *(f"right_hand_{k}" for k in range(21)))  # AlphaPose, whole body
 # fmt: on
 
 
@@ -133,6 +135,7 @@ KNOWN = {
         JointNames("coco18", _COCO18),
         JointNames("halpe26", _HALPE26),
         JointNames("wholebody133", _WHOLEBODY133),
+        JointNames("halpe136", _HALPE136),
         JointNames("mpii16", _MPII16),
         JointNames("h36m17", _H36M17),
         JointNames("shelf14", SHELF14.joints),

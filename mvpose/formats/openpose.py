@@ -52,11 +52,20 @@ def read_people(path: str | Path, *, skeleton: JointNames = _BODY25) -> tuple[Fl
     people = read_json_object(path, what=_WHAT).get("people")
     if not isinstance(people, list):
         raise ValueError(f"{path}: no list 'people'; expected {_WHAT}")
-    body = np.array([_keypoints(path, index, person, skeleton) for index, person in enumerate(people)])
-    body = body.reshape(-1, len(skeleton), 3)
-    keypoints, scores = to_coco17(body[..., :2], body[..., 2], skeleton)
+    keypoints, scores = to_coco17(*keypoints_of(path, people, skeleton), skeleton)
     detected = (scores > 0).any(axis=1)
     return keypoints[detected], scores[detected]
+
+
+def keypoints_of(path: Path, people: Sequence[Any], skeleton: JointNames) -> tuple[Floats, Floats]:
+    """Return the keypoints (n, J, 2) and scores (n, J) of ``people`` in a file, on its own skeleton.
+
+    Raises:
+        ValueError: a person without keypoints of the skeleton; the message names the file.
+    """
+    body = np.array([_keypoints(path, index, person, skeleton) for index, person in enumerate(people)])
+    body = body.reshape(-1, len(skeleton), 3)
+    return body[..., :2], body[..., 2]
 
 
 def read_frame(paths: Sequence[str | Path], *, skeleton: JointNames = _BODY25) -> Detections:
@@ -127,14 +136,14 @@ def _files_of(folder: Path) -> list[Path]:
             f"{folder}: no such folder; expected OpenPose files of the camera {folder.name!r}; {has}. "
             "Name the folders as the cameras of the calibration, or select cameras"
         )
-    paths = sorted(folder.glob("*.json"), key=_natural)
+    paths = sorted(folder.glob("*.json"), key=natural_order)
     if not paths:
         raise ValueError(f"{folder}: has no *.json; expected {_WHAT}, one for each frame")
     return paths
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Return a key that sorts numbers in names by value: frame_2 before frame_10."""
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts paths by name, with numbers by value: frame_2 before frame_10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
