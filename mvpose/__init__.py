@@ -1,10 +1,29 @@
 """Multi-person 3D pose estimation from a few calibrated cameras (Dong et al., CVPR 2019); needs no GPU."""
 
-from mvpose.camera import Camera, Rig
-from mvpose.detections import Detections
-from mvpose.estimate import Estimate, Matching
-from mvpose.pipeline import Pipeline
-from mvpose.skeleton import COCO17, PANOPTIC19, SHELF14, Skeleton
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mvpose.camera import Camera, Rig
+    from mvpose.detections import Detections
+    from mvpose.estimate import Estimate, Matching
+    from mvpose.pipeline import Pipeline
+    from mvpose.skeleton import COCO17, PANOPTIC19, SHELF14, Skeleton
+
+_MODULES = {
+    "COCO17": "mvpose.skeleton",
+    "PANOPTIC19": "mvpose.skeleton",
+    "SHELF14": "mvpose.skeleton",
+    "Camera": "mvpose.camera",
+    "Detections": "mvpose.detections",
+    "Estimate": "mvpose.estimate",
+    "Matching": "mvpose.estimate",
+    "Pipeline": "mvpose.pipeline",
+    "Rig": "mvpose.camera",
+    "Skeleton": "mvpose.skeleton",
+}
 
 __all__ = [
     "COCO17",
@@ -18,3 +37,16 @@ __all__ = [
     "Rig",
     "Skeleton",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import public names at their first use, so that `mvpose --help` does not load numba."""
+    if name not in _MODULES:
+        raise AttributeError(f"module 'mvpose' has no attribute {name!r}; it has {', '.join(__all__)}")
+    value = getattr(import_module(_MODULES[name]), name)
+    globals()[name] = value  # found without this function from now on
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -39,6 +39,7 @@ def _editable() -> dict[str, Any]:
     return {
         "packages": setuptools.find_packages(include=(*_PACKAGES, "mvpose", "mvpose.*")),
         "install_requires": _requirements() + mvpose["dependencies"] + extras,
+        "entry_points": _entry_points(_scripts() | mvpose["scripts"]),
     }
 
 
@@ -49,12 +50,21 @@ def _wheel() -> dict[str, Any]:
     return {
         "packages": [*setuptools.find_packages(include=_PACKAGES), "simharness.scenarios"],
         "package_dir": {"simharness.scenarios": "scenarios"},
+        "entry_points": _entry_points(_scripts()),
         "install_requires": [*_requirements(), f"mvpose[{','.join(_EXTRAS)}]=={version.strip()}"],
     }
 
 
 def _requirements() -> list[str]:
     return list(_read("pyproject.toml")["tool"]["simharness"]["dependencies"])
+
+
+def _scripts() -> dict[str, str]:
+    return dict(_read("pyproject.toml")["tool"]["simharness"]["scripts"])
+
+
+def _entry_points(scripts: dict[str, str]) -> dict[str, list[str]]:
+    return {"console_scripts": [f"{name} = {place}" for name, place in scripts.items()]}
 
 
 def _read(file: str) -> dict[str, Any]:

@@ -1,0 +1,5 @@
+"""``python -m mvpose.cli``."""
+
+from mvpose.cli import main
+
+main()

@@ -1,0 +1,44 @@
+"""The program: its name, help, version and commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from mvpose.cli import estimate
+
+app = typer.Typer(
+    name="mvpose",
+    help="Multi-person 3D pose from calibrated cameras: from the files of a recording to tracked people.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        for name in ("mvpose", "simharness"):  # an editable install of simharness holds both packages
+            try:
+                typer.echo(f"mvpose {version(name)}")
+            except PackageNotFoundError:
+                continue
+            break
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Multi-person 3D pose from calibrated cameras: from the files of a recording to tracked people."""
+
+
+estimate.add_to(app)

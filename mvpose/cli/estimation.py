@@ -1,0 +1,62 @@
+"""People of a recording: the estimator over all frames, with progress, and the check that the cameras agree."""
+
+from __future__ import annotations
+
+import math
+
+from mvpose.cli.exit_codes import failing
+from mvpose.cli.inputs import Inputs
+from mvpose.cli.progress import bar
+from mvpose.formats.views.plausibility import agreement, check_agreement
+from mvpose.pipeline import Estimator, Pipeline, SequenceEstimator
+from mvpose.presets import NEED_DESCRIPTORS, PRESETS
+from mvpose.recording import People
+
+
+def estimator(method: str, *, lag: float, period: float) -> Estimator:
+    """Return the preset of a name.
+
+    Raises:
+        ValueError: an unknown name, one that needs descriptors, which files of detections do not have, or a bad lag.
+    """
+    if method in NEED_DESCRIPTORS:
+        raise ValueError(f"--method {method}: needs descriptors, which files of detections do not hold; use track")
+    if method not in PRESETS:
+        raise ValueError(f"--method {method}: no such method; expected one of {', '.join(PRESETS)}")
+    if not lag >= 0.0 or math.isnan(lag):
+        raise ValueError(f"--lag must be 0 s or more, or inf, got {lag}")
+    return Pipeline.preset(method, lag=lag, period=period)
+
+
+def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -> People:
+    """Estimate the people of all frames.
+
+    Args:
+        inputs: the recording.
+        method: one of :func:`estimator`; one without memory numbers the people of each frame anew.
+        trust: accept people on whom the cameras do not agree.
+
+    Raises:
+        ValueError: cameras that do not agree, :func:`mvpose.formats.views.plausibility.check_agreement`.
+        RunError: the estimator failed.
+    """
+    estimates = []
+    tracks = isinstance(method, SequenceEstimator)
+    with bar("estimate", len(inputs.frames)) as advance, failing("estimation"):
+        results = (
+            method.track(inputs.rig, inputs.frames)
+            if isinstance(method, SequenceEstimator)
+            else (method.estimate(inputs.rig, frame) for frame in inputs.frames)
+        )
+        for estimate in results:
+            estimates.append(estimate)
+            advance(1)
+    if not trust:
+        import numpy as np
+
+        view = np.concatenate([frame.view for frame in inputs.frames])
+        labels = np.concatenate(
+            [each.matching.labels_of(len(frame)) for each, frame in zip(estimates, inputs.frames, strict=True)]
+        )
+        check_agreement(inputs.rig, agreement(view, labels >= 0, len(inputs.rig)))
+    return People.of_estimates(estimates, period=inputs.period, untracked=not tracks)

@@ -1,0 +1,195 @@
+"""Calibration and detections of a recording, read and checked: the first step of every command about one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mvpose.cli.exit_codes import note
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from mvpose import Detections, Rig
+
+Calibration = Annotated[
+    Path,
+    typer.Argument(
+        help="Calibration of the cameras: a file of OpenCV, EasyMocap, Pose2Sim, Anipose, VoxelPose or Panoptic, or a "
+        "folder with a file for each camera.",
+        metavar="CALIBRATION",
+    ),
+]
+DetectionPaths = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Detections: a folder or file for each camera, or a folder that holds them. OpenPose folders, COCO and "
+        "AlphaPose results, MMPose predictions, arrays of RTMLib, the folder [cyan]pose[/] of Pose2Sim.",
+        metavar="DETECTIONS...",
+    ),
+]
+Fps = Annotated[float | None, typer.Option(metavar="N", help="Frames per second. [dim]\\[default: 25][/]")]
+Times = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
+    ),
+]
+Cameras = Annotated[
+    str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
+]
+Frames = Annotated[
+    str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")
+]
+Skeleton = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..."),
+]
+Size = Annotated[
+    str | None,
+    typer.Option(metavar="WxH", help="Size of the pictures in pixels, for calibrations that do not state it."),
+]
+Up = Annotated[
+    str | None,
+    typer.Option(metavar="AXIS", help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]"),
+]
+
+_FPS = 25.0
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """A recording that was read.
+
+    Attributes:
+        rig: its cameras, z up.
+        frames: detections of each of the T frames, with the times of the pictures.
+        numbers: number of each frame in the files, (T,).
+        period: time between frames, seconds.
+    """
+
+    rig: Rig
+    frames: list[Detections]
+    numbers: NDArray[np.int64]
+    period: float
+
+
+@dataclass(frozen=True)
+class Choices:
+    """Options of commands that read a recording, as given; see the types of this module."""
+
+    fps: float | None = None
+    times: Path | None = None
+    cameras: str | None = None
+    frames: str | None = None
+    skeleton: str | None = None
+    size: str | None = None
+    up: str | None = None
+
+
+def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices) -> Inputs:
+    """Read a calibration and detections, and check that they can belong together. Notes are printed on stderr.
+
+    Raises:
+        ValueError: anything wrong with a file or an option.
+    """
+    from mvpose.cli.progress import bar
+    from mvpose.formats.calibration.registry import read_calibration
+    from mvpose.formats.joint_names import known_skeleton
+    from mvpose.formats.views import plausibility
+    from mvpose.formats.views.recording import read_recording
+
+    if choices.fps is not None and choices.times is not None:
+        raise ValueError("--fps and --times: give one of them")
+    if choices.fps is not None and not 0.0 < choices.fps < 1e6:
+        raise ValueError(f"--fps must be above 0, got {choices.fps}")
+    only = tuple(name.strip() for name in choices.cameras.split(",")) if choices.cameras else ()
+    frames, size = _frames(choices.frames), _size(choices.size)
+    skeleton = known_skeleton(choices.skeleton) if choices.skeleton else None
+    rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=only, key="--cameras")
+    names = [camera.name for camera in rig]
+    with bar("read", len(rig)) as advance:
+        recorded = read_recording(names, detections, skeleton=skeleton, frames=frames, progress=advance)
+    note(recorded.assignment.text(names))
+    extents = recorded.extents()
+    rig, about_size = plausibility.with_sizes(rig, extents, size=size)
+    if about_size:
+        note(about_size)
+    plausibility.check_principal_points(rig)
+    plausibility.check_extents(rig, extents)
+    if choices.up is None:
+        plausibility.check_up(rig)
+    else:
+        rig = plausibility.turned_up(rig, choices.up)
+    times, period = _times(choices, recorded.numbers, len(rig))
+    return Inputs(rig, recorded.detections(times), recorded.numbers, period)
+
+
+def _times(choices: Choices, numbers: NDArray[np.int64], cameras: int) -> tuple[NDArray[np.float64], float]:
+    """Return the time of each picture, (T, V), seconds, and the time between frames."""
+    import numpy as np
+
+    if choices.times is not None:
+        times = _read_times(choices.times, len(numbers), cameras)
+        return times, float(np.median(np.diff(np.nanmean(times, axis=1)))) if len(times) > 1 else 1.0 / _FPS
+    if choices.fps is None:
+        note(f"no --fps: {_FPS:g} frames per second are assumed, which sets how fast people can move")
+    period = 1.0 / (choices.fps or _FPS)
+    return np.repeat((numbers * period)[:, None], cameras, axis=1), period
+
+
+def _read_times(path: Path, frames: int, cameras: int) -> NDArray[np.float64]:
+    """Read times of pictures, (T, V): lines of one number, or of one for each camera; a first line may hold names.
+
+    Raises:
+        ValueError: no such file, or another number of lines or of numbers in a line.
+    """
+    import re
+
+    import numpy as np
+
+    from mvpose.files.input_files import read_bytes
+
+    text = read_bytes(path, what="times of pictures, a line for each frame").decode("utf-8", "replace")
+    lines = [re.split(r"[,;\s]+", line.strip()) for line in text.splitlines() if line.strip()]
+    if lines and any(re.search(r"[A-Za-z]", each) and each.lower() != "nan" for each in lines[0]):
+        lines = lines[1:]
+    try:
+        values = [[float(each) if each else float("nan") for each in line] for line in lines]
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}; expected times in seconds, a line for each frame") from None
+    if len(values) != frames or any(len(line) not in (1, cameras) for line in values):
+        widths = sorted({len(line) for line in values})
+        raise ValueError(
+            f"{path}: expected {frames} lines, one for each frame, of 1 or {cameras} numbers; got {len(values)} lines of "
+            f"{', '.join(map(str, widths)) or 'no'} numbers"
+        )
+    times = np.array([line * (cameras if len(line) == 1 else 1) for line in values]).reshape(frames, cameras)
+    of_frames = np.array([np.nanmean(row) if np.isfinite(row).any() else np.nan for row in times])
+    if not np.isfinite(of_frames).all() or (np.diff(of_frames) <= 0).any():
+        raise ValueError(f"{path}: the times of frames must be numbers of seconds that increase")
+    return times
+
+
+def _frames(given: str | None) -> tuple[int, int] | None:
+    if given is None:
+        return None
+    first, _, last = given.partition(":")
+    if not (first.strip().isdigit() and last.strip().isdigit() and int(first) <= int(last)):
+        raise ValueError(f"--frames must be FIRST:LAST, such as 0:299, got {given!r}")
+    return int(first), int(last)
+
+
+def _size(given: str | None) -> tuple[int, int] | None:
+    if given is None:
+        return None
+    sides = given.lower().replace("×", "x").replace(",", "x").split("x")
+    if len(sides) != 2 or not all(side.strip().isdigit() and 0 < int(side) < 10**6 for side in sides):
+        raise ValueError(f"--size must be WIDTHxHEIGHT in pixels, such as 1920x1080, got {given!r}")
+    return int(sides[0]), int(sides[1])

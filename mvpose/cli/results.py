@@ -1,0 +1,47 @@
+"""Files of tracked people in a folder that appears when it is complete."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from mvpose.cli.inputs import Inputs
+from mvpose.cli.output_folder import RESULTS
+from mvpose.files.atomic_files import atomic_folder
+from mvpose.formats.writers import check_formats, write_people
+from mvpose.recording import People
+
+ALWAYS = ("parquet", "json")
+"""Formats that every folder of results holds."""
+
+
+def formats_of(given: str) -> tuple[str, ...]:
+    """Return the formats to write, given their names separated by commas.
+
+    Raises:
+        ValueError: an unknown name, or a format whose package is not installed.
+    """
+    names = tuple(name.strip().lower() for name in given.split(",") if name.strip())
+    try:
+        check_formats(names)
+    except ValueError as error:
+        raise ValueError(f"--format: {error}") from None
+    return tuple(dict.fromkeys((*ALWAYS, *names)))
+
+
+def write_results(folder: Path, people: People, inputs: Inputs, *, formats: Sequence[str], command: str) -> None:
+    """Write people in some formats, and what they were estimated from.
+
+    Raises:
+        OSError: the folder cannot be written; nothing is left of it.
+    """
+    with atomic_folder(folder) as partial:
+        write_people(people, partial, formats=formats)
+        about = {
+            "command": command,
+            "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
+            "fps": round(people.rate, 6),
+            "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
+        }
+        (partial / RESULTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
