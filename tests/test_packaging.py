@@ -2,6 +2,7 @@
 
 import ast
 import fnmatch
+import importlib
 import re
 import shutil
 import subprocess
@@ -69,6 +70,14 @@ class TestPyproject:
         assert not ours & its.union(*(names(each) for each in extras.values()))
 
 
+def test_scripts_name_functions_that_exist():
+    scripts = SIMHARNESS["tool"]["simharness"]["scripts"] | MVPOSE["project"]["scripts"]
+    assert scripts.keys() == {"simharness", "mvpose"}
+    for place in scripts.values():
+        module, _, function = place.partition(":")
+        assert callable(getattr(importlib.import_module(module), function))
+
+
 def test_only_compiled_functions_go_without_types():
     """Mypy lets the packages with kernels define untyped functions; these must be compiled by Numba."""
     untyped = []
@@ -129,6 +138,12 @@ class TestWheels:
     def test_there_are_two(self, metadata):
         assert {name: each.name for name, each in metadata.items()} == {"mvpose": "mvpose", "simharness": "simharness"}
         assert metadata["mvpose"].version == metadata["simharness"].version
+
+    def test_each_has_its_own_program(self, wheels):
+        for name, wheel in wheels.items():
+            with zipfile.ZipFile(wheel) as opened:
+                (file,) = (each for each in opened.namelist() if each.endswith(".dist-info/entry_points.txt"))
+                assert re.findall(r"^(\w+) =", opened.read(file).decode(), re.M) == [name]
 
     def test_simharness_requires_mvpose_of_its_version(self, metadata):
         (required,) = (each for each in metadata["simharness"].requires_dist if each.name == "mvpose")

@@ -16,5 +16,5 @@ def main() -> None:
     try:
         from mvpose.cli.app import app
     except ModuleNotFoundError as error:  # the package itself needs neither typer nor rich
-        sys.exit(f"error: the command line needs {error.name}, which is not installed; pip install 'mvpose[recordings]'")
+        sys.exit(f"error: mvpose needs {error.name}, which is not installed; pip install 'mvpose[recordings]'")
     app()

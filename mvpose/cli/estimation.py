@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from mvpose.cli.exit_codes import failing
+from mvpose.cli.agreement import agreement, check
+from mvpose.cli.exit_codes import failing, note
 from mvpose.cli.inputs import Inputs
 from mvpose.cli.progress import bar
-from mvpose.formats.views.plausibility import agreement, check_agreement
 from mvpose.pipeline import Estimator, Pipeline, SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.recording import People
@@ -34,10 +34,10 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
     Args:
         inputs: the recording.
         method: one of :func:`estimator`; one without memory numbers the people of each frame anew.
-        trust: accept people on whom the cameras do not agree.
+        trust: accept people who contradict their detections.
 
     Raises:
-        ValueError: cameras that do not agree, :func:`mvpose.formats.views.plausibility.check_agreement`.
+        ValueError: people who contradict their detections, :func:`mvpose.cli.agreement.check`.
         RunError: the estimator failed.
     """
     estimates = []
@@ -51,12 +51,12 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
         for estimate in results:
             estimates.append(estimate)
             advance(1)
-    if not trust:
-        import numpy as np
-
-        view = np.concatenate([frame.view for frame in inputs.frames])
-        labels = np.concatenate(
-            [each.matching.labels_of(len(frame)) for each, frame in zip(estimates, inputs.frames, strict=True)]
-        )
-        check_agreement(inputs.rig, agreement(view, labels >= 0, len(inputs.rig)))
+    try:
+        remarks = check(inputs.rig, agreement(inputs.rig, inputs.frames, estimates))
+    except ValueError as error:
+        if not trust:
+            raise
+        remarks = [str(error)]
+    for remark in remarks:
+        note(remark)
     return People.of_estimates(estimates, period=inputs.period, untracked=not tracks)

@@ -44,9 +44,7 @@ Times = Annotated[
 Cameras = Annotated[
     str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
 ]
-Frames = Annotated[
-    str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")
-]
+Frames = Annotated[str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")]
 Skeleton = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..."),
@@ -57,7 +55,9 @@ Size = Annotated[
 ]
 Up = Annotated[
     str | None,
-    typer.Option(metavar="AXIS", help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]"),
+    typer.Option(
+        metavar="AXIS", help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]"
+    ),
 ]
 
 _FPS = 25.0
@@ -167,8 +167,8 @@ def _read_times(path: Path, frames: int, cameras: int) -> NDArray[np.float64]:
     if len(values) != frames or any(len(line) not in (1, cameras) for line in values):
         widths = sorted({len(line) for line in values})
         raise ValueError(
-            f"{path}: expected {frames} lines, one for each frame, of 1 or {cameras} numbers; got {len(values)} lines of "
-            f"{', '.join(map(str, widths)) or 'no'} numbers"
+            f"{path}: expected {frames} lines, one for each frame, of 1 or {cameras} numbers; got {len(values)} "
+            f"lines of {', '.join(map(str, widths)) or 'no'} numbers"
         )
     times = np.array([line * (cameras if len(line) == 1 else 1) for line in values]).reshape(frames, cameras)
     of_frames = np.array([np.nanmean(row) if np.isfinite(row).any() else np.nan for row in times])

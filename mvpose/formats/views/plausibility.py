@@ -6,14 +6,12 @@ What is certainly wrong is refused here, before anything is estimated; what only
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mvpose.arrays import Bools, Floats
-from mvpose.camera import Camera, Rig
-from mvpose.files.message_text import listed
+from mvpose.arrays import Floats
+from mvpose.camera import Rig
 
 UNKNOWN_SIZE = (1, 1)
 """Marks cameras of files that do not state the size of the pictures: no picture has it."""
@@ -128,7 +126,7 @@ def turned_up(rig: Rig, up: str) -> Rig:
     if up not in _AXES:
         raise ValueError(f"--up must be one of {', '.join(_AXES)}, got {up!r}")
     axis = _AXES.index(up) % 3
-    axes = np.roll(np.eye(3), axis - 2, axis=1)  # x_file = axes x_ours: the third column is the upward axis
+    axes = np.roll(np.eye(3), 2 - axis, axis=1)  # x_file = axes x_ours: the third column is the upward axis
     if up.startswith("-"):
         axes = axes @ np.diag([1.0, -1.0, -1.0])
     return Rig([replace(camera, R=camera.R @ axes) for camera in rig])
@@ -147,38 +145,3 @@ def check_up(rig: Rig) -> None:
             f"--up={up}; if z does point up, the rotations are of other conventions (camera to world, other camera "
             "axes): `mvpose doctor` says which; --up=z takes the calibration as it is"
         )
-
-
-def agreement(view: Sequence[int], matched: Bools, cameras: int) -> Floats:
-    """Return the share of each camera's detections that belong to a person seen by other cameras, too, (V,).
-
-    Args:
-        view: camera of each detection, (m,).
-        matched: whether it belongs to such a person, (m,).
-        cameras: their number V.
-    """
-    counts = np.bincount(view, minlength=cameras)
-    return np.bincount(view, np.asarray(matched, float), minlength=cameras) / np.maximum(counts, 1)
-
-
-def check_agreement(rig: Rig, shares: Floats, *, least: float = 0.35) -> None:
-    """Check that most people whom a camera sees are people whom other cameras see.
-
-    Args:
-        rig: the cameras.
-        shares: of each camera, :func:`agreement`.
-        least: least share.
-
-    Raises:
-        ValueError: cameras below it.
-    """
-    low = [k for k in range(len(rig)) if shares[k] < least]
-    if not low:
-        return
-    found = listed([f"{rig[k].name} {100 * shares[k]:.0f} %" for k in low])
-    what = "no two cameras" if len(low) >= len(rig) - 1 else "these cameras"
-    raise ValueError(
-        f"the calibration does not fit the detections: of the people that a camera sees, too few are seen by others: "
-        f"{found}; {what} agree. Check which detections belong to which camera, the clocks, units and conventions: "
-        "`mvpose doctor` compares them; --trust writes the result nevertheless"
-    )

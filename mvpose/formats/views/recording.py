@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.arrays import Floats, Integers
-from mvpose.camera import Rig
 from mvpose.detections import Detections
 from mvpose.files.message_text import listed
 from mvpose.formats.joint_names import JointNames
@@ -152,9 +151,7 @@ def _joined(pictures: Sequence[Picture | None], times: Floats) -> Detections:
     keypoints = np.concatenate([each.keypoints for each in present])
     scores = np.concatenate([each.scores for each in present])
     spanned = Detections.from_keypoints(view, keypoints, scores)
-    boxes, box_scores = (
-        np.concatenate([getattr(each, key) for each in present]) for key in ("boxes", "box_scores")
-    )
+    boxes, box_scores = (np.concatenate([getattr(each, key) for each in present]) for key in ("boxes", "box_scores"))
     time = np.where([each is None for each in pictures], np.nan, times)
     return Detections(
         spanned.view,

@@ -1,11 +1,11 @@
 """People of one camera in all its pictures, read from the files of several programs.
 
-| Program | Files |
-|---|---|
-| OpenPose, Pose2Sim | a folder with a JSON file for each picture: ``{"people": [{"pose_keypoints_2d": [x, y, score, ...]}]}`` |
-| COCO results, AlphaPose | a JSON list: ``[{"image_id", "keypoints": [x, y, score, ...], "score", "bbox" or "box"}]`` |
-| MMPose | a JSON list, or ``instance_info`` of an object: ``[{"frame_id", "instances": [{"keypoints", "keypoint_scores"}]}]`` |
-| RTMLib | its arrays, frame by frame: JSON ``[{"keypoints": (n, J, 2), "scores": (n, J)}]``, or npz with these names |
+- OpenPose, Pose2Sim: a folder with a JSON file for each picture,
+  ``{"people": [{"pose_keypoints_2d": [x, y, score, ...]}]}``;
+- COCO results, AlphaPose: a JSON list, ``[{"image_id", "keypoints": [x, y, score, ...], "score", "bbox" or "box"}]``;
+- MMPose: a JSON list, or ``instance_info`` of an object, ``[{"frame_id", "instances": [{"keypoints",
+  "keypoint_scores"}]}]``;
+- RTMLib: its arrays, frame by frame, JSON ``[{"keypoints": (n, J, 2), "scores": (n, J)}]``, or npz with these names.
 
 The skeleton is that which is declared, or else the usual one with this number of joints. Everything becomes COCO-17.
 """
@@ -28,7 +28,9 @@ from mvpose.formats import coco_results, openpose
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.formats.views.sources import SUFFIXES, Source
 
-USUAL = {len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")}
+USUAL = {
+    len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")
+}
 """Skeleton by its number of joints, where none is declared."""
 
 _WHAT = "detections of one camera: OpenPose, COCO or AlphaPose results, MMPose predictions or RTMLib arrays"
@@ -106,7 +108,9 @@ def _read_folder(source: Source, skeleton: JointNames | None) -> ViewPeople:
             instances = content["instances"] if isinstance(content, dict) else content
             pictures[number], kind = _of_instances(file, instances, skeleton), "MMPose"
         else:
-            raise ValueError(f"{file}: expected the people of one picture, {{'people': [...]}}, got {_summary(content)}")
+            raise ValueError(
+                f"{file}: expected the people of one picture, {{'people': [...]}}, got {_summary(content)}"
+            )
     return ViewPeople(source, dict(sorted(pictures.items())), complete=True, kind=kind)
 
 
@@ -131,7 +135,9 @@ def _read_file(source: Source, skeleton: JointNames | None) -> ViewPeople:
         if "people" in content:
             return ViewPeople(source, {0: _of_openpose(path, content["people"], skeleton)}, True, "OpenPose")
         if "annotations" in content:
-            raise ValueError(f"{path}: COCO annotations; expected COCO results, a list of {{image_id, keypoints, score}}")
+            raise ValueError(
+                f"{path}: COCO annotations; expected COCO results, a list of {{image_id, keypoints, score}}"
+            )
         raise ValueError(f"{path}: expected {_WHAT}; got {_summary(content)}")
     if not isinstance(content, list) or not all(isinstance(each, dict) for each in content):
         raise ValueError(f"{path}: expected {_WHAT}; got {_summary(content)}")
@@ -164,9 +170,7 @@ def _read_arrays(source: Source, skeleton: JointNames | None) -> ViewPeople:
         raise ValueError(f"{path}: expected arrays keypoints (T, n, J, 2) and scores (T, n, J), got {sorted(arrays)}")
     if keypoints.ndim == 3:
         keypoints, scores = keypoints[:, None], scores[:, None]
-    pictures = {
-        k: _picture(f"{path}: frame {k}", keypoints[k], scores[k], skeleton) for k in range(len(keypoints))
-    }
+    pictures = {k: _picture(f"{path}: frame {k}", keypoints[k], scores[k], skeleton) for k in range(len(keypoints))}
     return ViewPeople(source, pictures, complete=True, kind="RTMLib")
 
 
@@ -272,7 +276,7 @@ def _converted(
 def _usual(where: object, joints: int) -> JointNames:
     if joints not in USUAL:
         known = listed([f"{name.name} ({count})" for count, name in USUAL.items()])
-        raise ValueError(f"{where}: has {joints} joints a person; name their skeleton (--skeleton), expected one of {known}")
+        raise ValueError(f"{where}: has {joints} joints a person; expected {known}, or a --skeleton by its name")
     return USUAL[joints]
 
 
@@ -284,13 +288,15 @@ def _check_scores(where: object, scores: Floats) -> None:
     """
     if scores.size and np.nanmax(scores) > _GREATEST_SCORE:
         raise ValueError(
-            f"{where}: scores must lie in 0..1, got {np.nanmax(scores):.6g}; divide per cent by 100, take the sigmoid of "
-            "logits"
+            f"{where}: scores must lie in 0..1, got {np.nanmax(scores):.6g}; divide per cent by 100, take the sigmoid "
+            "of logits"
         )
 
 
 def _is_instances(content: Any) -> bool:
-    return bool(content) and isinstance(content, list) and isinstance(content[0], dict) and "keypoint_scores" in content[0]
+    return (
+        bool(content) and isinstance(content, list) and isinstance(content[0], dict) and "keypoint_scores" in content[0]
+    )
 
 
 def _named_joints(path: Path, content: Mapping[str, Any]) -> JointNames | None:
