@@ -212,6 +212,7 @@ class TestProgram:
         place = os.pathsep.join([str(tmp_path), *sys.path])
         done = subprocess.run(
             [sys.executable, "-m", "mvpose.cli"],
+            check=False,
             env={**os.environ, "PYTHONPATH": place},
             capture_output=True,
             text=True,

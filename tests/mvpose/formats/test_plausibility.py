@@ -52,7 +52,7 @@ class TestRefusals:
         check_principal_points(RIG)
 
     def test_normalised_keypoints(self):
-        with pytest.raises(ValueError, match="camera 'cam0': the keypoints lie between .* they are normalised"):
+        with pytest.raises(ValueError, match=r"camera 'cam0': the keypoints lie between .* they are normalised"):
             check_extents(RIG, INSIDE / [1280.0, 960.0])
 
     def test_pictures_of_another_size(self):
