@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 from pathlib import Path
 from typing import Any
 
@@ -27,3 +28,13 @@ def fill_template(template: str, /, *, folder: Path = TEMPLATES, **values: Any) 
         lstrip_blocks=True,
     )
     return environment.get_template(template).render(values)
+
+
+def program_version() -> str:
+    """Return the version of the installed distribution with this package; empty where none is installed."""
+    for distribution in ("mvpose", "simharness"):  # an editable install of simharness holds mvpose
+        try:
+            return importlib.metadata.version(distribution)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return ""

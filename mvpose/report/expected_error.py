@@ -16,7 +16,7 @@ from mvpose.arrays import Floats
 from mvpose.reconstruction.error_scale import PRIOR_FREEDOM
 from mvpose.recording import People
 
-_DRAWS = 50_000  # of errors in all; the median of so many is right to a percent
+_DRAWS = 30_000  # of errors in all; the median of so many is right to a percent
 _LEAST_DRAWS, _MOST_JOINTS = 8, 6000  # draws of each joint, and joints drawn for
 _SEED = 0  # the same numbers for the same people
 
@@ -48,19 +48,17 @@ def expected_median(covariance: Floats, freedom: ArrayLike = PRIOR_FREEDOM) -> f
     return float(np.median(lengths * np.sqrt((freedoms - 2.0) / rng.chisquare(freedoms, lengths.shape))))
 
 
-def expected_errors(people: People) -> Floats | None:
-    """Return the expected median error of each joint of each person, (n, J), metres; None without covariances."""
-    if people.covariance is None:
-        return None
-    errors = np.full((len(people), len(people.skeleton)), np.nan)
-    for person, joint in np.ndindex(errors.shape):
-        freedom = PRIOR_FREEDOM if people.freedom is None else people.freedom[:, person, joint]
-        errors[person, joint] = expected_median(people.covariance[:, person, joint], freedom)
-    return errors
+def expected_error(people: People, person: int | None = None, joints: ArrayLike | None = None) -> float:
+    """Return the expected median error of people, metres; NaN without covariances.
 
-
-def expected_error(people: People) -> float:
-    """Return the expected median error of all joints, metres; NaN without covariances."""
+    Args:
+        people: the people.
+        person: row of one person; None for all.
+        joints: mask (J,) of some joints; None for all.
+    """
     if people.covariance is None:
         return np.nan
-    return expected_median(people.covariance, PRIOR_FREEDOM if people.freedom is None else people.freedom)
+    rows = slice(None) if person is None else slice(person, person + 1)
+    columns = np.ones(len(people.skeleton), bool) if joints is None else np.asarray(joints, bool)
+    freedom = PRIOR_FREEDOM if people.freedom is None else people.freedom[:, rows][:, :, columns]
+    return expected_median(people.covariance[:, rows][:, :, columns], freedom)

@@ -106,13 +106,13 @@ def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: 
         shown = np.flatnonzero(owner >= 0)
         offset = seen.keypoints[shown] - pixels[seen.view[shown], k, owner[shown]]
         which, joint = np.nonzero(np.isfinite(offset).all(axis=-1))
-        detection = shown[which]
-        view, person = seen.view[detection], owner[detection]
-        metres = np.hypot(*offset[which, joint].T) * scale[view, k, person, joint]
-        rows.append((
-            np.full(len(which), frame), view, person, joint, seen.keypoints[detection, joint], offset[which, joint],
-            metres, metres <= np.maximum(reach[joint], noise.pixels * scale[view, k, person, joint]),
-        ))  # fmt: skip
+        row = shown[which]
+        views, persons = seen.view[row], owner[row]
+        size = scale[views, k, persons, joint]
+        metres = np.hypot(*offset[which, joint].T) * size
+        supports = metres <= np.maximum(reach[joint], noise.pixels * size)
+        whole = np.full(len(which), frame)
+        rows.append((whole, views, persons, joint, seen.keypoints[row, joint], offset[which, joint], metres, supports))
     empty = (*(np.zeros(0, np.int64) for _ in range(4)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
     columns = [np.concatenate(each) for each in zip((*empty, np.zeros(0, bool)), *rows, strict=True)]
     return Reprojection(numbers, tuple(owners), *columns)

@@ -37,6 +37,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text: in the page's font, and found by the browser's search
     "figure.facecolor": "none",
     "axes.facecolor": "none",
+    "text.parse_math": False,  # names of cameras and files may hold dollars
     "font.size": 9,
     "axes.titlesize": 9,
     "text.color": INK,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,12 +96,6 @@ def identities_of(truth: Floats, estimates: Sequence[Estimate], time: Floats) ->
         places=tuple(roots(estimate.joints, COCO17)[:, 0, :2] for estimate in estimates),
         colors=_colors(frames, pairs),
     )
-
-
-def runs_of(values: NDArray[np.generic]) -> Iterator[tuple[int, int]]:
-    """Yield the first index and the index after the last of each run of equal values, (T,)."""
-    bounds = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
-    yield from itertools.pairwise(bounds) if len(values) else ()
 
 
 def _colors(frames: TrackedFrames, pairs: ClearMot) -> tuple[Color, ...]:

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.report.palette import UNMATCHED, css
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
-from simharness.report.run.identities import Identities, runs_of
+from mvpose.report.track_plots import BAR, draw_bar, half_step, label_ends, runs_of, thinned
+from simharness.report.run.identities import Identities
 from simharness.scoring.tracking.clear_mot import ABSENT, MISSED
 
 _ROWS, _ROW = 3.4, (0.25, 0.55)  # height of all rows together, and least and greatest height of one, inches
-_BAR = 0.62  # height of a bar, rows
 _MOST_GHOST_ROWS = 8
-_MOST_POINTS = 400  # of a drawn path: more are not seen, and make pages large
-_LETTER = 4.3  # width of a letter of a bar's label, px
-_PLOT_WIDTH = 300.0  # of the axes, px
 
 
 def timeline(name: str, identities: Identities) -> str:
@@ -35,7 +28,7 @@ def timeline(name: str, identities: Identities) -> str:
         identities: identities of a variant.
     """
     time, people = identities.time, identities.frames.people
-    half = 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.5
+    half = half_step(time)
     span = float(time[-1] - time[0]) + 2 * half
     rows, left_out = _ghost_rows(identities)
     below = 0.5 * len(rows) + (0.6 if rows else 0.0)
@@ -82,13 +75,13 @@ def trajectories(name: str, identities: Identities) -> str:
                 axes.plot(*places[0], ".", ms=2.5, mew=0, color=color, alpha=0.6, zorder=2)
             else:
                 width, order = (1.2, 2) if ghost else (3.0, 3)
-                axes.plot(*_thinned(places).T, color=color, lw=width, alpha=0.7, solid_capstyle="round", zorder=order)
+                axes.plot(*thinned(places).T, color=color, lw=width, alpha=0.7, solid_capstyle="round", zorder=order)
             known = places[np.isfinite(places).all(axis=1)]
             if len(known) and not ghost:
                 ends[track] = known[-1]
         for person in range(identities.frames.people):
             path = identities.paths[:, person]
-            axes.plot(*_thinned(path).T, color=INK, lw=0.7, zorder=4, label="true path" if person == 0 else None)
+            axes.plot(*thinned(path).T, color=INK, lw=0.7, zorder=4, label="true path" if person == 0 else None)
             there = path[np.isfinite(path).all(axis=1)]
             if len(there):
                 axes.plot(*there[-1], ".", ms=3.5, mew=0, color=INK, zorder=6)
@@ -105,7 +98,7 @@ def trajectories(name: str, identities: Identities) -> str:
         axes.spines[:].set_visible(False)
         for track, place in ends.items():
             axes.plot(*place, "o", ms=5, color=identities.colors[track], mew=0, zorder=5)
-        _label_ends(axes, {str(identities.frames.ids[track]): place for track, place in ends.items()})
+        label_ends(axes, {str(identities.frames.ids[track]): place for track, place in ends.items()})
         legend_above(axes, columns=4)
     return written[0]
 
@@ -121,22 +114,10 @@ def _row_of_person(axes: Axes, identities: Identities, person: int, half: float,
             axes.plot([first, last], [person, person], color=FAINT, lw=1, solid_capstyle="butt")
         else:
             color = identities.colors[state]
-            axes.broken_barh([(first, last - first)], (person - _BAR / 2, _BAR), color=color, lw=0, zorder=3)
             label = str(identities.frames.ids[state])
-            if (last - first) / span * _PLOT_WIDTH > _LETTER * len(label) + 5:
-                ink = "#fdfdfd" if np.dot(to_rgb(color), (0.299, 0.587, 0.114)) < 0.55 else "#16181c"
-                axes.text(
-                    (first + last) / 2,
-                    person,
-                    label,
-                    ha="center",
-                    va="center_baseline",
-                    fontsize=7,
-                    color=ink,
-                    zorder=4,
-                )
+            draw_bar(axes, person, (first, last), color=color, label=label, span=span)
     switched = time[identities.pairs.switched[:, person]] - half
-    above = np.full(len(switched), person - _BAR / 2 - 0.12)
+    above = np.full(len(switched), person - BAR / 2 - 0.12)
     axes.plot(switched, above, "v", ms=4.5, color=INK, mew=0, zorder=5, clip_on=False)
 
 
@@ -170,32 +151,3 @@ def _stretches(frames: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Return the first and the last of each stretch of consecutive frames."""
     found = runs_of(frames - np.arange(len(frames)))
     return [(int(frames[start]), int(frames[end - 1])) for start, end in found]
-
-
-def _thinned(path: Floats) -> Floats:
-    """Return every n-th point of a path, (k, 2), and the last one."""
-    step = max(1, math.ceil(len(path) / _MOST_POINTS))
-    return path[np.unique([*range(0, len(path), step), len(path) - 1])] if len(path) else path
-
-
-def _label_ends(axes: Axes, ends: Mapping[str, Floats]) -> None:
-    """Write each identity where its track ends, beside it where another label is in the way, or not at all."""
-    low, high = np.array(axes.get_xlim()), np.array(axes.get_ylim())
-    unit = max(float(high[1] - high[0]), float(low[1] - low[0])) / 270.0  # metres per px, nearly
-    taken: list[tuple[float, float, float]] = []
-    for text, place in ends.items():
-        width = 5.0 * len(text)
-        for right, up in ((6, 0), (-6 - width, 0), (-width / 2, 9), (-width / 2, -9), (6, 9), (6, -9)):
-            x, y = float(place[0]) / unit + right, float(place[1]) / unit + up
-            if all(abs(y - other) > 9 or x > end + 2 or x + width + 2 < start for start, end, other in taken):
-                taken.append((x, x + width, y))
-                axes.annotate(
-                    text,
-                    (float(place[0]), float(place[1])),
-                    xytext=(right, up),
-                    textcoords="offset points",
-                    va="center",
-                    fontsize=8,
-                    zorder=7,
-                )
-                break

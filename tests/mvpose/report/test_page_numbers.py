@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from people import crowd, detect, ring
 from scipy.stats import chi, f
-from walking_people import recording
+from synthetic_recording import recording
 
 from mvpose import COCO17, Detections
 from mvpose.reconstruction.likelihood import Noise
 from mvpose.recording import People
-from mvpose.report.expected_error import expected_error, expected_errors, expected_median
+from mvpose.report.expected_error import expected_error, expected_median
 from mvpose.report.measures import bones, median_by, share_on_one_view, supporting_views, views_of_people
 from mvpose.report.reprojection import reproject
 
@@ -187,9 +187,16 @@ class TestExpectedError:
         covariance = people.covariance.copy()
         covariance[:, 1, 10] *= 4.0
         people = replace(people, covariance=covariance)
-        errors = expected_errors(people)
-        assert errors.shape == (2, 17)
-        assert errors[1, 10] == pytest.approx(2 * errors[0, 10], rel=0.02)
-        assert expected_error(people) == pytest.approx(np.median(errors), rel=0.02)
-        assert expected_errors(replace(people, covariance=None)) is None
+        median = 0.02 * np.sqrt(f(3, 3).median())
+        wrist = np.arange(17) == 10
+        assert expected_error(people, 0) == pytest.approx(median, rel=0.02)
+        assert expected_error(people, 0, wrist) == pytest.approx(median, rel=0.02)
+        assert expected_error(people, 1, wrist) == pytest.approx(2 * median, rel=0.02)
+        assert expected_error(people, None, wrist) < 2 * median < 1.02 * expected_error(people, 1, wrist)
         assert np.isnan(expected_error(replace(people, covariance=None)))
+
+    def test_of_people_whose_degrees_of_freedom_are_known(self):
+        _, _, people = recording(1, sigma=0.02)
+        freedom = np.full(people.scores.shape, 8.0)
+        known = expected_error(replace(people, freedom=freedom))
+        assert known == pytest.approx(0.02 * np.sqrt(3 * 0.75 * f(3, 8).median()), rel=0.02)

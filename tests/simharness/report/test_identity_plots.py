@@ -10,7 +10,8 @@ from test_page import make_record
 
 from mvpose import Estimate, Matching
 from mvpose.report.palette import UNMATCHED, css, identity_color, line_color
-from simharness.report.run.identities import identities_of, runs_of
+from mvpose.report.track_plots import runs_of
+from simharness.report.run.identities import identities_of
 from simharness.report.run.identity_plots import timeline, trajectories
 from simharness.report.run.page import render
 from simharness.scoring.tracking.summary import tracking_summary

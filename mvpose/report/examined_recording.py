@@ -1,0 +1,137 @@
+"""Recordings with what their pages measure: residuals, views, bones, expected errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.calibration.findings import camera_names
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+from mvpose.recording import People
+from mvpose.report.expected_error import expected_error
+from mvpose.report.measures import (
+    Bone,
+    bones,
+    median_by,
+    share_on_one_view,
+    supporting_views,
+    views_of_people,
+)
+from mvpose.report.reprojection import Reprojection, reproject
+from mvpose.report.tables import joint_groups
+
+
+@dataclass(frozen=True)
+class ExaminedRecording:
+    """A recording and what its page measures.
+
+    Attributes:
+        people: people of the T frames.
+        rig: V cameras.
+        frames: detections of the T frames.
+        names: names of the cameras, all different.
+        seen: people beside the detections.
+        supports: views that support each joint, (F, n, J); -1 if absent.
+        views: views of each person, (F, n); -1 if absent.
+        groups: names of the G groups of joints that tables show.
+        group: group of each joint, (J,).
+    """
+
+    people: People
+    rig: Rig
+    frames: Sequence[Detections]
+    names: tuple[str, ...]
+    seen: Reprojection
+    supports: Integers
+    views: Integers
+    groups: tuple[str, ...]
+    group: Integers
+
+    @classmethod
+    def of(cls, people: People, rig: Rig, frames: Sequence[Detections]) -> ExaminedRecording:
+        """Measure a recording."""
+        seen = reproject(rig, frames, people)
+        supports, views = supporting_views(seen, people), views_of_people(seen, people)
+        return cls(people, rig, frames, camera_names(rig), seen, supports, views, *joint_groups(people.skeleton))
+
+    @cached_property
+    def bones(self) -> list[Bone]:
+        """Lengths of all bones of all people."""
+        return bones(self.people)
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Expected median error of each person and group of joints, (n, G), metres; NaN without covariances."""
+        table = np.full((len(self.people), len(self.groups)), np.nan)
+        for person, group in np.ndindex(table.shape):
+            table[person, group] = expected_error(self.people, person, self.group == group)
+        return table
+
+    @property
+    def residual(self) -> tuple[float, float]:
+        """Median residual in pixels, and in metres at the person; NaN without any."""
+        if not len(self.seen):
+            return math.nan, math.nan
+        return float(np.median(self.seen.pixels)), float(np.median(self.seen.metres))
+
+    def numbers(self) -> dict[str, Any]:
+        """Return all numbers of the page as values that ``json.dumps`` writes."""
+        people, pixels, metres = self.people, *self.residual
+        return {
+            "frames": people.frames,
+            "rate_hz": _json(people.rate),
+            "frames_measured": len(self.seen.frames),
+            "residual_px": _json(pixels),
+            "residual_mm": _json(1000 * metres),
+            "joints_on_one_view": _json(share_on_one_view(self.supports)),
+            "expected_error_mm": _json(1000 * expected_error(people)),
+            "people": [self._numbers_of_person(row) for row in range(len(people))],
+            "cameras": self._numbers_of_cameras(),
+        }
+
+    def _numbers_of_person(self, row: int) -> dict[str, Any]:
+        people, span = self.people, self.people.span(row)
+        views = self.views[self.views[:, row] >= 0, row]
+        return {
+            "id": int(people.ids[row]),
+            "frames": int(people.present[:, row].any(axis=1).sum()),
+            "from_s": _json(float(people.times[span.start])),
+            "to_s": _json(float(people.times[max(span.start, span.stop - 1)])),
+            "median_views": _json(float(np.median(views)) if len(views) else math.nan),
+            "joints_on_one_view": _json(share_on_one_view(self.supports[:, row])),
+            "expected_error_mm": {
+                name: _json(1000 * value) for name, value in zip(self.groups, self.errors[row].tolist(), strict=True)
+            },
+            "bones": {
+                bone.name: {
+                    "length_mm": _json(1000 * bone.length),
+                    "spread_mm": _json(1000 * bone.spread),
+                    "sides_differ_percent": _json(100 * bone.asymmetry),
+                }
+                for bone in self.bones
+                if bone.person == row
+            },
+        }
+
+    def _numbers_of_cameras(self) -> dict[str, Any]:
+        seen, joints = self.seen, self.people.skeleton.joints
+        by_camera = median_by(seen.pixels, (seen.view, len(self.rig)))
+        by_joint = median_by(seen.pixels, (seen.view, len(self.rig)), (seen.joint, len(joints)))
+        return {
+            camera: {
+                "residual_px": _json(float(by_camera[view])),
+                "residual_by_joint_px": dict(zip(joints, map(_json, by_joint[view].tolist()), strict=True)),
+            }
+            for view, camera in enumerate(self.names)
+        }
+
+
+def _json(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None

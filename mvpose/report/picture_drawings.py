@@ -1,0 +1,141 @@
+"""Drawings over pictures of a camera, as SVG: sharp at any size, and without a picture on plain ground."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.camera import Camera
+from mvpose.detections import Detections
+from mvpose.report.limbs import Edges, limbs_of
+from mvpose.report.palette import UNMATCHED, css
+
+Pictures = Callable[[int, int], NDArray[np.uint8] | None]
+"""Function of frame and view that returns the picture, (h, w, 3) uint8 RGB, or None where there is none."""
+
+_USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
+_BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
+_WIDEST = 960  # pixels of an embedded picture
+_QUALITY = 80
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person as drawn in a picture.
+
+    Attributes:
+        pixels: projected joints, (J, 2); NaN for a joint to leave out.
+        color: colour of the limbs.
+        name: what a pointer on the limbs shows.
+    """
+
+    pixels: Floats
+    color: str
+    name: str
+
+
+def picture_element(
+    camera: Camera, parts: Iterable[str], *, label: str, picture: NDArray[np.uint8] | None = None
+) -> str:
+    """Return an SVG element of the size of a camera's picture, with a picture or plain ground below the parts.
+
+    Args:
+        camera: the camera.
+        parts: SVG elements in pixels of the picture.
+        label: description for readers who cannot see it.
+        picture: (h, w, 3) uint8; it is stretched over the whole element.
+    """
+    width, height = camera.size
+    ground = '<rect class="ground" x="-0.5" y="-0.5" width="100%" height="100%"/>'
+    if picture is not None:
+        ground = (
+            f'<image x="-0.5" y="-0.5" width="{width}" height="{height}" preserveAspectRatio="none" '
+            f'href="{_jpeg_uri(picture)}"/>'
+        )
+    kind = "view pictured" if picture is not None else "view"
+    return (
+        f'<svg class="{kind}" viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="{html.escape(label)}">'
+        f"{ground}{''.join(parts)}</svg>"
+    )
+
+
+def draw_detections(
+    camera: Camera, detections: Detections, view: int, owners: NDArray[np.int64], colors: Sequence[str]
+) -> Iterator[str]:
+    """Yield the detections of a view as thin lines with dots at the joints; nobody's are grey and dashed.
+
+    Args:
+        camera: the camera.
+        detections: detections of the frame, in all views.
+        view: index of the camera.
+        owners: person of each detection, (m,); -1 for none.
+        colors: colours of the people.
+    """
+    unit, edges = _unit(camera), limbs_of(detections.skeleton)
+    for row in np.flatnonzero(detections.view == view):
+        owner = int(owners[row])
+        color = css(UNMATCHED) if owner < 0 else colors[owner]
+        points = detections.keypoints[row]
+        path, dots = _path(camera, points, edges), _dots(camera, points, 2.4 * unit)
+        dashed = f' stroke-dasharray="{4 * unit:.3g} {3 * unit:.3g}"' if owner < 0 else ""
+        yield f'<g class="detected"><path d="{path}" stroke-width="{1.2 * unit:.3g}"{dashed}/>'
+        yield f'<path class="dots" d="{dots}" style="fill: {color}" stroke-width="{0.8 * unit:.3g}"/></g>'
+
+
+def draw_people(camera: Camera, people: Sequence[Person], edges: Edges) -> Iterator[str]:
+    """Yield people as broad translucent limbs."""
+    unit = _unit(camera)
+    for person in people:
+        path = _path(camera, person.pixels, edges)
+        if path:
+            yield (
+                f'<path class="limbs" d="{path}" stroke="{person.color}" stroke-width="{8 * unit:.3g}">'
+                f"<title>{html.escape(person.name)}</title></path>"
+            )
+
+
+def _unit(camera: Camera) -> float:
+    return camera.size[1] / _USUAL_HEIGHT
+
+
+def _near(camera: Camera, points: Floats) -> NDArray[np.bool_]:
+    """Return which points (k, 2) lie in the picture or not far outside of it, (k,)."""
+    size = np.array(camera.size)
+    with np.errstate(invalid="ignore"):
+        near = (points > -_BEYOND * size) & (points < (1 + _BEYOND) * size)
+    return near[:, 0] & near[:, 1]
+
+
+def _path(camera: Camera, points: Floats, edges: Edges) -> str:
+    near = _near(camera, points)
+    return "".join(
+        f"M{points[a, 0]:.1f} {points[a, 1]:.1f}L{points[b, 0]:.1f} {points[b, 1]:.1f}"
+        for a, b in edges
+        if near[a] and near[b]
+    )
+
+
+def _dots(camera: Camera, points: Floats, radius: float) -> str:
+    """Return circles around points as one path."""
+    arc = f"a{radius:.3g} {radius:.3g} 0 1 0 "
+    return "".join(
+        f"M{x - radius:.1f} {y:.1f}{arc}{2 * radius:.3g} 0{arc}{-2 * radius:.3g} 0"
+        for x, y in points[_near(camera, points)].tolist()
+    )
+
+
+def _jpeg_uri(rgb: NDArray[np.uint8]) -> str:
+    from PIL import Image
+
+    picture = Image.fromarray(rgb)
+    picture.thumbnail((_WIDEST, _WIDEST))
+    buffer = io.BytesIO()
+    picture.save(buffer, "JPEG", quality=_QUALITY)
+    return "data:image/jpeg;base64," + base64.b64encode(buffer.getvalue()).decode()

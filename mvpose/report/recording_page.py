@@ -1,0 +1,226 @@
+"""Page of a recording without truth: who was where, and how far the people agree with the pictures and themselves."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from mvpose.calibration.findings import Diagnosis
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+from mvpose.files.atomic_files import write_atomic
+from mvpose.recording import People
+from mvpose.report import recording_plots as plots
+from mvpose.report import tables
+from mvpose.report.documents import fill_template, program_version
+from mvpose.report.examined_recording import ExaminedRecording
+from mvpose.report.expected_error import expected_error
+from mvpose.report.limbs import limbs_of
+from mvpose.report.measures import median_by, share_on_one_view
+from mvpose.report.palette import identity_color
+from mvpose.report.picture_drawings import Person, Pictures, draw_detections, draw_people, picture_element
+from mvpose.report.verdict import sentence
+
+PAGE, NUMBERS = "recording.html", "recording.json"
+"""Names of the files that :func:`write_page` writes."""
+
+_MOST_VIEWS = 12  # drawn of a frame
+_MOST_COLUMNS = 8  # people in a table
+
+
+def write_page(
+    folder: str | Path,
+    *,
+    name: str,
+    people: People,
+    rig: Rig,
+    frames: Sequence[Detections],
+    diagnosis: Diagnosis | None = None,
+    doctor_page: str = "",
+    pictures: Pictures | None = None,
+    shown_frames: int = 3,
+) -> Path:
+    """Write the page of a recording, ``recording.html``, and its numbers, ``recording.json``.
+
+    Args:
+        folder: an existing folder.
+        name: title of the page.
+        people: people of the T frames.
+        rig: V cameras.
+        frames: detections of the T frames.
+        diagnosis: what the doctor found, where it was asked.
+        doctor_page: address of the doctor's page, relative to the folder.
+        pictures: function that returns the picture of a frame and view; by default people are drawn on plain ground.
+        shown_frames: frames that are drawn.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ValueError: detections of other frames or joints than the people, or no frame.
+        OSError: the folder cannot be written to.
+    """
+    if not len(frames):
+        raise ValueError("a page needs at least one frame, got none; read detections of at least one frame")
+    recording = ExaminedRecording.of(people, rig, frames)
+    page = fill_template(
+        "recording.html",
+        program="mvpose",
+        code=program_version(),
+        name=name,
+        facts=_facts(recording),
+        cards=_cards(recording),
+        doctor=_doctor(diagnosis, doctor_page),
+        detections=sum(map(len, frames)),
+        **_sections(recording, pictures, shown_frames),
+    )
+    numbers = {"name": name, **recording.numbers(), "doctor": None if diagnosis is None else diagnosis.to_json()}
+    write_atomic(Path(folder) / NUMBERS, (json.dumps(numbers, indent=1, allow_nan=False) + "\n").encode())
+    write_atomic(Path(folder) / PAGE, page.encode())
+    return Path(folder) / PAGE
+
+
+def _facts(recording: ExaminedRecording) -> list[tuple[str, str]]:
+    people, rig = recording.people, recording.rig
+    sizes = {f"{camera.size[0]}×{camera.size[1]}" for camera in rig}
+    seconds = float(people.times[-1] - people.times[0]) + 1.0 / people.rate
+    return [
+        ("cameras", f"{len(rig)} × {sizes.pop()}" if len(sizes) == 1 else str(len(rig))),
+        ("frames", f"{people.frames} at {people.rate:.4g} Hz"),
+        ("duration", f"{seconds:.1f} s" if seconds < 120 else f"{seconds / 60:.1f} min"),
+        ("detections", f"{sum(map(len, recording.frames))}"),
+        ("skeleton", people.skeleton.name),
+    ]
+
+
+def _cards(recording: ExaminedRecording) -> list[dict[str, str]]:
+    people = recording.people
+    present = people.present.any(axis=2).sum(axis=1)
+    pixels, metres = recording.residual
+    error, alone = expected_error(people), share_on_one_view(recording.supports)
+    known = [bone.spread / bone.length for bone in recording.bones]
+    varies = 100 * float(np.median(known)) if known else math.nan
+    cards = [
+        ("People", str(len(people)), f"identities; at most {int(present.max(initial=0))} at once"),
+        ("Residual", _with_unit(pixels, 1, "px"), f"median of detected joints, {1000 * metres:.0f} mm at the person"),
+        ("On one view", _with_unit(100 * alone, 1, "%"), "of joints rest on one view or none, which gives no depth"),
+        ("Bones vary", _with_unit(varies, 1, "%"), "of their length over time, median"),
+        ("Expected error", _with_unit(1000 * error, 0, "mm"), "median, from covariances: expected, not measured"),
+    ]  # fmt: skip
+    return [{"title": title, "text": text, "about": about} for title, text, about in cards if text != tables.NOTHING]
+
+
+def _with_unit(value: float, digits: int, unit: str) -> str:
+    return f"{value:.{digits}f} {unit}" if math.isfinite(value) else tables.NOTHING
+
+
+def _doctor(diagnosis: Diagnosis | None, page: str) -> dict[str, Any] | None:
+    if diagnosis is None:
+        return None
+    lines = [finding.text for finding in diagnosis.alarms[1:]] or list(diagnosis.evidence[:4])
+    return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines, "link": page}
+
+
+def _sections(recording: ExaminedRecording, pictures: Pictures | None, shown_frames: int) -> dict[str, Any]:
+    """Return plots, drawings and tables by the names of the template; without people nearly nothing."""
+    people, rig, seen = recording.people, recording.rig, recording.seen
+    step = seen.frames[1] - seen.frames[0] if len(seen.frames) > 1 else 1
+    thin = "" if step == 1 else f" Residuals and views are taken from one frame in {step}."
+    if not len(people):
+        return {"plots": {}, "thinned": thin}
+    hidden = len(people) - plots.MOST_ROWS
+    drawn = {
+        "above": plots.paths_from_above("from-above", people, rig),
+        "identities": plots.identities("identities", people),
+        "views": plots.views_over_time("views-over-time", people, seen.frames, recording.views, len(rig)),
+    }
+    columns = plots.longest(people, _MOST_COLUMNS).tolist()
+    return {
+        "plots": {key: Markup(svg) for key, svg in drawn.items()},
+        "left_out": f" {hidden} more were there for a shorter time." if hidden > 0 else "",
+        "drawings": _drawings(recording, pictures, shown_frames),
+        "residuals": _residuals(recording),
+        "rests": _rests(recording),
+        "errors": _errors(recording, columns),
+        "lengths": tables.bone_table(recording.bones, people, columns),
+        "thinned": thin,
+    }
+
+
+def _residuals(recording: ExaminedRecording) -> tables.Table:
+    seen, views = recording.seen, len(recording.rig)
+    groups, group = recording.groups, recording.group[seen.joint]
+    return tables.residual_table(
+        recording.names,
+        median_by(seen.pixels, (group, len(groups)), (seen.view, views)),
+        rows=groups,
+        by_row=median_by(seen.pixels, (group, len(groups))),
+        by_column=median_by(seen.pixels, (seen.view, views)),
+        overall=recording.residual[0],
+    )
+
+
+def _rests(recording: ExaminedRecording) -> list[dict[str, str]]:
+    counts = np.bincount(recording.supports[recording.supports >= 0], minlength=len(recording.rig) + 1)
+    shares = counts / max(1, counts.sum())
+    names = ["none", "one", *(str(views) for views in range(2, len(shares)))]
+    return [
+        {"name": name, "share": f"{share:.3f}", "text": f"{100 * share:.1f} %"}
+        for name, share in zip(names, shares.tolist(), strict=True)
+    ]
+
+
+def _errors(recording: ExaminedRecording, columns: Sequence[int]) -> tables.Table | None:
+    people = recording.people
+    if people.covariance is None:
+        return None
+    of_people = np.array([expected_error(people, row) for row in columns])
+    return tables.error_table(of_people, recording.errors[columns], recording.groups, people, columns)
+
+
+def _drawings(recording: ExaminedRecording, pictures: Pictures | None, count: int) -> list[dict[str, Any]]:
+    """Return the drawings of some frames: of each part of the recording the one with the most detections of people."""
+    people, seen = recording.people, recording.seen
+    detections = np.array([(owner >= 0).sum() for owner in seen.owners])
+    drawn = []
+    for part in np.array_split(np.arange(len(seen.frames)), min(count, len(seen.frames))):
+        row = int(part[np.argmax(detections[part])])
+        frame = int(seen.frames[row])
+        views = np.flatnonzero(np.arange(len(recording.rig)) < _MOST_VIEWS).tolist()
+        drawn.append(
+            {
+                "number": frame,
+                "time": f"{people.times[frame]:.2f}",
+                "views": [_drawing(recording, row, view, pictures) for view in views],
+            }
+        )
+    return drawn
+
+
+def _drawing(recording: ExaminedRecording, row: int, view: int, pictures: Pictures | None) -> dict[str, Any]:
+    people, seen, camera = recording.people, recording.seen, recording.rig[view]
+    frame = int(seen.frames[row])
+    here = (seen.frame == frame) & (seen.view == view)
+    colors = [identity_color(person) for person in range(len(people))]
+    shown = [
+        Person(camera.project(people.joints[frame, person]), colors[person], f"person {people.ids[person]}")
+        for person in np.flatnonzero(people.present[frame].any(axis=1)).tolist()
+    ]
+    parts = [
+        *draw_people(camera, shown, limbs_of(people.skeleton)),
+        *draw_detections(camera, recording.frames[frame], view, seen.owners[row], colors),
+    ]
+    picture = None if pictures is None else pictures(frame, view)
+    label = f"camera {recording.names[view]}, frame {frame}"
+    note = f"residual {np.median(seen.pixels[here]):.1f} px" if here.any() else "nobody is seen"
+    return {
+        "name": recording.names[view],
+        "svg": Markup(picture_element(camera, parts, label=label, picture=picture)),
+        "note": note,
+    }
