@@ -28,19 +28,29 @@ _OF_ERRORS = ("person", "error")
 
 
 def rig_arrays(rig: Rig) -> Arrays:
-    """Return the calibration: ``names`` (V,), ``K``, ``R``, ``t`` (metres), ``distortion``, ``size`` of V cameras."""
+    """Return the calibration: ``names`` (V,), ``K``, ``R``, ``t`` (metres), ``distortion``, ``size`` of V cameras.
+
+    ``readout`` (V,) in seconds is there where a camera has a rolling shutter.
+    """
+    readout = np.array([camera.readout for camera in rig])
     return {
         "names": np.array([camera.name for camera in rig]),
         **{key: np.stack([getattr(camera, key) for camera in rig]) for key in ("K", "R", "t", "distortion")},
         "size": np.array([camera.size for camera in rig]),
+        **({"readout": readout} if readout.any() else {}),
     }
 
 
 def rig_of_arrays(arrays: Arrays) -> Rig:
     """Restore a rig from :func:`rig_arrays`."""
-    fields = (arrays[key] for key in ("K", "R", "t", "distortion", "size", "names"))
-    cameras = zip(*fields, strict=True)
-    return Rig([Camera(K, R, t, d, (int(w), int(h)), str(name)) for K, R, t, d, (w, h), name in cameras])
+    fields = [arrays[key] for key in ("K", "R", "t", "distortion", "size", "names")]
+    cameras = zip(*fields, arrays.get("readout", np.zeros(len(fields[0]))), strict=True)
+    return Rig(
+        [
+            Camera(K, R, t, d, (int(w), int(h)), str(name), float(readout))
+            for K, R, t, d, (w, h), name, readout in cameras
+        ]
+    )
 
 
 def detection_arrays(detections: Sequence[Detections]) -> Arrays:

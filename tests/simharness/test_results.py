@@ -6,12 +6,14 @@ import math
 import operator
 import re
 import shlex
+import tomllib
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from simharness.report.study.digest import SCORED, markdown
+from simharness.runtime.version import code_version
 from simharness.scenario.load import load
 from simharness.scenario.study_definition import load_study
 from simharness.trial.provenance import PROVENANCE
@@ -20,6 +22,8 @@ from tools.paper_tables.text import markdown as paper_text
 
 ROOT = Path(__file__).parents[2]
 DIGESTS = sorted(path.parent.name for path in (ROOT / "results").glob("*/digest.json"))
+MARKER = ROOT / "results" / "behind.toml"
+BEHIND = tomllib.loads(MARKER.read_text(encoding="utf-8")) if MARKER.is_file() else {}
 PAPER = {
     "voxelpose": "shelf/voxelpose.json",
     "2019": "shelf/2019.json",
@@ -46,11 +50,26 @@ def test_a_digest_is_of_the_scenario_as_it_is(name):
     study = load_study(ROOT / file)
     assert told["name"] == study.name == name
     assert told["seeds"] == list(study.seeds)
-    assert told["variants"] == list(study.variants)[: len(told["variants"])]  # variants may have been added since
+    gained = BEHIND.get("gained", {}).get(name, [])
+    expected = [variant for variant in study.variants if variant not in gained]
+    assert told["variants"] == expected, f"make results-{name}, or name in results/behind.toml what {file} has gained"
     for factor in told["factors"]:
         asked = {setting.factors[factor["key"]] for setting in study.settings}
         assert set(factor["values"]) == asked
     assert {key for factor in told["factors"] for key in (factor["key"], *factor["along"])} == set(study.factors)
+
+
+@pytest.mark.skipif(not BEHIND, reason="all results are of the scenarios as they are")
+def test_what_results_are_behind_is_true():
+    """The marker names nothing but variants that the scenario has, that the result lacks, and the result's version."""
+    assert BEHIND.keys() == {"version", "gained"}
+    assert BEHIND["gained"], "remove results/behind.toml: it names no study"
+    for name, gained in BEHIND["gained"].items():
+        told = json.loads((ROOT / "results" / name / "digest.json").read_text(encoding="utf-8"))
+        study = load_study(ROOT / "scenarios" / f"{name}.toml")
+        assert told["code"] == BEHIND["version"] != code_version(), f"remove {name} from results/behind.toml"
+        assert gained
+        assert set(gained) <= set(study.variants) - set(told["variants"])
 
 
 @pytest.mark.parametrize("name", DIGESTS)

@@ -147,7 +147,11 @@ class Faults(Section):
         (), max_length=MOST_CAMERAS, description="pairs of indices of cameras that deliver each other's pictures"
     )
     rolling_shutter: float = Field(
-        0.0, ge=0.0, le=10.0, description="readout time from the first row to the last, seconds"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="readout time from the first row to the last, seconds; the method is given it, and variants that "
+        "track people use it",
     )
 
 

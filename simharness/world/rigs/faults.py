@@ -66,6 +66,7 @@ def schedule_exposures(
     - ``dropped`` and ``frozen`` are chances per picture. A frozen camera repeats its last picture that arrived; if none
       has arrived yet, it delivers a new one. The method is given the time of a new picture. A dropped picture does not
       arrive, frozen or not;
+    - ``rolling_shutter`` is the readout of all cameras, in the believed rig as well;
     - ``dead`` cameras deliver nothing; two ``swapped`` cameras each deliver the pictures of the other.
 
     Args:
@@ -109,7 +110,9 @@ def schedule_exposures(
 
 
 def _believed(rig: Rig, faults: Faults, seed: int) -> Rig:
-    """Return the rig with constant calibration errors."""
+    """Return the rig with constant calibration errors, and with the readout of its cameras, which data sheets name."""
+    if faults.rolling_shutter:
+        rig = Rig([replace(camera, readout=faults.rolling_shutter) for camera in rig])
     rotations = np.radians(faults.rotation) * _normals(seed, "rotation", len(rig))
     shifts = faults.translation * _normals(seed, "translation", len(rig))
     lengths = np.exp(faults.focal * _normals(seed, "focal", len(rig), 1)[:, 0])

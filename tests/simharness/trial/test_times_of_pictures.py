@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from moments import crowd, estimate_of, moment, recorded, ring
 
+from mvpose import Pipeline, Rig
 from simharness.scenario.load import load
 from simharness.trial.run_trial import run_trial
 
@@ -58,6 +59,31 @@ def test_free_running_cameras_are_tracked_at_their_times(trial):
     together = trial("duration=1.5", "rate=25")
     scores = [each.assessments["track-fast"].scores for each in (result, together)]
     assert scores[0]["mpjpe_mm"] < scores[1]["mpjpe_mm"] + 5
+
+
+def test_the_readout_of_a_rolling_shutter_helps_trackers_only(trial):
+    runners = ('people.activities=["run"]', "duration=2.0", "rate=25", "faults.rolling_shutter=0.03")
+    result = trial(*runners, 'detector.profile="perfect"')
+    frames = [frame.detections for frame in result.detected.frames]
+    unknown = Rig([replace(camera, readout=0.0) for camera in result.detected.rig])
+    assert all(camera.readout == 0.03 for camera in result.detected.rig)
+    blind = {
+        "fast": [Pipeline.preset("fast").estimate(unknown, seen) for seen in frames],
+        "track-fast": list(Pipeline.preset("track-fast").track(unknown, frames)),
+    }
+    for one, other in zip(blind["fast"], result.estimates["fast"], strict=True):
+        assert one.joints.tobytes() == other.joints.tobytes()
+
+    def error(estimates):
+        """Mean distance of the joints to those of the nearest person, metres, once the tracks are settled."""
+        truth = [frame.truth.joints for frame in result.detected.frames]
+        apart = [
+            np.linalg.norm(estimate.joints[:, None] - joints, axis=-1).mean(axis=-1).min(axis=1)
+            for estimate, joints in zip(estimates[20:], truth[20:], strict=True)
+        ]
+        return np.concatenate(apart).mean()
+
+    assert error(result.estimates["track-fast"]) < 0.95 * error(blind["track-fast"])
 
 
 class TestTruthAtTimesOfEstimates:

@@ -78,6 +78,15 @@ def test_a_fault_changes_nothing_else(fault, touched):
     assert unlike == [touched == name for name in ("believed", "time", "source", "true", "readout")]
 
 
+def test_the_method_is_given_the_readout_of_a_rolling_shutter():
+    faults = Faults(rolling_shutter=0.02, rotation=1.0)
+    without = schedule_exposures(RIG, Faults(rotation=1.0), TIME, seed=0).believed_rig
+    believed = schedule_exposures(RIG, faults, TIME, seed=0).believed_rig
+    assert [camera.readout for camera in believed] == [0.02] * len(RIG)
+    assert [camera.readout for camera in without] == [0.0] * len(RIG)
+    np.testing.assert_array_equal(believed.packed, without.packed)
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_among_others_changes_nothing_else(fault):
     """With all other faults present: their draws do not shift."""
