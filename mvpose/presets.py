@@ -8,7 +8,7 @@ from mvpose.affinity import AppearanceAffinity, FusedAffinity, GeometricAffinity
 from mvpose.matching import Matcher
 from mvpose.pipeline import Estimator, Pipeline, UnmatchedPipeline
 from mvpose.reconstruction import Triangulation
-from mvpose.tracking.tracker import TrackingModel
+from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracking_pipeline import TrackingPipeline
 
 PRESETS: dict[str, str] = {

@@ -32,6 +32,7 @@ class Sign:
         lost: tracks that may come back.
         state: arrays of the tracker, kB.
         resident: resident memory of the process, MB.
+        drifts: cameras that the tracker took for moved; none has.
         ms: mean time of a frame since the previous row, with that of its simulation, ms.
     """
 
@@ -43,6 +44,7 @@ class Sign:
     lost: int
     state: float
     resident: float
+    drifts: int
     ms: float
 
 
@@ -65,7 +67,7 @@ def _signs(lag: float, minutes: float, every: float) -> Iterator[Sign]:
             state, now = tracker.state(), time.perf_counter()
             yield Sign(
                 lag, frame / 60 / RATE, frame, int(known) + 1, state.followed, state.lost, state.nbytes / 1e3,
-                resident_memory(), 1e3 * (now - start) / step,
+                resident_memory(), len(tracker.drifts), 1e3 * (now - start) / step,
             )  # fmt: skip
             start = now
 
@@ -82,11 +84,11 @@ def resident_memory() -> float:
 
 def table_of(signs: list[Sign]) -> str:
     """Format the rows as text."""
-    rows = [["lag s", "minutes", "frames", "identities", "tracks", "lost", "state kB", "resident MB", "ms/frame"]]
+    rows = [["lag s", "minutes", "frames", "identities", "tracks", "lost", "state kB", "resident MB", "moved", "ms/frame"]]
     rows += [
         [
             figure(each.lag), f"{each.minutes:g}", str(each.frames), str(each.identities), str(each.tracks),
-            str(each.lost), figure(each.state), figure(each.resident), figure(each.ms),
+            str(each.lost), figure(each.state), figure(each.resident), str(each.drifts), figure(each.ms),
         ]
         for each in signs
     ]  # fmt: skip

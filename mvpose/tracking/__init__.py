@@ -1,8 +1,19 @@
 """People through time: identities, hidden people, and pictures that come late or not at all."""
 
+from mvpose.tracking.drift_watch import CameraResiduals, Drift, DriftModel
 from mvpose.tracking.smoothing import track
 from mvpose.tracking.state import TrackerState
-from mvpose.tracking.tracker import Tracker, TrackingModel
+from mvpose.tracking.tracker import Tracker
+from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracking_pipeline import TrackingPipeline
 
-__all__ = ["Tracker", "TrackerState", "TrackingModel", "TrackingPipeline", "track"]
+__all__ = [
+    "CameraResiduals",
+    "Drift",
+    "DriftModel",
+    "Tracker",
+    "TrackerState",
+    "TrackingModel",
+    "TrackingPipeline",
+    "track",
+]

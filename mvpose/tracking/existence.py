@@ -17,6 +17,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats
 from mvpose.kernels import njit
+from mvpose.tracking.line_of_sight import beside, depth_of, in_image
 
 _SHORTEST, _LONGEST = 1e-3, 60.0  # seconds: people who were there before the first picture came within a minute
 _DENSITY_MEMORY, _FLASH_MEMORY = 5.0, 30.0  # seconds
@@ -207,16 +208,16 @@ def gather_evidence(
                 found[owner[d]] = True
         camera, step, keep = cameras[v], min(since[v] / independent, 1.0), np.exp(-since[v] / memory)
         for t in range(n):
-            depth[t] = _depth(camera, centers[t])
+            depth[t] = depth_of(camera, centers[t])
         for t in range(n):
-            if not found[t] and not (pictures[v] and _in_image(camera, sizes[v], states[t])):
+            if not found[t] and not (pictures[v] and in_image(camera, sizes[v], states[t])):
                 continue
             if not found[t]:
                 hidden = False
                 for other in range(n):
                     hidden = hidden or (
                         other != t and found[other] and 0.0 < depth[other] < depth[t]
-                        and _beside(camera, centers[t], centers[other]) < _REACH
+                        and beside(camera, centers[t], centers[other]) < _REACH
                     )  # fmt: skip
                 if hidden:
                     continue
@@ -230,48 +231,6 @@ def gather_evidence(
             else:
                 misses[t, v] += weight
                 absent[t, v] += 0.0 if seen[t] else step
-
-
-@njit(cache=True, borrows=True)
-def _depth(camera, point):
-    """Return the distance of a point along the optical axis."""
-    depth = 0.0
-    for r in range(3):
-        depth += camera[11 + r] * (point[r] - camera[14 + r])
-    return depth
-
-
-@njit(cache=True, borrows=True)
-def _beside(camera, point, nearer):
-    """Return the distance of a nearer point from the line of sight to a point."""
-    square, along, reach = 0.0, 0.0, 0.0
-    for r in range(3):
-        a, b = point[r] - camera[14 + r], nearer[r] - camera[14 + r]
-        reach += a * a
-        along += a * b
-        square += b * b
-    return np.sqrt(max(square - along * along / max(reach, 1e-12), 0.0))
-
-
-@njit(cache=True, borrows=True)
-def _in_image(camera, size, state):
-    """Return whether most joints of a person lie in the image; distortion is left out."""
-    inside, known = 0, 0
-    for j in range(len(state)):
-        if np.isnan(state[j, 0]):
-            continue
-        known += 1
-        z = _depth(camera, state[j])
-        if z <= 0.0:
-            continue
-        x, y = 0.0, 0.0
-        for r in range(3):
-            offset = state[j, r] - camera[14 + r]
-            x += camera[5 + r] * offset
-            y += camera[8 + r] * offset
-        u, v = camera[0] * x / z + camera[1] * y / z + camera[2], camera[3] * y / z + camera[4]
-        inside += (0.0 <= u < size[0]) and (0.0 <= v < size[1])
-    return 2 * inside > known
 
 
 class Clutter:

@@ -280,15 +280,6 @@ def report_tracks(shown, state, covariance, scores, length, variance, ends, shar
     return joints, spread, confidence, labels
 
 
-@njit(cache=True)
-def vagueness(state, covariance):
-    """Return the standard deviation along an axis of each track's best-known joint, (n,), metres."""
-    least = np.empty(len(state))
-    for t in range(len(state)):
-        least[t] = vagueness_of(state[t], covariance[t])
-    return least
-
-
 @njit(cache=True, borrows=True)
 def vagueness_of(state, covariance):
     """Return the standard deviation along an axis of the best-known joint of one track, metres."""

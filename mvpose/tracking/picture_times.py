@@ -26,8 +26,8 @@ class FrameTimes(NamedTuple):
         now: time of the frame, that of its latest picture, seconds; NaN before the first picture.
         elapsed: time since the previous frame, seconds; 0 in the first.
         lead: time from the frame to the picture of each camera, (V,), at most 0 seconds; 0 without a picture.
-        pictures: whether each camera gave a picture that is of use, (V,).
-        some_unused: whether a picture is of no use, because it is too old.
+        pictures: whether each camera gave a picture that is used, (V,).
+        too_old: whether the picture of some camera is too old to be used.
         latest: time of the latest picture, seconds; NaN without any.
     """
 
@@ -35,7 +35,7 @@ class FrameTimes(NamedTuple):
     elapsed: float
     lead: Floats
     pictures: Bools
-    some_unused: bool
+    too_old: bool
     latest: float
 
 
@@ -151,7 +151,7 @@ def _latest(times):
 
 @njit(cache=True)
 def _leads(times, now, oldest):
-    """Return lead and use of each camera's picture, as in :class:`FrameTimes`, and a camera with a too old picture."""
+    """Return ``lead`` and ``pictures`` of :class:`FrameTimes`, and a camera whose picture is too old, or -1."""
     lead, pictures, old = np.zeros(len(times)), np.zeros(len(times), np.bool_), -1
     for camera in range(len(times)):
         if times[camera] >= oldest:

@@ -21,8 +21,9 @@ from mvpose.estimate import Estimate
 from mvpose.kernels import njit
 from mvpose.tracking.existence import FLASH
 from mvpose.tracking.frame_kernels import vagueness_of
+from mvpose.tracking.moment import Moment
 from mvpose.tracking.motion import transition
-from mvpose.tracking.tracker import Moment, Tracker
+from mvpose.tracking.tracker import Tracker
 
 _FASTEST = 1e3  # frames per second; more wait only for a clock that stands still
 

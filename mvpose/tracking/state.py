@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from mvpose.camera import Rig
 from mvpose.skeleton import Skeleton
+from mvpose.tracking.drift_charts import Charts
 from mvpose.tracking.tracks import Tracks
 
-VERSION = 1
-"""Version of the layout; a change of the fields of :class:`mvpose.tracking.tracks.Tracks` needs another."""
+VERSION = 2
+"""Version of the layout; a change of the fields of the arrays' classes needs another."""
 
 _LARGEST = 1 << 28  # bytes of a file: a state with hundreds of people has less than one in a hundred of it
 _SINGLE = {"clock": 3, "clutter": 2, "born": 1}  # sizes of the arrays that describe no track and no camera
@@ -26,6 +27,7 @@ _RECENT: dict[str, tuple[tuple[Any, ...], str]] = {  # fields of RecentPictures,
     "latest": (("V",), "f"), "view": (("k",), "i"), "keypoints": (("k", "J", 2), "f"), "scores": (("k", "J"), "f"),
     "boxes": (("k", 4), "f"), "box_scores": (("k",), "f"), "descriptors": (("k", "D"), "f"), "time": (("k",), "f"),
 }  # fmt: skip
+_DRIFT = Charts._fields
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class TrackerState:
     Attributes:
         arrays: read-only arrays by name: ``tracks.*`` and ``lost.*`` are the fields of
             :class:`mvpose.tracking.tracks.Tracks`, ``recent.*`` those of
-            :class:`mvpose.tracking.recent_pictures.RecentPictures`, the others clock, rates, rig and skeleton.
+            :class:`mvpose.tracking.recent_pictures.RecentPictures`, ``drift.*`` those of
+            :class:`mvpose.tracking.drift_charts.Charts`, the others clock, rates, rig and skeleton.
 
     Raises:
         ValueError: arrays of another version of the layout, or that do not fit each other.
@@ -76,6 +79,11 @@ class TrackerState:
     def recent(self) -> dict[str, NDArray[Any]]:
         """Arrays of the latest pictures."""
         return {name: self.arrays[f"recent.{name}"] for name in _RECENT}
+
+    @property
+    def drift(self) -> dict[str, NDArray[Any]]:
+        """Arrays of the watch over the cameras."""
+        return {name: self.arrays[f"drift.{name}"] for name in _DRIFT}
 
     def save(self, path: str | Path) -> None:
         """Write the arrays to an npz file, without pickle; a file of this name is replaced when all is written."""
@@ -171,6 +179,7 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
         "version", "rig.cameras", "rig.sizes", "skeleton.joints", "skeleton.edges", "density", "watched", *_SINGLE,
         *tracks,
         *(f"recent.{name}" for name in _RECENT),
+        *(f"drift.{name}" for name in _DRIFT),
     }  # fmt: skip
     if names != set(arrays):
         raise ValueError(f"arrays are missing or unknown: {', '.join(sorted(names ^ set(arrays)))}")
@@ -185,6 +194,8 @@ def _check(arrays: Mapping[str, NDArray[Any]]) -> None:
     for name, (shape, kind) in _RECENT.items():
         sizes = {"V": cameras, "k": waiting, "J": joints, "D": descriptor}
         _of(arrays, f"recent.{name}", tuple(sizes.get(size, size) for size in shape), kind)
+    for name, expected in Charts.of(cameras)._asdict().items():
+        _of(arrays, f"drift.{name}", expected.shape)
     bones = _of(arrays, "tracks.length", (None, None)).shape[1]
     dimensions = _of(arrays, "tracks.looks", (None, None)).shape[1]
     like = Tracks.none(joints=joints, bones=bones, cameras=cameras, dimensions=dimensions)

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,106 +23,62 @@ from mvpose.ordering import number_views
 from mvpose.pipeline import Pipeline, enter
 from mvpose.rays import Rays
 from mvpose.reconstruction.error_scale import SHARED
-from mvpose.reconstruction.likelihood import Noise
 from mvpose.reconstruction.poses import Poses
-from mvpose.reconstruction.triangulation import Triangulation
 from mvpose.skeleton import Skeleton
-from mvpose.tracking.association import TrackAffinity
+from mvpose.tracking.births import Births
 from mvpose.tracking.bones import BonePrior, bone_prior
-from mvpose.tracking.existence import Clutter, Existence
-from mvpose.tracking.frame_kernels import (
-    judge_tracks,
-    number_people,
-    predict_tracks,
-    repeats,
-    report_tracks,
-    update_tracks,
-)
-from mvpose.tracking.looks import learn_looks, nearest_rival, scale_of
-from mvpose.tracking.motion import JointMotion, Motion
-from mvpose.tracking.picture_times import FrameClock
-from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.drift_watch import CameraResiduals, Drift, DriftWatch
+from mvpose.tracking.existence import Clutter
+from mvpose.tracking.frame_kernels import judge_tracks, predict_tracks, report_tracks, update_tracks
+from mvpose.tracking.looks import learn_looks
+from mvpose.tracking.moment import Moment
+from mvpose.tracking.motion import JointMotion
+from mvpose.tracking.picture_times import FrameClock, FrameTimes
+from mvpose.tracking.placed_people import place_people, repetition
+from mvpose.tracking.population import Population
 from mvpose.tracking.recent_pictures import RecentPictures
 from mvpose.tracking.rolling_shutter import readouts, undo_rolling
 from mvpose.tracking.state import TrackerState, check_serves, layout, of_tracks
+from mvpose.tracking.tracking_model import TrackingModel
 from mvpose.tracking.tracks import Tracks
 
 _FORGETTING = 0.5  # seconds: time constant of the score of a joint that no view supports
 
 
-@dataclass(frozen=True)
-class TrackingModel:
-    """Settings of a tracker.
+class _Frame(NamedTuple):
+    """Detections of a frame that take part, in the canonical order.
 
     Attributes:
-        motion: motion of joints.
-        affinity: affinity between tracks and detections.
-        existence: how often people come, and how often people and ghosts are found.
-        reappearance: how people who were lost come back.
-        noise: error model of keypoints.
-        correlation: time over which the errors of poses are correlated, seconds: wrong keypoints last 0.2 to 0.3 s,
-            others change faster.
-        period: time between frames whose detections carry no time, seconds.
+        chosen: their indices, (m,).
+        ordered: the detections.
+        rays: their viewing rays.
+        lead: time from the frame to the picture of each, (m,), seconds.
+        times: times of the frame and its pictures.
     """
 
-    motion: Motion = Motion()
-    affinity: TrackAffinity = TrackAffinity()
-    existence: Existence = Existence()
-    reappearance: Reappearance = Reappearance()
-    noise: Noise = Noise()
-    correlation: float = 0.15
-    period: float = 0.04
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.correlation < np.inf:
-            raise ValueError(f"correlation must be 0 s or more and finite, got {self.correlation}")
-        if not 0.0 < self.period < np.inf:
-            raise ValueError(f"period must be above 0 s and finite, got {self.period}")
-
-
-def repetition(since: float, correlation: float) -> float:
-    """Return the factor of the variance of errors that repeat those of ``since`` seconds ago.
-
-    Errors with the correlation ``exp(-t / correlation)`` average out over many frames like independent ones of
-    ``coth(since / (2 correlation))`` times the variance.
-    """
-    return 1.0 / math.tanh(since / (2.0 * correlation)) if since > 0.0 and correlation > 0.0 else 1.0
-
-
-@dataclass
-class Moment:
-    """What a tracker knows after a frame, for its estimate and for smoothing.
-
-    Attributes:
-        time: time of the frame, seconds; NaN before the first picture.
-        elapsed: time since the previous frame, seconds.
-        tracks: tracks after the frame, with those that end here.
-        predicted: state of each track before the frame, (n, J, 6), and its covariance, (n, J, 6, 6); NaN for new
-            tracks. None where nobody smooths.
-        odds: log-odds that each track is a person, (n,).
-        presence: log-odds that this person is still here, (n,).
-        shown: whether each track is reported, (n,).
-        owner: track of each detection that took part, (k,), or -1.
-        chosen: indices of these detections, (k,).
-        detections: number of detections of the frame.
-        poses: poses of the tracks as the pipeline gives them, where the frame is the first.
-        timings: seconds by stage.
-        link: row of each track in the next moment and the gains of the smoother, where they are known already.
-    """
-
-    time: float
-    elapsed: float
-    tracks: Tracks
-    predicted: tuple[Floats, Floats] | None
-    odds: Floats
-    presence: Floats
-    shown: Bools
-    owner: Integers
     chosen: Integers
-    detections: int
+    ordered: Detections
+    rays: Rays
+    lead: Floats
+    times: FrameTimes
+
+
+class _Sightings(NamedTuple):
+    """Detections that show tracks, of this frame and of earlier pictures that met their partners in it.
+
+    Attributes:
+        owner: track of each of the m detections of the frame, (m,), or -1.
+        shown_by: the same of all k detections, (k,).
+        in_view: their cameras, (k,).
+        poses: poses of newcomers; None where nobody came.
+        since: time from the previous picture of each camera, (V,), seconds.
+    """
+
+    owner: Integers
+    shown_by: Integers
+    in_view: Integers
     poses: Poses | None
-    timings: dict[str, float]
-    link: tuple[Integers, Floats] | None = None
+    since: Floats
 
 
 class Tracker:
@@ -138,7 +93,6 @@ class Tracker:
         self.pipeline = Pipeline() if pipeline is None else pipeline
         self.model = TrackingModel() if model is None else model
         self._clock = FrameClock(self.model.period, self.model.period)
-        self._born = 0  # people so far
         self._rig: Rig | None = None  # before the first frame, and after a restoration
         self._skeleton: Skeleton | None = None
         self._layout: Mapping[str, NDArray[Any]] | None = None  # rig and skeleton of the first frame
@@ -165,6 +119,19 @@ class Tracker:
         """
         return self.report(self.advance(rig, detections))
 
+    @property
+    def residuals(self) -> CameraResiduals | None:
+        """How well each camera agrees with the others in the latest seconds; None before the first frame."""
+        return None if self._layout is None else self._watch.residuals
+
+    @property
+    def drifts(self) -> tuple[Drift, ...]:
+        """Cameras that have moved since the first minute, the first one found first.
+
+        A rig of two cameras has none: neither is known to be right.
+        """
+        return () if self._rig is None else self._watch.drifts(self._rig)
+
     def advance(self, rig: Rig, detections: Detections, *, keep: bool = False) -> Moment:
         """Take the next frame, without an estimate; see :meth:`estimate`.
 
@@ -174,80 +141,130 @@ class Tracker:
             keep: whether the moment is still needed after the next frame; else it shares memory with the tracker.
         """
         start = clock.perf_counter()
-        model, first = self.model, not self._clock.started
-        chosen, ordered, rays = enter(rig, detections, self.pipeline.duplicates)
-        if rig is not self._rig or detections.skeleton is not self._skeleton:
-            self._serve(rig, detections.skeleton)
-        times = self._clock.read(detections, len(rig))
-        now, elapsed, pictures = times.now, times.elapsed, times.pictures
-        if times.some_unused:
-            of_use = pictures[ordered.view]
-            chosen, ordered, rays = chosen[of_use], ordered.select(of_use), rays.select(of_use)
-        affinity = self.pipeline.affinity(rig, ordered, rays)
+        first = not self._clock.started
+        frame = self._enter(rig, detections)
+        times, ordered = frame.times, frame.ordered
+        affinity = self.pipeline.affinity(rig, ordered, frame.rays)
         if ordered.descriptors is not None:
-            self._see_looks(ordered.descriptors.shape[1])
+            self._people.see_looks(ordered.descriptors.shape[1])
         self._clock.take(times)
-        tracks, vague = self._tracks, model.existence.vague
-        known, all_known = predict_tracks(tracks.state, tracks.covariance, elapsed, *self.motion, 2.0 * vague)
-        self._drop(now, known, all_known)
-        tracks = self._tracks
-        before = (tracks.state.copy(), tracks.covariance.copy()) if keep else None
-        lead, count = times.lead[ordered.view], len(tracks)
-        joined, views = model.affinity.join(
-            affinity, number_views(ordered.view), rays, tracks.state, tracks.covariance, lead
+        before = self._predict(times, keep)
+        count, tracks = len(self._people.tracks), self._people.tracks
+        joined, views = self.model.affinity.join(
+            affinity, number_views(ordered.view), frame.rays, tracks.state, tracks.covariance, frame.lead
         )
         compared = clock.perf_counter()
         labels = self.pipeline.matching(joined, views).labels
         matched = clock.perf_counter()
-        m, noise, bones, rays = len(ordered), model.noise, self._bones, self._at_once(ordered, rays, labels)
-        placed = self._place(rays, detections.skeleton, labels[:m], labels[m:], lead, elapsed)
-        owner, fresh, groups = update_tracks(
-            tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels[:m],
-            labels[m:], rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas,
-            noise.floor, *self.motion, *placed, bones.ends, elapsed, float(np.exp(-elapsed / _FORGETTING)),
-        )  # fmt: skip
-        poses: Poses | None = None
-        since = self._recent.take(now, times.lead, pictures)
-        span = model.existence.span(float(since.min(where=pictures, initial=np.inf)))
-        if groups or first:
-            poses = self._give_birth(rays, ordered, fresh, owner, now, span)
-        shown_by, in_view = owner, ordered.view
-        if self._recent.wait_for(now, pictures):
-            partners, cameras = self._pair_with_recent(rig, ordered, lead, owner, now, span)
-            shown_by, in_view = np.concatenate([owner, partners]), np.concatenate([in_view, cameras])
-        self._recent.add(ordered, owner < 0)
-        tracks, new = self._tracks, len(self._tracks) - count
-        if ordered.descriptors is not None:
-            learn_looks(tracks.looks, tracks.described, owner, ordered.descriptors, elapsed)
-        odds, here, shown, followed, all_followed, false = judge_tracks(
-            tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
-            tracks.found, tracks.reported, new, shown_by, in_view, rig.packed, self._sizes, pictures, since,
-            *model.existence.correlation, self._clutter.density, self._clutter.flashes, model.existence.rates,
-            model.existence.presence, now, vague, first,
-        )  # fmt: skip
-        self._clutter.count(false, pictures, since, elapsed)
+        sightings = self._update(rig, frame, labels, first)
+        odds, presence, shown, followed, all_followed = self._judge(rig, frame, sightings, count, first)
+        tracks = self._people.tracks
         if before is not None:
+            new = len(tracks) - count
             tracks, before = tracks.snapshot(), (_with_nan(before[0], new), _with_nan(before[1], new))
         moment = Moment(
-            now,
-            elapsed,
-            tracks,
-            before,
-            odds,
-            here,
-            shown,
-            owner,
-            chosen,
-            len(detections),
-            poses if first else None,
-            {},
+            time=times.now,
+            elapsed=times.elapsed,
+            tracks=tracks,
+            predicted=before,
+            odds=odds,
+            presence=presence,
+            shown=shown,
+            owner=sightings.owner,
+            chosen=frame.chosen,
+            detections=len(detections),
+            poses=sightings.poses if first else None,
+            timings={},
         )
-        self._drop(now, followed, all_followed)
+        self._drop(times.now, followed, all_followed)
         end = clock.perf_counter()
         moment.timings.update(
             affinity=compared - start, matching=matched - compared, reconstruction=end - matched, total=end - start
         )
         return moment
+
+    def _enter(self, rig: Rig, detections: Detections) -> _Frame:
+        """Return the detections that take part; refuse bad ones, and leave the tracker as it was then."""
+        chosen, ordered, rays = enter(rig, detections, self.pipeline.duplicates)
+        if rig is not self._rig or detections.skeleton is not self._skeleton:
+            self._serve(rig, detections.skeleton)
+        times = self._clock.read(detections, len(rig))
+        if times.too_old:
+            kept = times.pictures[ordered.view]
+            chosen, ordered, rays = chosen[kept], ordered.select(kept), rays.select(kept)
+        return _Frame(chosen, ordered, rays, times.lead[ordered.view], times)
+
+    def _predict(self, times: FrameTimes, keep: bool) -> tuple[Floats, Floats] | None:
+        """Carry all tracks to the time of the frame; return states and covariances there if they are to be kept."""
+        tracks, vague = self._people.tracks, self.model.existence.vague
+        known, all_known = predict_tracks(tracks.state, tracks.covariance, times.elapsed, *self.motion, 2.0 * vague)
+        self._drop(times.now, known, all_known)
+        tracks = self._people.tracks
+        return (tracks.state.copy(), tracks.covariance.copy()) if keep else None
+
+    def _update(self, rig: Rig, frame: _Frame, labels: Integers, first: bool) -> _Sightings:
+        """Update tracks by the detections that were matched with them, and start those of newcomers.
+
+        Args:
+            rig: cameras.
+            frame: the m detections.
+            labels: groups of the detections and of the n tracks, (m + n,), or -1.
+            first: whether the frame is the first.
+        """
+        model, people, times, ordered, lead = self.model, self._people, frame.times, frame.ordered, frame.lead
+        tracks, noise, m = people.tracks, model.noise, len(ordered)
+        labels, groups = labels[:m], labels[m:]
+        rays = self._at_once(ordered, frame.rays, labels, groups)
+        self._watch.take(
+            rays, labels, groups, lead, now=times.now, elapsed=times.elapsed, pictures=times.pictures,
+            reported=tracks.reported, state=tracks.state, sigmas=self._sigmas, cameras=rig.packed, sizes=self._sizes,
+        )  # fmt: skip
+        placed = place_people(
+            self.pipeline.reconstruction, rays, ordered.skeleton, labels, groups, lead,
+            factor=repetition(times.elapsed, model.correlation),
+        )  # fmt: skip
+        owner, fresh, newcomers = update_tracks(
+            tracks.state, tracks.covariance, tracks.scores, tracks.length, tracks.variance, labels, groups,
+            rays.origins, rays.directions, rays.weights, noise.pixels * rays.pixel, lead, self._sigmas, noise.floor,
+            *self.motion, *placed, self._bones.ends, times.elapsed, float(np.exp(-times.elapsed / _FORGETTING)),
+        )  # fmt: skip
+        since = self._recent.take(times.now, times.lead, times.pictures)
+        came = {"now": times.now, "span": model.existence.span(float(since.min(where=times.pictures, initial=np.inf)))}
+        poses, shown_by, in_view = None, owner, ordered.view
+        if newcomers or first:
+            poses = self._births.give_birth(rays, ordered, fresh, owner, **came)
+        if self._recent.wait_for(times.now, times.pictures):
+            partners, cameras = self._births.pair_with_recent(self._recent, rig, ordered, lead, owner, **came)
+            shown_by, in_view = np.concatenate([owner, partners]), np.concatenate([in_view, cameras])
+        self._recent.add(ordered, owner < 0)
+        return _Sightings(owner, shown_by, in_view, poses, since)
+
+    def _judge(
+        self, rig: Rig, frame: _Frame, sightings: _Sightings, count: int, first: bool
+    ) -> tuple[Floats, Floats, Bools, Bools, bool]:
+        """Decide who is a person, who is present, and who is followed further, by what the pictures show.
+
+        Args:
+            rig: cameras.
+            frame: the detections.
+            sightings: their tracks.
+            count: number of tracks before the newcomers.
+            first: whether the frame is the first.
+
+        Returns:
+            As :func:`mvpose.tracking.frame_kernels.judge_tracks`, without the false detections, which are counted.
+        """
+        tracks, times, existence, clutter = self._people.tracks, frame.times, self.model.existence, self._clutter
+        if frame.ordered.descriptors is not None:
+            learn_looks(tracks.looks, tracks.described, sightings.owner, frame.ordered.descriptors, times.elapsed)
+        *verdict, false = judge_tracks(
+            tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
+            tracks.found, tracks.reported, len(tracks) - count, sightings.shown_by, sightings.in_view, rig.packed,
+            self._sizes, times.pictures, sightings.since, *existence.correlation, clutter.density, clutter.flashes,
+            existence.rates, existence.presence, times.now, existence.vague, first,
+        )  # fmt: skip
+        clutter.count(false, times.pictures, sightings.since, times.elapsed)
+        return tuple(verdict)
 
     def report(self, moment: Moment) -> Estimate:
         """Return the estimate of a moment."""
@@ -278,17 +295,18 @@ class Tracker:
         """
         if self._layout is None:
             raise ValueError("a tracker has no state before its first frame")
-        watch, clutter = self._clock, self._clutter
+        watch, clutter, people = self._clock, self._clutter, self._people
         return TrackerState(
             {
                 **self._layout,
                 "clock": np.array([watch.interval, watch.time, watch.pictured]),
-                "born": np.array([self._born]),
+                "born": np.array([people.born]),
                 "density": clutter.density,
                 "watched": clutter.watched,
                 "clutter": clutter.counts,
-                **of_tracks(self._tracks, self._lost),
+                **of_tracks(people.tracks, people.lost),
                 **{f"recent.{name}": array for name, array in self._recent.state().items()},
+                **{f"drift.{name}": array for name, array in self._watch.state().items()},
             }
         )
 
@@ -306,12 +324,12 @@ class Tracker:
         tracker, arrays = cls(pipeline, model=model), state.arrays
         tracker._layout = {name: arrays[name] for name in arrays if name.startswith(("version", "rig.", "skeleton."))}
         tracker._clock = FrameClock(tracker.model.period, *map(float, arrays["clock"]))
-        tracker._born = int(arrays["born"][0])
         tracker._clutter = Clutter(tracker.model.existence, len(arrays["density"]))
         tracker._clutter.density, tracker._clutter.counts = arrays["density"].copy(), arrays["clutter"].copy()
         tracker._clutter.watched = arrays["watched"].copy()
-        tracker._tracks, tracker._lost = state.group("tracks"), state.group("lost")
+        tracker._people = Population(state.group("tracks"), state.group("lost"), int(arrays["born"][0]))
         tracker._recent = RecentPictures.restored(state.recent)
+        tracker._watch = DriftWatch.restored(tracker.model.drift, state.drift)
         return tracker
 
     def _serve(self, rig: Rig, skeleton: Skeleton) -> None:
@@ -321,7 +339,9 @@ class Tracker:
             self._layout = layout(rig, skeleton)
             self._clutter = Clutter(self.model.existence, len(rig))
             self._recent = RecentPictures(len(rig), len(skeleton))
-            self._tracks = self._lost = Tracks.none(joints=len(skeleton), bones=len(bones.length), cameras=len(rig))
+            self._watch = DriftWatch(self.model.drift, len(rig))
+            nobody = Tracks.none(joints=len(skeleton), bones=len(bones.length), cameras=len(rig))
+            self._people = Population(nobody, nobody)
         else:
             check_serves(self._layout, rig, skeleton)
         self._rig, self._skeleton = rig, skeleton
@@ -330,138 +350,26 @@ class Tracker:
         self.motion: JointMotion = self.model.motion.of_joints(skeleton)
         self._bones: BonePrior = bones
         self._sigmas = self.model.noise.sigmas(skeleton)
+        self._births = Births(
+            self._people, self.pipeline, returns=self.model.reappearance, motion=self.model.motion,
+            of_joints=self.motion, bones=bones, cameras=len(rig),
+        )  # fmt: skip
 
-    def _at_once(self, ordered: Detections, rays: Rays, labels: Integers) -> Rays:
+    def _at_once(self, ordered: Detections, rays: Rays, labels: Integers, groups: Integers) -> Rays:
         """Return viewing rays as if all rows of a picture were exposed at once."""
         if self._readout is None:
             return rays
-        m = len(ordered)
         directions = undo_rolling(
-            self._readout, ordered.view, ordered.keypoints, rays.origins, rays.directions, rays.weights, labels[:m],
-            labels[m:], self._tracks.state,
+            self._readout, ordered.view, ordered.keypoints, rays.origins, rays.directions, rays.weights, labels,
+            groups, self._people.tracks.state,
         )  # fmt: skip
         return Rays(rays.view, rays.origins, directions, rays.weights, rays.pixel, rays.modes)
 
-    def _see_looks(self, dimensions: int) -> None:
-        """Make room for descriptors of a length, or refuse another length than before."""
-        known = self._tracks.looks.shape[1]
-        if not known:
-            self._tracks, self._lost = self._tracks.widened(dimensions), self._lost.widened(dimensions)
-        elif dimensions not in (0, known):
-            raise ValueError(
-                f"descriptors must be (m, {known}) as in earlier frames, got (m, {dimensions}): start another tracker"
-            )
-
-    def _place(
-        self, rays: Rays, skeleton: Skeleton, labels: Integers, groups: Integers, lead: Floats, elapsed: float
-    ) -> tuple[Integers, Floats, Floats, Floats, float]:
-        """Return the poses of tracked people as the stages of a frame place them, for :func:`update_tracks`.
-
-        Triangulation uses each joint's rays alone, which the update does better: it then gets no pose.
-        """
-        count, joints = len(groups), len(skeleton)
-        of_pose, people = np.full(count, -1), np.full(len(labels), -1)
-        if not isinstance(self.pipeline.reconstruction, Triangulation):
-            number_people(labels, groups, lead, of_pose, people)
-        if not (people >= 0).any():
-            return of_pose, np.empty((0, joints, 3)), np.empty((0, joints, 3, 3)), np.empty((0, joints)), 1.0
-        poses = self.pipeline.reconstruction(rays, people, skeleton)
-        factor = repetition(elapsed, self.model.correlation)
-        return of_pose, poses.joints, poses.covariance, poses.scores, factor
-
-    def _give_birth(
-        self,
-        rays: Rays,
-        detections: Detections,
-        fresh: Integers,
-        owner: Integers,
-        now: float,
-        span: float,
-        motion: float = 0.0,
-    ) -> Poses:
-        """Start tracks of the groups ``fresh`` (m,) of detections that belong to nobody known; set their owner.
-
-        A group that repeats the pose of a track is left out: its detections were torn from that person's. ``motion`` is
-        the time, in seconds, in which people may have moved since the pictures.
-        """
-        poses = self.pipeline.reconstruction(rays, fresh, detections.skeleton)
-        if not len(poses.joints):
-            return poses
-        if motion > 0.0:
-            moved = (motion * self.motion.speed) ** 2
-            poses = poses._replace(covariance=poses.covariance + moved[:, None, None] * np.eye(3))
-        tracks, count, cameras = self._tracks, len(poses.joints), len(self._sizes)
-        new = ~repeats(poses.joints, tracks.state)
-        born = Tracks.born(
-            poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self.motion.speed,
-            bones=self._bones, cameras=cameras, dimensions=tracks.looks.shape[1],
-        )  # fmt: skip
-        witnesses = np.zeros(count, np.int64)
-        if detections.descriptors is not None and tracks.looks.shape[1]:
-            # For comparison; the frame counts with its time when it is known whose it is.
-            witnesses = learn_looks(born.looks, born.described, fresh, detections.descriptors, 0.0)
-        born = born.select(new)
-        back = self.model.reappearance.match(
-            born, self._lost, time=now, motion=self.model.motion, trunk=self.motion.trunk, present=tracks,
-            witnesses=witnesses[new], scale=scale_of(self.pipeline.affinity),
-        )  # fmt: skip
-        for k, lost in enumerate(back):
-            if lost >= 0:
-                born.resume(k, self._lost, lost)
-            else:
-                born.ids[k], self._born = self._born, self._born + 1
-        remain = np.ones(len(self._lost), np.bool_)
-        remain[back[back >= 0]] = False
-        self._lost = self._lost.select(remain)
-        slot = np.where(new, len(tracks) + np.cumsum(new) - 1, -1)
-        owner[fresh >= 0] = slot[fresh[fresh >= 0]]
-        self._tracks = tracks.join(born)
-        return poses
-
-    def _pair_with_recent(
-        self, rig: Rig, ordered: Detections, lead: Floats, owner: Integers, now: float, span: float
-    ) -> tuple[Integers, Integers]:
-        """Start tracks of people whom two cameras saw at different times of the latest tenth of a second.
-
-        The owners of detections that get a track are set, (m,).
-
-        Returns:
-            Track and camera of each detection of an earlier picture that got a track, (k,) each.
-        """
-        alone, recent = np.flatnonzero(owner < 0), self._recent
-        if not len(alone):
-            return alone, alone
-        both = recent.beside(ordered.select(alone), ordered.skeleton)
-        motion = float(np.abs(np.concatenate([lead[alone], recent.rows["time"] - now])).max())
-        chosen, both, rays = enter(rig, both, self.pipeline.duplicates)
-        labels = self.pipeline.matching(self.pipeline.affinity(rig, both, rays), number_views(both.view)).labels
-        present = chosen < len(alone)
-        people, fresh = np.unique(labels[present & (labels >= 0)]), np.full(len(labels), -1)
-        of_present = np.isin(labels, people)
-        fresh[of_present] = np.searchsorted(people, labels[of_present])
-        tracks = np.full(len(labels), -1)
-        if len(people):
-            self._give_birth(rays, both, fresh, tracks, now, span, motion)
-        owner[alone[chosen[present]]] = tracks[present]
-        earlier = ~present & (tracks >= 0)
-        claimed = np.zeros(len(recent.rows["time"]), np.bool_)
-        claimed[chosen[earlier] - len(alone)] = True
-        recent.drop(claimed)
-        return tracks[earlier], both.view[earlier]
-
     def _drop(self, now: float, followed: Bools, everyone: bool) -> None:
         """Stop to follow tracks; those who were people may come back."""
-        tracks = self._tracks
         if not everyone:
-            self._clutter.vanish(now - tracks.born_at[~followed])
-            gone = tracks.select(~followed & tracks.reported)
-            for others in (tracks, self._lost):
-                gone.rival = np.minimum(gone.rival, nearest_rival(gone, others))
-            self._lost, self._tracks = self._lost.join(gone), tracks.select(followed)
-        if len(self._lost):
-            remembered = self.model.reappearance.remembers(self._lost, now)
-            if not remembered.all():
-                self._lost = self._lost.select(remembered)
+            self._clutter.vanish(now - self._people.keep(followed))
+        self._people.forget(now, self.model.reappearance)
 
 
 def _with_nan(array: Floats, rows: int) -> Floats:

@@ -10,7 +10,8 @@ from mvpose.detections import Detections
 from mvpose.estimate import Estimate
 from mvpose.pipeline import Pipeline
 from mvpose.tracking.smoothing import track
-from mvpose.tracking.tracker import Tracker, TrackingModel
+from mvpose.tracking.tracker import Tracker
+from mvpose.tracking.tracking_model import TrackingModel
 
 
 @dataclass(frozen=True)

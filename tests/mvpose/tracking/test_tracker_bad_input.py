@@ -108,7 +108,7 @@ def test_the_first_frames_may_have_no_picture_at_all():
 @pytest.mark.parametrize("rate", [12.0, 25.0, 60.0])
 @pytest.mark.parametrize("timed", [False, True])
 def test_a_minute_without_pictures_or_people(rate, timed):
-    """Whatever the rate, frames without pictures neither overtake the clock nor keep anybody."""
+    """At any rate, the time of frames without pictures stays behind that of the next picture, and all tracks end."""
     count = int(60 * rate)
     times = (np.arange(count + 20) + np.random.default_rng(0).uniform(-0.2, 0.2, count + 20)) / rate
     rig, frames, _ = film(PATHS, times[:10])

@@ -1,0 +1,152 @@
+"""Births of tracks, from detections that belong to nobody known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+from mvpose.ordering import number_views
+from mvpose.pipeline import Pipeline, enter
+from mvpose.rays import Rays
+from mvpose.reconstruction.poses import Poses
+from mvpose.tracking.bones import BonePrior
+from mvpose.tracking.frame_kernels import repeats
+from mvpose.tracking.looks import learn_looks, scale_of
+from mvpose.tracking.motion import JointMotion, Motion
+from mvpose.tracking.population import Population
+from mvpose.tracking.reappearance import Reappearance
+from mvpose.tracking.recent_pictures import RecentPictures
+from mvpose.tracking.tracks import Tracks
+
+
+class Births:
+    """How tracks begin, and who of them is somebody who was lost.
+
+    Args:
+        population: people who are known.
+        pipeline: stages of one frame; its reconstruction places newcomers.
+        returns: how lost people come back.
+        motion: motion of people.
+        of_joints: motion of their joints.
+        bones: bones of the skeleton.
+        cameras: number of cameras.
+    """
+
+    def __init__(
+        self,
+        population: Population,
+        pipeline: Pipeline,
+        *,
+        returns: Reappearance,
+        motion: Motion,
+        of_joints: JointMotion,
+        bones: BonePrior,
+        cameras: int,
+    ) -> None:
+        self._population, self._pipeline, self._returns = population, pipeline, returns
+        self._motion, self._of_joints, self._bones, self._cameras = motion, of_joints, bones, cameras
+
+    def give_birth(
+        self,
+        rays: Rays,
+        detections: Detections,
+        fresh: Integers,
+        owner: Integers,
+        *,
+        now: float,
+        span: float,
+        moved_for: float = 0.0,
+    ) -> Poses:
+        """Start tracks of groups of detections that belong to nobody known, and return the poses of all groups.
+
+        A group that repeats the pose of a track is left out: its detections were torn from that person's.
+
+        Args:
+            rays: viewing rays of the m detections.
+            detections: the detections.
+            fresh: group of each, (m,), or -1.
+            owner: output, (m,): track of each detection that gets one.
+            now: time of the frame, seconds.
+            span: time in which the people may have come, seconds.
+            moved_for: time in which they may have moved since the pictures, seconds.
+        """
+        poses = self._pipeline.reconstruction(rays, fresh, detections.skeleton)
+        if not len(poses.joints):
+            return poses
+        if moved_for > 0.0:
+            moved = (moved_for * self._of_joints.speed) ** 2
+            poses = poses._replace(covariance=poses.covariance + moved[:, None, None] * np.eye(3))
+        people = self._population
+        tracks, count = people.tracks, len(poses.joints)
+        new = ~repeats(poses.joints, tracks.state)
+        born = Tracks.born(
+            poses, ids=np.zeros(count, np.int64), time=now, span=span, speed=self._of_joints.speed,
+            bones=self._bones, cameras=self._cameras, dimensions=tracks.looks.shape[1],
+        )  # fmt: skip
+        witnesses = np.zeros(count, np.int64)
+        if detections.descriptors is not None and tracks.looks.shape[1]:
+            # For comparison; the frame counts with its time when it is known whose it is.
+            witnesses = learn_looks(born.looks, born.described, fresh, detections.descriptors, 0.0)
+        born = born.select(new)
+        self._identify(born, witnesses[new], now)
+        slot = np.where(new, len(tracks) + np.cumsum(new) - 1, -1)
+        owner[fresh >= 0] = slot[fresh[fresh >= 0]]
+        people.tracks = tracks.join(born)
+        return poses
+
+    def _identify(self, born: Tracks, witnesses: Integers, now: float) -> None:
+        """Give new tracks the identities of lost people who have come back, or new ones."""
+        people = self._population
+        back = self._returns.match(
+            born, people.lost, time=now, motion=self._motion, trunk=self._of_joints.trunk, present=people.tracks,
+            witnesses=witnesses, scale=scale_of(self._pipeline.affinity),
+        )  # fmt: skip
+        for k, lost in enumerate(back):
+            if lost >= 0:
+                born.resume(k, people.lost, lost)
+            else:
+                born.ids[k], people.born = people.born, people.born + 1
+        remain = np.ones(len(people.lost), np.bool_)
+        remain[back[back >= 0]] = False
+        people.lost = people.lost.select(remain)
+
+    def pair_with_recent(
+        self, recent: RecentPictures, rig: Rig, detections: Detections, lead: Floats, owner: Integers, *,
+        now: float, span: float,
+    ) -> tuple[Integers, Integers]:  # fmt: skip
+        """Start tracks of people whom two cameras saw at different times of the latest tenth of a second.
+
+        Args:
+            recent: detections of the latest pictures that belong to nobody.
+            rig: cameras.
+            detections: the m detections of the frame.
+            lead: time from the frame to the picture of each, (m,), seconds.
+            owner: track of each, (m,), or -1; those of detections that get a track are set.
+            now: time of the frame, seconds.
+            span: time in which the people may have come, seconds.
+
+        Returns:
+            Track and camera of each detection of an earlier picture that got a track, (k,) each.
+        """
+        alone = np.flatnonzero(owner < 0)
+        if not len(alone):
+            return alone, alone
+        both = recent.beside(detections.select(alone), detections.skeleton)
+        moved_for = float(np.abs(np.concatenate([lead[alone], recent.rows["time"] - now])).max())
+        chosen, both, rays = enter(rig, both, self._pipeline.duplicates)
+        labels = self._pipeline.matching(self._pipeline.affinity(rig, both, rays), number_views(both.view)).labels
+        present = chosen < len(alone)
+        people, fresh = np.unique(labels[present & (labels >= 0)]), np.full(len(labels), -1)
+        of_present = np.isin(labels, people)
+        fresh[of_present] = np.searchsorted(people, labels[of_present])
+        tracks = np.full(len(labels), -1)
+        if len(people):
+            self.give_birth(rays, both, fresh, tracks, now=now, span=span, moved_for=moved_for)
+        owner[alone[chosen[present]]] = tracks[present]
+        earlier = ~present & (tracks >= 0)
+        claimed = np.zeros(len(recent.rows["time"]), np.bool_)
+        claimed[chosen[earlier] - len(alone)] = True
+        recent.drop(claimed)
+        return tracks[earlier], both.view[earlier]
