@@ -84,7 +84,8 @@ def resident_memory() -> float:
 
 def table_of(signs: list[Sign]) -> str:
     """Format the rows as text."""
-    rows = [["lag s", "minutes", "frames", "identities", "tracks", "lost", "state kB", "resident MB", "moved", "ms/frame"]]
+    counts = ["frames", "identities", "tracks", "lost"]
+    rows = [["lag s", "minutes", *counts, "state kB", "resident MB", "moved", "ms/frame"]]
     rows += [
         [
             figure(each.lag), f"{each.minutes:g}", str(each.frames), str(each.identities), str(each.tracks),
