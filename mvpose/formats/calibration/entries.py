@@ -12,6 +12,8 @@ from mvpose.arrays import Floats
 from mvpose.checks import as_array
 from mvpose.files.message_text import shown
 
+_FULL_TURN = 6.3  # radians; longer vectors are in degrees
+
 
 def rotation(value: Any, name: str) -> Floats:
     """Return a rotation matrix (3, 3), given a matrix or a Rodrigues vector of three numbers, radians.
@@ -23,6 +25,12 @@ def rotation(value: Any, name: str) -> Floats:
     if given.size in (3, 9) and not np.isfinite(given).all():
         raise ValueError(f"{name} must be finite, got {shown(given.tolist())}")
     if given.size == 3:
+        angle = float(np.linalg.norm(given))
+        if angle > _FULL_TURN:
+            raise ValueError(
+                f"{name} must be a Rodrigues vector in radians, at most 2 pi long, got {shown(given.tolist())}, "
+                f"{angle:.4g} long: degrees (multiply by pi / 180) or Euler angles (convert to a 3 x 3 matrix)"
+            )
         return Rotation.from_rotvec(given.copy()).as_matrix()  # SciPy refuses read-only arrays
     if given.size == 9:
         return given.reshape(3, 3)

@@ -1,12 +1,12 @@
-"""OpenCV calibrations (YAML or XML of ``cv2.FileStorage``): ``x_cam = R X + T``, metres.
+"""OpenCV calibrations (YAML, XML or JSON of ``cv2.FileStorage``, and plain JSON or TOML): ``x_cam = R X + T``, metres.
 
 OpenCV prescribes no layout for many cameras. The reader accepts:
 
 - a list ``cameras`` of maps with a ``name``, or one map for each camera by its name, with the values that
-  ``calibrateCamera`` returns, under any of the usual names (``camera_matrix`` or ``K``, ``distortion_coefficients`` or
-  ``dist``, ``R`` or ``rvec``, ``T`` or ``tvec``, ``image_width`` and ``image_height``, or ``size``);
+  ``calibrateCamera`` returns, under any of the usual names (:mod:`.camera_entry`);
 - a stereo calibration, as OpenCV's ``stereo_calib`` sample writes it: ``M1 D1 M2 D2`` (``intrinsics.yml``) and ``R T``
-  (``extrinsics.yml``, beside it); R and T transform camera 1 into camera 2, and the world frame is that of camera 1.
+  (``extrinsics.yml``, beside it); R and T transform camera 1 into camera 2, and the world frame is that of camera 1;
+- one file for each camera, whose name is that of the file: :mod:`.camera_folder`.
 
 The writer uses the first layout.
 """
@@ -21,14 +21,14 @@ import numpy as np
 
 from mvpose import Camera, Rig
 from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
-from mvpose.formats.calibration.entries import camera, check_names, image_size
-from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, write_storage
+from mvpose.formats.calibration.camera_entry import is_camera, read_camera
+from mvpose.formats.calibration.entries import check_names
+from mvpose.formats.calibration.file_storage import matrix, missing_half, read_beside, read_storage, write_storage
+from mvpose.formats.calibration.storage_values import with_matrices
 
-_K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")
+_K = ("camera_matrix", "K", "cameraMatrix", "intrinsics", "M")  # of a stereo pair, with 1 and 2 appended
 _TERMS = ("distortion_coefficients", "dist", "distCoeffs", "distortion", "D")
-_R = ("R", "rvec", "rotation", "Rot")
-_T = ("T", "tvec", "t", "translation")
-_SIZE = ("size", "image_size", "imageSize")
+_SIZE = ("size", "image_size", "imageSize", "image_width", "image_height")
 _EXPECTS = (
     "a map for each camera with camera_matrix, distortion_coefficients, R or rvec, T and "
     "image_width, image_height; or M1 D1 M2 D2 R T of a stereo pair"
@@ -52,14 +52,15 @@ def read_calibration(path: str | Path, *, size: tuple[int, int]) -> Rig:
             a wrong shape, or the cameras make no rig.
     """
     path = Path(path)
-    values = read_beside(path, what=_WHAT)
+    plain = _plain_values(CalibrationFile(path, _WHAT))
+    values = read_beside(path, what=_WHAT) if plain is None else plain
     try:
         stereo = _stereo(values, path)
         entries = stereo or _entries(values)
         if not entries:
             keys = ", ".join(list(values)[:8]) or "no keys"
             raise ValueError(f"no camera found, only {keys}; expected {_WHAT}")
-        return Rig([_camera(name, entry, size) for name, entry in entries.items()])
+        return Rig([read_camera(name, entry, size) for name, entry in entries.items()])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -77,30 +78,44 @@ def write_calibration(path: str | Path, rig: Rig) -> None:
             raise ValueError(
                 f"camera {each.name!r}: OpenCV drops spaces at the ends of a name; expected a name without them"
             )
-    entries = [
-        {
-            "name": each.name,
-            "image_width": each.size[0],
-            "image_height": each.size[1],
-            "camera_matrix": each.K,
-            "distortion_coefficients": matrix(each.distortion),
-            "R": each.R,
-            "T": matrix(each.t).T,
-        }
-        for each in rig
-    ]
-    write_storage(Path(path), {"cameras": entries})
+    write_storage(Path(path), {"cameras": [{"name": each.name, **_entry(each)} for each in rig]})
+
+
+def write_values(path: Path, camera: Camera) -> None:
+    """Write one camera into a file of its own, without its name."""
+    write_storage(path, _entry(camera))
+
+
+def _entry(camera: Camera) -> dict[str, Any]:
+    return {
+        "image_width": camera.size[0],
+        "image_height": camera.size[1],
+        "camera_matrix": camera.K,
+        "distortion_coefficients": matrix(camera.distortion),
+        "R": camera.R,
+        "T": matrix(camera.t).T,
+    }
+
+
+def values_of(file: CalibrationFile) -> dict[str, Any]:
+    """Return the named values of a YAML, XML, JSON or TOML file.
+
+    Raises:
+        ValueError: it does not exist or cannot be parsed.
+    """
+    plain = _plain_values(file)
+    return read_storage(file.path, what=_WHAT) if plain is None else plain
 
 
 def _recognises(file: CalibrationFile) -> bool:
-    return file.storage is not None
+    return file.storage is not None or bool(_entries(file.json or file.toml or {}))
 
 
 def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
     return read_calibration(path, size=size)
 
 
-FORMAT = CalibrationFormat("OpenCV (YAML or XML)", _EXPECTS, _recognises, _read, write_calibration)
+FORMAT = CalibrationFormat("OpenCV (YAML, XML, JSON)", _EXPECTS, _recognises, _read, write_calibration)
 
 
 def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -111,7 +126,16 @@ def _entries(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
         if not all(isinstance(each, dict) for each in listed):
             raise ValueError(f"cameras must be a list of maps; expected {_WHAT}")
         return {f"{each.get('name', k)}": each for k, each in enumerate(listed)}
-    return {name: each for name, each in values.items() if isinstance(each, dict) and any(key in each for key in _K)}
+    return {name: each for name, each in values.items() if is_camera(each)}
+
+
+def _plain_values(file: CalibrationFile) -> dict[str, Any] | None:
+    """Return the named values of a JSON or TOML file; None for other files."""
+    plain = file.json if file.json is not None else None if file.storage is not None else file.toml
+    try:
+        return None if plain is None else dict(with_matrices(plain))
+    except ValueError as error:
+        raise ValueError(f"{file.path}: {error}") from None
 
 
 def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
@@ -137,28 +161,8 @@ def _stereo(values: dict[str, Any], path: Path) -> dict[str, dict[str, Any]]:
         )
     terms: list[Any] = [next((values[f"{key}{k}"] for key in _TERMS if f"{key}{k}" in values), []) for k in (1, 2)]
     poses = ((np.eye(3), np.zeros(3)), (values["R"], values["T"]))
-    sizes = {key: values[key] for key in (*_SIZE, "image_width", "image_height") if key in values}
+    sizes = {key: values[key] for key in _SIZE if key in values}
     return {
         f"{k + 1}": {"K": values[f"{matrices}{k + 1}"], "dist": terms[k], "R": poses[k][0], "T": poses[k][1], **sizes}
         for k in (0, 1)
     }
-
-
-def _camera(name: str, entry: dict[str, Any], size: tuple[int, int]) -> Camera:
-    chosen = {}
-    for keys in (_K, _R, _T):
-        key = next((key for key in keys if key in entry), None)
-        if key is None:
-            raise ValueError(f"camera {name!r} has none of {', '.join(keys)}; expected {_WHAT}")
-        chosen[keys] = entry[key]
-    given = next((entry[key] for key in _SIZE if key in entry), None)
-    if given is None:
-        given = (entry.get("image_width", size[0]), entry.get("image_height", size[1]))
-    return camera(
-        name,
-        K=chosen[_K],
-        R=chosen[_R],
-        t=chosen[_T],
-        terms=next((entry[key] for key in _TERMS if key in entry), []),
-        size=image_size(given, f"camera {name!r}: size"),
-    )

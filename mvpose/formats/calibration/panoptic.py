@@ -17,6 +17,7 @@ from mvpose import Camera, Rig
 from mvpose.checks import as_array
 from mvpose.files.input_files import CALIBRATION, read_json_object
 from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_entry import is_camera
 from mvpose.formats.calibration.entries import camera, check_names, image_size
 
 _KEYS = ("name", "resolution", "K", "distCoef", "R", "t")
@@ -84,7 +85,11 @@ def write_calibration(path: str | Path, rig: Rig, *, kind: str = "hd") -> None:
 
 
 def _recognises(file: CalibrationFile) -> bool:
-    return isinstance((file.json or {}).get("cameras"), list)
+    entries = (file.json or {}).get("cameras")
+    if not isinstance(entries, list):
+        return False
+    ours = {"distCoef", "resolution", "type"}  # a list of cameras with other keys is of OpenCV
+    return not any(map(is_camera, entries)) or any(isinstance(each, dict) and ours & each.keys() for each in entries)
 
 
 def _read(path: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:

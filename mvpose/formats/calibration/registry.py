@@ -24,16 +24,61 @@ from mvpose import Rig
 from mvpose.files.message_text import one_line
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from mvpose.formats.calibration.calibration_format import CalibrationFile, CalibrationFormat
+from mvpose.formats.calibration.camera_folder import only_file, read_folder, suffix_of, write_folder
 from mvpose.formats.calibration.selection import select
 
 FORMATS: list[CalibrationFormat] = [
     panoptic.FORMAT,
     voxelpose.FORMAT,
     easymocap.FORMAT,
-    opencv.FORMAT,  # after EasyMocap, which writes the same kind of file: it takes the rest
     pose2sim.FORMAT,
+    opencv.FORMAT,  # after EasyMocap and Pose2Sim, which write the same kinds of files: it takes the rest
 ]
 """Registered formats; the first that recognises a file reads it."""
+
+
+def write_like(original: str | Path, path: str | Path, rig: Rig) -> None:
+    """Write a rig in the format of another calibration.
+
+    Args:
+        original: a calibration of any registered format.
+        path: the file to write; of formats in two files either of them; a folder where the original is one.
+        rig: the cameras.
+
+    Raises:
+        ValueError: an unknown or read-only format, or a rig that it cannot hold.
+        OSError: the file cannot be written.
+    """
+    place, chosen = _format_of(Path(original))
+    if chosen is None:
+        Path(path).mkdir(parents=True, exist_ok=True)
+        write_folder(Path(path), rig, suffix=suffix_of(place))
+    elif chosen.write is None:
+        raise ValueError(f"{original}: calibrations of {chosen.name} can be read, but not written")
+    else:
+        target = Path(path) / place.name if Path(original).is_dir() else Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        chosen.write(target, rig)
+
+
+def _format_of(path: Path) -> tuple[Path, CalibrationFormat | None]:
+    """Return the file or folder of a calibration, and its format; None for a folder with a file for each camera.
+
+    Raises:
+        ValueError: no such file, or no registered format recognises it.
+    """
+    place = path
+    if path.is_dir():
+        found = only_file(path)
+        if found is None or found.is_dir():
+            return found or path, None
+        place = found
+    file = CalibrationFile(place, f"a camera calibration: {', '.join(each.name for each in FORMATS)}")
+    chosen = next((each for each in FORMATS if each.recognises(file)), None)
+    if chosen is None:
+        known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
+        raise ValueError(one_line(f"{place}: not a known calibration: found {file.summary}; expected one of {known}"))
+    return place, chosen
 
 
 def register(added: CalibrationFormat) -> None:
@@ -47,7 +92,8 @@ def read_calibration(
     """Read a calibration file of any registered format.
 
     Args:
-        path: the file; of formats in two files (EasyMocap, a stereo pair of OpenCV) either of them.
+        path: the file; of formats in two files (EasyMocap, a stereo pair of OpenCV) either of them; or a folder with
+            a file for each camera, or with one file.
         size: width and height of the images in pixels, for files that do not hold them (VoxelPose, and some files of
             EasyMocap and OpenCV).
         only: names of the cameras to take, in this order; empty: all (of Panoptic: the HD cameras).
@@ -57,14 +103,10 @@ def read_calibration(
         ValueError: the file does not exist, no registered format recognises it, or its reader finds a fault; every
             message names the file.
     """
-    file = CalibrationFile(Path(path), f"a camera calibration: {', '.join(each.name for each in FORMATS)}")
-    chosen = next((each for each in FORMATS if each.recognises(file)), None)
-    if chosen is None:
-        known = "; ".join(f"{each.name}: {one_line(each.expects, 30)}" for each in FORMATS)
-        raise ValueError(one_line(f"{path}: not a known calibration: found {file.summary}; expected one of {known}"))
     try:
+        place, chosen = _format_of(Path(path))
         with np.errstate(over="ignore", invalid="ignore"):  # of values that the cameras refuse
-            rig = chosen.read(file.path, size=size, only=only)
+            rig = (read_folder if chosen is None else chosen.read)(place, size=size, only=only)
     except ValueError as error:
         raise ValueError(one_line(str(error))) from None
     try:

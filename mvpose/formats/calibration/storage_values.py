@@ -65,7 +65,7 @@ class Builder:
         """
         key, structure = self._open.pop()
         matrix = isinstance(structure, dict) and structure.keys() >= _MATRIX
-        self.add(_matrix(structure) if matrix and isinstance(structure, dict) else structure, key)
+        self.add(matrix_of(structure) if matrix and isinstance(structure, dict) else structure, key)
 
     def add(self, value: Any, key: str = "") -> None:
         """Add a complete value to the last structure that has begun, under a key where that is a map.
@@ -85,8 +85,25 @@ class Builder:
             structure[key] = value
 
 
-def _matrix(given: dict[str, Any]) -> np.ndarray:
-    """Return a matrix (rows, columns), (rows, columns, channels) or of its sizes."""
+def with_matrices(value: Any) -> Any:
+    """Return a JSON value with FileStorage's matrices, maps of ``rows cols dt data``, as arrays of floats.
+
+    Raises:
+        ValueError: a matrix whose size does not fit its data.
+    """
+    if isinstance(value, dict):
+        if value.keys() >= _MATRIX:
+            return matrix_of(value)
+        return {key: with_matrices(each) for key, each in value.items()}
+    return [with_matrices(each) for each in value] if isinstance(value, list) else value
+
+
+def matrix_of(given: dict[str, Any]) -> np.ndarray:
+    """Return a matrix of FileStorage: (rows, columns), (rows, columns, channels) or of its sizes.
+
+    Raises:
+        ValueError: an unknown type, or a size that does not fit the data.
+    """
     data, kind = given["data"], _TYPE.fullmatch(str(given["dt"]))
     sides = given["sizes"] if "sizes" in given else [given.get("rows"), given.get("cols")]
     if kind is None:

@@ -1,0 +1,134 @@
+"""One camera under any of the names that programs give its values: ``camera_matrix`` or ``K``, ``rvec`` or ``R`` ...
+
+Names of two letters or fewer count as they are written, because K and k, T and t differ; longer ones without regard to
+case and punctuation. Values may lie in maps within the entry (``intrinsics: {camera_matrix: ...}``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mvpose import Camera
+from mvpose.arrays import Floats
+from mvpose.checks import as_array
+from mvpose.formats.calibration.entries import camera, image_size
+
+MATRIX = ("K", "M", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "matrix", "kmatrix")
+"""Names of the intrinsic matrix, 3 x 3."""
+
+TERMS = ("D", "distortioncoefficients", "distcoeffs", "distcoef", "distcoefs", "distortion", "distortions", "dist")
+"""Names of the distortion terms, k1 k2 p1 p2 k3."""
+
+ROTATION = ("R", "rvec", "rotation", "rot", "rotationmatrix", "rotationvector", "rmat", "rvecs")
+"""Names of the rotation from world to camera: a matrix, or a Rodrigues vector in radians."""
+
+TRANSLATION = ("T", "t", "tvec", "translation", "translationvector", "tvecs", "trans")
+"""Names of the translation of ``x_cam = R x + T``, metres."""
+
+BOTH = ("Rt", "RT", "extrinsicmatrix", "extrinsics", "extrinsic", "worldtocamera", "w2c")
+"""Names of a matrix 3 x 4 or 4 x 4 of rotation and translation, world to camera."""
+
+SIZE = ("size", "imagesize", "resolution", "imgsize", "framesize", "calibrationsize")
+"""Names of width and height, pixels."""
+
+_SIDES = (("imagewidth", "imageheight"), ("width", "height"), ("W", "H"))
+_FOCAL = ("fx", "fy", "cx", "cy")
+_INVERSE = ("cameratoworld", "c2w", "camtoworld")
+_EXPECTED = "camera_matrix (or K), distortion_coefficients, R or rvec, T or tvec, and the size of the pictures"
+
+
+def is_camera(entry: Any, *, placed: bool = False) -> bool:
+    """Return whether a value is a map with intrinsics of a camera, and if ``placed`` with its pose as well."""
+    if not isinstance(entry, dict):
+        return False
+    flat = _flat(entry)
+    if placed and all(find(flat, names) is None for names in (ROTATION, BOTH, _INVERSE)):
+        return False
+    return find(flat, MATRIX) is not None or all(key in flat for key in _FOCAL)
+
+
+def read_camera(name: str, entry: Mapping[str, Any], size: tuple[int, int]) -> Camera:
+    """Return the camera of an entry.
+
+    Args:
+        name: its name.
+        entry: its values.
+        size: width and height of its pictures where the entry does not state them.
+
+    Raises:
+        ValueError: a value that is missing or of a wrong form; the message names the camera.
+    """
+    flat = _flat(entry)
+    K = find(flat, MATRIX)
+    if K is None and all(key in flat for key in _FOCAL):
+        fx, fy, cx, cy = (float(as_array(flat[key], (), f"camera {name!r}: {key}")) for key in _FOCAL)
+        K = [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+    R, t = find(flat, ROTATION), find(flat, TRANSLATION)
+    if R is None or t is None:
+        R, t = _of_both(name, flat, R, t)
+    for usual, value in (("camera_matrix, K, mtx", K), ("R, rvec, rotation", R), ("T, tvec, translation", t)):
+        if value is None:
+            has = ", ".join(list(flat)[:8]) or "nothing"
+            raise ValueError(f"camera {name!r} has none of {usual} ...: it has {has}; expected {_EXPECTED}")
+    terms = find(flat, TERMS)
+    return camera(
+        name,
+        K=np.asarray(K, dtype=object).reshape(3, 3) if np.size(np.asarray(K, dtype=object)) == 9 else K,
+        R=R,
+        t=t,
+        terms=[] if terms is None else terms,
+        size=_size(name, flat, size),
+    )
+
+
+def find(entry: Mapping[str, Any], names: tuple[str, ...]) -> Any:
+    """Return the value of the first of some names in an entry; None where it has none of them, or only maps."""
+    plain = {_plain(key): value for key, value in reversed(list(entry.items())) if not isinstance(value, dict)}
+    for name in names:
+        if name in plain:
+            return plain[name]
+    return None
+
+
+def _plain(key: str) -> str:
+    short = re.sub(r"[^A-Za-z0-9]", "", key)
+    return short if len(short) <= 2 else short.lower()
+
+
+def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of an entry and of the maps in it."""
+    flat: dict[str, Any] = {}
+    for key, value in entry.items():
+        if isinstance(value, dict):
+            flat |= {inner: each for inner, each in value.items() if inner not in entry}
+        else:
+            flat[str(key)] = value
+    return flat
+
+
+def _of_both(name: str, flat: Mapping[str, Any], R: Any, t: Any) -> tuple[Any, Any]:
+    """Return rotation and translation of a matrix that holds both, in the place of those that are missing."""
+    joined, inverse = find(flat, BOTH), find(flat, _INVERSE)
+    given = inverse if joined is None else joined
+    if given is None or np.size(np.asarray(given, dtype=object)) not in (12, 16):
+        return R, t
+    values = np.asarray(given, dtype=object)
+    matrix: Floats = as_array(values.reshape(-1, 4)[:3], (3, 4), f"camera {name!r}: extrinsics")
+    if joined is None:  # camera to world
+        return matrix[:, :3].T, -matrix[:, :3].T @ matrix[:, 3]
+    return matrix[:, :3], matrix[:, 3]
+
+
+def _size(name: str, flat: Mapping[str, Any], size: tuple[int, int]) -> tuple[int, int]:
+    given = find(flat, SIZE)
+    if given is not None:
+        return image_size(given, f"camera {name!r}: size")
+    for width, height in _SIDES:
+        sides = find(flat, (width,)), find(flat, (height,))
+        if None not in sides:
+            return image_size(sides, f"camera {name!r}: {width} and {height}")
+    return size
