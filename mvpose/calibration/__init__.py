@@ -3,7 +3,8 @@
 The input is a calibration and detections over time; no calibration board and no markers.
 """
 
+from mvpose.calibration.clocks import Clocks, estimate_clocks
 from mvpose.calibration.findings import Diagnosis, Finding
 from mvpose.calibration.sightings import Sightings, gather
 
-__all__ = ["Diagnosis", "Finding", "Sightings", "gather"]
+__all__ = ["Clocks", "Diagnosis", "Finding", "Sightings", "estimate_clocks", "gather"]

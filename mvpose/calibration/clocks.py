@@ -1,0 +1,255 @@
+"""Clocks of the cameras, from people who move: how much later each camera takes its pictures than their times say.
+
+Views of a moving joint agree on its place only where their pictures are of one time. Offsets of all cameras that make
+them agree are found in three steps: whole frames at which the rays of views meet (:mod:`.clock_search`), least squares
+with velocities of joints (:mod:`.clock_adjustment`), and changes by whole frames on the way (:mod:`.picture_order`).
+Only differences between clocks can be seen: the time of the cameras that agree is taken as right where they are more
+than half, else the mean time of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.calibration.clock_adjustment import ClockAdjustment, adjust
+from mvpose.calibration.clock_search import coarse_offsets
+from mvpose.calibration.findings import Finding, camera_names
+from mvpose.calibration.joint_tracks import JointTracks
+from mvpose.calibration.picture_order import ClockStep, find_step, repeated_pictures
+from mvpose.calibration.sightings import Sightings, gather
+from mvpose.camera import Rig
+from mvpose.checks import Sealed
+from mvpose.detections import Detections
+
+_SHARE = 0.9  # of the probability in an interval
+_VAGUE = 0.02  # s: half an interval beyond which a clock is not determined; a person who walks is 2.5 cm elsewhere
+_STILL = 0.2  # least share of the motion that is not noise
+_AGREE = 3.0  # standard deviations within which a camera has the time of the reference
+_HARMLESS = 0.010  # s: people who walk are 1.3 cm elsewhere, less than a keypoint is wrong by
+_TYPICAL_SPEED = 1.3  # m/s, of people who walk (Bohannon, Age and Ageing 1997)
+_MOST_STEPS = 20
+_FLOOR, _FLOOR_SHARE = 0.0, 1.0
+_FEWEST = 40  # joints at times that two views share
+
+
+@dataclass(frozen=True)
+class Clocks(Sealed):
+    """Clocks of V cameras over F frames.
+
+    Attributes:
+        offsets: true time minus given time of each camera's pictures, (V,), seconds, against the reference; 0 where it
+            is not determined.
+        interval: lowest and highest value of 90 % of the probability, (V, 2), seconds; infinite where nothing is known.
+        covariance: of the offsets, (V, V), s²; infinite where nothing is known.
+        determined: whether the recording determines each clock, to 20 ms, (V,).
+        reference: indices of the cameras whose mean time is taken as right.
+        steps: whole frames by which a clock is later from a frame on, because pictures were lost.
+        repeated: pictures that repeat the one before, (F, V).
+        times: corrected times of the pictures, (F, V), seconds; of a repeated picture, when it was first delivered; NaN
+            without a picture.
+        names: names of the cameras.
+        period: time between frames, seconds.
+    """
+
+    offsets: Floats
+    interval: Floats
+    covariance: Floats
+    determined: Bools
+    reference: tuple[int, ...]
+    steps: tuple[ClockStep, ...]
+    repeated: Bools
+    times: Floats
+    names: tuple[str, ...]
+    period: float
+
+    def corrected(self, frames: Iterable[Detections]) -> tuple[Detections, ...]:
+        """Return the frames with the corrected times of their pictures; detections stay as they are.
+
+        The tracker reads the times. A method of single frames takes detections of a frame as those of one time:
+        :func:`mvpose.calibration.resampling.resampled` moves them there.
+        """
+        return tuple(replace(each, time=times) for each, times in zip(frames, self.times, strict=True))
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what is wrong with clocks and the order of pictures."""
+        return (*self._offset_findings(), *self._dropped_findings(), *self._repeated_findings())
+
+    def _offset_findings(self) -> Iterable[Finding]:
+        for view, name in enumerate(self.names):
+            ms, (low, high) = 1e3 * self.offsets[view], 1e3 * self.interval[view]
+            if not self.determined[view]:
+                yield Finding(
+                    "clock-offset",
+                    f"the clock of {name} cannot be compared with the others: nobody moves enough in what it shares",
+                    severity="unknown",
+                    probability=0.5,
+                    camera=name,
+                    view=view,
+                    mend="record ten seconds of a person who walks where this camera and two others see them",
+                )
+                continue
+            if low <= 0.0 <= high:
+                continue
+            deviation = max((high - low) / 2 / norm.ppf((1 + _SHARE) / 2), 1e-6)
+            harmful = 1e3 * _HARMLESS
+            probability = norm.sf((harmful - ms) / deviation) + norm.cdf((-harmful - ms) / deviation)
+            alarm = max(low, -high) > harmful
+            yield Finding(
+                "clock-offset",
+                f"{name} takes its pictures {abs(ms):.1f} ms {'later' if ms > 0 else 'earlier'} than their times say",
+                severity="alarm" if alarm else "note",
+                probability=float(probability),
+                camera=name,
+                view=view,
+                size={"ms": float(ms)},
+                interval={"ms": (float(low), float(high))},
+                cost=float(probability * _TYPICAL_SPEED * abs(ms) / 1e3),
+                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+            )
+
+    def _dropped_findings(self) -> Iterable[Finding]:
+        for step in self.steps:
+            name, count = self.names[step.view], abs(step.frames)
+            lost = "misses" if step.frames > 0 else "has"
+            yield Finding(
+                "dropped-pictures" if step.frames > 0 else "repeated-pictures",
+                f"{name} {lost} {count} picture{'s' * (count > 1)} {'too many ' * (step.frames < 0)}at "
+                f"{step.time:.2f} s: all later ones belong to {'later' if step.frames > 0 else 'earlier'} frames",
+                probability=float(1.0 - 2.0 * norm.sf(step.deviations)),
+                camera=name,
+                view=step.view,
+                size={"pictures": float(count), "since_s": step.time},
+                cost=_TYPICAL_SPEED * count * self.period,
+                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+            )
+
+    def _repeated_findings(self) -> Iterable[Finding]:
+        for view, name in enumerate(self.names):
+            count = int(self.repeated[:, view].sum())
+            if not count:
+                continue
+            share = count / max(int(np.isfinite(self.times[:, view]).sum()), 1)
+            yield Finding(
+                "repeated-pictures",
+                f"{name} delivers the same picture again in {count} frames ({100 * share:.1f} %)",
+                severity="alarm" if share > 0.01 else "note",
+                camera=name,
+                view=view,
+                size={"pictures": float(count), "percent": 100 * share},
+                cost=_TYPICAL_SPEED * self.period * share,
+                mend="frames = estimate_clocks(rig, frames).corrected(frames)",
+            )
+
+
+def estimate_clocks(
+    rig: Rig, recording: Sequence[Detections] | Sightings, *, period: float = 0.04, largest: float = 1.0
+) -> Clocks:
+    """Return the clocks of the cameras; ten seconds of people who walk are enough.
+
+    Args:
+        rig: the calibrated cameras; it may be off by a few degrees.
+        recording: detections of each frame in the order of time, or what :func:`.sightings.gather` makes of them.
+        period: time between frames whose detections carry no times, seconds.
+        largest: most by which two clocks differ, seconds.
+    """
+    sightings = recording if isinstance(recording, Sightings) else gather(rig, recording, period=period)
+    repeated = repeated_pictures(sightings)
+    tracks = JointTracks.of(rig, sightings, without=repeated)
+    names = camera_names(rig)
+    if not _comparable(tracks):
+        return _unknown(names, repeated, sightings.times, tracks.period)
+    adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
+    steps: list[ClockStep] = []
+    while len(steps) < _MOST_STEPS and (step := find_step(adjustment, tracks.times, tracks.period)) is not None:
+        steps.append(step)
+        times = tracks.times.copy()
+        times[step.frame :, step.view] += step.frames * tracks.period
+        tracks = replace(tracks, times=times)
+        adjustment = adjust(rig, tracks, adjustment.offsets)
+    times = np.where(np.isfinite(sightings.times), tracks.times, np.nan)
+    return _clocks(names, adjustment, tuple(steps), repeated, times, tracks.period)
+
+
+def _comparable(tracks: JointTracks) -> bool:
+    """Return whether views share enough for any comparison."""
+    return bool((np.isfinite(tracks.points[..., 0]).sum(axis=1) >= 2).sum() >= _FEWEST)
+
+
+def _clocks(
+    names: tuple[str, ...],
+    adjustment: ClockAdjustment,
+    steps: tuple[ClockStep, ...],
+    repeated: Bools,
+    times: Floats,
+    period: float,
+) -> Clocks:
+    """Return the clocks of an adjustment, with ``times`` (F, V) of the pictures from which steps are taken out."""
+    views = len(names)
+    noise = np.maximum(adjustment.motion, _STILL)
+    deviations = _FLOOR_SHARE * adjustment.deviations / noise
+    covariance = deviations.T @ deviations + _FLOOR**2 * np.eye(views)
+    mean = np.eye(views) - 1.0 / views
+    known = (adjustment.motion > _STILL) & (_half_widths(deviations, covariance, mean) < _VAGUE)
+    if known.sum() < 2:
+        return _unknown(names, repeated, times, period)
+    reference = _reference(adjustment.offsets, covariance, known)
+    against = np.eye(views)
+    against[:, reference] -= 1.0 / len(reference)
+    offsets, covariance = against @ adjustment.offsets, against @ covariance @ against.T
+    halves = _half_widths(deviations, covariance, against)
+    offsets = np.where(known, offsets, 0.0)
+    halves[~known] = np.inf
+    covariance[~known] = covariance[:, ~known] = 0.0
+    covariance[~known, ~known] = np.inf
+    corrected = times + offsets
+    for frame in range(1, len(times)):
+        corrected[frame] = np.where(repeated[frame], corrected[frame - 1], corrected[frame])
+    return Clocks(
+        offsets=offsets,
+        interval=np.stack([offsets - halves, offsets + halves], axis=1),
+        covariance=covariance,
+        determined=known,
+        reference=tuple(reference.tolist()),
+        steps=steps,
+        repeated=repeated,
+        times=corrected,
+        names=names,
+        period=period,
+    )
+
+
+def _unknown(names: tuple[str, ...], repeated: Bools, times: Floats, period: float) -> Clocks:
+    """Return clocks of which nothing is known."""
+    views = len(names)
+    interval = np.tile([-np.inf, np.inf], (views, 1))
+    covariance = np.where(np.eye(views) > 0, np.inf, 0.0)
+    nobody = np.zeros(views, np.bool_)
+    return Clocks(np.zeros(views), interval, covariance, nobody, (), (), repeated, times, names, period)
+
+
+def _half_widths(deviations: Floats, covariance: Floats, against: Floats) -> Floats:
+    """Return half the width of the interval of each offset, (V,), seconds.
+
+    The quantile is that of Student's t: a variance that rests on few people and seconds is uncertain itself, with the
+    degrees of freedom of Satterthwaite (Biometrics Bulletin 1946).
+    """
+    squares = (deviations @ against.T) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        freedom = np.fmax(squares.sum(axis=0) ** 2 / (squares**2).sum(axis=0), 1.0)
+    return student.ppf((1.0 + _SHARE) / 2.0, freedom) * np.sqrt(np.diag(covariance))
+
+
+def _reference(offsets: Floats, covariance: Floats, known: Bools) -> Integers:
+    """Return the cameras whose clocks agree with the one in the middle; all cameras, if they are fewer than half."""
+    ordered = np.flatnonzero(known)[np.argsort(offsets[known], kind="stable")]
+    middle = ordered[(len(ordered) - 1) // 2]
+    variance = np.diag(covariance) + covariance[middle, middle] - 2.0 * covariance[middle]
+    near = np.abs(offsets - offsets[middle]) <= _AGREE * np.sqrt(np.maximum(variance, 0.0))
+    agreeing = np.flatnonzero(known & near)
+    return agreeing if 2 * len(agreeing) > known.sum() else np.flatnonzero(known)
