@@ -99,8 +99,7 @@ def _of_shared_people(sightings: Sightings) -> Bools:
 def _normalized(camera: Camera, pixels: Floats) -> Floats:
     """Return pixels (k, 2) as x / z and y / z in the camera, (k, 2); NaN where the lens images no direction."""
     flat = camera.undistort(pixels)
-    normalized: Floats = np.linalg.solve(camera.K, np.column_stack([flat, np.ones(len(flat))]).T).T[:, :2]
-    return normalized
+    return np.asarray(np.linalg.solve(camera.K, np.column_stack([flat, np.ones(len(flat))]).T).T[:, :2], np.float64)
 
 
 def _filled(times: Floats) -> Floats:
@@ -173,8 +172,8 @@ def _parabola(points, sigma, times, now, bandwidth, value, speed, scale):
             weight = weights[i]
             if turn:
                 square = 0.0
-                for c in range(2):
-                    square += (points[i, c] - fit[c, 0] - u * (fit[c, 1] + u * fit[c, 2])) ** 2
+                for axis in range(2):
+                    square += (points[i, axis] - fit[axis, 0] - u * (fit[axis, 1] + u * fit[axis, 2])) ** 2
                 weight /= 1.0 + square / (2.0 * spread) ** 2
             power = weight
             for m in range(5):
