@@ -1,0 +1,155 @@
+"""Findings about single cameras: sizes with intervals, and whether they are alarms or notes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from mvpose.calibration.cameras import CameraFault, Fit
+from mvpose.calibration.findings import Finding, Severity
+from mvpose.camera import Rig
+
+_DEGREES, _METRES = 0.5, 0.04
+"""Corrections from which a camera has moved: twice those that people ask for of careful, published calibrations (0.16
+to 0.28 degrees and 1 to 2.5 cm on Shelf)."""
+
+_PERCENT, _CENTER, _CORNER, _MS = 2.0, 10.0, 10.0, 10.0  # of the focal length; px; px at the corner; ms
+
+_SYSTEMATIC = np.array([*[np.radians(0.1)] * 3, *[0.008] * 3, 0.003, 1.0, 1.0, 0.01, 0.002])
+"""Standard deviations of what detectors add, who place joints differently from different sides (FACTS: hips are off by
+30 to 50 mm); it does not shrink with the length of a recording."""
+
+_REPAIR = "mvpose repair CALIBRATION DETECTIONS --out NEW"
+_DRAWS = 4000
+
+
+def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined: bool) -> list[Finding]:
+    """Return the findings about single cameras.
+
+    Args:
+        fit: what was found.
+        rig: the cameras that it is about.
+        starts: time of the start of each block, (B,), seconds from the start of the recording.
+        names: names of the cameras.
+        undetermined: whether the recording does not determine the calibration: then nothing is an alarm.
+    """
+    findings = []
+    depth = _depths(fit, rig)
+    for each in fit.faults:
+        finding = _finding(each, rig, starts, names, depth, undetermined)
+        if finding is not None:
+            findings.append(finding)
+    faulty = {each.fault.view for each in fit.faults}
+    for view in range(len(rig)):
+        if view not in faulty:
+            findings += _note(fit, view, names, depth)
+    return findings
+
+
+def _finding(
+    found: CameraFault, rig: Rig, starts: Floats, names: Sequence[str], depth: Floats, undetermined: bool
+) -> Finding | None:
+    view, kind, change = found.fault.view, found.fault.model.kind, found.change
+    name = names[view]
+    draws = _draws(change, found.covariance)
+    mend = _REPAIR
+    if kind == "moved-camera":
+        size, interval = _pose_size(change, draws)
+        alarm = size["degrees"] >= _DEGREES or size["metres"] >= _METRES
+        cost = np.radians(size["degrees"]) * depth[view] + size["metres"]
+        text = f"{name} stands or looks elsewhere than calibrated, by {size['degrees']:.1f} degrees and "
+        text += f"{100 * size['metres']:.0f} cm"
+        if found.fault.course == "growing":
+            kind, text = "drifting-camera", text + " at the end, growing from the start"
+        if found.since is not None:
+            best, low, high = found.since
+            later = min(high + 1, len(starts) - 1)
+            size["since_s"] = float(starts[best])
+            interval["since_s"] = float(starts[max(low - 1, 0)]), float(starts[later])
+            text += f", since {starts[best]:.1f} s"
+    elif kind == "focal-length":
+        percent = 100 * np.expm1(draws[:, 6])
+        size = {"percent": float(100 * np.expm1(change[6]))}
+        interval = {"percent": _range(percent)}
+        alarm, cost = abs(size["percent"]) >= _PERCENT, abs(size["percent"]) / 100 * 0.3 * depth[view]
+        text = f"the focal length of {name} should be {size['percent']:+.1f} %"
+        mend = f"K = rig[{view}].K.copy(); K[:2, :2] *= {np.exp(change[6]):.4f}"
+    elif kind == "principal-point":
+        size = {"x_px": float(change[7]), "y_px": float(change[8])}
+        interval = {"x_px": _range(draws[:, 7]), "y_px": _range(draws[:, 8])}
+        shift = float(np.hypot(*change[7:9]))
+        alarm, cost = shift >= _CENTER, shift / rig[view].K[0, 0] * depth[view]
+        text = f"the principal point of {name} is off by {shift:.0f} px"
+        mend = f"K = rig[{view}].K.copy(); K[:2, 2] += [{change[7]:.1f}, {change[8]:.1f}]  # cropped pictures?"
+    elif kind == "distortion-ignored":
+        camera = rig[view]
+        radius = 0.5 * np.hypot(*camera.size) / camera.K[0, 0]
+        corner = abs(change[9]) * radius**3 * camera.K[0, 0]
+        size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
+        alarm, cost = corner >= _CORNER, 0.3 * corner / camera.K[0, 0] * depth[view]
+        text = f"the lens of {name} distorts otherwise than calibrated, by {corner:.0f} px in the corner"
+        kind = "distortion-model" if camera.distortion.any() else kind
+        mend = f"distortion = rig[{view}].distortion + np.array([{change[9]:.3f}, 0, 0, 0, 0])"
+    else:  # offsets of clocks are findings of mvpose.calibration.clocks
+        return None
+    severity: Severity = "alarm" if alarm else "note"
+    if alarm and undetermined:
+        severity = "unknown"
+    probability = found.probability * found.kind_probability
+    return Finding(
+        kind,
+        text,
+        severity,
+        min(probability, 1.0),
+        name,
+        view,
+        size,
+        interval,
+        cost=float(probability * cost / len(rig)),
+        mend=mend,
+    )
+
+
+def _note(fit: Fit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
+    """Return a note if people ask for a correction that good calibrations need as well."""
+    change, covariance = fit.change[view], fit.covariance[view]
+    deviation = np.abs(change[:6]) / np.sqrt(np.diagonal(covariance)[:6])
+    if deviation.max() < 3.0:
+        return []
+    size, interval = _pose_size(change, _draws(change, covariance))
+    if size["degrees"] < 0.1 and size["metres"] < 0.01:
+        return []
+    text = f"people ask for a correction of {names[view]} by {size['degrees']:.2f} degrees and "
+    text += f"{100 * size['metres']:.1f} cm, as they do of good calibrations"
+    cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
+    return [Finding("moved-camera", text, "note", 0.5, names[view], view, size, interval, cost, _REPAIR)]
+
+
+def _pose_size(change: Floats, draws: Floats) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Return angle and shift of a pose, with 90 % intervals."""
+    angle, shift = (np.linalg.norm(draws[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+    size = {"degrees": float(np.degrees(np.linalg.norm(change[:3]))), "metres": float(np.linalg.norm(change[3:6]))}
+    return size, {"degrees": _range(np.degrees(angle)), "metres": _range(shift)}
+
+
+def _draws(change: Floats, covariance: Floats) -> Floats:
+    """Return draws of the parameters, (n, 11), with the systematic errors of detectors."""
+    total = covariance + np.diag(_SYSTEMATIC**2)
+    factor = np.linalg.cholesky(total)
+    return change + np.random.default_rng(0).standard_normal((_DRAWS, len(change))) @ factor.T
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    low, high = np.quantile(values, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def _depths(fit: Fit, rig: Rig) -> Floats:
+    """Return the median distance of people from each camera, (V,), metres."""
+    joints = fit.equations.joints
+    joints = joints[np.isfinite(joints[:, 0])]
+    if not len(joints):
+        return np.full(len(rig), 3.0)
+    return np.array([float(np.median(np.linalg.norm(joints - center, axis=1))) for center in rig.centers])

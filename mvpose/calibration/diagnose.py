@@ -1,0 +1,149 @@
+"""The doctor: what is wrong with a rig, found from the people in the pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.calibration import camera_findings, convention_findings
+from mvpose.calibration.cameras import Fit, fit, joint_views
+from mvpose.calibration.clocks import estimate_clocks
+from mvpose.calibration.consistency import Consistency, Reading, cut
+from mvpose.calibration.conventions import search
+from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.normal_equations import residuals_of_others
+from mvpose.calibration.people_size import relative_size
+from mvpose.calibration.reread import reread_rig, reread_tracklets
+from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
+from mvpose.calibration.sufficiency import RECORD, travelled, unknowns
+from mvpose.calibration.tracklets import link
+from mvpose.calibration.views import Agreement, silent_views, strangers
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+
+
+def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Diagnosis:
+    """Return what is wrong with a rig.
+
+    First the conventions of its files are checked by what the views agree about without any reconstruction
+    (:mod:`.conventions`), then each camera against the people whom the others see (:mod:`.cameras`), under the files
+    as they would have to be read.
+
+    Args:
+        rig: the cameras as calibrated.
+        frames: detections of each frame, all views; ten seconds or more of people who walk.
+        period: seconds between frames whose detections carry no time.
+
+    Raises:
+        ValueError: frames of different skeletons, a view that the rig does not have, or wrong times.
+    """
+    names = camera_names(rig)
+    tracklets = link(rig, frames, period=period)
+    if not len(tracklets.frame):
+        nobody = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
+        return Diagnosis.of([nobody], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
+    detections = np.bincount(tracklets.view, minlength=len(rig))
+    findings = silent_views(detections, names)
+    consistency = Consistency(cut(tracklets))
+    reading, mistakes, _ = search(consistency, Reading.as_given(rig.packed), [camera.size for camera in rig])
+    findings += [convention_findings.of(each, names) for each in mistakes]
+    ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
+    reading, unit = convention_findings.unit(reading, ratio)
+    findings += unit
+    agreement = Agreement.of(consistency, reading)
+    findings += strangers(agreement, detections, names)
+    mended = reread_rig(rig, reading)
+    if mended is None:  # the cameras of no reading stand in different places within 200 m
+        mended, reading = rig, Reading.as_given(rig.packed)
+    tracklets = reread_tracklets(tracklets, reading)
+    sightings = sightings_of(tracklets, match_over_time(mended, tracklets).person)
+    useless = {each.view for each in findings if each.kind in _USELESS and each.view is not None}
+    sightings = sightings.select(~np.isin(sightings.view, list(useless)))
+    joints, rows = joint_views(sightings)
+    result = fit(mended.packed, joints)
+    times = np.nanmin(sightings.times[sightings.frame[rows]], axis=1) - np.nanmin(sightings.times)
+    first = joints.start[:-1]
+    missing = unknowns(
+        result,
+        seconds=_seconds(times),
+        moved=_travelled(sightings, rows[first], result.equations.joints),
+        agreement=agreement,
+        left_out=useless,
+        names=names,
+    )
+    findings += missing
+    starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
+    undetermined = any(each.camera is None for each in missing)
+    findings += camera_findings.of(result, mended, starts, names, undetermined=undetermined)
+    findings += estimate_clocks(mended, sightings, period=period).findings()
+    residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
+    return Diagnosis.of(
+        findings,
+        evidence=_evidence(result, times, agreement, ratio, bones, residuals, names),
+        cameras=names,
+        residuals=residuals,
+    )
+
+
+_USELESS = ("silent-view", "other-people")
+
+
+def _seconds(times: Floats) -> float:
+    """Return how long people were seen by several views: time in which the next sighting came within half a second."""
+    gaps = np.diff(np.unique(times))
+    return float(gaps[gaps <= 0.5].sum())
+
+
+def _travelled(sightings: Sightings, rows: Integers, joints: Floats) -> float:
+    """Return how far people moved in all, metres, by the joint of each that is seen most."""
+    if not len(rows):
+        return 0.0
+    number = sightings.person[rows] * len(sightings.skeleton) + sightings.joint[rows]
+    person = sightings.person[rows]
+    result = 0.0
+    for each in np.unique(person):
+        own = np.flatnonzero(person == each)
+        names, counts = np.unique(number[own], return_counts=True)
+        result += travelled(joints[own[number[own] == names[np.argmax(counts)]]])
+    return result
+
+
+def _evidence(
+    result: Fit,
+    times: Floats,
+    agreement: Agreement,
+    ratio: float,
+    bones: int,
+    residuals: Floats,
+    names: Sequence[str],
+) -> list[str]:
+    """Return the numbers on which the verdict rests."""
+    pairs = agreement.pairs[np.isfinite(agreement.pairs)]
+    known = np.isfinite(result.equations.joints[:, 0])
+    lines = [
+        f"{int(known.sum())} joints seen by two cameras or more, over {_seconds(times):.1f} s",
+        f"agreement of pairs of cameras (1: rays meet as well as keypoints allow): mean {pairs.mean():.2f}, "
+        f"least {pairs.min():.2f}"
+        if len(pairs)
+        else "no two cameras have detections at the same time",
+    ]
+    if np.isfinite(ratio):
+        lines.append(f"people are {ratio:.2f} times as large as adults ({bones} bones)")
+    lines.append(
+        "median distance from the people whom the other cameras see: "
+        + ", ".join(f"{name} {value:.1f} px" for name, value in zip(names, residuals, strict=True))
+    )
+    lines.append(
+        f"errors of keypoints are {result.equations.scale:.2f} of the error model, {result.quadratic.temper:.1f} of "
+        "them count as one"
+    )
+    for name, change, covariance in zip(names, result.change, result.covariance, strict=True):
+        turn, shift = np.degrees(np.linalg.norm(change[:3])), 100 * np.linalg.norm(change[3:6])
+        sigma = np.sqrt(np.diagonal(covariance))
+        lines.append(
+            f"{name}: people ask for {turn:.2f} degrees and {shift:.1f} cm "
+            f"(standard deviations {np.degrees(sigma[:3].max()):.2f} degrees and {100 * sigma[3:6].max():.1f} cm)"
+        )
+    return lines

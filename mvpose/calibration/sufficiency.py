@@ -1,0 +1,105 @@
+"""Whether a recording determines the calibration: how long it is, how much people moved, who saw them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from mvpose.calibration.cameras import MODELS, Fault, Fit
+from mvpose.calibration.findings import Finding
+from mvpose.calibration.views import Agreement
+
+_SECONDS = 3.0  # of people whom several views see; errors of a detector last for half a second
+_TRAVELLED = 1.0  # metres, all people together
+_JOINTS = 200  # joints in frames seen by two views or more
+_AGREES = 0.25  # mean agreement of pairs of views below which they see different people
+_TURN, _SHIFT = np.radians(0.6), 0.06  # standard deviations of the pose of a camera that people determine
+
+RECORD = (
+    "record at least 10 s at 10 pictures a second or more, in which one to four people walk through all of the space "
+    "that the cameras share, so that at least three cameras see each of them"
+)
+"""What to record."""
+
+
+def travelled(places: Floats) -> float:
+    """Return how far a joint moved, metres: the extent of where it was, without its farthest fifth.
+
+    Args:
+        places: places over time, (n, 3), metres; NaN where unknown.
+    """
+    known = places[np.isfinite(places[:, 0])]
+    if len(known) < 8:
+        return 0.0
+    low, high = np.quantile(known, [0.1, 0.9], axis=0)
+    return float(np.linalg.norm(high - low))
+
+
+def unknowns(
+    fit: Fit,
+    *,
+    seconds: float,
+    moved: float,
+    agreement: Agreement,
+    left_out: set[int],
+    names: Sequence[str],
+) -> list[Finding]:
+    """Return what the recording does not determine.
+
+    Args:
+        fit: what was found about the cameras.
+        seconds: time in which people were seen by several views.
+        moved: sum of :func:`travelled` over people, of one joint of each.
+        agreement: agreement of pairs of views.
+        left_out: views that contribute nothing, for which there are findings.
+        names: names of the cameras.
+    """
+    views = len(names)
+    used = [view for view in range(views) if view not in left_out]
+    joints = int(np.isfinite(fit.equations.joints[:, 0]).sum())
+    pairs = [agreement.pairs[i, j] for i in used for j in used if i < j and np.isfinite(agreement.pairs[i, j])]
+    if views == 2 or len(used) <= 2:
+        which = "the rig has two cameras" if views == 2 else "only two cameras see the same people"
+        return [_cannot(f"{which}: their errors and the places of people cannot be told apart", "add a third camera")]
+    if not pairs or np.mean(pairs) < _AGREES:
+        return [
+            _cannot(
+                "the cameras do not see the same people at the same time and place",
+                f"check that the pictures are of one time, and {RECORD}",
+            )
+        ]
+    if joints < _JOINTS or seconds < _SECONDS:
+        return [_cannot(f"people were seen by several cameras for {seconds:.1f} s only ({joints} joints)", RECORD)]
+    if moved < _TRAVELLED:
+        return [_cannot(f"people stood still (they moved by {moved:.1f} m in all)", RECORD)]
+    findings = []
+    for view in used:
+        turn, shift = _uncertainty(fit, view, views)
+        if turn > _TURN or shift > _SHIFT:
+            findings.append(
+                _cannot(
+                    f"too little of what the other cameras see is seen by {names[view]}: its pose is known to "
+                    f"{np.degrees(turn):.1f} degrees and {100 * shift:.0f} cm only",
+                    RECORD,
+                    camera=names[view],
+                    view=view,
+                )
+            )
+    if len(findings) > 0.5 * len(used):
+        return [_cannot("people were seen in too few places to determine the poses of most cameras", RECORD)]
+    return findings
+
+
+def _uncertainty(fit: Fit, view: int, views: int) -> tuple[float, float]:
+    """Return the standard deviations of turn (rad) and shift (m) of a camera of which nothing is believed."""
+    widest = max((each for each in MODELS if each.kind == "moved-camera"), key=lambda each: each.sigma)
+    blocks = len(fit.quadratic.H)
+    _, covariance = fit.quadratic.posterior([Fault(widest, view, "always", np.ones(blocks))])
+    pose = covariance[-6:, -6:]
+    return float(np.sqrt(np.trace(pose[:3, :3]) / 3)), float(np.sqrt(np.trace(pose[3:, 3:]) / 3))
+
+
+def _cannot(text: str, mend: str, camera: str | None = None, view: int | None = None) -> Finding:
+    return Finding("cannot-tell", f"cannot tell: {text}", "unknown", 0.5, camera, view, cost=0.0, mend=mend)

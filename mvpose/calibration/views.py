@@ -1,0 +1,95 @@
+"""Views that contribute nothing: no detections in them, or of other people than the rest sees.
+
+Pictures that are mirrored and exchanged names of left and right are among the conventions (:mod:`.conventions`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.calibration.consistency import Consistency, Reading
+from mvpose.calibration.findings import Finding
+
+_SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
+_STRANGER = 0.10  # agreement of the best pair of views below which they see different people
+_SHARED = 0.30  # agreement from which two views see the same people
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well pairs of views agree.
+
+    Attributes:
+        pairs: evidence of each pair as a share of what it would be without errors, (V, V), 0 to 1; NaN where the two
+            views have no detections at the same time.
+    """
+
+    pairs: Floats
+
+    @classmethod
+    def of(cls, consistency: Consistency, reading: Reading) -> Agreement:
+        """Return the agreement of all pairs of views under a reading."""
+        evidence, ideal = (each.sum(axis=2) for each in (consistency(reading), consistency.ideal(reading)))
+        evidence, ideal = evidence + evidence.T, ideal + ideal.T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return cls(np.where(ideal > 0, evidence / ideal, np.nan))
+
+    @property
+    def best(self) -> Floats:
+        """Agreement of each view with the one that it agrees with best, (V,); 0 without any."""
+        return np.nan_to_num(self.pairs).max(axis=1)
+
+
+def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
+    """Return views with no or nearly no detections.
+
+    Args:
+        detections: number of detections of each view in the recording, (V,).
+        names: names of the cameras.
+    """
+    findings = []
+    usual = float(np.median(detections[detections > 0])) if (detections > 0).any() else 0.0
+    for view, count in enumerate(detections.tolist()):
+        if count > _SILENT * usual:
+            continue
+        findings.append(
+            Finding(
+                "silent-view",
+                f"{names[view]} has {count or 'no'} detections, a view of this rig has usually {usual:.0f}",
+                camera=names[view],
+                view=view,
+                size={"detections": float(count)},
+                cost=0.05,
+                mend="check the pictures and the detector of this camera, or leave it out of the rig",
+            )
+        )
+    return findings
+
+
+def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) -> list[Finding]:
+    """Return views that agree with no other one, where the others agree with each other."""
+    findings: list[Finding] = []
+    views = len(names)
+    alone = (agreement.best < _STRANGER) & (detections > 0)
+    if (agreement.best >= _SHARED).sum() < 2:
+        return findings
+    for view in np.flatnonzero(alone).tolist():
+        findings.append(
+            Finding(
+                "other-people",
+                f"{names[view]} sees nobody whom the other cameras see where its calibration has them: it sees other "
+                "people, its pictures are of another time or place, or its calibration is wrong altogether",
+                probability=0.95,
+                camera=names[view],
+                view=view,
+                size={"agreement": float(agreement.best[view])},
+                cost=1.0 / views,
+                mend="compare the pictures of this camera with those of the others at one time; calibrate it again, or "
+                "leave it out of the rig",
+            )
+        )
+    return findings

@@ -1,0 +1,124 @@
+"""The doctor on people who walk: the planted fault is named, and nothing where nothing is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_people import film, walk
+from people import look_at
+from scipy.spatial.transform import Rotation
+
+from mvpose import Rig
+from mvpose.calibration.diagnose import diagnose
+
+_FRAMES, _PERIOD = 60, 0.1
+_PLACES = ((4.0, 0.3, 2.1), (1.0, 3.8, 1.6), (-3.3, 2.4, 2.6), (-2.6, -3.2, 1.9), (1.6, -4.1, 2.4))
+
+
+def uneven(count):
+    """A rig without symmetry: no turn or mirroring of the world maps its cameras to each other."""
+    return Rig([look_at(np.array(_PLACES[v]), np.array([0.1 * v, 0.0, 1.0]), name=f"c{v}") for v in range(count)])
+
+
+@pytest.fixture(scope="module")
+def recording():
+    rig = uneven(5)
+    frames, _ = film(rig, walk(3, frames=_FRAMES, period=_PERIOD), noise=3.0)
+    return rig, frames
+
+
+def alarms(rig, frames):
+    diagnosis = diagnose(rig, frames, period=_PERIOD)
+    return diagnosis, [(each.kind, each.view) for each in diagnosis.alarms]
+
+
+def with_camera(rig, view, **changes):
+    cameras = list(rig)
+    cameras[view] = replace(cameras[view], **changes)
+    return Rig(cameras)
+
+
+def test_nothing_is_wrong_with_a_right_rig(recording):
+    diagnosis, found = alarms(*recording)
+    assert found == []
+    assert diagnosis.verdict == "fine"
+    assert diagnosis.residuals.max() < 8.0
+    assert diagnosis.evidence
+
+
+def test_the_camera_that_moved_is_named_with_its_size(recording):
+    rig, frames = recording
+    camera = rig[3]
+    turn = np.radians(1.5) * np.array([0.6, 0.64, 0.48])
+    R, center = Rotation.from_rotvec(turn).as_matrix() @ camera.R, camera.center + [0.05, 0.0, -0.05]
+    diagnosis, found = alarms(with_camera(rig, 3, R=R, t=-R @ center), frames)
+    assert found == [("moved-camera", 3)]
+    low, high = diagnosis.alarms[0].interval["degrees"]
+    assert low < 1.5 < high
+    low, high = diagnosis.alarms[0].interval["metres"]
+    assert low < 0.0707 < high
+
+
+@pytest.mark.parametrize("views", [(2,), (0, 1, 2, 3, 4)])
+def test_inverted_extrinsics_are_named_for_one_camera_and_for_all(recording, views):
+    rig, frames = recording
+    cameras = [replace(c, R=c.R.T, t=c.center) if v in views else c for v, c in enumerate(rig)]
+    diagnosis, found = alarms(Rig(cameras), frames)
+    assert found == [("extrinsics-inverted", 2 if len(views) == 1 else None)]
+    assert diagnosis.alarms[0].probability > 0.95
+
+
+def test_exchanged_cameras_are_named(recording):
+    rig, frames = recording
+    cameras = list(rig)
+    cameras[1], cameras[3] = cameras[3], cameras[1]
+    diagnosis, found = alarms(Rig(cameras), frames)
+    assert [kind for kind, _ in found] == ["cameras-swapped"]
+    assert diagnosis.alarms[0].view in (1, 3)
+
+
+def test_centimetres_are_named_by_the_size_of_people(recording):
+    rig, frames = recording
+    small = Rig([replace(c, t=10.0 * c.t) for c in rig])
+    diagnosis, found = alarms(small, frames)
+    assert found == [("wrong-unit", None)]
+    assert 8.0 < diagnosis.alarms[0].size["times_adults"] < 13.0
+
+
+def test_people_who_stand_still_do_not_determine_a_calibration():
+    rig = uneven(5)
+    frames, _ = film(rig, walk(1, frames=_FRAMES, period=_PERIOD, still=True), noise=3.0)
+    diagnosis, found = alarms(rig, frames)
+    assert diagnosis.verdict == "cannot tell"
+    assert found == []
+    assert "stood still" in diagnosis.findings[0].text
+
+
+def test_two_cameras_cannot_be_told_apart(recording):
+    rig, frames = recording
+    pair = [each.select(each.view < 2) for each in frames]
+    diagnosis, found = alarms(Rig([rig[0], rig[1]]), pair)
+    assert (diagnosis.verdict, found) == ("cannot tell", [])
+
+
+def test_cameras_that_look_at_different_people_cannot_be_compared():
+    rig = uneven(4)
+    only = [{v} for v in range(4)]
+    frames, _ = film(rig, walk(4, frames=_FRAMES, period=_PERIOD), only=only)
+    diagnosis, found = alarms(rig, frames)
+    assert (diagnosis.verdict, found) == ("cannot tell", [])
+
+
+def test_one_camera_that_sees_somebody_else_and_one_without_detections_are_named():
+    rig = uneven(5)
+    only = [{0, 1}, {0, 1}, {0, 1}, {2}, set()]
+    frames, _ = film(rig, walk(3, frames=_FRAMES, period=_PERIOD), only=only)
+    _, found = alarms(rig, frames)
+    assert sorted(found) == [("other-people", 3), ("silent-view", 4)]
+
+
+def test_no_detections_are_no_error(recording):
+    rig, frames = recording
+    diagnosis = diagnose(rig, [each.select(each.view < 0) for each in frames])
+    assert diagnosis.verdict == "cannot tell"
+    assert np.isnan(diagnosis.residuals).all()
