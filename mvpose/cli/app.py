@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli import estimate
+from mvpose.cli import estimate, view
 
 app = typer.Typer(
     name="mvpose",
@@ -42,3 +42,4 @@ def options(
 
 
 estimate.add_to(app)
+view.add_to(app)

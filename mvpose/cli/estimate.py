@@ -48,6 +48,7 @@ def estimate(
     frames: Frames = None,
     skeleton: Skeleton = None,
     up: Up = None,
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page of the result.")] = True,
     trust: Annotated[
         bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
     ] = False,
@@ -65,5 +66,5 @@ def estimate(
         choices = Choices(fps, times, cameras, frames, skeleton, size, up)
         inputs = read_inputs(calibration, detections, choices)
         people = estimate_people(inputs, estimator(method, lag=lag, period=inputs.period), trust=trust)
-        write_results(out, people, inputs, formats=chosen, command=command_line())
+        write_results(out, people, inputs, formats=chosen, command=command_line(), page=page)
     typer.echo(f"{len(people)} people in {people.frames} frames: {out}")

@@ -32,5 +32,5 @@ def check_writable(folder: Path, *, option: str = "--out") -> None:
         raise ValueError(f"{option} {folder}: cannot be written: permission denied")
 
 
-RESULTS = "recording.json"
+RESULTS = "inputs.json"
 """A file that every folder of results holds, and by which one is recognised."""

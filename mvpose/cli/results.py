@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from mvpose.cli.exit_codes import failing
 from mvpose.cli.inputs import Inputs
 from mvpose.cli.output_folder import RESULTS
 from mvpose.files.atomic_files import atomic_folder
@@ -30,8 +31,10 @@ def formats_of(given: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*ALWAYS, *names)))
 
 
-def write_results(folder: Path, people: People, inputs: Inputs, *, formats: Sequence[str], command: str) -> None:
-    """Write people in some formats, and what they were estimated from.
+def write_results(
+    folder: Path, people: People, inputs: Inputs, *, formats: Sequence[str], command: str, page: bool = True
+) -> None:
+    """Write people in some formats, what they were estimated from, and the page of the recording.
 
     Raises:
         OSError: the folder cannot be written; nothing is left of it.
@@ -45,3 +48,8 @@ def write_results(folder: Path, people: People, inputs: Inputs, *, formats: Sequ
             "numbers": inputs.numbers.tolist(),  # of the frames in the files of detections; ours count from 0
         }
         (partial / RESULTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
+        if page:
+            from mvpose.report.recording_page import write_page
+
+            with failing("the page"):
+                write_page(partial, name=folder.absolute().name, people=people, rig=inputs.rig, frames=inputs.frames)

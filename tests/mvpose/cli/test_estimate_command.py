@@ -65,9 +65,10 @@ class TestEstimate:
         assert len(table) == 12 * 2 * 17
         assert np.median(distances(table, joints)) < 0.01
         assert sorted(each.name for each in (tmp_path / "out").iterdir()) == [
-            "people.json", "person_0.trc", "person_1.trc", "poses.parquet", "recording.json",
+            "inputs.json", "people.json", "person_0.trc", "person_1.trc", "poses.parquet", "recording.html",
+            "recording.json",
         ]  # fmt: skip
-        about = json.loads((tmp_path / "out" / "recording.json").read_text())
+        about = json.loads((tmp_path / "out" / "inputs.json").read_text())
         assert about["numbers"] == list(range(12))
 
     def test_formats_frames_methods_and_times(self, lab, tmp_path):
@@ -96,7 +97,7 @@ class TestEstimate:
         result = run("estimate", folder / "unsized.json", folder / "openpose", "--out", tmp_path / "out")
         assert result.exit_code == 0, result.output
         assert "taken as 1280 x 960" in result.stderr
-        assert json.loads((tmp_path / "out" / "recording.json").read_text())["cameras"][0]["size"] == [1280, 960]
+        assert json.loads((tmp_path / "out" / "inputs.json").read_text())["cameras"][0]["size"] == [1280, 960]
 
 
 class TestRefusals:

@@ -1,0 +1,33 @@
+"""``mvpose view``: the page of a folder of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mvpose.cli.exit_codes import exit_on_error
+
+_PAGES = ("recording.html", "doctor.html")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(view)
+
+
+def view(
+    folder: Annotated[Path, typer.Argument(help="Folder of results of [cyan]mvpose estimate[/].", metavar="FOLDER")],
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+) -> None:
+    """Show the page of a result: print where it is, and open it in a browser."""
+    with exit_on_error():
+        page = next((folder / name for name in _PAGES if (folder / name).is_file()), None)
+        if page is None:
+            raise ValueError(f"{folder}: has no {_PAGES[0]}; expected a folder that `mvpose estimate ... --out` made")
+        typer.echo(page)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(page.absolute().as_uri())
