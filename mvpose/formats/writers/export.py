@@ -12,6 +12,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.formats.writers.uniform import uniform
 from mvpose.recording import People
+from mvpose.skeleton_fit import FittedBody, fit_bodies
 
 Up = Literal["z", "y"]
 
@@ -67,6 +68,11 @@ class Export:
     def uniform(self) -> People:
         """The people at uniform times, for formats that state a rate instead of the time of each frame."""
         return uniform(self.people)
+
+    @cached_property
+    def bodies(self) -> list[FittedBody]:
+        """Bodies fitted to the people at uniform times."""
+        return fit_bodies(self.uniform)
 
 
 def each_person(people: People) -> Iterator[tuple[int, int, slice]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mvpose.files.atomic_files import write_atomic
-from mvpose.formats.writers import c3d, panoptic, people_json, rerun, tables, trc
+from mvpose.formats.writers import bone_lengths, bvh, c3d, gltf, panoptic, people_json, rerun, tables, trc
 from mvpose.formats.writers.export import Export, Options
 from mvpose.recording import People
 
@@ -42,6 +42,9 @@ FORMATS: dict[str, PeopleFormat] = {
     "parquet": PeopleFormat(tables.write_parquet, "poses.parquet", ("polars",)),
     "json": PeopleFormat(people_json.write, "people.json"),
     "panoptic": PeopleFormat(panoptic.write, "hdPose3d/body3DScene_FRAME.json"),
+    "bvh": PeopleFormat(bvh.write, "person_ID.bvh"),
+    "gltf": PeopleFormat(gltf.write, "people.glb"),
+    "lengths": PeopleFormat(bone_lengths.write, "bone_lengths.csv"),
     "rrd": PeopleFormat(rerun.write, "people.rrd", ("rerun",), "rerun-sdk"),
 }
 """Registered formats by name."""

@@ -1,0 +1,76 @@
+"""Rotation matrices and rotation vectors of any leading shape, by SciPy."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose.arrays import Floats
+
+_NEAR_HALF_TURN = -0.999  # cosine of an angle
+
+
+def to_matrices(vectors: Floats) -> Floats:
+    """Return the rotations of rotation vectors (..., 3), radians, as matrices (..., 3, 3)."""
+    flat = np.array(vectors.reshape(-1, 3))  # SciPy refuses arrays that are read-only
+    return Rotation.from_rotvec(flat).as_matrix().reshape(*vectors.shape, 3)
+
+
+def to_vectors(matrices: Floats) -> Floats:
+    """Return the rotation vectors (..., 3), radians, of rotation matrices (..., 3, 3)."""
+    cosine = (np.trace(matrices, axis1=-2, axis2=-1) - 1.0) / 2.0
+    sines = np.stack([matrices[..., 2, 1], matrices[..., 0, 2], matrices[..., 1, 0]], axis=-1)
+    sines = (sines - np.stack([matrices[..., 1, 2], matrices[..., 2, 0], matrices[..., 0, 1]], axis=-1)) / 2.0
+    sine = np.sqrt(np.sum(sines**2, axis=-1))
+    angle = np.arctan2(sine, cosine)
+    vectors = sines * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)[..., None]
+    half = cosine < _NEAR_HALF_TURN  # where the sines lose the axis
+    if half.any():
+        vectors[half] = Rotation.from_matrix(matrices[half]).as_rotvec()
+    return vectors
+
+
+def shortest(start: Floats, end: Floats) -> Floats:
+    """Return the rotations with the least angle that turn unit vectors into others, (..., 3, 3).
+
+    Opposite vectors, between which there is no shortest turn, give a half turn about an axis at right angles.
+    """
+    start, end = np.broadcast_arrays(start, end)
+    axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)
+    opposite = cosine < -1.0 + 1e-12
+    K = skew(axis)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.eye(3) + K + K @ K / (1.0 + cosine)[..., None, None]
+    if opposite.any():
+        least = np.eye(3)[np.abs(start[opposite]).argmin(axis=-1)]
+        normal = np.cross(start[opposite], least)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        turns[opposite] = 2.0 * normal[:, :, None] * normal[:, None, :] - np.eye(3)
+    return turns
+
+
+def skew(vectors: Floats) -> Floats:
+    """Return the matrices (..., 3, 3) that multiply as the cross product with vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
+    return np.stack(rows, axis=-1).reshape(*vectors.shape, 3)
+
+
+def frame(primary: Floats, secondary: Floats, axes: tuple[int, int]) -> Floats:
+    """Return right-handed frames, (..., 3, 3) with axes as columns, from two directions.
+
+    Args:
+        primary: direction of the axis ``axes[0]``, (..., 3), any length above 0.
+        secondary: direction of the axis ``axes[1]`` as far as it is at right angles to the first, (..., 3).
+        axes: which axes they are, 0 to 2, different.
+    """
+    first = primary / np.linalg.norm(primary, axis=-1, keepdims=True)
+    second = secondary - np.sum(secondary * first, axis=-1, keepdims=True) * first
+    second = second / np.linalg.norm(second, axis=-1, keepdims=True)
+    third = np.cross(first, second)
+    result = np.empty((*first.shape, 3))
+    result[..., axes[0]], result[..., axes[1]] = first, second
+    cyclic = (axes[1] - axes[0]) % 3 == 1
+    result[..., 3 - sum(axes)] = third if cyclic else -third
+    return result
