@@ -9,7 +9,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.recording import People
 from mvpose.report.palette import identity_color
-from mvpose.report.rig_plots import camera_from_above
+from mvpose.report.rig_plots import camera_from_above, fit_view
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
 from mvpose.report.track_plots import draw_bar, half_step, label_ends, runs_of, thinned
 
@@ -66,14 +66,7 @@ def paths_from_above(name: str, people: People, rig: Rig) -> str:
             if known.any():
                 ends[str(people.ids[person])] = places[known, person][-1]
                 axes.plot(*ends[str(people.ids[person])], "o", ms=5, color=color, mew=0, zorder=5)
-        middle, half = (low + high) / 2, (high - low) / 2
-        half = np.maximum(half, half[::-1] / _TALL ** np.array([1, -1]))  # the shape of the axes, nearly
-        axes.set(xlabel="x, m", ylabel="y, m")
-        axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
-        axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-        axes.set_aspect("equal")
-        axes.grid()
-        axes.spines[:].set_visible(False)
+        fit_view(axes, low, high, tall=_TALL)
         label_ends(axes, ends)
     return written[0]
 

@@ -38,6 +38,18 @@ def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: 
         )
 
 
+def fit_view(axes: Axes, low: Floats, high: Floats, *, tall: float) -> None:
+    """Show the rectangle from ``low`` to ``high``, (2,), metres, to scale, in axes ``tall`` times as high as wide."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    half = np.maximum(half, [half[1] / tall, half[0] * tall])
+    axes.set(xlabel="x, m", ylabel="y, m")
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    axes.set_aspect("equal")
+    axes.grid()
+    axes.spines[:].set_visible(False)
+
+
 def cone_from_above(camera: Camera, reach: float) -> Floats:
     """Return the centre and the two far corners of the horizontal field of view, (3, 2), metres."""
     forward = camera.R[2]

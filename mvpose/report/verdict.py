@@ -13,9 +13,18 @@ _SENTENCES = {
 }
 _UNITS = {
     "degrees": "°", "metres": "m", "ms": "ms", "s": "s", "px": "px", "pixels": "px", "percent": "%", "hz": "Hz",
-    "mm": "mm", "cm": "cm", "factor": "", "frames": "frames", "share": "",
+    "mm": "mm", "cm": "cm", "factor": "", "frames": "frames", "pictures": "pictures", "share": "",
 }  # fmt: skip
-_DECIMALS = {"°": 2, "m": 2, "cm": 1, "mm": 0, "ms": 1, "s": 1, "px": 1, "%": 1, "frames": 0}
+_NAMES = {
+    "degrees": "angle",
+    "metres": "distance",
+    "mm": "distance",
+    "ms": "time",
+    "s": "time",
+    "px": "distance",
+    "percent": "share",
+}
+_DECIMALS = {"°": 2, "m": 2, "cm": 1, "mm": 0, "ms": 1, "s": 1, "px": 1, "%": 1, "frames": 0, "pictures": 0}
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ def _name_and_unit(key: str) -> tuple[str, str]:
     """Return the name and the unit of a key such as ``since_s``: ("since", "s")."""
     head, _, unit = key.rpartition("_")
     if unit in _UNITS:
-        return head.replace("_", " "), _UNITS[unit]
+        return head.replace("_", " ") or _NAMES.get(unit, unit), _UNITS[unit]
     return key.replace("_", " "), ""
 
 

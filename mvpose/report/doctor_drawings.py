@@ -1,0 +1,225 @@
+"""Drawings of the doctor's page over pictures, as SVG: residual arrows of a camera, epipolar lines of a pair."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mvpose.arrays import Floats
+from mvpose.calibration.sightings import Sightings
+from mvpose.camera import Camera, Rig
+from mvpose.report.limbs import limbs_of
+from mvpose.report.svg_plots import VARIANT_COLORS
+
+_USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
+_DEPTHS = np.geomspace(0.3, 60.0, 160)  # metres along a ray, of the points that a line is drawn through
+_MOST_LINES = len(VARIANT_COLORS)  # in a pair of pictures: more hide each other
+_INEXACT = 0.1  # OKS sigma of joints that are not drawn
+_NICE = (1.0, 2.0, 5.0)  # leading digits of factors
+_ARROW = 0.085  # of the width of the picture: length of a long arrow
+
+
+@dataclass(frozen=True)
+class Field:
+    """Mean residual field of one camera: places (c, 2) and offsets (c, 2), pixels."""
+
+    places: Floats
+    offsets: Floats
+
+
+def exaggeration(fields: Sequence[tuple[Field, float]]) -> float:
+    """Return one factor for the arrows of all cameras, 1, 2, 5, 10, ..., with which the long ones are easy to see.
+
+    Args:
+        fields: fields with the widths of their pictures, pixels.
+    """
+    relative = [np.hypot(*field.offsets.T) / width for field, width in fields if len(field.offsets)]
+    if not relative:
+        return 1.0
+    return nice_factor(_ARROW / max(float(np.quantile(np.concatenate(relative), 0.9)), 1e-9))
+
+
+def nice_factor(factor: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... up to a factor, at least 1."""
+    if factor <= 1.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(factor) + 1e-9)
+    return float(max(digit * power for digit in _NICE if digit * power <= factor * (1 + 1e-9)))
+
+
+def draw_field(camera: Camera, field: Field, *, kind: str, factor: float) -> Iterator[str]:
+    """Yield the arrows of a residual field, from where the other cameras place the joints to where they were detected.
+
+    Args:
+        camera: the camera.
+        field: its residuals.
+        kind: class of the arrows in the style sheet, "before" or "after".
+        factor: by which the arrows are longer than the residuals.
+    """
+    unit = camera.size[1] / _USUAL_HEIGHT
+    head = 7.0 * unit
+    path = ""
+    for (x, y), offset in zip(field.places.tolist(), factor * field.offsets, strict=True):
+        length = float(np.hypot(*offset))
+        end_x, end_y = x + float(offset[0]), y + float(offset[1])
+        path += f"M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}"
+        if length > head:
+            along = offset / length * head
+            for turn in (0.45, -0.45):
+                back_x = end_x - along[0] * math.cos(turn) + along[1] * math.sin(turn)
+                back_y = end_y - along[0] * math.sin(turn) - along[1] * math.cos(turn)
+                path += f"M{end_x:.1f} {end_y:.1f}L{back_x:.1f} {back_y:.1f}"
+    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{2 * unit:.2g}"/>' for x, y in field.places.tolist())
+    yield f'<g class="field {kind}"><path d="{path}" stroke-width="{2.2 * unit:.3g}"/>{dots}</g>'
+
+
+@dataclass(frozen=True)
+class MatchedJoint:
+    """A joint that two views detected in a frame: its pixels in both, (2,), and its name."""
+
+    frame: int
+    first: Floats
+    second: Floats
+    name: str
+
+
+def matched_joints(sightings: Sightings, pair: tuple[int, int], sizes: Sequence[tuple[int, int]]) -> list[MatchedJoint]:
+    """Return joints of one frame that both views of a pair detected, far from each other in the second picture.
+
+    The frame is that with the most people in both views, and then with the most joints. Hips and the like, whose place
+    detectors find least exactly, are left out.
+
+    Args:
+        sightings: keypoints matched over views.
+        pair: the two views.
+        sizes: width and height of the pictures of all views, pixels.
+    """
+    exact = np.array(sightings.skeleton.sigmas)[sightings.joint] < _INEXACT
+    first, second = (
+        {_key(sightings, k): k for k in np.flatnonzero(exact & (sightings.view == view)).tolist()} for view in pair
+    )
+    frames: dict[int, list[tuple[int, int, int]]] = {}
+    for key, k in second.items():
+        if key in first and _inside(sightings.pixels[k], sizes[pair[1]]):
+            frames.setdefault(key[0], []).append(key)
+    if not frames:
+        return []
+    best = max(frames.values(), key=lambda keys: (len({person for _, person, _ in keys}), len(keys)))
+    chosen = _far_apart(np.array([sightings.pixels[second[key]] for key in best]))
+    return [
+        MatchedJoint(
+            best[k][0],
+            sightings.pixels[first[best[k]]],
+            sightings.pixels[second[best[k]]],
+            sightings.skeleton.joints[best[k][2]].replace("_", " "),
+        )
+        for k in chosen
+    ]
+
+
+def draw_bodies(camera: Camera, sightings: Sightings, frame: int, view: int) -> Iterator[str]:
+    """Yield everybody who was detected in a picture as thin limbs."""
+    here = (sightings.frame == frame) & (sightings.view == view)
+    edges, unit = limbs_of(sightings.skeleton), camera.size[1] / _USUAL_HEIGHT
+    path = ""
+    for person in np.unique(sightings.person[here]):
+        rows = np.flatnonzero(here & (sightings.person == person))
+        place = dict(zip(sightings.joint[rows].tolist(), sightings.pixels[rows].tolist(), strict=True))
+        path += "".join(
+            f"M{place[a][0]:.1f} {place[a][1]:.1f}L{place[b][0]:.1f} {place[b][1]:.1f}"
+            for a, b in edges
+            if a in place and b in place
+        )
+    yield f'<path class="body" d="{path}" stroke-width="{1.6 * unit:.3g}"/>'
+
+
+def _key(sightings: Sightings, k: int) -> tuple[int, int, int]:
+    return int(sightings.frame[k]), int(sightings.person[k]), int(sightings.joint[k])
+
+
+def _inside(pixel: Floats, size: tuple[int, int]) -> bool:
+    return bool(0 <= pixel[0] < size[0] and 0 <= pixel[1] < size[1])
+
+
+def _far_apart(points: Floats) -> list[int]:
+    """Return the indices of at most :data:`_MOST_LINES` points, each the farthest from those before."""
+    chosen = [int(np.argmin(points[:, 1]))]
+    while len(chosen) < min(_MOST_LINES, len(points)):
+        distance = np.linalg.norm(points[:, None] - points[chosen], axis=-1).min(axis=1)
+        chosen.append(int(np.argmax(distance)))
+    return chosen
+
+
+def epipolar_curve(first: Camera, second: Camera, pixel: Floats) -> Floats:
+    """Return the image in the second camera of the ray of a pixel of the first, (k, 2), pixels; NaN where not seen.
+
+    It is a line where the second lens has no distortion.
+    """
+    ray = first.rays(pixel)
+    return second.project(first.center + _DEPTHS[:, None] * ray)
+
+
+def draw_joints(camera: Camera, joints: Sequence[MatchedJoint], *, second: bool) -> Iterator[str]:
+    """Yield the joints of a pair in one of its pictures as numbered dots."""
+    unit = camera.size[1] / _USUAL_HEIGHT
+    for number, joint in enumerate(joints):
+        x, y = (joint.second if second else joint.first).tolist()
+        color = VARIANT_COLORS[number]
+        yield (
+            f'<g class="joint"><circle cx="{x:.1f}" cy="{y:.1f}" r="{6 * unit:.3g}" style="fill: {color}" '
+            f'stroke-width="{1.5 * unit:.3g}"><title>{html.escape(joint.name)}</title></circle>'
+            f'<text x="{x + 10 * unit:.1f}" y="{y - 8 * unit:.1f}" font-size="{19 * unit:.3g}">{number + 1}</text></g>'
+        )
+
+
+def draw_lines(first: Camera, second: Camera, joints: Sequence[MatchedJoint], *, kind: str) -> Iterator[str]:
+    """Yield the epipolar lines of joints of the first camera in the picture of the second."""
+    unit = second.size[1] / _USUAL_HEIGHT
+    size = np.array(second.size)
+    for number, joint in enumerate(joints):
+        curve = epipolar_curve(first, second, joint.first)
+        with np.errstate(invalid="ignore"):
+            near = ((curve > -size) & (curve < 2 * size)).all(axis=1)
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in curve[near].tolist())
+        color = VARIANT_COLORS[number]
+        yield f'<polyline class="line {kind}" points="{points}" stroke="{color}" stroke-width="{2 * unit:.3g}"/>'
+
+
+def distance_from_line(first: Camera, second: Camera, joint: MatchedJoint) -> float:
+    """Return the distance of a joint in the second picture from the epipolar line of the first, pixels; NaN if none."""
+    curve = epipolar_curve(first, second, joint.first)
+    known = curve[np.isfinite(curve).all(axis=1)]
+    if len(known) < 2:
+        return math.nan
+    start, step = known[:-1], np.diff(known, axis=0)
+    length2 = np.maximum((step**2).sum(axis=1), 1e-12)
+    along = np.clip(((joint.second - start) * step).sum(axis=1) / length2, 0.0, 1.0)
+    return float(np.linalg.norm(start + along[:, None] * step - joint.second, axis=1).min())
+
+
+def best_partner(sightings: Sightings, view: int, rig: Rig) -> int | None:
+    """Return the view whose epipolar lines in a view say the most about it: its joints are the farthest off them.
+
+    Only views that share at least half as many joints with it as another one does are considered.
+    """
+    points, count = sightings.points
+    seen = np.zeros((count, len(rig)), bool)
+    seen[points, sightings.view] = True
+    shared = seen[seen[:, view]].sum(axis=0)
+    shared[view] = 0
+    if not shared.any():
+        return None
+    sizes = [camera.size for camera in rig]
+    candidates = np.flatnonzero(2 * shared >= shared.max()).tolist()
+    return max(candidates, key=lambda other: _median_distance(rig, sightings, (other, view), sizes))
+
+
+def _median_distance(rig: Rig, sightings: Sightings, pair: tuple[int, int], sizes: Sequence[tuple[int, int]]) -> float:
+    joints = matched_joints(sightings, pair, sizes)
+    distances = [distance_from_line(rig[pair[0]], rig[pair[1]], joint) for joint in joints]
+    known = [distance for distance in distances if math.isfinite(distance)]
+    return float(np.median(known)) if known else -1.0

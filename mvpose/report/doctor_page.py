@@ -1,0 +1,307 @@
+"""Page of the doctor: what is wrong with a rig, in plain words and in pictures, before and after the repair."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from markupsafe import Markup
+
+from mvpose.arrays import Floats
+from mvpose.calibration.clocks import Clocks
+from mvpose.calibration.findings import KINDS, Diagnosis, Finding, camera_names
+from mvpose.calibration.sightings import Sightings
+from mvpose.camera import Rig
+from mvpose.files.atomic_files import write_atomic
+from mvpose.report import doctor_drawings as drawings
+from mvpose.report import doctor_plots as plots
+from mvpose.report.documents import fill_template, program_version
+from mvpose.report.leave_one_out import Missing, leave_one_out, mean_field
+from mvpose.report.picture_drawings import Pictures, picture_element
+from mvpose.report.verdict import quantities, sentence
+
+PAGE, NUMBERS = "doctor.html", "doctor.json"
+"""Names of the files that :func:`write_doctor_page` writes."""
+
+_MOST_VIEWS = 16  # with residual arrows: those with the largest residuals
+_NINETY = 1.645  # standard deviations of a Gaussian to each side of the middle 90 %
+
+
+class Repaired(Protocol):
+    """What the page takes from a :class:`mvpose.calibration.Repair`."""
+
+    @property
+    def rig(self) -> Rig:
+        """The corrected rig."""
+
+    @property
+    def offsets(self) -> Floats:
+        """Offset of each camera's clock, (V,), seconds."""
+
+    @property
+    def corrections(self) -> Floats:
+        """Rotation vector (rad) and centre (m) of each camera's correction, (V, 6)."""
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of each camera's correction, (V, 6, 6)."""
+
+    @property
+    def refused(self) -> str | None:
+        """Why nothing was changed; None where something was."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the repair as values that ``json.dumps`` writes."""
+
+
+def write_doctor_page(
+    folder: str | Path,
+    *,
+    name: str,
+    rig: Rig,
+    sightings: Sightings,
+    diagnosis: Diagnosis,
+    repair: Repaired | None = None,
+    clocks: Clocks | None = None,
+    pictures: Pictures | None = None,
+) -> Path:
+    """Write what the doctor found, ``doctor.html``, and the same as ``doctor.json``.
+
+    Args:
+        folder: an existing folder.
+        name: what was examined, the title of the page.
+        rig: the rig as it was given.
+        sightings: keypoints matched over time and views, of :func:`mvpose.calibration.gather`.
+        diagnosis: what is wrong.
+        repair: the corrected rig, where one was asked for.
+        clocks: offsets of the clocks of all cameras with intervals; by default those of findings and of the repair.
+        pictures: function that returns the picture of a frame and view; by default drawings are on plain ground.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    case = Case.of(rig, sightings, diagnosis, repair)
+    page = fill_template(
+        "doctor.html",
+        program="mvpose",
+        code=program_version(),
+        name=name,
+        verdict=diagnosis.verdict,
+        sentence=sentence(diagnosis),
+        evidence=diagnosis.evidence,
+        findings=[_finding(each) for each in diagnosis.findings],
+        refused=None if repair is None else repair.refused,
+        repaired=case.after is not None,
+        above=_above(case),
+        cameras=_cameras(case),
+        fields=_fields(case),
+        lines=_lines(case, pictures),
+        clocks=_clocks(case, clocks),
+    )
+    numbers = {"name": name, **diagnosis.to_json(), "repair": None if repair is None else repair.to_json()}
+    write_atomic(Path(folder) / NUMBERS, (json.dumps(numbers, indent=1, allow_nan=False) + "\n").encode())
+    write_atomic(Path(folder) / PAGE, page.encode())
+    return Path(folder) / PAGE
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rig with its residuals before and after the repair.
+
+    Attributes:
+        rig: the rig as it was given.
+        names: names of its cameras, all different.
+        sightings: keypoints matched over time and views.
+        diagnosis: what is wrong.
+        repair: the repair, or None.
+        before: residuals of the sightings with the rig.
+        after: residuals with the repaired rig; None where nothing was changed.
+    """
+
+    rig: Rig
+    names: tuple[str, ...]
+    sightings: Sightings
+    diagnosis: Diagnosis
+    repair: Repaired | None
+    before: Missing
+    after: Missing | None
+
+    @classmethod
+    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repaired | None) -> Case:
+        """Compare the sightings with both rigs."""
+        after = None
+        if repair is not None and repair.refused is None:
+            after = leave_one_out(repair.rig, sightings, offsets=repair.offsets)
+        return cls(rig, camera_names(rig), sightings, diagnosis, repair, leave_one_out(rig, sightings), after)
+
+    @property
+    def accused(self) -> list[int]:
+        """Views that an alarm names, worst first."""
+        return list(dict.fromkeys(each.view for each in self.diagnosis.alarms if each.view is not None))
+
+    def residuals(self, missing: Missing) -> Floats:
+        """Return the median residual of each view, (V,), pixels; NaN for a view without any."""
+        lengths = np.hypot(*missing.offset.T)
+        known = np.isfinite(lengths)
+        return np.array(
+            [
+                np.median(lengths[here]) if (here := known & (self.sightings.view == view)).any() else np.nan
+                for view in range(len(self.rig))
+            ]
+        )
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    text = finding.text or KINDS[finding.kind]
+    return {
+        "kind": finding.kind.replace("-", " "),
+        "camera": finding.camera,
+        "severity": finding.severity,
+        "text": f"{text[:1].upper()}{text[1:].rstrip('.')}.",
+        "probability": f"{100 * finding.probability:.0f} %",
+        "quantities": quantities(finding),
+        "cost": f"{1000 * finding.cost:.0f} mm" if finding.cost >= 0.0005 else "",
+        "mend": finding.mend,
+    }
+
+
+def _above(case: Case) -> dict[str, Any]:
+    repaired = None if case.after is None or case.repair is None else case.repair.rig
+    moved = case.accused
+    if repaired is not None and not moved:
+        moved = [view for view in range(len(case.rig)) if np.any(repaired[view].P != case.rig[view].P)]
+    factor = 1.0 if repaired is None or not moved else plots.motion_factor(case.rig, repaired)
+    svg = plots.rig_from_above(
+        "rig-from-above", case.rig, repaired=repaired, moved=moved, points=case.before.point, factor=factor
+    )
+    return {"svg": Markup(svg), "factor": f"{factor:g}" if factor > 1 else ""}
+
+
+def _cameras(case: Case) -> list[dict[str, Any]]:
+    """Return the rows of the table of cameras."""
+    before = case.residuals(case.before)
+    after = None if case.after is None else case.residuals(case.after)
+    rows = []
+    for view, name in enumerate(case.names):
+        row: dict[str, Any] = {"name": name, "before": _pixels(before[view]), "accused": view in case.accused}
+        if after is not None and case.repair is not None:
+            correction, covariance = case.repair.corrections[view], case.repair.covariance[view]
+            row["turned"] = _with_spread(correction[:3], covariance[:3, :3], 180.0 / math.pi, "°", 2)
+            row["moved"] = _with_spread(correction[3:], covariance[3:, 3:], 100.0, " cm", 1)
+            row["after"] = _pixels(after[view])
+        rows.append(row)
+    return rows
+
+
+def _with_spread(vector: Floats, covariance: Floats, factor: float, unit: str, digits: int) -> str:
+    """Return the length of a correction with its 90 % interval, as text; the spread is that along the correction."""
+    length = float(np.linalg.norm(vector))
+    if length == 0.0 and not np.any(covariance):
+        return "held"
+    along = vector / length if length > 0 else np.array([1.0, 0.0, 0.0])
+    spread = _NINETY * math.sqrt(max(float(along @ covariance @ along), 0.0))
+    return f"{factor * length:.{digits}f}{unit} ± {factor * spread:.{digits}f}"
+
+
+def _pixels(value: float) -> str:
+    return f"{value:.1f}" if math.isfinite(value) else "–"
+
+
+def _fields(case: Case) -> dict[str, Any] | None:
+    """Return the residual arrows of each camera; None where no camera has enough residuals."""
+    order = np.argsort(-np.nan_to_num(case.residuals(case.before), nan=-1.0), kind="stable")[:_MOST_VIEWS]
+    kinds = {"before": case.before, **({} if case.after is None else {"after": case.after})}
+    fields = {
+        (view, kind): drawings.Field(*_mean_field(case, missing, view))
+        for view in sorted(order.tolist())
+        for kind, missing in kinds.items()
+    }
+    if not any(len(field.offsets) for field in fields.values()):
+        return None
+    factor = drawings.exaggeration([(field, case.rig[view].size[0]) for (view, _), field in fields.items()])
+    views = []
+    for view in sorted(order.tolist()):
+        camera = case.rig[view]
+        parts: list[str] = []
+        notes: list[str] = []
+        for kind, missing in kinds.items():
+            field = fields[view, kind]
+            parts += drawings.draw_field(camera, field, kind=kind, factor=factor)
+            notes.append(_pixels(case.residuals(missing)[view]))
+        label = f"residual arrows of camera {case.names[view]}"
+        views.append(
+            {
+                "name": case.names[view],
+                "note": f"median {' → '.join(notes)} px",
+                "accused": view in case.accused,
+                "svg": Markup(picture_element(camera, parts, label=label)),
+            }
+        )
+    return {"views": views, "factor": f"{factor:g}", "hidden": len(case.rig) - len(views)}
+
+
+def _mean_field(case: Case, missing: Missing, view: int) -> tuple[Floats, Floats]:
+    here = case.sightings.view == view
+    return mean_field(case.sightings.pixels[here], missing.offset[here], size=case.rig[view].size)
+
+
+def _lines(case: Case, pictures: Pictures | None) -> dict[str, Any] | None:
+    """Return the epipolar lines of some joints in a pair of views; None where no pair shares any."""
+    residuals = np.nan_to_num(case.residuals(case.before), nan=-1.0)
+    second = case.accused[0] if case.accused else int(np.argmax(residuals))
+    first = drawings.best_partner(case.sightings, second, case.rig)
+    if first is None:
+        return None
+    sizes = [camera.size for camera in case.rig]
+    joints = drawings.matched_joints(case.sightings, (first, second), sizes)
+    if not joints:
+        return None
+    before, after = (case.rig[first], case.rig[second]), None
+    if case.after is not None and case.repair is not None:
+        after = case.repair.rig[first], case.repair.rig[second]
+    parts = [*drawings.draw_lines(*before, joints, kind="before")]
+    parts += [] if after is None else drawings.draw_lines(*after, joints, kind="after")
+    views = []
+    for view, over in ((first, []), (second, parts)):
+        dots = drawings.draw_joints(case.rig[view], joints, second=view == second)
+        bodies = drawings.draw_bodies(case.rig[view], case.sightings, joints[0].frame, view)
+        picture = None if pictures is None else pictures(joints[0].frame, view)
+        label = f"joints in camera {case.names[view]}"
+        element = picture_element(case.rig[view], [*bodies, *over, *dots], label=label, picture=picture)
+        views.append({"name": case.names[view], "svg": Markup(element)})
+    rows = [
+        {
+            "number": number + 1,
+            "joint": joint.name,
+            "before": _pixels(drawings.distance_from_line(*before, joint)),
+            "after": "" if after is None else _pixels(drawings.distance_from_line(*after, joint)),
+        }
+        for number, joint in enumerate(joints)
+    ]
+    return {"views": views, "rows": rows, "frame": joints[0].frame}
+
+
+def _clocks(case: Case, clocks: Clocks | None) -> Markup | None:
+    """Return the plot of clock offsets; None where nothing is known of any."""
+    offsets: dict[int, plots.Interval] = {}
+    if clocks is not None:
+        for view in np.flatnonzero(clocks.determined).tolist():
+            value, (low, high) = float(clocks.offsets[view]), clocks.interval[view].tolist()
+            offsets[view] = plots.Interval(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
+    elif case.repair is not None and case.repair.refused is None and np.any(case.repair.offsets):
+        for view, offset in enumerate(case.repair.offsets.tolist()):
+            offsets[view] = plots.Interval(case.names[view], 1000.0 * offset)
+    for finding in case.diagnosis.findings:
+        if finding.kind == "clock-offset" and finding.view is not None and "ms" in finding.size:
+            low, high = finding.interval.get("ms", (math.nan, math.nan))
+            offsets[finding.view] = plots.Interval(case.names[finding.view], finding.size["ms"], low, high)
+    if not offsets:
+        return None
+    return Markup(plots.clock_offsets("clock-offsets", [offsets[view] for view in sorted(offsets)]))
