@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading, cut
 from mvpose.calibration.conventions import search
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
-from mvpose.calibration.normal_equations import residuals_of_others
+from mvpose.calibration.normal_equations import residuals_of_others, with_errors
 from mvpose.calibration.people_size import relative_size
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
@@ -52,17 +53,23 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
     reading, unit = convention_findings.unit(reading, ratio)
     findings += unit
-    agreement = Agreement.of(consistency, reading)
-    findings += strangers(agreement, detections, names)
     mended = reread_rig(rig, reading)
     if mended is None:  # the cameras of no reading stand in different places within 200 m
         mended, reading = rig, Reading.as_given(rig.packed)
     tracklets = reread_tracklets(tracklets, reading)
     sightings = sightings_of(tracklets, match_over_time(mended, tracklets).person)
-    useless = {each.view for each in findings if each.kind in _USELESS and each.view is not None}
-    sightings = sightings.select(~np.isin(sightings.view, list(useless)))
     joints, rows = joint_views(sightings)
     result = fit(mended.packed, joints)
+    agreement = Agreement.of(consistency, reading, _corrected(reading, result))
+    found_strangers = strangers(agreement, detections, names)
+    if found_strangers:
+        sightings = sightings.select(
+            ~np.isin(sightings.view, [each.view for each in found_strangers if each.view is not None])
+        )
+        joints, rows = joint_views(sightings)
+        result = fit(mended.packed, joints)
+    findings += found_strangers
+    useless = {each.view for each in findings if each.kind in _USELESS and each.view is not None}
     times = np.nanmin(sightings.times[sightings.frame[rows]], axis=1) - np.nanmin(sightings.times)
     first = joints.start[:-1]
     missing = unknowns(
@@ -88,6 +95,11 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
 
 
 _USELESS = ("silent-view", "other-people")
+
+
+def _corrected(reading: Reading, result: Fit) -> Reading:
+    """Return the reading with the cameras as people have them, at the end of the recording."""
+    return replace(reading, cameras=with_errors(reading.cameras, result.change.reshape(1, -1))[0, :, :22].copy())
 
 
 def _seconds(times: Floats) -> float:

@@ -160,7 +160,7 @@ class Diagnosis(Sealed):
         verdict: Verdict = "fine"
         if any(each.severity == "alarm" for each in ordered):
             verdict = "faults"
-        elif any(each.kind == "cannot-tell" and each.camera is None for each in ordered):
+        elif any(each.severity == "unknown" and each.kind == "cannot-tell" and each.camera is None for each in ordered):
             verdict = "cannot tell"
         return cls(tuple(ordered), verdict, tuple(evidence), tuple(cameras), residuals)
 

@@ -15,8 +15,8 @@ from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.findings import Finding
 
 _SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
-_STRANGER = 0.10  # agreement of the best pair of views below which they see different people
-_SHARED = 0.30  # agreement from which two views see the same people
+_STRANGER = 0.50  # mean agreement with the other views, over theirs, below which a view sees other people
+_SHARED = 0.40  # agreement from which two views see the same people
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,10 @@ class Agreement:
     pairs: Floats
 
     @classmethod
-    def of(cls, consistency: Consistency, reading: Reading) -> Agreement:
-        """Return the agreement of all pairs of views under a reading."""
-        evidence, ideal = (each.sum(axis=2) for each in (consistency(reading), consistency.ideal(reading)))
+    def of(cls, consistency: Consistency, *readings: Reading) -> Agreement:
+        """Return the agreement of all pairs of views, at each time under the best of some readings."""
+        evidence = np.max([consistency(each) for each in readings], axis=0).sum(axis=2)
+        ideal = consistency.ideal(readings[0]).sum(axis=2)
         evidence, ideal = evidence + evidence.T, ideal + ideal.T
         with np.errstate(invalid="ignore", divide="ignore"):
             return cls(np.where(ideal > 0, evidence / ideal, np.nan))
@@ -42,6 +43,12 @@ class Agreement:
     def best(self) -> Floats:
         """Agreement of each view with the one that it agrees with best, (V,); 0 without any."""
         return np.nan_to_num(self.pairs).max(axis=1)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean agreement of each view with the others, (V,); 0 without any."""
+        known = np.isfinite(self.pairs)
+        return np.where(known, self.pairs, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
 
 
 def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
@@ -71,12 +78,19 @@ def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
 
 
 def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) -> list[Finding]:
-    """Return views that agree with no other one, where the others agree with each other."""
+    """Return views that agree with no other one, where the others agree with each other.
+
+    Args:
+        agreement: agreement before or after errors of the cameras were corrected.
+        detections: number of detections of each view in the recording, (V,).
+        names: names of the cameras.
+    """
     findings: list[Finding] = []
     views = len(names)
-    alone = (agreement.best < _STRANGER) & (detections > 0)
     if (agreement.best >= _SHARED).sum() < 2:
         return findings
+    usual = float(np.median(agreement.best[agreement.best >= _SHARED]))
+    alone = (agreement.mean < _STRANGER * usual) & (detections > 0)
     for view in np.flatnonzero(alone).tolist():
         findings.append(
             Finding(
@@ -86,7 +100,7 @@ def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) 
                 probability=0.95,
                 camera=names[view],
                 view=view,
-                size={"agreement": float(agreement.best[view])},
+                size={"agreement": float(agreement.mean[view])},
                 cost=1.0 / views,
                 mend="compare the pictures of this camera with those of the others at one time; calibrate it again, or "
                 "leave it out of the rig",
