@@ -20,7 +20,7 @@ _DEPTHS = np.geomspace(0.3, 60.0, 160)  # metres along a ray, of the points that
 _MOST_LINES = len(VARIANT_COLORS)  # in a pair of pictures: more hide each other
 _INEXACT = 0.1  # OKS sigma of joints that are not drawn
 _NICE = (1.0, 2.0, 5.0)  # leading digits of factors
-_ARROW = 0.085  # of the width of the picture: length of a long arrow
+_ARROW = 0.11  # of the width of the picture: length of a long arrow
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,20 +14,23 @@ from markupsafe import Markup
 
 from mvpose.arrays import Floats
 from mvpose.calibration.clocks import Clocks
-from mvpose.calibration.findings import KINDS, Diagnosis, Finding, camera_names
-from mvpose.calibration.sightings import Sightings
+from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
+from mvpose.detections import Detections
 from mvpose.files.atomic_files import write_atomic
+from mvpose.recording import PERIOD
 from mvpose.report import doctor_drawings as drawings
 from mvpose.report import doctor_plots as plots
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.leave_one_out import Missing, leave_one_out, mean_field
 from mvpose.report.picture_drawings import Pictures, picture_element
-from mvpose.report.verdict import quantities, sentence
+from mvpose.report.verdict import quantities, sentence, sentence_of
 
 PAGE, NUMBERS = "doctor.html", "doctor.json"
 """Names of the files that :func:`write_doctor_page` writes."""
 
+_EVIDENCE = 4  # lines below the verdict; more unfold
 _MOST_VIEWS = 16  # with residual arrows: those with the largest residuals
 _NINETY = 1.645  # standard deviations of a Gaussian to each side of the middle 90 %
 
@@ -63,11 +67,14 @@ def write_doctor_page(
     *,
     name: str,
     rig: Rig,
-    sightings: Sightings,
+    frames: Sequence[Detections],
     diagnosis: Diagnosis,
     repair: Repaired | None = None,
+    sightings: Sightings | None = None,
     clocks: Clocks | None = None,
     pictures: Pictures | None = None,
+    period: float = PERIOD,
+    files: tuple[str, str] = ("CALIBRATION", "DETECTIONS"),
 ) -> Path:
     """Write what the doctor found, ``doctor.html``, and the same as ``doctor.json``.
 
@@ -75,11 +82,15 @@ def write_doctor_page(
         folder: an existing folder.
         name: what was examined, the title of the page.
         rig: the rig as it was given.
-        sightings: keypoints matched over time and views, of :func:`mvpose.calibration.gather`.
+        frames: detections of each frame.
         diagnosis: what is wrong.
         repair: the corrected rig, where one was asked for.
+        sightings: keypoints matched over time and views; by default they are matched here, with the corrected rig where
+            there is one (:func:`mvpose.calibration.gather`).
         clocks: offsets of the clocks of all cameras with intervals; by default those of findings and of the repair.
         pictures: function that returns the picture of a frame and view; by default drawings are on plain ground.
+        period: seconds between frames whose detections carry no time.
+        files: calibration and detections as a command names them, for commands that can be copied.
 
     Returns:
         Path of the page.
@@ -87,6 +98,9 @@ def write_doctor_page(
     Raises:
         OSError: the folder cannot be written to.
     """
+    if sightings is None:
+        better = rig if repair is None or repair.refused is not None else repair.rig
+        sightings = gather(better, frames, period=period)
     case = Case.of(rig, sightings, diagnosis, repair)
     page = fill_template(
         "doctor.html",
@@ -95,8 +109,9 @@ def write_doctor_page(
         name=name,
         verdict=diagnosis.verdict,
         sentence=sentence(diagnosis),
-        evidence=diagnosis.evidence,
-        findings=[_finding(each) for each in diagnosis.findings],
+        evidence=diagnosis.evidence[:_EVIDENCE],
+        more_evidence=diagnosis.evidence[_EVIDENCE:],
+        findings=[_finding(each, files) for each in diagnosis.findings],
         refused=None if repair is None else repair.refused,
         repaired=case.after is not None,
         above=_above(case),
@@ -158,17 +173,16 @@ class Case:
         )
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
-    text = finding.text or KINDS[finding.kind]
+def _finding(finding: Finding, files: tuple[str, str]) -> dict[str, Any]:
     return {
         "kind": finding.kind.replace("-", " "),
         "camera": finding.camera,
         "severity": finding.severity,
-        "text": f"{text[:1].upper()}{text[1:].rstrip('.')}.",
+        "text": sentence_of(finding),
         "probability": f"{100 * finding.probability:.0f} %",
         "quantities": quantities(finding),
         "cost": f"{1000 * finding.cost:.0f} mm" if finding.cost >= 0.0005 else "",
-        "mend": finding.mend,
+        "mend": finding.mend.replace("CALIBRATION", files[0]).replace("DETECTIONS", files[1]),
     }
 
 

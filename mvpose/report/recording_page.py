@@ -25,7 +25,7 @@ from mvpose.report.limbs import limbs_of
 from mvpose.report.measures import median_by, share_on_one_view
 from mvpose.report.palette import identity_color
 from mvpose.report.picture_drawings import Person, Pictures, draw_detections, draw_people, picture_element
-from mvpose.report.verdict import sentence
+from mvpose.report.verdict import sentence, sentence_of
 
 PAGE, NUMBERS = "recording.html", "recording.json"
 """Names of the files that :func:`write_page` writes."""
@@ -123,7 +123,7 @@ def _with_unit(value: float, digits: int, unit: str) -> str:
 def _doctor(diagnosis: Diagnosis | None, page: str) -> dict[str, Any] | None:
     if diagnosis is None:
         return None
-    lines = [finding.text for finding in diagnosis.alarms[1:]] or list(diagnosis.evidence[:4])
+    lines = [sentence_of(finding) for finding in diagnosis.alarms[1:]] or list(diagnosis.evidence[:4])
     return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines, "link": page}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mvpose.calibration.findings import Diagnosis, Finding
+from mvpose.calibration.findings import KINDS, Diagnosis, Finding
 
 _SENTENCES = {
     "fine": "Nothing is wrong with the cameras.",
@@ -41,10 +41,17 @@ def sentence(diagnosis: Diagnosis) -> str:
     alarms = diagnosis.alarms
     if not alarms:
         return _SENTENCES[diagnosis.verdict]
-    first = alarms[0].text.rstrip(".")
     more = len(alarms) - 1
-    others = "" if not more else f" – and {more} other fault{'s' if more > 1 else ''}"
-    return f"{first[:1].upper()}{first[1:]}{others}."
+    others = "" if not more else f" There {'are' if more > 1 else 'is'} {more} more fault{'s' if more > 1 else ''}."
+    return f"{sentence_of(alarms[0])}{others}"
+
+
+def sentence_of(finding: Finding) -> str:
+    """Return a finding as a sentence, in which a camera whose name is only a number is called a camera."""
+    text, name = (finding.text or KINDS[finding.kind]).rstrip("."), finding.camera
+    if name and text.startswith(f"{name} ") and not name.lower().startswith(("cam", "view", "kinect")):
+        text = f"camera {text}"
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def quantities(finding: Finding) -> list[Quantity]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from people import crowd, ring
+from people import crowd, detect, ring
 from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Rig
@@ -24,7 +24,7 @@ from mvpose.report.doctor_drawings import (
 from mvpose.report.doctor_page import write_doctor_page
 from mvpose.report.doctor_plots import exaggerated, motion_factor
 from mvpose.report.leave_one_out import leave_one_out, mean_field
-from mvpose.report.verdict import quantities
+from mvpose.report.verdict import quantities, sentence_of
 
 
 def sighted(rig, *, frames=12, people=3, noise=0.0, offsets=None):
@@ -177,14 +177,15 @@ class MadeRepair:
 def finding(**changes):
     given = dict(
         kind="moved-camera", text="camera <2> has moved", camera="cam2", view=2, size={"degrees": 2.0, "metres": 0.05},
-        interval={"metres": (0.04, 0.06)}, cost=0.03, mend="mvpose repair a.json b --out c.json",
+        interval={"metres": (0.04, 0.06)}, cost=0.03, mend="mvpose repair CALIBRATION DETECTIONS --out c.json",
     )  # fmt: skip
     return Finding(**{**given, **changes})
 
 
 def page_of(folder, rig, sightings, findings, repair=None):
     diagnosis = Diagnosis.of(findings, evidence=["a line"], cameras=[c.name for c in rig], residuals=np.zeros(len(rig)))
-    path = write_doctor_page(folder, name="a rig", rig=rig, sightings=sightings, diagnosis=diagnosis, repair=repair)
+    given = dict(diagnosis=diagnosis, repair=repair, files=("a.json", "b"))
+    path = write_doctor_page(folder, name="a rig", rig=rig, frames=[], sightings=sightings, **given)
     page = path.read_text(encoding="utf-8")
     for svg in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
         ET.fromstring(svg.replace("xlink:", ""))
@@ -255,3 +256,23 @@ def test_sizes_are_shown_in_units_that_people_use():
     assert shown["since"] == ("4.0 s", "")
     assert shown["scale"] == ("2.5 %", "")
     assert ("3 pictures", "") in shown.values()
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "expected"),
+    [
+        ("2 looks elsewhere", "2", "Camera 2 looks elsewhere."),
+        ("cam2 looks elsewhere.", "cam2", "Cam2 looks elsewhere."),
+        ("the unit is wrong", None, "The unit is wrong."),
+    ],
+)
+def test_findings_are_sentences(text, name, expected):
+    assert sentence_of(finding(text=text, camera=name)) == expected
+
+
+def test_sightings_are_matched_where_none_are_given(tmp_path):
+    rig = ring(4)
+    frames = [detect(rig, crowd(1) + k * np.array([0.05, 0, 0]), noise=1.0, seed=k)[0] for k in range(20)]
+    diagnosis = Diagnosis.of([], evidence=[], cameras=[c.name for c in rig], residuals=np.zeros(4))
+    path = write_doctor_page(tmp_path, name="a rig", rig=rig, frames=frames, diagnosis=diagnosis)
+    assert 'class="line before"' in path.read_text(encoding="utf-8")
