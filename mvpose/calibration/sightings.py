@@ -16,11 +16,15 @@ from mvpose.detections import Detections
 from mvpose.skeleton import Skeleton
 
 UNCERTAINTIES = (
-    RigUncertainty(np.radians(0.3), 0.02),  # a careful calibration
-    RigUncertainty(np.radians(1.5), 0.10),  # cameras that were touched
-    RigUncertainty(np.radians(3.0), 0.20),  # cameras that were measured by eye
+    RigUncertainty(np.radians(0.3), 0.02, 0.05),  # a careful calibration
+    RigUncertainty(np.radians(1.5), 0.10, 0.05),  # cameras that were touched
+    RigUncertainty(np.radians(3.0), 0.20, 0.05),  # cameras that were measured by eye
 )
 """Uncertainties of the rig that :func:`gather` tries; the one under which the detections are likeliest is taken."""
+
+
+_CLEARLY_BETTER = 0.02  # share of the score by which a rig that is further off must be likelier
+_LEAST_BETTER = 10.0
 
 
 @dataclass(frozen=True)
@@ -129,9 +133,16 @@ def gather(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> S
 def match_over_time(
     rig: Rig, tracklets: Tracklets, *, uncertainties: Sequence[RigUncertainty] = UNCERTAINTIES
 ) -> PeopleGroups:
-    """Match tracklets under each uncertainty of the rig and return the likeliest result."""
-    matched = [match_tracklets(rig, tracklets, each) for each in uncertainties]
-    return max(matched, key=lambda each: each.score)
+    """Match tracklets under each uncertainty of the rig, in rising order, and return the likeliest result.
+
+    A rig that is further off must explain clearly more: with enough freedom, people who walk alike fit each other.
+    """
+    best = match_tracklets(rig, tracklets, uncertainties[0])
+    for each in uncertainties[1:]:
+        other = match_tracklets(rig, tracklets, each)
+        if other.score > best.score + max(_LEAST_BETTER, _CLEARLY_BETTER * abs(best.score)):
+            best = other
+    return best
 
 
 def sightings_of(tracklets: Tracklets, person: Integers) -> Sightings:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.tracklets import Tracklets, chosen_frames
+from mvpose.calibration.tracklets import Tracklets, chosen_frames, frame_times
 from mvpose.camera import Camera, Rig
 from mvpose.kernels import njit
 from mvpose.matching.clustering import join_by_gains
@@ -113,7 +113,7 @@ def match_tracklets(rig: Rig, tracklets: Tracklets, uncertainty: RigUncertainty)
         )
         matrix = np.where(apart, -np.inf, 0.0)
         matrix[pairs[:, 0], pairs[:, 1]] = matrix[pairs[:, 1], pairs[:, 0]] = gains
-        groups = join_by_gains(matrix)
+        before, groups = groups, join_by_gains(matrix)
         inside = groups[pairs[:, 0]] == groups[pairs[:, 1]]
         # Gauss-Newton step: corrections since the believed rig have the prior of the believed rig.
         lhs, rhs = prior.copy(), -prior @ total
@@ -127,6 +127,8 @@ def match_tracklets(rig: Rig, tracklets: Tracklets, uncertainty: RigUncertainty)
         # Marginal likelihood: what the freedom of the rig and the correction cost is taken off.
         freedom = np.linalg.slogdet(lhs)[1] - np.linalg.slogdet(prior)[1]
         score = float(gains[inside].sum() - 0.5 * (total @ prior @ total + freedom))
+        if weight == 1.0 and (before == groups).all() and step @ lhs @ step < len(step):
+            break
         corrections = step.reshape(views, UNKNOWNS)
         clocks = clocks + corrections[:, 6]
         adjusted = Rig([corrected(c, each[:3], each[3:6]) for c, each in zip(adjusted, corrections, strict=True)])
@@ -165,9 +167,7 @@ def _lines_of_sight(rig: Rig, tracklets: Tracklets, rows: Integers, clocks: Floa
     Pictures of one frame that were taken at different times are compared at the median of these times.
     """
     view, frame = tracklets.view[rows], tracklets.frame[rows]
-    with np.errstate(all="ignore"):
-        reference = np.nanmedian(tracklets.times[frame], axis=1)
-    late = tracklets.times[frame, view] + clocks[view] - reference
+    late = tracklets.times[frame, view] + clocks[view] - frame_times(tracklets.times)[frame]
     velocity = tracklets.velocity[rows]
     pixels = tracklets.keypoints[rows] - velocity * late[:, None, None]
     directions, change = np.zeros((*pixels.shape[:2], 3)), np.zeros((*pixels.shape[:2], 3))

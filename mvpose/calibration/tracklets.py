@@ -90,6 +90,19 @@ def picture_times(frames: Sequence[Detections], views: int, *, period: float) ->
     return times
 
 
+def frame_times(times: Floats) -> Floats:
+    """Return the median time of the pictures of each frame, (F,), seconds; NaN for a frame without pictures.
+
+    Args:
+        times: of all pictures, (F, V), seconds; NaN where there is none.
+    """
+    result = np.full(len(times), np.nan)
+    pictured = np.isfinite(times).any(axis=1)
+    if pictured.any():
+        result[pictured] = np.nanmedian(times[pictured], axis=1)
+    return result
+
+
 def link(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Tracklets:
     """Link the detections of each view over time.
 
@@ -179,8 +192,8 @@ def _linked(frame: Integers, times: Floats, keypoints: Floats, size: Floats) -> 
                 continue
             last = latest[after[i]]
             result[d] = result[last]
-            moved = np.nanmedian(keypoints[d] - keypoints[last], axis=0)
-            speed = moved / elapsed[after[i]]
+            moved = keypoints[d] - keypoints[last]
+            speed = np.median(moved[np.isfinite(moved[:, 0])], axis=0) / elapsed[after[i]]
             drift[d] = 0.5 * (drift[last] + speed)
         goes_on = np.ones(len(latest), np.bool_)
         goes_on[after[after >= 0]] = False
@@ -254,11 +267,10 @@ def chosen_frames(tracklets: Tracklets, *, spacing: float) -> Bools:
     """
     times = tracklets.times
     chosen = np.zeros(len(times), np.bool_)
-    with_pictures = np.isfinite(times).any(axis=1)
+    when = frame_times(times)
+    with_pictures = np.isfinite(when)
     if not with_pictures.any():
         return chosen
-    when = np.full(len(times), np.nan)
-    when[with_pictures] = np.nanmedian(times[with_pictures], axis=1)
     slot = np.where(with_pictures, np.floor((when - np.nanmin(when)) / spacing + 1e-9), -1)
     detections = np.bincount(tracklets.frame, minlength=len(times))
     for each in np.unique(slot[slot >= 0]):

@@ -1,0 +1,305 @@
+"""Repair of a rig from the people in its pictures.
+
+Matching over seconds and bundle adjustment alternate: matching with a wrong rig gives a better rig, which matches more.
+Only what the data determine is changed; the rest is held, with the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.calibration.adjustment import Adjustment, Prior, adjust
+from mvpose.calibration.bundle import CENTER, CLOCK, FOCAL, PARAMETERS, ROTATION, TRANSLATION, observations, reduce
+from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
+from mvpose.calibration.tracklet_matching import RigUncertainty, match_tracklets
+from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+
+Freedom = Literal["extrinsics", "focal", "center"]
+"""What a repair may change: places and orientations; focal lengths; principal points."""
+
+_PLACES = {"extrinsics": slice(0, 6), "focal": FOCAL, "center": CENTER}
+_SPACING = 0.2  # seconds between the frames that are used: errors of detectors last as long
+_NARROW = RigUncertainty(np.radians(0.3), 0.02, 0.02)  # of the rig that has been adjusted once
+_MOST_TURNS = 3
+_LEAST_CAMERAS = 3
+_LEAST_SIGHTINGS = 100
+_LEAST_SHARED = 20  # sightings of a camera that other cameras share
+_CAN_TELL = (float(np.radians(0.75)), 0.06)  # standard deviations beyond which a pose is not determined: rad, m
+
+
+@dataclass(frozen=True)
+class Repair:
+    """Repaired rig, and what is known about it.
+
+    Attributes:
+        rig: repaired cameras; the given rig, the same object, where the repair is refused.
+        offsets: time that a camera's clock is behind, (V,), seconds: a picture stamped t was taken at t + offset.
+        corrections: change of each camera, (V, 6): rotation vector about its optical centre (world axes, rad), and
+            shift of the centre, metres.
+        covariance: of the corrections of each camera, (V, 6, 6); 0 for cameras that were held.
+        offset_sigmas: standard deviations of the offsets, (V,), seconds; 0 where they were held.
+        focal: factor of each focal length, (V,).
+        center: shift of each principal point, (V, 2), pixels.
+        held: what was not changed, and why.
+        refused: why nothing was changed; None where the rig was repaired.
+        residuals_before: median distance between keypoints and projected joints with the given rig, (V,), pixels; NaN
+            for a view that shares nobody with others.
+        residuals_after: the same with the repaired rig.
+        people: number of people whom two or more views see.
+    """
+
+    rig: Rig
+    offsets: Floats
+    corrections: Floats
+    covariance: Floats
+    offset_sigmas: Floats
+    focal: Floats
+    center: Floats
+    held: tuple[str, ...]
+    refused: str | None
+    residuals_before: Floats
+    residuals_after: Floats
+    people: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all numbers and texts, ready for JSON; missing values are None."""
+        cameras = [
+            {
+                "name": camera.name,
+                "R": camera.R.tolist(),
+                "t": camera.t.tolist(),
+                "K": camera.K.tolist(),
+                "rotation_degrees": np.degrees(self.corrections[v, :3]).tolist(),
+                "shift_metres": self.corrections[v, 3:].tolist(),
+                "sigma_degrees": np.degrees(np.sqrt(np.diag(self.covariance[v])[:3])).tolist(),
+                "sigma_metres": np.sqrt(np.diag(self.covariance[v])[3:]).tolist(),
+                "offset_seconds": float(self.offsets[v]),
+                "sigma_offset_seconds": float(self.offset_sigmas[v]),
+                "focal_factor": float(self.focal[v]),
+                "center_pixels": self.center[v].tolist(),
+                "residual_before_pixels": _number(self.residuals_before[v]),
+                "residual_after_pixels": _number(self.residuals_after[v]),
+            }
+            for v, camera in enumerate(self.rig)
+        ]
+        return {"refused": self.refused, "held": list(self.held), "people": self.people, "cameras": cameras}
+
+
+def repair(
+    rig: Rig,
+    frames: Sequence[Detections],
+    *,
+    period: float = 0.04,
+    free: Sequence[Freedom] = ("extrinsics",),
+    cameras: Sequence[int | str] | None = None,
+    clocks: bool = True,
+    prior: Prior | None = None,
+) -> Repair:
+    """Repair the calibration of a rig from detections of people over time.
+
+    The place, the orientation and the size of the whole rig are not in the data: they stay those of the believed rig,
+    of the majority of its cameras where most agree with each other.
+
+    Args:
+        rig: believed cameras.
+        frames: detections of each frame, all views.
+        period: seconds between frames whose detections carry no time.
+        free: what may change.
+        cameras: indices or names of the cameras that may change; by default all.
+        clocks: whether the clocks of the cameras may be off.
+        prior: plausible errors of the believed rig.
+
+    Returns:
+        The repaired rig, or the given one with the reason in ``refused``.
+
+    Raises:
+        ValueError: an unknown freedom or camera, or frames that do not fit the rig.
+    """
+    allowed = _allowed(rig, free, cameras, clocks=clocks)
+    tracklets = link(rig, frames, period=period)
+    chosen = chosen_frames(tracklets, spacing=_SPACING)
+    if len(rig) < _LEAST_CAMERAS:
+        return _refused(rig, "two cameras cannot tell which of them is off; add a third that sees the same people")
+    if not len(tracklets):
+        return _refused(rig, "there are no detections; record people who walk through the views of all cameras")
+    groups = match_over_time(rig, tracklets)
+    person, start = groups.person, groups.rig
+    adjusted: Adjustment | None = None
+    held: list[str] = []
+    mask = allowed
+    for _ in range(_MOST_TURNS):
+        sightings = _used(tracklets, person, chosen)
+        reason = _too_little(sightings)
+        if reason:
+            return _refused(rig, reason)
+        mask, held = _connected(rig, sightings, allowed)
+        if not mask.any():
+            return _refused(rig, "; ".join(held))
+        adjusted = adjust(
+            rig, sightings, free=mask, prior=prior, start=start,
+            offsets=None if adjusted is None else adjusted.parameters[:, CLOCK].ravel(),
+        )  # fmt: skip
+        again = match_tracklets(adjusted.rig, tracklets, _NARROW)
+        if _same_groups(again.person, person):
+            break
+        person, start = again.person, adjusted.rig
+    assert adjusted is not None
+    reason = _undetermined(adjusted, mask)
+    if reason:
+        return _refused(rig, reason)
+    return _result(rig, sightings, adjusted, held)
+
+
+def _allowed(rig: Rig, free: Sequence[Freedom], cameras: Sequence[int | str] | None, *, clocks: bool) -> Bools:
+    """Return the parameters that may change, (V, 10)."""
+    unknown = [each for each in free if each not in get_args(Freedom)]
+    if isinstance(free, str) or unknown:
+        raise ValueError(f"free must be some of {', '.join(get_args(Freedom))}, got {free!r}")
+    names = [camera.name for camera in rig]
+    chosen = np.zeros(len(rig), np.bool_)
+    for each in range(len(rig)) if cameras is None else cameras:
+        view = names.index(each) if each in names else each
+        if isinstance(view, str) or not 0 <= view < len(rig):
+            raise ValueError(
+                f"cameras names {each!r}, which the rig does not have; expected names ({', '.join(names)}) or indices "
+                f"from 0 to {len(rig) - 1}"
+            )
+        chosen[view] = True
+    result = np.zeros((len(rig), PARAMETERS), np.bool_)
+    for each in free:
+        result[chosen, _PLACES[each]] = True
+    result[chosen, CLOCK] = clocks
+    return result
+
+
+def _used(tracklets: Tracklets, person: Integers, chosen: Bools) -> Sightings:
+    sightings = sightings_of(tracklets, person)
+    return sightings.select(np.flatnonzero(chosen[sightings.frame] & sightings.shared))
+
+
+def _same_groups(one: Integers, other: Integers) -> bool:
+    """Whether two numberings of tracklets group them alike."""
+    pairs = len(np.unique(np.stack([one, other]), axis=1).T)
+    return pairs == len(np.unique(one)) == len(np.unique(other))
+
+
+def _too_little(sightings: Sightings) -> str | None:
+    """Return why the sightings say nothing about the rig, or None."""
+    if len(sightings) < _LEAST_SIGHTINGS:
+        return (
+            "cannot tell: hardly anybody is seen by two cameras at one time; record people in the middle of the scene, "
+            "or check that the cameras film one place and that their files are in the order of the rig"
+        )
+    return None
+
+
+def _connected(rig: Rig, sightings: Sightings, allowed: Bools) -> tuple[Bools, list[str]]:
+    """Hold cameras that share nobody with two others; return the mask of the rest and the reasons."""
+    views = len(rig)
+    points, count = sightings.points
+    seen = np.zeros((views, count), np.float32)
+    seen[sightings.view, points] = 1.0
+    common = seen @ seen.T
+    linked = (common >= _LEAST_SHARED) & ~np.eye(views, dtype=bool)
+    reach = np.linalg.matrix_power(linked.astype(float) + np.eye(views), views) > 0
+    mask, held = allowed.copy(), []
+    for view, camera in enumerate(rig):
+        if not allowed[view].any():
+            continue
+        name = f"camera {camera.name or view}"
+        if not linked[view].any():
+            mask[view] = False
+            held.append(f"{name}: cannot tell, it shares nobody with other cameras; record people whom others see too")
+        elif reach[view].sum() < _LEAST_CAMERAS:
+            mask[view] = False
+            held.append(
+                f"{name}: cannot tell, it shares people with one camera alone, which may be the wrong one; record "
+                "people whom three cameras see"
+            )
+    return mask, held
+
+
+def _undetermined(adjusted: Adjustment, mask: Bools) -> str | None:
+    """Return why the data do not determine the cameras, or None.
+
+    A camera is determined where its pose relative to the others is, that is, with the others fixed.
+    """
+    worst = 0.0
+    for view in np.flatnonzero(mask[:, :6].all(axis=1)):
+        block = slice(PARAMETERS * view, PARAMETERS * view + 6)
+        information = adjusted.information[block, block]
+        sigmas = np.sqrt(np.diag(np.linalg.inv(information + 1e-6 * np.diag(np.diag(information)) + 1e-9 * np.eye(6))))
+        worst = max(
+            worst, np.linalg.norm(sigmas[ROTATION]) / _CAN_TELL[0], np.linalg.norm(sigmas[TRANSLATION]) / _CAN_TELL[1]
+        )
+    if worst > 1.0:
+        return (
+            "cannot tell: people were in too few places to tell a turned camera from a moved one; record somebody who "
+            "walks through the whole scene for ten seconds"
+        )
+    return None
+
+
+def _residuals(rig: Rig, sightings: Sightings, given: Rig, offsets: Floats) -> Floats:
+    """Return the median distance of keypoints from projected joints by view, (V,), pixels."""
+    seen = observations(given, sightings)
+    solved = reduce(rig, offsets, seen)
+    error = np.linalg.norm(solved.residuals, axis=1) * sightings.sigma[seen.row]
+    sound = seen.scale > 0
+    return np.array(
+        [
+            np.median(error[sound & (seen.view == v)]) if (sound & (seen.view == v)).any() else np.nan
+            for v in range(len(rig))
+        ]
+    )
+
+
+def _result(rig: Rig, sightings: Sightings, adjusted: Adjustment, held: list[str]) -> Repair:
+    views = len(rig)
+    covariance = adjusted.covariance.reshape(views, PARAMETERS, views, PARAMETERS)
+    own = np.stack([covariance[v, :, v] for v in range(views)])
+    offsets = adjusted.parameters[:, CLOCK].ravel()
+    return Repair(
+        rig=adjusted.rig,
+        offsets=offsets,
+        corrections=adjusted.parameters[:, :6],
+        covariance=own[:, :6, :6],
+        offset_sigmas=np.sqrt(own[:, CLOCK, CLOCK].ravel()),
+        focal=np.exp(adjusted.parameters[:, FOCAL].ravel()),
+        center=adjusted.parameters[:, CENTER],
+        held=tuple(held),
+        refused=None,
+        residuals_before=_residuals(rig, sightings, rig, np.zeros(views)),
+        residuals_after=_residuals(adjusted.rig, sightings, rig, offsets),
+        people=len(np.unique(sightings.person)),
+    )
+
+
+def _refused(rig: Rig, reason: str) -> Repair:
+    views = len(rig)
+    unknown = np.full(views, np.nan)
+    return Repair(
+        rig=rig,
+        offsets=np.zeros(views),
+        corrections=np.zeros((views, 6)),
+        covariance=np.zeros((views, 6, 6)),
+        offset_sigmas=np.zeros(views),
+        focal=np.ones(views),
+        center=np.zeros((views, 2)),
+        held=tuple(f"camera {camera.name or v}: all" for v, camera in enumerate(rig)),
+        refused=reason,
+        residuals_before=unknown,
+        residuals_after=unknown,
+        people=0,
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
