@@ -231,7 +231,7 @@ def _undetermined(adjusted: Adjustment, mask: Bools) -> str | None:
 
     A camera is determined where its pose relative to the others is, that is, with the others fixed.
     """
-    worst = 0.0
+    worst: float = 0.0
     for view in np.flatnonzero(mask[:, :6].all(axis=1)):
         block = slice(PARAMETERS * view, PARAMETERS * view + 6)
         information = adjusted.information[block, block]
