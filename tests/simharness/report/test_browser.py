@@ -1,14 +1,10 @@
 """Page of a study in a real browser: no script errors, nothing wider than the screen, and 3D views that turn."""
 
-import contextlib
 import json
-import os
 import re
-import shutil
-import signal
-import subprocess
 
 import pytest
+from headless_browser import find_browser, run_browser
 
 from simharness.report.study.page import render_study
 
@@ -67,36 +63,12 @@ addEventListener("message", (event) => { document.documentElement.dataset.probed
 
 @pytest.fixture(scope="module")
 def browser():
-    """Path of the browser; without one the test is skipped, or fails where SIMHARNESS_REQUIRE_BROWSER is set."""
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        if found := shutil.which(name):
-            return found
-    missing = "no headless browser: install chromium"
-    (pytest.fail if os.environ.get("SIMHARNESS_REQUIRE_BROWSER") else pytest.skip)(missing)
+    return find_browser()
 
 
 @pytest.fixture(scope="module")
 def page(ran, shown):
     return render_study(ran, shown=[picture for picture, _ in shown])
-
-
-def run_browser(browser, folder, *arguments):
-    """Run the browser and return its output and its log; all of its processes are ended in every case."""
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    with subprocess.Popen(
-        [browser, *options, f"--user-data-dir={folder / 'profile'}", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        try:
-            output, log = process.communicate(timeout=400)
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    assert process.returncode == 0, log
-    return output, log
 
 
 def browse(browser, page, folder, *, width, dark=False):
