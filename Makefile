@@ -7,7 +7,7 @@ DEV    := $(VENV)/.dev
 WORKERS ?= 2
 # Oracles of tests whose requirements stay out: opencv-python of trackeval would overwrite opencv-python-headless.
 ORACLES := trackeval==1.3.0
-STUDIES := angle calibration clutter crowd detector look_alike panoptic phantoms stress sync views views_corners views_side
+STUDIES := angle calibration clocks clutter crowd detector look_alike panoptic phantoms stress sync tracking views views_corners views_side
 
 PROJECTS := pyproject.toml mvpose/pyproject.toml tools/build_backend.py
 
@@ -35,7 +35,7 @@ wheels: $(VENV)
 	$(BIN)/python -m pip wheel --disable-pip-version-check --quiet --no-deps --wheel-dir dist ./mvpose .
 	rm -rf build/lib build/bdist.* mvpose/build
 
-# An hour and a half on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
+# Two and a half hours on two cores. Finished trials are kept: it can be stopped, and runs only what the code has changed.
 results: $(STUDIES:%=results-%) results-paper results-time results-overview
 
 results-%: $(RUN)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD, Box
@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from simharness.cli.score_tables import ScoreTable
 from simharness.reality.evaluation import Evaluation
 from simharness.reality.published_scores import ABLATION, PublishedPcp
 from simharness.reality.twin_comparison import TOLERANCE
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from simharness.reality.seed_evaluation import SeedEvaluation
     from simharness.reality.twin_comparison import TwinComparison
 
+_ONLY_ANNOTATED = (
+    " Identities: IDR, people with the estimate of their identity within 0.5 m. There is no HOTA and no IDF1: they "
+    "would count estimates of people who are not annotated as false."
+)
 _PAPER_ACTORS = (0, 1, 2)  # of Campus and Shelf, by tables 1 and 2
 
 
@@ -33,13 +38,15 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         f"  {evaluation.frames} frames, {evaluation.annotated} of them annotated; head mapping ",
         (evaluation.head, "bold"),
     )
+    tracked = {name: [each["tracking"]] for name, each in summaries.items() if "tracking" in each}
     tables = [_pcp_table(name, evaluation) for name in evaluation.variants]
     numbers = ", ".join(str(actor + 1) for actor in evaluation.actors)
     paper = "Paper: Dong et al. 2019, with their detections and the 2019 head." if _paper(evaluation) else ""
     notes = Text(
         f"PCP: part correct within 0.5 of its length; average of actors {numbers}; ignores ghosts. {paper}\n"
         "One-to-one: pairs under 500 mm. An estimate of a person who is not annotated in a frame counts as a ghost. "
-        "Same view: detections that share an estimate with another detection of their view.",
+        "Same view: detections that share an estimate with another detection of their view."
+        f"{_ONLY_ANNOTATED if tracked else ''}",
         style="dim",
     )
     blocks: list[RenderableType] = [
@@ -47,7 +54,7 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         *tables,
         *([_variants_table(evaluation)] if len(tables) > 1 else []),
         _people_table(summaries),
-        *([_identities_table(summaries)] if any("tracking" in each for each in summaries.values()) else []),
+        *([_identities_table(tracked)] if tracked else []),
         _time_table(summaries),
         notes,
     ]
@@ -88,26 +95,24 @@ def print_twin_comparison(comparison: TwinComparison, console: Console) -> None:
 
 
 def print_seed_evaluation(result: SeedEvaluation, console: Console) -> None:
-    """Print PCP by variant, of all people and of each person."""
+    """Print PCP by variant, of all people and of each person, and the scores of identities of variants with any."""
     first, *others = result.scenario.method.variants
-    table = Table(
-        title=f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
-        f"{first} on the same detections, and of each person",
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-    )
-    table.add_column("variant", no_wrap=True)
     people = range(result.scenario.people.count)
-    for column in ("all", f"minus {first}", *map(str, people)):
-        table.add_column(column, justify="right", no_wrap=True)
+    rows = []
     for name in (first, *others):
         difference = "" if name == first else result.difference(name, first)
         scores = [result.pcp(name, [person]) for person in people]
-        table.add_row(name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores))
-    console.print(table)
+        rows.append((name, str(result.pcp(name)), str(difference), *(f"{each.pcp:.1f}" for each in scores)))
+    title = (
+        f"{result.scenario.name}: PCP over {len(result.seeds)} seeds with 95 % intervals: of all people, minus "
+        f"{first} on the same detections, and of each person"
+    )
+    ScoreTable(title, ("variant",), ("all", f"minus {first}", *map(str, people)), rows).print_to(console)
+    trackings = {name: [each.tracking for each in result.variant_scores(name)] for name in (first, *others)}
+    tracked = {name: known for name, each in trackings.items() if (known := [one for one in each if one is not None])}
+    if tracked:
+        console.print(_identities_table(tracked))
+        console.print(_ONLY_ANNOTATED.strip(), style="dim", highlight=False)
 
 
 def _paper(evaluation: Evaluation) -> Mapping[str, PublishedPcp]:
@@ -168,23 +173,30 @@ def _people_table(summaries: Mapping[str, Any]) -> Table:
     return table
 
 
-def _identities_table(summaries: Mapping[str, Any]) -> Table:
-    table = _table("Identities of annotated people: PCP and people under their identity in %, MPJPE in mm", "variant")
+def _identities_table(tracked: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
+    """Return the scores of identities by variant, means over its recordings."""
+    table = _table("Identities of annotated people: PCP and IDR in %, MPJPE in mm", "variant")
     for column in ("PCP", "IDR", "MPJPE", "switches", "a minute", "interrupted"):
         table.add_column(column, justify="right")
-    for name, scores in summaries.items():
-        if tracking := scores.get("tracking"):
-            at = tracking["mean_joint"][f"{DISTANCE:g}"]
-            table.add_row(
-                name,
-                _number(tracking["pcp_tracked"], 1),
-                _number(at["idr"], 1, scale=100),
-                _number(tracking["mpjpe_tracked_mm"], 1),
-                _number(at["id_switches"], 0),
-                _number(at["switches_per_minute"], 2),
-                _number(at["interruptions"], 0),
-            )
+    for name, recordings in tracked.items():
+        at = [each["mean_joint"][f"{DISTANCE:g}"] for each in recordings]
+        counted = 0 if len(recordings) == 1 else 1  # decimals: means of counts are no whole numbers
+        table.add_row(
+            name,
+            _number(_mean(recordings, "pcp_tracked"), 1),
+            _number(_mean(at, "idr"), 1, scale=100),
+            _number(_mean(recordings, "mpjpe_tracked_mm"), 1),
+            _number(_mean(at, "id_switches"), counted),
+            _number(_mean(at, "switches_per_minute"), 2),
+            _number(_mean(at, "interruptions"), counted),
+        )
     return table
+
+
+def _mean(figures: Sequence[Mapping[str, Any]], key: str) -> float | None:
+    """Return the mean of a figure over the recordings that have it."""
+    known = [each[key] for each in figures if each[key] is not None]
+    return sum(known) / len(known) if known else None
 
 
 def _time_table(summaries: Mapping[str, Any]) -> Table:

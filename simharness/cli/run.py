@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,8 @@ from simharness.cli.exit_codes import exit_on_error
 from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from simharness.cli.score_tables import ScoreTable
+    from simharness.report.run.headline import Column
 
 
 def add_to(app: typer.Typer) -> None:
@@ -53,7 +55,8 @@ def run(
             folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     console = Console()
-    console.print(_headline(summary))
+    for table in _tables(summary):
+        table.print_to(console)
     console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
 
 
@@ -98,19 +101,23 @@ def render(
     typer.echo(f"{len(list(folder.rglob('*.*')))} files in {folder}")
 
 
-def _headline(summary: dict[str, Any]) -> Table:
-    """Return the headline scores of a run, a row for each variant."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
+def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
+    """Return the headline scores of a run, and those of identities where a variant has any."""
     from simharness.report.run.headline import COLUMNS
+    from simharness.report.run.tracked_people import IDENTITY_COLUMNS, has_identities
 
+    variants: Mapping[str, Any] = summary["variants"]
     title = f"{summary['name']}: {summary['frames']} frames, seed {summary['seed']}"
-    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
-    table.add_column("variant", no_wrap=True)
-    for column in COLUMNS:
-        heading = f"{column.title}\n{column.unit}" if column.unit else column.title.replace(" ", "\n")
-        table.add_column(heading, justify="right", no_wrap=True)
-    for name, scores in summary["variants"].items():
-        table.add_row(name, *(column.number(scores) for column in COLUMNS))
-    return table
+    tables = [_table(title, COLUMNS, variants)]
+    if tracked := {name: scores for name, scores in variants.items() if has_identities(scores)}:
+        tables.append(_table("identities, within 0.5 m", IDENTITY_COLUMNS, tracked))
+    return tables
+
+
+def _table(title: str, columns: Sequence[Column], variants: Mapping[str, Any]) -> ScoreTable:
+    """Return a table of scores, a row for each variant."""
+    from simharness.cli.score_tables import ScoreTable
+
+    headings = [f"{each.title}\n{each.unit}" if each.unit else each.title.replace(" ", "\n") for each in columns]
+    rows = [(name, *(column.number(scores) for column in columns)) for name, scores in variants.items()]
+    return ScoreTable(title, ("variant",), headings, rows)

@@ -16,12 +16,14 @@ from simharness.cli.exit_codes import FAILED, exit_on_error, run_errors_only
 from simharness.cli.options import Overrides, ScenarioFile, command_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    import polars as pl
 
+    from simharness.cli.score_tables import ScoreTable
     from simharness.study.result_folder import Results
 
 INTERRUPTED = 130
 _LISTED = 10  # failed trials that are listed
+_IDENTITIES = ("hota", "idf1", "id_switches", "switches_per_minute")
 
 
 def add_to(app: typer.Typer) -> None:
@@ -94,7 +96,8 @@ def study(
                 )
             info = dict(results.info)
             if len(results.trials):
-                Console().print(_headline(results))
+                for table in _tables(results):
+                    table.print_to(Console())
             _write(_counts(info, loaded.name))
             _report(results)
     if info["failed"]:
@@ -140,34 +143,41 @@ def _part(shard: str | None) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
-def _headline(results: Results) -> Table:
+def _tables(results: Results) -> list[ScoreTable]:
+    """Return mean scores with intervals over seeds, and those of identities of the variants that have any."""
+    import polars as pl
+
+    from simharness.report.study.tables import tracks_people
+    from simharness.scoring.catalogue import HEADLINE
+
+    tables = [_table(results, results.info["name"], results.trials, HEADLINE)]
+    if tracks_people(results.trials):
+        tracked = results.trials.filter(pl.col("hota").is_not_null().any().over("variant"))
+        tables.append(_table(results, "identities, within 0.5 m", tracked, _IDENTITIES))
+    return tables
+
+
+def _table(results: Results, title: str, trials: pl.DataFrame, scores: Sequence[str]) -> ScoreTable:
     """Return mean scores with intervals over seeds, a row for each variant; with one factor, for each setting."""
     import polars as pl
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
 
+    from simharness.cli.score_tables import ScoreTable
     from simharness.report.study.tables import by_seed
-    from simharness.scoring.catalogue import HEADLINE, SCORES
+    from simharness.scoring.catalogue import SCORES
     from simharness.statistics.intervals import mean_interval
 
     factors = results.info["factors"] if len(results.info["factors"]) == 1 else []
     keys = [*(("case",) if any(results.trials["case"]) else ()), *factors, "variant"]
-    table = Table(
-        title=Text(results.info["name"]), title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False
-    )
-    for key in keys:
-        table.add_column(key.replace(".", ".\n"), no_wrap=True)
-    for score in HEADLINE:
-        info = SCORES[score]
-        table.add_column(f"{info.title}\n{info.unit}", justify="right", no_wrap=True)
-    for group in results.trials.select(keys).unique(maintain_order=True).iter_rows():
-        rows = results.trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
+    lines = []
+    for group in trials.select(keys).unique(maintain_order=True).iter_rows():
+        rows = trials.filter(*(pl.col(key).eq_missing(value) for key, value in zip(keys, group, strict=True)))
         cells = [
             _cell(mean_interval(list(by_seed(rows, score).values()), unit=SCORES[score].unit), SCORES[score].digits)
-            for score in HEADLINE
+            for score in scores
         ]
-        table.add_row(*(Text("–" if value is None else str(value)) for value in group), *cells)
-    return table
+        lines.append((*("–" if value is None else str(value) for value in group), *cells))
+    headings = [f"{SCORES[score].title}\n{SCORES[score].unit}" for score in scores]
+    return ScoreTable(title, [key.replace(".", ".\n") for key in keys], headings, lines)
 
 
 def _cell(interval: Any, digits: int) -> str:

@@ -54,10 +54,21 @@ def _jerk(scores: Mapping[str, Any]) -> float | None:
     return jerk["estimate"] / jerk["truth"] if jerk["truth"] else None
 
 
+def has_identities(scores: Mapping[str, Any]) -> bool:
+    """Return whether a variant gives identities, from its summary."""
+    return (scores.get("tracking") or {}).get("mean_joint") is not None
+
+
 def _column(key: str, value: Callable[[Mapping[str, Any]], float | None]) -> Column:
     info = SCORES[key]
     return Column(info.title, info.unit, info.about, value, info.digits)
 
+
+IDENTITY_COLUMNS: tuple[Column, ...] = (
+    *(_column(key, _identity(key, 100.0)) for key in ("hota", "idf1")),
+    *(_column(key, _identity(key)) for key in ("id_switches", "switches_per_minute")),
+)
+"""Columns of the terminal, of variants with identities only."""
 
 TRACKING_COLUMNS: tuple[Column, ...] = (
     *(_column(key, _identity(key, 100.0)) for key in ("hota", "deta", "assa", "idf1", "mota")),

@@ -97,9 +97,15 @@ class Worker:
 
 
 def fuzz(numbers, folder, readers=()):
-    """Yield the readers, all or some, each with the tally of some numbers of mutations of its file."""
+    """Yield the readers, all or some, each with the tally of some numbers of mutations of its file.
+
+    Raises:
+        ValueError: a name that no reader has; the message lists those of the readers.
+    """
     worker = Worker(folder)
     try:
+        if unknown := [name for name in readers if name not in worker.readers]:
+            raise ValueError(f"no reader is called {', '.join(unknown)}; the readers are {', '.join(worker.readers)}")
         for reader in readers or worker.readers:
             tally = Tally()
             for number in numbers:
@@ -111,10 +117,13 @@ def fuzz(numbers, folder, readers=()):
 
 def main():
     columns = ("mutations", "accepted", "refused", "failed", "odd", "worst s", "MiB")
-    print(f"{'reader':26}" + "".join(f"{column:>10}" for column in columns), flush=True)
+    header = f"{'reader':26}" + "".join(f"{column:>10}" for column in columns)
     count = int(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
         for name, tally in fuzz(range(count), Path(folder), sys.argv[2:]):
+            if header:
+                print(header, flush=True)
+                header = ""
             counts = [count, *(tally.counts[each] for each in ("accepted", "refused", "failed")), len(tally.problems)]
             cells = [*map(str, counts), f"{tally.slowest:.2f}", f"{tally.memory / 2**20:.0f}"]
             print(f"{name:26}" + "".join(f"{cell:>10}" for cell in cells), flush=True)
@@ -123,4 +132,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except ValueError as error:
+        sys.exit(f"reader_fuzzing: {error}")

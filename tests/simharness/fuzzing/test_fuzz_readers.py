@@ -36,3 +36,18 @@ def test_a_dead_worker_counts_as_a_failure_and_the_next_one_answers(tmp_path):
         assert worker.attempt("store", 0)["outcome"] in ("accepted", "refused")
     finally:
         worker.close()
+
+
+def test_an_unknown_reader_is_refused_with_the_names_of_all(tmp_path, monkeypatch):
+    class Idle:
+        readers = ("TRC markers", "study")
+
+        def __init__(self, folder):
+            self.closed = False
+
+        def close(self):
+            self.closed = True
+
+    monkeypatch.setattr("reader_fuzzing.Worker", Idle)
+    with pytest.raises(ValueError, match="no reader is called trc; the readers are TRC markers, study"):
+        next(fuzz(range(2), tmp_path, ["study", "trc"]))

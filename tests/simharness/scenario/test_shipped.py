@@ -19,6 +19,7 @@ SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 STUDIES = [
     "angle",
     "calibration",
+    "clocks",
     "clutter",
     "crowd",
     "detector",
@@ -32,7 +33,7 @@ STUDIES = [
     "views_corners",
     "views_side",
 ]
-LONGER = {"tracking": 150}  # frames: who is who shows over time
+LONGER = {"tracking": 150, "clocks": 90}  # frames: who is who shows over time, and times of pictures at video rate
 assert set(LONGER) <= set(STUDIES)
 
 
