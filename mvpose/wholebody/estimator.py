@@ -1,0 +1,142 @@
+"""Estimators of the body made into estimators of the whole body."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from mvpose.arrays import Floats, Integers
+from mvpose.camera import Rig
+from mvpose.checks import seal
+from mvpose.detections import Detections
+from mvpose.estimate import Estimate
+from mvpose.pipeline import Estimator, SequenceEstimator
+from mvpose.rays import viewing_rays
+from mvpose.reconstruction import Triangulation
+from mvpose.skeleton import COCO17, Skeleton
+from mvpose.wholebody.detections import body_part, rows_of
+
+
+@dataclass(frozen=True)
+class WholeBody:
+    """Estimator of single frames that adds the joints beyond COCO17 to the people of another one.
+
+    The other estimator gets the body alone. The joints beyond it are triangulated from the detections that it matched
+    to each person, with the error model and covariances of :class:`mvpose.reconstruction.Triangulation`; a joint that
+    fewer than two views agree on is missing. They belong to the pictures of the frame: a tracker does not move them to
+    its own time, nor does it smooth them.
+
+    Attributes:
+        estimator: estimator of people on COCO17 that reports labels.
+        triangulation: reconstruction of the other joints.
+    """
+
+    estimator: Estimator
+    triangulation: Triangulation = Triangulation()
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Estimate the people of one frame on the skeleton of the detections.
+
+        Args:
+            rig: calibrated cameras.
+            detections: 2D poses of all views, on COCO17 or a skeleton that holds some of its joints.
+
+        Raises:
+            ValueError: as the estimator; a skeleton without joints of COCO17; an estimator that reports no labels.
+        """
+        return self._completed(rig, detections, self.estimator.estimate(rig, body_part(detections)))
+
+    def _completed(self, rig: Rig, detections: Detections, body: Estimate) -> Estimate:
+        """Return the people of an estimate on COCO17 on the skeleton of the detections."""
+        skeleton = detections.skeleton
+        if skeleton == COCO17:
+            return body
+        start = time.perf_counter()
+        rows, others = rows_of(skeleton)
+        if len(body) and not body.matching.covers(len(detections)):
+            raise ValueError("the estimator reports no labels of detections, without which other joints have no person")
+        labels = body.matching.labels_of(len(detections))
+        used = np.flatnonzero((labels >= 0) & (labels < len(body)))
+        rays = viewing_rays(rig, _columns(detections, used, others))
+        found = self.triangulation(rays, labels[used], _part(skeleton))
+        count, known = len(found.joints), rows >= 0
+        shape = len(body), len(skeleton)
+        joints, scores = np.full((*shape, 3), np.nan), np.zeros(shape)
+        covariance, freedom = np.full((*shape, 3, 3), np.nan), np.full(shape, np.nan)
+
+        def place(whole: Floats, of_body: Floats, of_others: Floats) -> Floats:
+            whole[:, rows[known]] = of_body[:, known]
+            whole[:count, others] = of_others
+            seal(whole)
+            return whole
+
+        seconds = time.perf_counter() - start
+        timings = body.timings | {"whole body": seconds}
+        if "total" in timings:
+            timings["total"] += seconds
+        return replace(
+            body,
+            joints=place(joints, body.joints, found.joints),
+            scores=place(scores, body.scores, found.scores),
+            covariance=None if body.covariance is None else place(covariance, body.covariance, found.covariance),
+            freedom=None if body.freedom is None else place(freedom, body.freedom, found.freedom),
+            timings=timings,
+        )
+
+
+@dataclass(frozen=True)
+class WholeBodyTracking(WholeBody):
+    """As :class:`WholeBody`, of a tracker (:class:`mvpose.pipeline.SequenceEstimator`)."""
+
+    estimator: SequenceEstimator
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
+
+        Args:
+            rig: calibrated cameras.
+            frames: detections of each frame, in the order of time.
+
+        Raises:
+            ValueError: as :meth:`WholeBody.estimate`.
+        """
+        waiting: deque[Detections] = deque()  # frames whose estimates the tracker has not given yet
+
+        def bodies() -> Iterator[Detections]:
+            for detections in frames:
+                waiting.append(detections)
+                yield body_part(detections)
+
+        for body in self.estimator.track(rig, bodies()):
+            yield self._completed(rig, waiting.popleft(), body)
+
+
+def whole_body(estimator: Estimator) -> WholeBody:
+    """Return an estimator of the whole body: a tracker if the given one is a tracker."""
+    return WholeBodyTracking(estimator) if isinstance(estimator, SequenceEstimator) else WholeBody(estimator)
+
+
+def _columns(detections: Detections, used: Integers, joints: Integers) -> Detections:
+    """Return some joints of some detections."""
+    return Detections(
+        detections.view[used],
+        detections.keypoints[np.ix_(used, joints)],
+        detections.scores[np.ix_(used, joints)],
+        detections.boxes[used],
+        detections.box_scores[used],
+        _part(detections.skeleton),
+    )
+
+
+@lru_cache(maxsize=64)
+def _part(skeleton: Skeleton) -> Skeleton:
+    """Return the joints of a skeleton beyond COCO17 as a skeleton; only their names and sigmas mean anything."""
+    _, others = rows_of(skeleton)
+    names, sigmas = tuple(skeleton.joints[row] for row in others), tuple(skeleton.sigmas[row] for row in others)
+    parents = (-1, *[0] * (len(others) - 1))
+    return Skeleton(f"{skeleton.name} beyond COCO17", names, parents, tuple(range(len(others))), sigmas)
