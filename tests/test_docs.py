@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 
 import simharness
 from mvpose.formats.calibration.voxelpose import write_calibration
+from mvpose.wholebody import read_skeleton
 from simharness.cli import app
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.study_definition import load_study
@@ -233,7 +234,7 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 7, "toml": 7, "yaml": 1}
+    assert languages == {"python": 9, "toml": 8, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -531,3 +532,16 @@ def test_the_block_of_people_files_runs(tmp_path):
     exec(block, {"rig": recording.rig, "frames": recording.detections, "folder": tmp_path})
     names = {path.name for path in tmp_path.iterdir()}
     assert {"poses.parquet", "person_0.trc", "person_0.c3d"} <= names
+
+
+def test_the_blocks_of_the_whole_body_run(tmp_path):
+    rig = simharness.simulate(simharness.load_scenario("quickstart", overrides=["duration=0.1"])).rig
+    points = np.array([0.0, 0.0, 1.2]) + np.random.default_rng(0).uniform(-0.3, 0.3, (133, 3))
+    (block,) = [block for block in blocks("python") if "whole_body(" in block]
+    views = len(rig)
+    names = {"rig": rig, "view": np.arange(views), "keypoints": rig.project(points), "scores": np.ones((views, 133))}
+    exec(block, names)
+    np.testing.assert_allclose(names["people"].joints[0, 17:], points[17:], atol=0.02)
+    (file,) = [block for block in blocks("toml") if "[joints]" in block]
+    (tmp_path / "feet.toml").write_text(file)
+    assert len(read_skeleton(tmp_path / "feet.toml")) == 4
