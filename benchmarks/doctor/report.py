@@ -1,0 +1,244 @@
+"""Tables of the benchmark: each bar with what was measured, and faults against findings."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mvpose.calibration.findings import KINDS
+
+Results = Mapping[str, Mapping[str, Any]]
+_NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One bar.
+
+    Attributes:
+        what: what is measured.
+        bar: what is asked for.
+        measured: what was measured, as text.
+        met: whether the bar is met; None where it cannot be told.
+        trials: number of trials.
+    """
+
+    what: str
+    bar: str
+    measured: str
+    met: bool | None
+    trials: int
+
+
+def rows_of(results: Results) -> list[Row]:
+    """Return the bars that the results say something about."""
+    by: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    for key, result in results.items():
+        experiment, recording, case, _ = key.split("/")
+        by[experiment].append({**result, "recording": recording, "case": case})
+    rows: list[Row | None] = [
+        _share("Shelf, one camera 1 degree and 5 cm off: the right one named", by["moved"], "named", 95.0),
+        _share("   and no other alarm", by["moved"], "alone", None),
+        _share("untouched Shelf and clean rigs: false alarms", by["clean"], "false_alarm", 2.0, most=True),
+        *_repaired_rows(by["repaired"]),
+        _share("conventions named", by["conventions"], "named", 98.0),
+        _share("   of the right camera", by["conventions"], "camera", None),
+        _share("other faults named", by["faults"], "named", None),
+        *_rigs_rows(by["rigs-off"]),
+        *_clock_rows(by["clocks"]),
+        _coverage_row(by["coverage"]),
+        *_refusal_rows(by["refusals"]),
+    ]
+    return [row for row in rows if row is not None]
+
+
+def confusion_of(results: Results) -> dict[str, Counter[str]]:
+    """Return for each fault how many recordings have an alarm of each kind; "nothing" counts those without any."""
+    matrix: dict[str, Counter[str]] = {}
+    for key, result in results.items():
+        experiment, _, case, _ = key.split("/")
+        if experiment not in ("clean", "conventions", "faults"):
+            continue
+        kinds = {each["kind"] for each in result["findings"] if each["severity"] == "alarm"}
+        row = matrix.setdefault(case or "no fault", Counter())
+        row.update(kinds or {_NOTHING})
+        row["recordings"] += 1
+    return matrix
+
+
+def print_report(results: Results) -> None:
+    """Print both tables."""
+    for row in rows_of(results):
+        mark = {True: "✓", False: "✗", None: " "}[row.met]
+        print(f"{row.what:62s} {row.bar:26s} {mark} {row.measured}  ({row.trials})")
+    matrix = confusion_of(results)
+    if matrix:
+        print("\nalarms by fault, recordings:")
+    for fault, counts in matrix.items():
+        alarms = ", ".join(f"{kind} {count}" for kind, count in counts.most_common() if kind != "recordings")
+        print(f"{fault:36s} of {counts['recordings']:3d}: {alarms}")
+
+
+def write_report(results: Results, folder: Path) -> None:
+    """Write ``doctor.json`` (bars and confusion matrix) and ``confusion.html`` into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    matrix = confusion_of(results)
+    summary = {"bars": [asdict(row) for row in rows_of(results)], "confusion": {k: dict(v) for k, v in matrix.items()}}
+    (folder / "doctor.json").write_text(json.dumps(summary, indent=1) + "\n")
+    (folder / "confusion.html").write_text(_page(rows_of(results), matrix))
+
+
+def _share(
+    what: str, results: Sequence[Mapping[str, Any]], key: str, bar: float | None, *, most: bool = False
+) -> Row | None:
+    if not results:
+        return None
+    share = 100.0 * float(np.mean([each[key] for each in results]))
+    met = None if bar is None else share <= bar if most else share >= bar
+    text = "" if bar is None else f"{'<=' if most else '>='} {bar:g} %"
+    return Row(what, text, f"{share:.1f} %", met, len(results))
+
+
+def _worst(results: Sequence[Mapping[str, Any]], key: str) -> float:
+    return float(np.percentile([each[key] for each in results], 95))
+
+
+def _repaired_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    moved = [each for each in results if each["case"] != "untouched"]
+    untouched = [each for each in results if each["case"] == "untouched"]
+    if not moved:
+        return []
+    degrees, metres, count = _worst(moved, "degrees"), _worst(moved, "metres"), len(moved)
+    rows: list[Row | None] = [
+        Row(
+            "Shelf, one camera 2 degrees and 0.2 m off: repaired (95th percentile)", "<= 0.2 degrees, 2 cm",
+            f"{degrees:.2f} degrees, {100 * metres:.1f} cm", degrees <= 0.2 and metres <= 0.02, count,
+        ),
+        Row(
+            "   seconds", "< 10 s", f"{_worst(moved, 'seconds'):.1f} s", _worst(moved, "seconds") < 10.0, count
+        ),
+    ]  # fmt: skip
+    if untouched:
+        base, lost = untouched[0], untouched[0]["pcp_before"] - min(each["pcp_after"] for each in moved)
+        rows += [
+            Row(
+                "   the untouched rig, repaired", "", f"{base['degrees']:.2f} degrees, {100 * base['metres']:.1f} cm",
+                None, 1,
+            ),
+            Row(
+                "   PCP lost at worst against untouched", "<= 1",
+                f"{lost:.1f} of {base['pcp_before']:.1f}; unrepaired "
+                f"{np.mean([each['pcp_before'] for each in moved]):.1f}", lost <= 1.0, count,
+            ),
+        ]  # fmt: skip
+    return rows
+
+
+def _rigs_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    rows: list[Row | None] = []
+    for case in dict.fromkeys(each["case"] for each in results):
+        some = [each for each in results if each["case"] == case]
+        means = {
+            name: float(np.mean([each[f"pcp_{name}"] for each in some])) for name in ("before", "after", "perfect")
+        }
+        rows.append(
+            Row(
+                f"simulated, all cameras {case} off: PCP after repair", "perfect - 3" if case.startswith("2") else "",
+                f"{means['after']:.1f} (before {means['before']:.1f}, perfect {means['perfect']:.1f}; refused "
+                f"{sum(each['refused'] is not None for each in some)})",
+                means["after"] >= means["perfect"] - 3.0 if case.startswith("2") else None, len(some),
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _clock_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    if not results:
+        return []
+    errors = np.abs(np.concatenate([each["errors_ms"] for each in results]))
+    halves = np.concatenate([each["halves_ms"] for each in results])
+    share, inside = 100.0 * float((errors <= 5.0).mean()), 100.0 * float((errors <= halves).mean())
+    rows: list[Row | None] = [
+        Row(
+            "clocks, 10 s of walking: offsets within 5 ms", ">= 95 %",
+            f"{share:.1f} % (median {np.median(errors):.1f}, 95 % {np.percentile(errors, 95):.1f} ms)", share >= 95.0,
+            len(errors),
+        ),
+        Row("   inside of the 90 % interval", "85 to 95 %", f"{inside:.1f} %", 85.0 <= inside <= 95.0, len(errors)),
+    ]  # fmt: skip
+    for variant in ("full", "track"):
+        means = {
+            part: float(np.mean([each[f"pcp_{variant}{part}"] for each in results]))
+            for part in ("", "_repaired", "_synchronised")
+        }
+        lost = means["_synchronised"] - means["_repaired"]
+        rows.append(
+            Row(
+                f"   PCP of {variant}, against synchronised", "<= 1 lost",
+                f"{lost:.1f} lost: {means['']:.1f} -> {means['_repaired']:.1f} of {means['_synchronised']:.1f}",
+                lost <= 1.0, len(results),
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _coverage_row(results: Sequence[Mapping[str, Any]]) -> Row | None:
+    made = [each for each in results if each["refused"] is None]
+    if not made:
+        return None
+    share = 100.0 * sum(each["inside"] for each in made) / max(sum(each["parameters"] for each in made), 1)
+    return Row(
+        "true corrections inside of the 90 % interval", "85 to 95 %", f"{share:.1f} %", 85.0 <= share <= 95.0, len(made)
+    )
+
+
+def _refusal_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    rows: list[Row | None] = []
+    for case in dict.fromkeys(each["case"] for each in results):
+        some = [each for each in results if each["case"] == case]
+        kept = sum(each["unchanged"] for each in some)
+        unsure = sum(each["verdict"] == "cannot tell" for each in some)
+        rows.append(
+            Row(
+                f"{case}: rig unchanged; cannot tell", "all", f"{kept}; {unsure}", kept == unsure == len(some),
+                len(some),
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _page(rows: Sequence[Row], matrix: Mapping[str, Counter[str]]) -> str:
+    """Return both tables as a page without scripts; the darker a cell, the more recordings."""
+    kinds = [kind for kind in (*KINDS, _NOTHING) if any(kind in counts for counts in matrix.values())]
+    bars = "".join(
+        f"<tr><td>{html.escape(row.what)}<td>{html.escape(row.bar)}<td>{html.escape(row.measured)}"
+        f"<td>{ {True: '✓', False: '✗', None: ''}[row.met] }<td>{row.trials}"
+        for row in rows
+    )
+    head = "".join(f"<th><span>{html.escape(kind)}</span>" for kind in kinds)
+    body = "".join(
+        f"<tr><th>{html.escape(fault)}" + "".join(_cell(counts[kind], counts["recordings"]) for kind in kinds)
+        for fault, counts in matrix.items()
+    )
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>The doctor: faults and findings</title><style>'
+        "body{font:14px system-ui,sans-serif;margin:2em}td,th{padding:2px 6px;text-align:left;font-weight:normal}"
+        "th span{writing-mode:vertical-rl;transform:rotate(180deg)}table{border-collapse:collapse;margin:1em 0}"
+        "td{border:1px solid #ddd}</style><h1>The doctor</h1><h2>Bars</h2><table><tr><th>what<th>bar<th>measured<th>"
+        f"<th>trials{bars}</table><h2>Faults (rows) and alarms (columns)</h2><p>Recordings with an alarm of each kind."
+        f"</p><table><tr><th>{head}{body}</table></html>\n"
+    )
+
+
+def _cell(count: int, of: int) -> str:
+    if not count:
+        return "<td>"
+    share = count / of
+    return f'<td style="background:rgba(40,90,160,{share:.2f});color:{"#fff" if share > 0.5 else "#000"}">{count}'
