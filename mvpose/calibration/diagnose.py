@@ -84,7 +84,8 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
     findings += camera_findings.of(result, mended, starts, names, undetermined=undetermined)
-    findings += estimate_clocks(mended, sightings, period=period).findings()
+    clocks = estimate_clocks(mended, sightings, period=period)
+    findings += [each for each in clocks.findings() if each.view not in useless]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
     return Diagnosis.of(
         findings,
