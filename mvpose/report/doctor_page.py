@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -15,6 +15,7 @@ from markupsafe import Markup
 from mvpose.arrays import Floats
 from mvpose.calibration.clocks import Clocks
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
 from mvpose.detections import Detections
@@ -35,33 +36,6 @@ _MOST_VIEWS = 16  # with residual arrows: those with the largest residuals
 _NINETY = 1.645  # standard deviations of a Gaussian to each side of the middle 90 %
 
 
-class Repaired(Protocol):
-    """What the page takes from a :class:`mvpose.calibration.Repair`."""
-
-    @property
-    def rig(self) -> Rig:
-        """The corrected rig."""
-
-    @property
-    def offsets(self) -> Floats:
-        """Offset of each camera's clock, (V,), seconds."""
-
-    @property
-    def corrections(self) -> Floats:
-        """Rotation vector (rad) and centre (m) of each camera's correction, (V, 6)."""
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of each camera's correction, (V, 6, 6)."""
-
-    @property
-    def refused(self) -> str | None:
-        """Why nothing was changed; None where something was."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the repair as values that ``json.dumps`` writes."""
-
-
 def write_doctor_page(
     folder: str | Path,
     *,
@@ -69,7 +43,7 @@ def write_doctor_page(
     rig: Rig,
     frames: Sequence[Detections],
     diagnosis: Diagnosis,
-    repair: Repaired | None = None,
+    repair: Repair | None = None,
     sightings: Sightings | None = None,
     clocks: Clocks | None = None,
     pictures: Pictures | None = None,
@@ -116,6 +90,7 @@ def write_doctor_page(
         repaired=case.after is not None,
         above=_above(case),
         cameras=_cameras(case),
+        held=() if repair is None else repair.held,
         fields=_fields(case),
         lines=_lines(case, pictures),
         clocks=_clocks(case, clocks),
@@ -144,12 +119,12 @@ class Case:
     names: tuple[str, ...]
     sightings: Sightings
     diagnosis: Diagnosis
-    repair: Repaired | None
+    repair: Repair | None
     before: Missing
     after: Missing | None
 
     @classmethod
-    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repaired | None) -> Case:
+    def of(cls, rig: Rig, sightings: Sightings, diagnosis: Diagnosis, repair: Repair | None) -> Case:
         """Compare the sightings with both rigs."""
         after = None
         if repair is not None and repair.refused is None:
@@ -310,8 +285,10 @@ def _clocks(case: Case, clocks: Clocks | None) -> Markup | None:
             value, (low, high) = float(clocks.offsets[view]), clocks.interval[view].tolist()
             offsets[view] = plots.Interval(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
     elif case.repair is not None and case.repair.refused is None and np.any(case.repair.offsets):
-        for view, offset in enumerate(case.repair.offsets.tolist()):
-            offsets[view] = plots.Interval(case.names[view], 1000.0 * offset)
+        spread = _NINETY * case.repair.offset_sigmas
+        for view, (value, half) in enumerate(zip(case.repair.offsets.tolist(), spread.tolist(), strict=True)):
+            low, high = (value - half, value + half) if half > 0 else (math.nan, math.nan)
+            offsets[view] = plots.Interval(case.names[view], 1000.0 * value, 1000.0 * low, 1000.0 * high)
     for finding in case.diagnosis.findings:
         if finding.kind == "clock-offset" and finding.view is not None and "ms" in finding.size:
             low, high = finding.interval.get("ms", (math.nan, math.nan))

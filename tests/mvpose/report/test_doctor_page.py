@@ -3,7 +3,7 @@
 import json
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Rig
 from mvpose.calibration.findings import Diagnosis, Finding
+from mvpose.calibration.repair import Repair
 from mvpose.calibration.sightings import Sightings
 from mvpose.report.doctor_drawings import (
     MatchedJoint,
@@ -162,16 +163,24 @@ class TestExaggeration:
         assert motion_factor(rig, other) in (5.0, 2.0)
 
 
-@dataclass(frozen=True)
-class MadeRepair:
-    rig: Rig
-    offsets: np.ndarray
-    corrections: np.ndarray
-    covariance: np.ndarray
-    refused: str | None = None
-
-    def to_json(self):
-        return {"refused": self.refused}
+def made_repair(rig, corrections=None, refused=None):
+    """A repair that turned and moved cameras by ``corrections``, (V, 6)."""
+    views = len(rig)
+    corrections = np.zeros((views, 6)) if corrections is None else corrections
+    covariance = np.tile(1e-6 * np.eye(6), (views, 1, 1)) * (np.abs(corrections).max(axis=1) > 0)[:, None, None]
+    nothing = np.zeros(views)
+    clocks = dict(offsets=nothing, offset_sigmas=nothing, focal=np.ones(views), center=np.zeros((views, 2)))
+    residuals = dict(residuals_before=nothing, residuals_after=nothing)
+    return Repair(
+        rig,
+        corrections=corrections,
+        covariance=covariance,
+        held=("clocks",),
+        refused=refused,
+        people=3,
+        **clocks,
+        **residuals,
+    )
 
 
 def finding(**changes):
@@ -201,7 +210,7 @@ class TestPage:
         wrong = moved(rig, 2, degrees=2.0, metres=0.05)
         corrections = np.zeros((5, 6))
         corrections[2] = [0.02, 0, 0.028, 0, -0.03, -0.04]
-        repair = MadeRepair(rig, np.zeros(5), corrections, np.tile(1e-6 * np.eye(6), (5, 1, 1)))
+        repair = made_repair(rig, corrections)
         page, numbers = page_of(tmp_path, wrong, sighted(rig, noise=1.0), [finding()], repair)
         assert "Camera &lt;2&gt; has moved." in page
         assert "4.0 to 6.0" in page  # cm
@@ -210,11 +219,12 @@ class TestPage:
         assert 'class="line after"' in page
         assert "mvpose repair a.json b --out c.json" in page
         assert numbers["findings"][0]["kind"] == "moved-camera"
-        assert numbers["repair"] == {"refused": None}
+        assert "held" in page
+        assert numbers["repair"]["refused"] is None
 
     def test_what_was_refused_is_stated_and_nothing_is_drawn_after(self, tmp_path):
         rig = ring(4)
-        repair = MadeRepair(rig, np.zeros(4), np.zeros((4, 6)), np.zeros((4, 6, 6)), "nobody moved")
+        repair = made_repair(rig, refused="nobody moved")
         page, _ = page_of(tmp_path, rig, sighted(rig), [finding(kind="cannot-tell", severity="unknown")], repair)
         assert "nobody moved" in page
         assert "cannot tell" in page

@@ -9,7 +9,7 @@ from headless_browser import find_browser, run_browser
 from people import ring
 from PIL import Image
 from synthetic_recording import recording
-from test_doctor_page import MadeRepair, finding, moved, page_of, sighted
+from test_doctor_page import finding, made_repair, moved, page_of, sighted
 
 from mvpose.report.recording_page import write_page
 
@@ -40,7 +40,7 @@ def pages(tmp_path_factory):
     name = "a_recording_with_a_name_that_is_longer_than_the_screen_of_a_phone"
     path = write_page(folder, name=name, people=people, rig=rig, frames=frames)
     right = ring(5)
-    repair = MadeRepair(right, np.zeros(5), np.full((5, 6), 0.01), np.tile(1e-6 * np.eye(6), (5, 1, 1)))
+    repair = made_repair(right, np.full((5, 6), 0.01))
     doctor, _ = page_of(folder, moved(right, 2, degrees=2.0), sighted(right, noise=1.0), [finding()] * 2, repair)
     return {"recording": path.read_text(encoding="utf-8"), "doctor": doctor}
 
