@@ -96,6 +96,11 @@ IN_PARTS = {
 MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
+# Run by tests/mvpose/cli.
+MVPOSE = (
+    "mvpose estimate CALIBRATION DETECTIONS --out results",
+    "mvpose doctor CALIBRATION DETECTIONS",
+)  # tests/mvpose/cli
 SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
     f"python -m {name}"
@@ -127,6 +132,7 @@ KNOWN = {
     CI,
     *PYTEST,
     *SHELL,
+    *MVPOSE,
 }
 
 # Replaces the shipped suite ci, which takes minutes: nothing here is hard for the method.

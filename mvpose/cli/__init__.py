@@ -1,7 +1,7 @@
 """Command line ``mvpose``: from the files of a recording to tracked people, one module for each group of commands.
 
-Exit codes: 0 success, 2 bad input, 3 the run itself failed, 130 interrupted; errors are one line on stderr. Commands
-import numerical modules only when they run.
+Exit codes: 0 success, 1 faults found by the doctor, 2 bad input, 3 the run itself failed, 130 interrupted; errors are
+one line on stderr. Commands import numerical modules only when they run.
 """
 
 from __future__ import annotations

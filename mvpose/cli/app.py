@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli import estimate, view
+from mvpose.cli import doctor, estimate, view
 
 app = typer.Typer(
     name="mvpose",
@@ -42,4 +42,5 @@ def options(
 
 
 estimate.add_to(app)
+doctor.add_to(app)
 view.add_to(app)

@@ -13,6 +13,7 @@ import typer
 
 from mvpose.files.message_text import one_line
 
+FAULTS = 1
 BAD_INPUT = 2
 FAILED = 3
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -93,8 +94,14 @@ class Choices:
     up: str | None = None
 
 
-def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices) -> Inputs:
+def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:
     """Read a calibration and detections, and check that they can belong together. Notes are printed on stderr.
+
+    Args:
+        calibration: file or folder.
+        detections: files or folders.
+        choices: options of the command.
+        examined: whether the doctor looks at them next: what does not fit is then noted, not refused.
 
     Raises:
         ValueError: anything wrong with a file or an option.
@@ -121,14 +128,25 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices)
     rig, about_size = plausibility.with_sizes(rig, extents, size=size)
     if about_size:
         note(about_size)
-    plausibility.check_principal_points(rig)
-    plausibility.check_extents(rig, extents)
-    if choices.up is None:
-        plausibility.check_up(rig)
-    else:
+    with _noted() if examined else contextlib.nullcontext():
+        plausibility.check_principal_points(rig)
+    with _noted() if examined else contextlib.nullcontext():
+        plausibility.check_extents(rig, extents)
+    if choices.up is not None:
         rig = plausibility.turned_up(rig, choices.up)
+    elif not examined:
+        plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, len(rig))
     return Inputs(rig, recorded.detections(times), recorded.numbers, period)
+
+
+@contextlib.contextmanager
+def _noted() -> Iterator[None]:
+    """Print an error as a note."""
+    try:
+        yield
+    except ValueError as error:
+        note(str(error))
 
 
 def _times(choices: Choices, numbers: NDArray[np.int64], cameras: int) -> tuple[NDArray[np.float64], float]:
