@@ -37,7 +37,9 @@ _HALF = 0.5  # pixels, for the derivative of the lens
 
 
 def changed(camera: Camera, parameters: Floats) -> Camera:
-    """Return a camera changed by its ten parameters; the clock does not change it."""
+    """Return a camera changed by its ten parameters; the same one where all are 0, whatever its clock."""
+    if not np.delete(parameters, CLOCK).any():
+        return camera
     R = camera.R @ Rotation.from_rotvec(parameters[ROTATION]).as_matrix().T
     K = camera.K.copy()
     K[:2, :2] *= np.exp(parameters[FOCAL])
@@ -180,11 +182,12 @@ def reduce(
     clusters = np.zeros(len(seen), np.int64) if clusters is None else clusters
     image, slopes, scale = normalised(rig, offsets, seen)
     R = np.stack([camera.R for camera in rig])
+    warm = points is not None
     if points is None:
         points = _triangulated(seen.view, seen.start, image, scale, R, rig.centers)
     return Reduced(
-        *_reduce(seen.view, seen.start, image, slopes, scale, R, rig.centers, points.copy(), seen.importance,
-                 clusters, int(clusters.max(initial=0)) + 1)
+        *_reduce(seen.view, seen.start, image, slopes, scale, R, rig.centers, points.copy(), warm,
+                 seen.importance, clusters, int(clusters.max(initial=0)) + 1)
     )  # fmt: skip
 
 
@@ -221,10 +224,10 @@ def _solve3(a, b):
 
 
 @njit(cache=True)
-def _reduce(view, start, image, slopes, scale, R, centers, points, importance, clusters, cluster_count):  # noqa: PLR0915
+def _reduce(view, start, image, slopes, scale, R, centers, points, warm, importance, clusters, count):  # noqa: PLR0915
     """Return the fields of :class:`Reduced`; ``points`` is overwritten."""
     views, size = len(R), PARAMETERS * len(R)
-    information, gradients = np.zeros((size, size)), np.zeros((cluster_count, size))
+    information, gradients = np.zeros((size, size)), np.zeros((count, size))
     residuals, weights = np.zeros((len(view), 2)), np.zeros(len(view))
     cost = 0.0
     by_point = np.zeros((len(view), 2, 3))
@@ -254,7 +257,7 @@ def _reduce(view, start, image, slopes, scale, R, centers, points, importance, c
                 right_one = np.exp(-0.5 * square)
                 worth -= np.log(right_one + FLOOR)
                 # Wide at first, so that the joint is found although the cameras are off.
-                if turn == 0:
+                if turn == 0 and not warm:
                     weights[k] = 1.0 / (1.0 + square / 25.0)
                 else:
                     weights[k] = right_one / (right_one + FLOOR)

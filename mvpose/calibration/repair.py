@@ -16,7 +16,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.calibration.adjustment import Adjustment, Prior, adjust
 from mvpose.calibration.bundle import CENTER, CLOCK, FOCAL, PARAMETERS, ROTATION, TRANSLATION, observations, reduce
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
-from mvpose.calibration.tracklet_matching import RigUncertainty, match_tracklets
+from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, match_tracklets
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
 from mvpose.camera import Rig
 from mvpose.detections import Detections
@@ -32,6 +32,14 @@ _LEAST_CAMERAS = 3
 _LEAST_SIGHTINGS = 100
 _LEAST_SHARED = 20  # sightings of a camera that other cameras share
 _CAN_TELL = (float(np.radians(0.75)), 0.06)  # standard deviations beyond which a pose is not determined: rad, m
+_TOO_FEW_PLACES = (
+    "cannot tell: people were in too few places to tell a turned camera from a moved one; record somebody who walks "
+    "through the whole scene for ten seconds"
+)
+_TOO_FEW_SHARED = (
+    "cannot tell: hardly anybody is seen by two cameras at one time; record people in the middle of the scene, or "
+    "check that the cameras film one place and that their files are in the order of the rig"
+)
 
 
 @dataclass(frozen=True)
@@ -124,37 +132,46 @@ def repair(
     """
     allowed = _allowed(rig, free, cameras, clocks=clocks)
     tracklets = link(rig, frames, period=period)
-    chosen = chosen_frames(tracklets, spacing=_SPACING)
     if len(rig) < _LEAST_CAMERAS:
-        return _refused(rig, "two cameras cannot tell which of them is off; add a third that sees the same people")
+        return _refused(rig, "cannot tell: of two cameras either may be off; add a third that sees the same people")
     if not len(tracklets):
-        return _refused(rig, "there are no detections; record people who walk through the views of all cameras")
+        return _refused(
+            rig, "cannot tell: there are no detections; record people who walk through the views of all cameras"
+        )
     groups = match_over_time(rig, tracklets)
-    person, start = groups.person, groups.rig
-    adjusted: Adjustment | None = None
-    held: list[str] = []
-    mask = allowed
+    sightings, adjusted, held, reason = _alternate(rig, tracklets, groups, allowed, prior)
+    return _refused(rig, reason) if reason else _result(rig, sightings, adjusted, held)
+
+
+def _alternate(
+    rig: Rig, tracklets: Tracklets, groups: PeopleGroups, allowed: Bools, prior: Prior | None
+) -> tuple[Sightings, Adjustment, list[str], str | None]:
+    """Match and adjust in turn; return what was found, the reasons for what was held, and that for a refusal."""
+    chosen = chosen_frames(tracklets, spacing=_SPACING)
+    person, start, offsets = groups.person, groups.rig, np.zeros(len(rig))
     for _ in range(_MOST_TURNS):
         sightings = _used(tracklets, person, chosen)
-        reason = _too_little(sightings)
-        if reason:
-            return _refused(rig, reason)
         mask, held = _connected(rig, sightings, allowed)
         if not mask.any():
-            return _refused(rig, "; ".join(held))
-        adjusted = adjust(
-            rig, sightings, free=mask, prior=prior, start=start,
-            offsets=None if adjusted is None else adjusted.parameters[:, CLOCK].ravel(),
-        )  # fmt: skip
+            break
+        adjusted = adjust(rig, sightings, free=mask, prior=prior, start=start, offsets=offsets)
+        loose = _undetermined(adjusted, mask)
+        if loose.any():
+            mask[loose] = False
+            held += [f"{_name(rig, int(view))}: {_TOO_FEW_PLACES}" for view in np.flatnonzero(loose)]
+            if not mask.any():
+                break
+            adjusted = adjust(rig, sightings, free=mask, prior=prior, start=adjusted.rig, offsets=offsets)
         again = match_tracklets(adjusted.rig, tracklets, _NARROW)
         if _same_groups(again.person, person):
             break
-        person, start = again.person, adjusted.rig
-    assert adjusted is not None
-    reason = _undetermined(adjusted, mask)
-    if reason:
-        return _refused(rig, reason)
-    return _result(rig, sightings, adjusted, held)
+        person, start, offsets = again.person, adjusted.rig, adjusted.parameters[:, CLOCK].ravel()
+    reason = None
+    if not mask.any():
+        adjusted = adjust(rig, sightings, free=mask, prior=prior)
+        reasons = sorted({each.split(": ", 1)[1] for each in held})
+        reason = "; ".join(reasons) if len(sightings) >= _LEAST_SIGHTINGS else _TOO_FEW_SHARED
+    return sightings, adjusted, held, reason
 
 
 def _allowed(rig: Rig, free: Sequence[Freedom], cameras: Sequence[int | str] | None, *, clocks: bool) -> Bools:
@@ -190,16 +207,6 @@ def _same_groups(one: Integers, other: Integers) -> bool:
     return pairs == len(np.unique(one)) == len(np.unique(other))
 
 
-def _too_little(sightings: Sightings) -> str | None:
-    """Return why the sightings say nothing about the rig, or None."""
-    if len(sightings) < _LEAST_SIGHTINGS:
-        return (
-            "cannot tell: hardly anybody is seen by two cameras at one time; record people in the middle of the scene, "
-            "or check that the cameras film one place and that their files are in the order of the rig"
-        )
-    return None
-
-
 def _connected(rig: Rig, sightings: Sightings, allowed: Bools) -> tuple[Bools, list[str]]:
     """Hold cameras that share nobody with two others; return the mask of the rest and the reasons."""
     views = len(rig)
@@ -210,10 +217,10 @@ def _connected(rig: Rig, sightings: Sightings, allowed: Bools) -> tuple[Bools, l
     linked = (common >= _LEAST_SHARED) & ~np.eye(views, dtype=bool)
     reach = np.linalg.matrix_power(linked.astype(float) + np.eye(views), views) > 0
     mask, held = allowed.copy(), []
-    for view, camera in enumerate(rig):
+    for view in range(views):
         if not allowed[view].any():
             continue
-        name = f"camera {camera.name or view}"
+        name = _name(rig, view)
         if not linked[view].any():
             mask[view] = False
             held.append(f"{name}: cannot tell, it shares nobody with other cameras; record people whom others see too")
@@ -226,25 +233,18 @@ def _connected(rig: Rig, sightings: Sightings, allowed: Bools) -> tuple[Bools, l
     return mask, held
 
 
-def _undetermined(adjusted: Adjustment, mask: Bools) -> str | None:
-    """Return why the data do not determine the cameras, or None.
-
-    A camera is determined where its pose relative to the others is, that is, with the others fixed.
-    """
-    worst: float = 0.0
+def _undetermined(adjusted: Adjustment, mask: Bools) -> Bools:
+    """Return the cameras whose pose the data do not determine even with all other cameras fixed, (V,)."""
+    result = np.zeros(len(mask), np.bool_)
     for view in np.flatnonzero(mask[:, :6].all(axis=1)):
         block = slice(PARAMETERS * view, PARAMETERS * view + 6)
         information = adjusted.information[block, block]
-        sigmas = np.sqrt(np.diag(np.linalg.inv(information + 1e-6 * np.diag(np.diag(information)) + 1e-9 * np.eye(6))))
-        worst = max(
-            worst, np.linalg.norm(sigmas[ROTATION]) / _CAN_TELL[0], np.linalg.norm(sigmas[TRANSLATION]) / _CAN_TELL[1]
-        )
-    if worst > 1.0:
-        return (
-            "cannot tell: people were in too few places to tell a turned camera from a moved one; record somebody who "
-            "walks through the whole scene for ten seconds"
-        )
-    return None
+        size = np.sqrt(np.maximum(np.diag(information), 1e-9))
+        scaled = information / np.outer(size, size) + 1e-9 * np.eye(6)
+        sigmas = np.sqrt(np.diag(np.linalg.inv(scaled))) / size
+        turned, moved = (float(np.linalg.norm(sigmas[place])) for place in (ROTATION, TRANSLATION))
+        result[view] = turned > _CAN_TELL[0] or moved > _CAN_TELL[1]
+    return result
 
 
 def _residuals(rig: Rig, sightings: Sightings, given: Rig, offsets: Floats) -> Floats:
@@ -293,12 +293,16 @@ def _refused(rig: Rig, reason: str) -> Repair:
         offset_sigmas=np.zeros(views),
         focal=np.ones(views),
         center=np.zeros((views, 2)),
-        held=tuple(f"camera {camera.name or v}: all" for v, camera in enumerate(rig)),
+        held=tuple(f"{_name(rig, view)}: all" for view in range(views)),
         refused=reason,
         residuals_before=unknown,
         residuals_after=unknown,
         people=0,
     )
+
+
+def _name(rig: Rig, view: int) -> str:
+    return f"camera {rig[view].name or view}"
 
 
 def _number(value: float) -> float | None:
