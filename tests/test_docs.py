@@ -96,11 +96,11 @@ IN_PARTS = {
 MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
-# Run by tests/mvpose/cli.
-MVPOSE = (
+MVPOSE = (  # run by tests/mvpose/cli
     "mvpose estimate CALIBRATION DETECTIONS --out results",
     "mvpose doctor CALIBRATION DETECTIONS",
-)  # tests/mvpose/cli
+    "mvpose repair CALIBRATION DETECTIONS --out NEW",
+)
 SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
     f"python -m {name}"

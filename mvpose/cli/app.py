@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli import doctor, estimate, view
+from mvpose.cli import doctor, estimate, repair, view
 
 app = typer.Typer(
     name="mvpose",
@@ -43,4 +43,5 @@ def options(
 
 estimate.add_to(app)
 doctor.add_to(app)
+repair.add_to(app)
 view.add_to(app)

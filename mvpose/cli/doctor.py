@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,6 +25,7 @@ from mvpose.cli.inputs import (
 
 if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis
+    from mvpose.cli.inputs import Inputs
 
 _MARKS = {"alarm": "!", "unknown": "?", "note": "-"}
 
@@ -37,6 +39,9 @@ def doctor(
     calibration: Calibration,
     detections: DetectionPaths,
     as_json: Annotated[bool, typer.Option("--json", help="Print the diagnosis as JSON.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for a page with drawings, doctor.html.")
+    ] = None,
     fps: Fps = None,
     times: Times = None,
     size: Size = None,
@@ -47,6 +52,10 @@ def doctor(
 ) -> None:
     """Say what is wrong with a calibration, from the people in the pictures. Exit code 1 where there are faults."""
     with exit_on_error():
+        from mvpose.cli.output_folder import check_writable
+
+        if out is not None:
+            check_writable(out, holds="doctor.json")
         from mvpose.calibration import diagnose
         from mvpose.cli.exit_codes import failing
 
@@ -54,9 +63,28 @@ def doctor(
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the diagnosis"):
             diagnosis = diagnose(inputs.rig, inputs.frames, period=inputs.period)
+        if out is not None:
+            _write_page(out, inputs, diagnosis, (str(calibration), " ".join(map(str, detections))))
     typer.echo(json.dumps(diagnosis.to_json(), indent=1) if as_json else "\n".join(_lines(diagnosis)))
     if diagnosis.verdict == "faults":
         raise typer.Exit(FAULTS)
+
+
+def _write_page(folder: Path, inputs: Inputs, diagnosis: Diagnosis, files: tuple[str, str]) -> None:
+    from mvpose.cli.exit_codes import failing
+    from mvpose.files.atomic_files import atomic_folder
+    from mvpose.report.doctor_page import write_doctor_page
+
+    with atomic_folder(folder) as partial, failing("the page"):
+        write_doctor_page(
+            partial,
+            name=folder.absolute().name,
+            rig=inputs.rig,
+            frames=inputs.frames,
+            diagnosis=diagnosis,
+            period=inputs.period,
+            files=files,
+        )
 
 
 def _lines(diagnosis: Diagnosis) -> list[str]:

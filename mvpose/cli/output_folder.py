@@ -6,20 +6,46 @@ import os
 import secrets
 from pathlib import Path
 
+RESULTS = "inputs.json"
+"""A file that every folder of results holds, and by which one is recognised."""
 
-def check_writable(folder: Path, *, option: str = "--out") -> None:
+
+def check_writable(folder: Path, *, option: str = "--out", holds: str = RESULTS) -> None:
     """Check that a folder can be made or replaced, by making a file where it will be.
+
+    Args:
+        folder: the folder.
+        option: its option, for messages.
+        holds: a file by which earlier results of the command are recognised.
 
     Raises:
         ValueError: it cannot, is a file, or holds something other than results.
     """
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{option} {folder}: is a file; expected a folder for the results")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / RESULTS).exists():
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / holds).exists():
         raise ValueError(
-            f"{option} {folder}: has files, and is no earlier result (no {RESULTS}); give a new folder, or empty it"
+            f"{option} {folder}: has files, and is no earlier result (no {holds}); give a new folder, or empty it"
         )
-    above = folder.absolute().parent
+    _check_above(folder, option)
+    if folder.is_dir() and not os.access(folder, os.W_OK):
+        raise ValueError(f"{option} {folder}: cannot be written: permission denied")
+
+
+def check_new(path: Path, *, option: str = "--out") -> None:
+    """Check that a file or folder does not exist and can be made.
+
+    Raises:
+        ValueError: it exists, or cannot be written.
+    """
+    if path.exists():
+        raise ValueError(f"{option} {path}: exists, and is not replaced; give another name")
+    _check_above(path, option)
+
+
+def _check_above(path: Path, option: str) -> None:
+    """Check that the nearest folder above a path that exists can be written to."""
+    above = path.absolute().parent
     while not above.exists():
         above = above.parent
     probe = above / f".{secrets.token_hex(8)}.partial"
@@ -27,10 +53,4 @@ def check_writable(folder: Path, *, option: str = "--out") -> None:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise ValueError(f"{option} {folder}: cannot be written: {error.strerror} ({above})") from None
-    if folder.is_dir() and not os.access(folder, os.W_OK):
-        raise ValueError(f"{option} {folder}: cannot be written: permission denied")
-
-
-RESULTS = "inputs.json"
-"""A file that every folder of results holds, and by which one is recognised."""
+        raise ValueError(f"{option} {path}: cannot be written: {error.strerror} ({above})") from None

@@ -1,0 +1,138 @@
+"""``mvpose repair``: a better calibration, from the people in the pictures."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mvpose.cli.exit_codes import exit_on_error, note
+from mvpose.cli.inputs import (
+    Calibration,
+    Cameras,
+    Choices,
+    DetectionPaths,
+    Fps,
+    Frames,
+    Size,
+    Skeleton,
+    Times,
+    read_inputs,
+)
+
+if TYPE_CHECKING:
+    from mvpose import Rig
+    from mvpose.calibration import Repair
+    from mvpose.calibration.repair import Freedom
+    from mvpose.cli.inputs import Inputs
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(repair)
+
+
+def repair(
+    calibration: Calibration,
+    detections: DetectionPaths,
+    out: Annotated[Path, typer.Option(metavar="NEW", help="The new calibration, in the format of the old one.")],
+    free: Annotated[
+        str, typer.Option(metavar="NAME,...", help="What may change: extrinsics, focal, center.")
+    ] = "extrinsics",
+    new_times: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the times of the pictures with mended clocks, for --times."),
+    ] = None,
+    fps: Fps = None,
+    times: Times = None,
+    size: Size = None,
+    cameras: Cameras = None,
+    frames: Frames = None,
+    skeleton: Skeleton = None,
+) -> None:
+    """Mend a calibration by the people in the pictures, and write it in the format in which it came."""
+    with exit_on_error():
+        from mvpose.cli.output_folder import check_new
+
+        check_new(out)
+        if new_times is not None:
+            check_new(new_times, option="--new-times")
+        freedoms = _freedoms(free)
+        from mvpose.calibration import repair as mend
+        from mvpose.cli.exit_codes import failing
+
+        choices = Choices(fps, times, cameras, frames, skeleton, size)
+        inputs = read_inputs(calibration, detections, choices, examined=True)
+        with failing("the repair"):
+            result = mend(inputs.rig, inputs.frames, period=inputs.period, free=freedoms)
+        if result.refused:
+            raise ValueError(f"nothing was repaired: {result.refused}")
+        for reason in result.held:
+            note(f"not changed: {reason}")
+        write_new(calibration, out, result.rig)
+        if new_times is not None:
+            _write_times(new_times, inputs, result)
+    typer.echo("\n".join(_lines(result)))
+    typer.echo(f"{out}: repaired calibration; `mvpose doctor` examines it")
+
+
+def _freedoms(given: str) -> tuple[Freedom, ...]:
+    names = [name.strip() for name in given.split(",") if name.strip()]
+    known: dict[str, Freedom] = {"extrinsics": "extrinsics", "focal": "focal", "center": "center"}
+    for name in names:
+        if name not in known:
+            raise ValueError(f"--free {name}: expected some of {', '.join(known)}")
+    return tuple(known[name] for name in names)
+
+
+def write_new(original: Path, path: Path, rig: Rig) -> None:
+    """Write a rig in the format of a calibration; files appear when all are complete.
+
+    Raises:
+        ValueError: the format cannot hold the rig.
+        OSError: a file cannot be written.
+    """
+    from mvpose.formats.calibration.registry import write_like
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".", suffix=".partial") as partial:
+        write_like(original, Path(partial) / path.name, rig)
+        for each in Path(partial).iterdir():  # EasyMocap's calibrations are two files
+            if (path.parent / each.name).exists():
+                raise ValueError(f"--out {path.parent / each.name}: exists, and is not replaced; give another folder")
+        for each in Path(partial).iterdir():
+            shutil.move(each, path.parent / each.name)
+
+
+def _write_times(path: Path, inputs: Inputs, result: Repair) -> None:
+    import numpy as np
+
+    from mvpose.files.atomic_files import write_atomic
+
+    given = [np.zeros(len(inputs.rig)) if frame.time is None else frame.time for frame in inputs.frames]
+    mended = np.stack(given) + result.offsets
+    lines = [",".join(camera.name for camera in inputs.rig)]
+    lines += [",".join(f"{time:.6f}" for time in row) for row in mended.tolist()]
+    write_atomic(path, ("\n".join(lines) + "\n").encode())
+
+
+def _lines(result: Repair) -> list[str]:
+    """Return a line for each camera: its turn, its shift, its clock, and its residuals."""
+    import numpy as np
+
+    lines = []
+    for view, camera in enumerate(result.rig):
+        turn, shift = np.degrees(result.corrections[view, :3]), result.corrections[view, 3:]
+        parts = [f"turned by {np.linalg.norm(turn):.2f} degrees, moved by {100 * np.linalg.norm(shift):.1f} cm"]
+        if abs(result.focal[view] - 1.0) > 1e-9:
+            parts.append(f"focal length {100 * (result.focal[view] - 1.0):+.2f} %")
+        if result.offset_sigmas[view] > 0:
+            clock, sigma = 1000 * result.offsets[view], 1000 * result.offset_sigmas[view]
+            parts.append(f"clock {clock:+.0f} ms (standard deviation {sigma:.0f})")
+        before, after = result.residuals_before[view], result.residuals_after[view]
+        parts.append(f"residual {before:.1f} to {after:.1f} px")
+        lines.append(f"{camera.name}: {', '.join(parts)}")
+    return lines
