@@ -15,13 +15,14 @@ import numpy as np
 from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.gait import make_gait, similar_walk_ratio
+from simharness.world.motion.activities.gait_posture import walking_posture
 from simharness.world.motion.activities.route_steps import RouteSteps, briskness
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.poses.heel_rise import follow_shank
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_legs
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.motion.poses.pelvis_height import following_height
-from simharness.world.motion.poses.posture import blend, relaxed_posture
+from simharness.world.motion.poses.posture import blend, limbs, relaxed_posture
 from simharness.world.motion.routes import Route
 
 LOOKAHEAD = 3.0
@@ -30,7 +31,6 @@ LOOKAHEAD = 3.0
 _STRAIGHTEST = np.radians(7.0)
 _STEP_WIDTH = 0.7  # lateral distance of the feet relative to the neutral stance; 0.55 in a steady walk
 _WITHIN = 0.3  # of a stride: time in which the height of the pelvis follows the legs; two steps are 0.5 apart
-_ARM_SWING, _ELBOW_SWING = 19.0, 13.0
 # Degrees by which a person who passes close to another turns the shoulders.
 _GIVE_WAY = {"thorax_rotation": 22.0, "lumbar_rotation": 9.0}
 _NARROW = {"shoulder_abduction": 0.0, "shoulder_rotation": 30.0, "elbow_flexion": 15.0}
@@ -83,27 +83,13 @@ def walk_route(
         return pelvis, {side: each.foot(time, each.pitch(time)) for side, each in steps.items()}
 
     pelvis, _ = stances(time)
-    brisk, cycle = briskness(route, time), 2 * np.pi * phase(time)
-    counter = 2.0 * np.degrees(gait.pelvis_turn(phase(time), amplitude=brisk))
-    listed = np.degrees(pelvis.list)
-    forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}
     narrow = 1.0 - 0.7 * np.abs(turned)  # arms swing less and hang closer in a narrow place
     curves = dict(resting)
-    blend(
-        curves,
-        brisk,
-        lumbar_flexion=lean,
-        thorax_flexion=lean * 0.6,
-        neck_flexion=6.0 * droop - lean,
-        neck_rotation=0.5 * counter,
-        thorax_rotation=-0.65 * counter,
-        **{f"{side}_shoulder_flexion": 1.0 + narrow * arms * (4.0 + _ARM_SWING * forward[side]) for side in SIDES},
-        **{f"{side}_shoulder_abduction": 8.0 + 2.0 * droop for side in SIDES},
-        **{f"{side}_elbow_flexion": 12.0 + narrow * arms * (10.0 + _ELBOW_SWING * forward[side]) for side in SIDES},
-    )
-    blend(curves, np.abs(turned), **{f"{side}_{name}": value for side in SIDES for name, value in _NARROW.items()})
+    posture = walking_posture(gait, phase(time), arms=narrow * arms, lean=lean, droop=droop)
+    blend(curves, briskness(route, time), **posture)
+    blend(curves, np.abs(turned), **limbs(**_NARROW))
+    listed = np.degrees(pelvis.list)
     curves["lumbar_bending"], curves["thorax_bending"] = 0.6 * listed, 0.4 * listed
-    curves["lumbar_rotation"] = -0.35 * counter * brisk
     for name, most in _GIVE_WAY.items():
         curves[name] = curves[name] + most * turned
     seen = sum(_GIVE_WAY.values()) + np.degrees(_GIVE_WAY_PELVIS)

@@ -8,10 +8,12 @@ from mvpose.arrays import Floats
 from simharness.world.humans.anatomy import SIDES
 from simharness.world.motion.activities.footprints import Footprints
 from simharness.world.motion.activities.gait import Gait, make_gait
+from simharness.world.motion.activities.gait_posture import walking_posture
 from simharness.world.motion.motion import Motion
 from simharness.world.motion.paths import Loop
 from simharness.world.motion.poses.inverse_kinematics import Foot, Pelvis, pose_angles, solve_standing
 from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.motion.poses.posture import limbs
 from simharness.world.motion.registry import solo_activity
 
 _GRAVITY = 9.81
@@ -19,9 +21,6 @@ _STRAIGHTEST = np.radians(4.0)
 _TOE_OUT = np.radians(7.0)
 _STEP_WIDTH = 0.55  # lateral distance of the feet relative to the neutral stance
 _EVERY, _SHIFTS = 0.03, 9  # seconds between samples of the loop, and number of stride phases at each
-# Degrees at full vigour, after Murray, Sepic and Barnard, Phys. Ther. 47, 1967.
-_ARM_SWING = 19.0
-_ELBOW_SWING = 13.0
 
 
 @solo_activity("walk", track=Loop)
@@ -55,29 +54,14 @@ def walk(kinematics: Kinematics, loop: Loop, time: Floats, *, rng: np.random.Gen
         return pelvis, feet
 
     pelvis, feet = stances(time, phase)
-    cycle = 2 * np.pi * phase
     bank = np.clip(np.arctan(loop.speed**2 * loop.curvature(time) / _GRAVITY), -0.25, 0.25)  # into the bend
-    listed = pelvis.list
-    counter = 2.0 * np.degrees(gait.pelvis_turn(phase))  # the thorax rotates opposite to the pelvis
-    forward = {"left": -np.cos(cycle), "right": np.cos(cycle)}  # each arm swings with the opposite leg
+    curves = walking_posture(gait, phase, arms=arms, lean=lean_degrees, droop=droop)
+    curves["lumbar_bending"] = 0.6 * np.degrees(pelvis.list) + 0.2 * np.degrees(bank)
+    curves["thorax_bending"] = 0.4 * np.degrees(pelvis.list) + 0.2 * np.degrees(bank)
     look = np.degrees(np.clip(0.5 * loop.curvature(time), -0.6, 0.6))  # into the bend
-    angles = pose_angles(
-        len(time),
-        lumbar_flexion=lean_degrees,
-        thorax_flexion=lean_degrees * 0.6,
-        neck_flexion=6.0 * droop - lean_degrees,
-        lumbar_bending=0.6 * np.degrees(listed) + 0.2 * np.degrees(bank),
-        thorax_bending=0.4 * np.degrees(listed) + 0.2 * np.degrees(bank),
-        lumbar_rotation=-0.35 * counter,
-        thorax_rotation=-0.65 * counter,
-        neck_rotation=0.5 * counter + look,
-        **{f"{side}_shoulder_flexion": 1.0 + arms * (4.0 + _ARM_SWING * forward[side]) for side in forward},
-        **{f"{side}_shoulder_abduction": 8.0 + 2.0 * droop for side in forward},
-        **{f"{side}_shoulder_rotation": 8.0 for side in forward},
-        **{f"{side}_elbow_flexion": 12.0 + arms * (10.0 + _ELBOW_SWING * forward[side]) for side in forward},
-        **{f"{side}_forearm_pronation": 15.0 for side in forward},
-        **{f"{side}_wrist_flexion": 6.0 for side in forward},
-    )
+    curves["neck_rotation"] = curves["neck_rotation"] + look
+    hands = limbs(shoulder_rotation=8.0, forearm_pronation=15.0, wrist_flexion=6.0)
+    angles = pose_angles(len(time), **curves, **hands)
     lap, strides = laps(loop, gait)
     return solve_standing(kinematics, time, pelvis, feet, angles, straightest=_STRAIGHTEST, fit=stances(lap, strides))
 
