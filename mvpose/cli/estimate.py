@@ -15,6 +15,7 @@ from mvpose.cli.inputs import (
     DetectionPaths,
     Fps,
     Frames,
+    Joints,
     Size,
     Skeleton,
     Times,
@@ -47,6 +48,7 @@ def estimate(
     cameras: Cameras = None,
     frames: Frames = None,
     skeleton: Skeleton = None,
+    joints: Joints = "body",
     up: Up = None,
     page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page of the result.")] = True,
     trust: Annotated[
@@ -63,7 +65,7 @@ def estimate(
         from mvpose.cli.estimation import estimate_people, estimator
 
         estimator(method, lag=lag, period=1.0)
-        choices = Choices(fps, times, cameras, frames, skeleton, size, up)
+        choices = Choices(fps, times, cameras, frames, skeleton, size, up, joints)
         inputs = read_inputs(calibration, detections, choices)
         people = estimate_people(inputs, estimator(method, lag=lag, period=inputs.period), trust=trust)
         write_results(out, people, inputs, formats=chosen, command=command_line(), page=page)

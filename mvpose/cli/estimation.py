@@ -11,6 +11,8 @@ from mvpose.cli.progress import bar
 from mvpose.pipeline import Estimator, Pipeline, SequenceEstimator
 from mvpose.presets import NEED_DESCRIPTORS, PRESETS
 from mvpose.recording import People
+from mvpose.skeleton import COCO17
+from mvpose.wholebody import body_of, body_part, whole_body
 
 
 def estimator(method: str, *, lag: float, period: float) -> Estimator:
@@ -41,6 +43,7 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
         RunError: the estimator failed.
     """
     estimates = []
+    method = whole_body(method) if inputs.skeleton != COCO17 else method
     tracks = isinstance(method, SequenceEstimator)
     with bar("estimate", len(inputs.frames)) as advance, failing("estimation"):
         results = (
@@ -52,11 +55,12 @@ def estimate_people(inputs: Inputs, method: Estimator, *, trust: bool = False) -
             estimates.append(estimate)
             advance(1)
     try:
-        remarks = check(inputs.rig, agreement(inputs.rig, inputs.frames, estimates))
+        bodies = [body_of(each, inputs.skeleton) for each in estimates]
+        remarks = check(inputs.rig, agreement(inputs.rig, [body_part(frame) for frame in inputs.frames], bodies))
     except ValueError as error:
         if not trust:
             raise
         remarks = [str(error)]
     for remark in remarks:
         note(remark)
-    return People.of_estimates(estimates, period=inputs.period, untracked=not tracks)
+    return People.of_estimates(estimates, inputs.skeleton, inputs.period, untracked=not tracks)

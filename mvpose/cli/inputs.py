@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    import mvpose
     from mvpose import Detections, Rig
 
 Calibration = Annotated[
@@ -50,6 +51,12 @@ Skeleton = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..."),
 ]
+Joints = Annotated[
+    str,
+    typer.Option(
+        metavar="body|all", help="Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet."
+    ),
+]
 Size = Annotated[
     str | None,
     typer.Option(metavar="WxH", help="Size of the pictures in pixels, for calibrations that do not state it."),
@@ -70,7 +77,7 @@ class Inputs:
 
     Attributes:
         rig: its cameras, z up.
-        frames: detections of each of the T frames, with the times of the pictures.
+        frames: detections of each of the T frames, with the times of the pictures, all on one skeleton.
         numbers: number of each frame in the files, (T,).
         period: time between frames, seconds.
     """
@@ -79,6 +86,13 @@ class Inputs:
     frames: list[Detections]
     numbers: NDArray[np.int64]
     period: float
+
+    @property
+    def skeleton(self) -> mvpose.Skeleton:
+        """Skeleton of the detections."""
+        from mvpose import COCO17
+
+        return self.frames[0].skeleton if self.frames else COCO17
 
 
 @dataclass(frozen=True)
@@ -92,6 +106,7 @@ class Choices:
     skeleton: str | None = None
     size: str | None = None
     up: str | None = None
+    joints: str = "body"
 
 
 def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:
@@ -114,6 +129,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
 
     if choices.fps is not None and choices.times is not None:
         raise ValueError("--fps and --times: give one of them")
+    if choices.joints not in ("body", "all"):
+        raise ValueError(f"--joints must be body or all, got {choices.joints!r}")
     if choices.fps is not None and not 0.0 < choices.fps < 1e6:
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
     only = tuple(name.strip() for name in choices.cameras.split(",")) if choices.cameras else ()
@@ -122,7 +139,9 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=only, key="--cameras")
     names = [camera.name for camera in rig]
     with bar("read", len(rig)) as advance:
-        recorded = read_recording(names, detections, skeleton=skeleton, frames=frames, progress=advance)
+        recorded = read_recording(
+            names, detections, skeleton=skeleton, all_joints=choices.joints == "all", frames=frames, progress=advance
+        )
     note(recorded.assignment.text(names))
     extents = recorded.extents()
     rig, about_size = plausibility.with_sizes(rig, extents, size=size)

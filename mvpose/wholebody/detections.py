@@ -69,6 +69,8 @@ def with_body_boxes(view: ArrayLike, keypoints: ArrayLike, scores: ArrayLike, *,
         ValueError: as :class:`mvpose.Detections`, or a skeleton without joints of COCO17.
     """
     whole = Detections.from_keypoints(view, keypoints, scores, skeleton=skeleton)
+    if skeleton == COCO17:
+        return whole
     seen = body_part(whole)
     body = Detections.from_keypoints(seen.view, seen.keypoints, seen.scores)
     boxes = as_array(body.boxes, (len(whole), 4), "boxes")

@@ -116,6 +116,26 @@ class WholeBodyTracking(WholeBody):
             yield self._completed(rig, waiting.popleft(), body)
 
 
+def body_of(estimate: Estimate, skeleton: Skeleton) -> Estimate:
+    """Return the part of an estimate on COCO17; a joint that the skeleton lacks is missing."""
+    if skeleton == COCO17:
+        return estimate
+    rows, _ = rows_of(skeleton)
+
+    def of_body(whole: Floats | None, missing: float) -> Floats | None:
+        if whole is None:
+            return None
+        part = whole[:, rows].copy()
+        part[:, rows < 0] = missing
+        return part
+
+    joints, scores = of_body(estimate.joints, np.nan), of_body(estimate.scores, 0.0)
+    assert joints is not None
+    assert scores is not None
+    covariance, freedom = of_body(estimate.covariance, np.nan), of_body(estimate.freedom, np.nan)
+    return replace(estimate, joints=joints, scores=scores, covariance=covariance, freedom=freedom)
+
+
 def whole_body(estimator: Estimator) -> WholeBody:
     """Return an estimator of the whole body: a tracker if the given one is a tracker."""
     return WholeBodyTracking(estimator) if isinstance(estimator, SequenceEstimator) else WholeBody(estimator)

@@ -15,6 +15,8 @@ from mvpose.formats.joint_names import JointNames
 from mvpose.formats.views.assignment import Assignment, assign
 from mvpose.formats.views.sources import find_sources
 from mvpose.formats.views.view_people import Picture, ViewPeople, read_view
+from mvpose.skeleton import COCO17, Skeleton
+from mvpose.wholebody import skeleton_by_name, with_body_boxes
 
 MOST_FRAMES = 2_000_000
 """Largest number of frames of a recording: 11 hours at 50 Hz."""
@@ -29,12 +31,14 @@ class RecordedFrames:
         pictures: for each camera its pictures by frame; a frame without entry has no picture of this camera.
         assignment: which source belongs to which camera.
         kinds: layout of the files of each camera.
+        skeleton: joints of the detections.
     """
 
     numbers: Integers
     pictures: tuple[dict[int, Picture], ...]
     assignment: Assignment
     kinds: tuple[str, ...]
+    skeleton: Skeleton = COCO17
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -59,7 +63,7 @@ class RecordedFrames:
             times: time of each picture, (T, V), seconds. It becomes NaN where a camera has no picture.
         """
         return [
-            _joined([pictures.get(number) for pictures in self.pictures], times[row])
+            _joined([pictures.get(number) for pictures in self.pictures], times[row], self.skeleton)
             for row, number in enumerate(self.numbers.tolist())
         ]
 
@@ -69,6 +73,7 @@ def read_recording(
     paths: Sequence[Path],
     *,
     skeleton: JointNames | None = None,
+    all_joints: bool = False,
     frames: tuple[int, int] | None = None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> RecordedFrames:
@@ -78,6 +83,7 @@ def read_recording(
         cameras: names of the V cameras, in the order of the rig.
         paths: see :func:`mvpose.formats.views.sources.find_sources`.
         skeleton: joints of the files; None: by their number.
+        all_joints: keep the joints beyond COCO-17, on a skeleton of :mod:`mvpose.wholebody`.
         frames: first and last frame to take, by the numbers in the files; None: all.
         progress: called with the number of cameras that were read since the last call.
 
@@ -88,15 +94,16 @@ def read_recording(
     assignment = assign(cameras, find_sources(paths))
     views = []
     for source in assignment.sources:
-        views.append(read_view(source, skeleton=skeleton))
+        views.append(read_view(source, skeleton=skeleton, all_joints=all_joints))
         progress(1)
     numbers = _frame_numbers(cameras, views, frames)
+    joints = _joints(cameras, views)
     kept = set(numbers.tolist())
     pictures = []
     for view in views:
         chosen = {number: picture for number, picture in view.pictures.items() if number in kept}
         if not view.complete:
-            chosen |= {number: _NOBODY for number in kept - chosen.keys()}
+            chosen |= dict.fromkeys(kept - chosen.keys(), _NOBODY)
         pictures.append(chosen)
     empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(map(len, each.values()))]
     if empty:
@@ -105,10 +112,25 @@ def read_recording(
             f"nobody is detected in any frame of the camera {listed(empty)}; check its files, or leave it out: "
             f"--cameras {','.join(others)}"
         )
-    return RecordedFrames(numbers, tuple(pictures), assignment, tuple(view.kind for view in views))
+    return RecordedFrames(numbers, tuple(pictures), assignment, tuple(view.kind for view in views), joints)
 
 
 _NOBODY = Picture(np.zeros((0, 17, 2)), np.zeros((0, 17)), np.zeros((0, 4)), np.zeros(0))
+
+
+def _joints(cameras: Sequence[str], views: Sequence[ViewPeople]) -> Skeleton:
+    """Return the skeleton of all pictures that show somebody."""
+    found = {
+        each.joints.name: camera
+        for camera, view in zip(cameras, views, strict=True)
+        for each in view.pictures.values()
+        if len(each)
+    }
+    if len(found) > 1:
+        text = listed([f"{camera} {name}" for name, camera in found.items()])
+        raise ValueError(f"the cameras have different skeletons: {text}; take the joints of the body only")
+    (name,) = found or ("coco17",)
+    return COCO17 if name == COCO17.name else skeleton_by_name(name)
 
 
 def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: tuple[int, int] | None) -> Integers:
@@ -144,13 +166,15 @@ def _frame_numbers(cameras: Sequence[str], views: Sequence[ViewPeople], frames: 
     return np.array(numbers, np.int64)
 
 
-def _joined(pictures: Sequence[Picture | None], times: Floats) -> Detections:
+def _joined(pictures: Sequence[Picture | None], times: Floats, skeleton: Skeleton) -> Detections:
     """Return the detections of one frame; a camera without picture has the time NaN."""
-    present = [each if each is not None else _NOBODY for each in pictures]
+    count = len(skeleton)
+    nobody = Picture(np.zeros((0, count, 2)), np.zeros((0, count)), np.zeros((0, 4)), np.zeros(0))
+    present = [each if each else nobody for each in pictures]
     view = np.repeat(np.arange(len(present)), [len(each) for each in present])
     keypoints = np.concatenate([each.keypoints for each in present])
     scores = np.concatenate([each.scores for each in present])
-    spanned = Detections.from_keypoints(view, keypoints, scores)
+    spanned = with_body_boxes(view, keypoints, scores, skeleton=skeleton)
     boxes, box_scores = (np.concatenate([getattr(each, key) for each in present]) for key in ("boxes", "box_scores"))
     time = np.where([each is None for each in pictures], np.nan, times)
     return Detections(
@@ -159,5 +183,6 @@ def _joined(pictures: Sequence[Picture | None], times: Floats) -> Detections:
         spanned.scores,
         np.where(np.isfinite(boxes).all(axis=1)[:, None], boxes, spanned.boxes),
         np.where(np.isfinite(box_scores), box_scores, spanned.box_scores),
+        skeleton,
         time=time,
     )

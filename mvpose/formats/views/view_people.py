@@ -7,14 +7,15 @@
   "keypoint_scores"}]}]``;
 - RTMLib: its arrays, frame by frame, JSON ``[{"keypoints": (n, J, 2), "scores": (n, J)}]``, or npz with these names.
 
-The skeleton is that which is declared, or else the usual one with this number of joints. Everything becomes COCO-17.
+The skeleton is that which is declared, or else the usual one with this number of joints. Everything becomes COCO-17, or
+stays on its skeleton where all joints are asked for and :mod:`mvpose.wholebody` knows it.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ from mvpose.files.message_text import listed, shown
 from mvpose.formats import coco_results, openpose
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.formats.views.sources import SUFFIXES, Source
+from mvpose.skeleton import COCO17
+from mvpose.wholebody import SKELETONS
 
 USUAL = {
     len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")
@@ -39,19 +42,21 @@ _GREATEST_SCORE = 2.0  # heat maps and SimCC overshoot 1, mostly by a few per ce
 
 @dataclass(frozen=True)
 class Picture:
-    """People in one picture, on COCO-17.
+    """People in one picture.
 
     Attributes:
-        keypoints: (n, 17, 2), pixels; NaN where missing.
-        scores: (n, 17), 0 to 1; 0 where missing.
+        keypoints: (n, J, 2), pixels; NaN where missing.
+        scores: (n, J), 0 to 1; 0 where missing.
         boxes: x, y, width, height, (n, 4), pixels; NaN in the row of a person without box.
         box_scores: (n,), 0 to 1; NaN for a person without one.
+        joints: the J joints.
     """
 
     keypoints: Floats
     scores: Floats
     boxes: Floats
     box_scores: Floats
+    joints: JointNames = KNOWN["coco17"]
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -74,22 +79,55 @@ class ViewPeople:
     kind: str
 
 
-def read_view(source: Source, *, skeleton: JointNames | None = None) -> ViewPeople:
-    """Read the people of one camera.
+def read_view(source: Source, *, skeleton: JointNames | None = None, all_joints: bool = False) -> ViewPeople:
+    """Read the people of one camera, without those of whom no joint of COCO-17 was detected.
 
     Args:
         source: its folder or file.
         skeleton: joints of the files; None: by their number.
+        all_joints: keep the joints beyond COCO-17.
 
     Raises:
         ValueError: a file that cannot be read, is of no known layout, has an unknown number of joints, or scores that
-            are not 0..1; or no picture at all.
+            are not 0..1; no picture at all; or all joints are asked for of a skeleton that is not shipped.
     """
     if source.path.is_dir():
-        return _read_folder(source, skeleton)
-    if source.path.suffix.lower() == ".npz":
-        return _read_arrays(source, skeleton)
-    return _read_file(source, skeleton)
+        view = _read_folder(source, skeleton)
+    elif source.path.suffix.lower() == ".npz":
+        view = _read_arrays(source, skeleton)
+    else:
+        view = _read_file(source, skeleton)
+    convert = _whole if all_joints else _body
+    return replace(view, pictures={number: convert(source.path, each) for number, each in view.pictures.items()})
+
+
+def _body(_: Path, picture: Picture) -> Picture:
+    """Return a picture on COCO-17."""
+    keypoints, scores = to_coco17(picture.keypoints, picture.scores, picture.joints)
+    return _with_somebody(replace(picture, keypoints=keypoints, scores=scores, joints=KNOWN["coco17"]))
+
+
+def _whole(path: Path, picture: Picture) -> Picture:
+    """Return a picture on its own skeleton."""
+    joints = picture.joints
+    if joints.name not in KNOWN and joints.joints[:17] == COCO17.joints:
+        joints = USUAL.get(len(joints), joints)  # MMPose has other names for the points of hands and faces
+    if joints.name not in (*SKELETONS, "coco17"):
+        raise ValueError(
+            f"{path}: all joints of the skeleton {joints.name} are asked for; expected one of {', '.join(SKELETONS)}; "
+            "take those of the body only"
+        )
+    scores = np.clip(np.nan_to_num(picture.scores), 0.0, 1.0)
+    keypoints = np.where(scores[..., None] > 0, picture.keypoints, np.nan)
+    return _with_somebody(replace(picture, keypoints=keypoints, scores=scores, joints=joints))
+
+
+def _with_somebody(picture: Picture) -> Picture:
+    """Return a picture without people of whom none of the 17 joints was detected."""
+    rows = picture.joints.rows(COCO17.joints)
+    some = (picture.scores[:, rows[rows >= 0]] > 0).any(axis=1)
+    parts = (picture.keypoints[some], picture.scores[some], picture.boxes[some], picture.box_scores[some])
+    return Picture(*parts, picture.joints)
 
 
 def _read_folder(source: Source, skeleton: JointNames | None) -> ViewPeople:
@@ -182,7 +220,7 @@ def _of_openpose(path: Path, people: Any, skeleton: JointNames | None) -> Pictur
         skeleton = _usual(path, len(values) // 3 if isinstance(values, list) else 0)
     keypoints, scores = openpose.keypoints_of(path, people, skeleton or KNOWN["body25"])
     _check_scores(path, scores)
-    return _converted(keypoints, scores, skeleton or KNOWN["body25"])
+    return _read(keypoints, scores, skeleton or KNOWN["body25"])
 
 
 def _of_coco(path: Path, entries: Sequence[Any], skeleton: JointNames | None) -> dict[int, Picture]:
@@ -201,7 +239,7 @@ def _of_coco(path: Path, entries: Sequence[Any], skeleton: JointNames | None) ->
         _check_scores(path, values[..., 2])
         boxes = [np.full(4, np.nan) if box is None else box for _, box, _ in rows[frame]]
         scores = [np.nan if score is None else min(max(score, 0.0), 1.0) for _, _, score in rows[frame]]
-        pictures[frame] = _converted(values[..., :2], values[..., 2], skeleton, boxes, scores)
+        pictures[frame] = _read(values[..., :2], values[..., 2], skeleton, boxes, scores)
     return pictures
 
 
@@ -248,7 +286,7 @@ def _picture(
     except (TypeError, ValueError):
         raise ValueError(f"{where}: keypoints and scores must be numbers, (n, J, 2) and (n, J)") from None
     if not keypoints.size and not scores.size:
-        return _converted(np.zeros((0, 17, 2)), np.zeros((0, 17)), KNOWN["coco17"])
+        return _read(np.zeros((0, 17, 2)), np.zeros((0, 17)), KNOWN["coco17"])
     if keypoints.ndim != 3 or keypoints.shape[2] != 2 or scores.shape != keypoints.shape[:2]:
         raise ValueError(
             f"{where}: keypoints must be (n, J, 2) and scores (n, J), got {keypoints.shape} and {scores.shape}"
@@ -257,20 +295,18 @@ def _picture(
     if len(names) != keypoints.shape[1]:
         raise ValueError(f"{where}: has {keypoints.shape[1]} joints, but skeleton {names.name} has {len(names)}")
     _check_scores(where, scores)
-    return _converted(keypoints, scores, names, boxes, box_scores)
+    return _read(keypoints, scores, names, boxes, box_scores)
 
 
-def _converted(
+def _read(
     keypoints: Floats, scores: Floats, skeleton: JointNames, boxes: Any = None, box_scores: Any = None
 ) -> Picture:
-    """Return a picture on COCO-17, without people of whom none of the 17 joints was detected."""
-    keypoints, scores = to_coco17(keypoints, scores, skeleton)
+    """Return a picture with the joints of a file."""
     boxes = np.full((len(scores), 4), np.nan) if boxes is None else np.asarray(boxes, float).reshape(-1, 4)
     box_scores = np.full(len(scores), np.nan) if box_scores is None else np.asarray(box_scores, float)
     bad = ~np.isfinite(boxes).all(axis=1) | (boxes[:, 2:] < 0).any(axis=1)
     boxes = np.where(bad[:, None], np.nan, boxes)
-    detected = (scores > 0).any(axis=1)
-    return Picture(keypoints[detected], scores[detected], boxes[detected], box_scores[detected])
+    return Picture(keypoints, scores, boxes, box_scores, skeleton)
 
 
 def _usual(where: object, joints: int) -> JointNames:
