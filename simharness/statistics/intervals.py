@@ -54,8 +54,10 @@ class Scale:
 SCALES: Mapping[str, Scale] = MappingProxyType(
     {
         "per frame": Scale(low=0.0, event=1.0),
+        "/min": Scale(low=0.0, event=1.0),
         "%": Scale(low=0.0, high=100.0, event=25.0),
         "mm": Scale(low=0.0),
+        "mm/s": Scale(low=0.0),
         "px": Scale(low=0.0),
         "ms": Scale(low=0.0),
     }
@@ -63,7 +65,8 @@ SCALES: Mapping[str, Scale] = MappingProxyType(
 """Scales by unit; scores of other units have no bounds.
 
 The event of rates is one ghost in every frame of one scene, as a coat on a stand makes it; that of percentages is one
-person of four, the default number of people.
+person of four, the default number of people; that of switches a minute and person is one switch of four people in a
+quarter of a minute.
 """
 
 

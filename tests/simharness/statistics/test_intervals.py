@@ -54,6 +54,7 @@ SCORES = {
     "ghosts, few scenes": ("per frame", lambda rng, shape: clusters(rng, shape, 0.3, 5), 0.03),
     "ghosts, half of the scenes": ("per frame", lambda rng, shape: clusters(rng, shape, 1.0, 5), 0.1),
     "ghosts, overdispersed": ("per frame", lambda rng, shape: rng.poisson(rng.gamma(0.3, 5 / 3, shape)) / 50, 0.01),
+    "switches of six people in 15 s": ("/min", lambda rng, shape: rng.poisson(0.3, shape) / 1.5, 0.2),
     "a poster": ("per frame", lambda rng, shape: (rng.random(shape) < 0.1).astype(float), 0.1),
     "recall, mostly 100": (
         "%",
@@ -86,6 +87,7 @@ def test_intervals_of_scores_cover_their_means(score, scenes):
 def test_no_event_in_any_scene_limits_the_mean_by_poisson():
     """In many scenes the tail is that of 95 %: exp(-n mean / event) = 0.025 (Garwood)."""
     assert mean_interval(np.zeros(2000), unit="per frame").high == pytest.approx(-math.log(0.025) / 2000, rel=0.01)
+    assert mean_interval(np.zeros(2000), unit="/min").high == pytest.approx(-math.log(0.025) / 2000, rel=0.01)
     assert mean_interval(np.full(2000, 100.0), unit="%").low == pytest.approx(100 + 25 * math.log(0.025) / 2000)
     few = mean_interval(np.zeros(12), unit="per frame")
     assert (few.low, few.mean) == (0.0, 0.0)
