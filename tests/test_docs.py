@@ -105,10 +105,12 @@ SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
     f"python -m {name}"
     for name in (
+        "benchmarks.expected_error",
         "benchmarks.method",
         "benchmarks.simulator",
         "benchmarks.tracking",
         "benchmarks.planted_bugs",
+        "tools.page_pictures",
         "tools.reid",
     )
 )
@@ -240,7 +242,7 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 9, "toml": 8, "yaml": 1}
+    assert languages == {"python": 11, "toml": 8, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -551,3 +553,13 @@ def test_the_blocks_of_the_whole_body_run(tmp_path):
     (file,) = [block for block in blocks("toml") if "[joints]" in block]
     (tmp_path / "feet.toml").write_text(file)
     assert len(read_skeleton(tmp_path / "feet.toml")) == 4
+
+
+@pytest.mark.parametrize(("words", "page"), [("write_page(", "recording.html"), ("write_doctor_page(", "doctor.html")])
+def test_the_blocks_of_the_pages_run(tmp_path, words, page):
+    made = runpy.run_path(str(ROOT / "tests" / "mvpose" / "people.py"))
+    rig, step = made["ring"](4), np.array([0.05, 0.02, 0.0])
+    frames = [made["detect"](rig, made["crowd"](2) + k * step, noise=1.0, seed=k)[0] for k in range(30)]
+    (block,) = [block for block in blocks("python") if words in block]
+    exec(block, {"rig": rig, "frames": frames, "folder": tmp_path})
+    assert (tmp_path / page).read_text(encoding="utf-8").startswith("<!doctype html>")

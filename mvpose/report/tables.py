@@ -125,7 +125,7 @@ def bone_table(bones: Sequence[Bone], people: People, rows: Sequence[int]) -> Ta
             if bone is None:
                 cells.append(Cell(NOTHING))
                 continue
-            sides = f" · {100 * bone.asymmetry:.1f} %" if math.isfinite(bone.asymmetry) else ""
+            sides = f"\n{100 * bone.asymmetry:.1f} %" if math.isfinite(bone.asymmetry) else ""
             share = min(1.0, bone.spread / bone.length / 0.1)
             cells.append(Cell(f"{100 * bone.length:.1f} cm", f"± {1000 * bone.spread:.0f} mm{sides}", share))
         body.append((name, tuple(cells)))

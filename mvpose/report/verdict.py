@@ -47,9 +47,9 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def sentence_of(finding: Finding) -> str:
-    """Return a finding as a sentence, in which a camera whose name is only a number is called a camera."""
+    """Return a finding as a sentence; one that starts with the name of a camera calls it a camera."""
     text, name = (finding.text or KINDS[finding.kind]).rstrip("."), finding.camera
-    if name and text.startswith(f"{name} ") and not name.lower().startswith(("cam", "view", "kinect")):
+    if name and text.startswith(f"{name} ") and not name.lower().startswith("camera"):
         text = f"camera {text}"
     return f"{text[:1].upper()}{text[1:]}."
 

@@ -272,7 +272,8 @@ def test_sizes_are_shown_in_units_that_people_use():
     ("text", "name", "expected"),
     [
         ("2 looks elsewhere", "2", "Camera 2 looks elsewhere."),
-        ("cam2 looks elsewhere.", "cam2", "Cam2 looks elsewhere."),
+        ("cam2 looks elsewhere.", "cam2", "Camera cam2 looks elsewhere."),
+        ("camera 2 looks elsewhere", "camera 2", "Camera 2 looks elsewhere."),
         ("the unit is wrong", None, "The unit is wrong."),
     ],
 )
