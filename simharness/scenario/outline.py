@@ -14,6 +14,8 @@ from simharness.scenario.toml_files import dumps
 
 _WIDTH = 96  # columns of a line of values
 _MOST = 12  # listed values of one factor
+_LAID_OUT = ("count", "heights", "spread", "spacing", "positions", "aims", "fov", "distortion", "jitter", "aim_jitter")
+_WITHOUT_EFFECT = {"file": _LAID_OUT, "preset": (*_LAID_OUT, "radius", "height", "start", "aim", "size")}
 
 
 def outline(plan: Plan, note: str = "") -> str:
@@ -24,8 +26,20 @@ def outline(plan: Plan, note: str = "") -> str:
         note: additional line about a study.
     """
     lines = _lines(plan, note) if plan.is_study else []
+    lines += _unused(plan)
     comments = "".join(f"# {line}".rstrip() + "\n" for line in lines)
     return f"{comments}\n{dumps(plan.base)}" if comments else dumps(plan.base)
+
+
+def _unused(plan: Plan) -> list[str]:
+    """Return lines about the keys of [cameras] that have no effect on a rig of a file or a preset."""
+    layout = plan.base.cameras.layout
+    if layout not in _WITHOUT_EFFECT:
+        return []
+    size = "; cameras.size counts where the file does not state it" if layout == "file" else ""
+    names = ", ".join(_WITHOUT_EFFECT[layout])
+    text = f"The rig is that of cameras.{layout}. Without effect in [cameras]: {names}{size}"
+    return textwrap.wrap(text, _WIDTH)
 
 
 def _lines(plan: Plan, note: str) -> list[str]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mvpose.camera import Camera, Rig
 from mvpose.formats.calibration.registry import read_calibration
+from mvpose.formats.views.plausibility import UNKNOWN_SIZE
 from simharness.scenario.sections.scenario import Cameras
 from simharness.types.random_streams import stream
 from simharness.world.rigs.camera_positions import camera_positions
@@ -17,6 +18,7 @@ from simharness.world.rigs.presets import preset_rig
 
 _STEEPEST = 1e-6  # sine of the angle to the vertical below which the upright roll is undefined
 _SAME = 1e-9  # metres: closer points are the same
+_OFF_CENTER = 0.2  # of a picture: principal points lie nearer to its middle
 _NO_TURN = 1e-6  # largest deviation of a rotation matrix from the identity
 
 
@@ -87,7 +89,7 @@ def _from_file(cameras: Cameras) -> Rig:
         raise ValueError(
             "cameras.layout = 'file' needs cameras.file: a calibration file, relative to the folder of the scenario"
         )
-    rig = read_calibration(cameras.file, size=cameras.size, only=cameras.only)
+    rig = _sized(read_calibration(cameras.file, size=UNKNOWN_SIZE, only=cameras.only), cameras)
     for camera in rig:
         if np.abs(camera.R - np.eye(3)).max() < _NO_TURN and np.abs(camera.t).max() < _SAME:
             # The world frame is that of one camera, as after stereo calibration: it is placed as camera 0 of a ring.
@@ -95,6 +97,32 @@ def _from_file(cameras: Cameras) -> Rig:
             center = (cameras.radius * np.cos(bearing), cameras.radius * np.sin(bearing), cameras.height)
             return aligned(rig, camera, to=look_at(center, cameras.aim, K=camera.K, size=camera.size))
     return rig
+
+
+def _sized(rig: Rig, cameras: Cameras) -> Rig:
+    """Return the rig with the size of pictures that its file does not state.
+
+    Raises:
+        ValueError: the default size, where principal points show that it is another one; or a size of the scenario that
+            is not that of the file.
+    """
+    default = cameras.size == Cameras.model_fields["size"].default  # stated by quickstart as well
+    unknown = [camera.size == UNKNOWN_SIZE for camera in rig]
+    for camera, new in zip(rig, unknown, strict=True):
+        if not new and not default and camera.size != cameras.size:
+            raise ValueError(
+                f"cameras.size = {list(cameras.size)} has no effect, because {cameras.file} states {camera.size[0]} x "
+                f"{camera.size[1]} for camera {camera.name!r}: remove it, or calibrate for that size"
+            )
+    if any(unknown) and default:
+        middle = 2.0 * np.median([camera.K[:2, 2] for camera in rig], axis=0) + 1.0
+        if (np.abs(middle / cameras.size - 1.0) > _OFF_CENTER).any():
+            raise ValueError(
+                f"{cameras.file}: does not state the size of the pictures, which cannot be {cameras.size[0]} x "
+                f"{cameras.size[1]}: the principal points are in the middle of about {middle[0]:.0f} x {middle[1]:.0f}; "
+                "add cameras.size = [width, height], pixels"
+            )
+    return Rig([replace(each, size=cameras.size) if new else each for each, new in zip(rig, unknown, strict=True)])
 
 
 def aligned(rig: Rig, camera: Camera, *, to: Camera) -> Rig:
