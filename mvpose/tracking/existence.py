@@ -17,6 +17,7 @@ import numpy as np
 
 from mvpose.arrays import Bools, Floats
 from mvpose.kernels import njit
+from mvpose.tracking.displacement import staying
 from mvpose.tracking.line_of_sight import beside, depth_of, in_image
 
 _SHORTEST, _LONGEST = 1e-3, 60.0  # seconds: people who were there before the first picture came within a minute
@@ -25,6 +26,7 @@ _FLASHES, _WEIGHT = 0.02, 10.0  # groups per second before any was met, and the 
 FLASH = 0.5  # seconds: a track that ends earlier was a flash
 _REACH = 0.35  # metres: distance from the line of sight at which a nearer person hides another
 _TURNS_BLIND = 0.1  # probability that a view which saw the person at birth is blind later: people walk behind things
+_SWAY = 0.15  # metres: standard deviation of the place where false detections meet, as their keypoints have it
 _FRAME = 0.1  # seconds: no group of detections that vanishes at once is older
 
 
@@ -41,7 +43,8 @@ class Existence:
             along the epipolar line.
         patch: share of the false detections of a view that agree with a given place in the room.
         lasting: probability that a false detection lasts longer than ``memory``.
-        repeated: probability that a lasting one is there in a picture.
+        repeated: probability that a lasting one is there in a picture: it hangs where it is well seen.
+        mobile: share of the lasting ones that move: shadows, reflections.
         statues: false detections per second that appear to several views at one place of the room, and stay.
         least_clutter: least number of false detections in a picture, which a tracker starts with.
         independent: time between pictures that count as independent, seconds.
@@ -58,8 +61,9 @@ class Existence:
     seeable: float = 0.85
     band: float = 0.1
     patch: float = 0.03
-    lasting: float = 0.2
-    repeated: float = 0.8
+    lasting: float = 0.5
+    repeated: float = 0.95
+    mobile: float = 0.1
     statues: float = 0.02
     least_clutter: float = 0.02
     independent: float = 0.2
@@ -67,7 +71,7 @@ class Existence:
     vague: float = 0.5
 
     def __post_init__(self) -> None:
-        probabilities = ("found", "seeable", "band", "patch", "lasting", "repeated")
+        probabilities = ("found", "seeable", "band", "patch", "lasting", "repeated", "mobile")
         for each in fields(self):
             value, limit = getattr(self, each.name), 1.0 if each.name in probabilities else np.inf
             if not 0.0 < value < limit:
@@ -78,7 +82,7 @@ class Existence:
         """Probabilities for :func:`log_odds`."""
         return (
             self.arrivals, self.statues, self.found, self.seeable, self.band, self.patch, self.lasting, self.repeated,
-            self.memory,
+            self.mobile, self.memory,
         )  # fmt: skip
 
     @property
@@ -97,7 +101,7 @@ class Existence:
 
 
 @njit(cache=True, borrows=True)
-def log_odds(span, origin, hits, misses, clutter, flashes, rates):
+def log_odds(span, origin, hits, misses, moved, clutter, flashes, rates):
     """Return the logarithm of the odds that a track is a person.
 
     A track is a person who came, false detections that agreed by chance, one false detection of all views at once for a
@@ -110,11 +114,13 @@ def log_odds(span, origin, hits, misses, clutter, flashes, rates):
         origin: whether a view was among those that the track was born from, (V,).
         hits: effective number of pictures since then that found the track, by view, (V,).
         misses: effective number that should have, (V,).
+        moved: how far the track has moved since its birth, metres.
         clutter: false detections in a picture of each view, (V,).
         flashes: groups per second that vanish as soon as they come.
         rates: :attr:`Existence.rates`.
     """
-    arrivals, statues, found, seeable, band, patch, lasting, repeated, memory = rates
+    arrivals, statues, found, seeable, band, patch, lasting, repeated, mobile, memory = rates
+    lasting *= staying(moved, _SWAY, mobile)
     person, statue = np.log(arrivals * span), np.log(statues * span)
     flash, chance = np.log(flashes * min(span, _FRAME)), np.log(band) - 2.0 * np.log(patch)
     born_from, all_last = 0, 1.0  # probability that all of them last, given that they agree
@@ -244,7 +250,7 @@ class Clutter:
     """
 
     def __init__(self, model: Existence, cameras: int) -> None:
-        self._least = model.least_clutter
+        self._least, self._first = model.least_clutter, model.independent
         self.density = np.full(cameras, model.least_clutter)
         self.watched = np.full(cameras, model.independent)
         self.counts = np.array([_FLASHES * _WEIGHT, _WEIGHT])
@@ -263,11 +269,13 @@ class Clutter:
         Args:
             unclaimed: expected numbers, (V,).
             pictures: whether each camera gave a picture, (V,).
-            since: time from the previous picture of each camera, (V,), seconds; infinite for its first, in which
-                nobody is known yet.
+            since: time from the previous picture of each camera, (V,), seconds; infinite for its first, which counts
+                as one independent picture.
             elapsed: time since the previous frame, seconds.
         """
-        _count(self.density, self.watched, self.counts, unclaimed, pictures, since, self._least, elapsed)
+        _count(
+            self.density, self.watched, self.counts, unclaimed, pictures, since, self._least, self._first, elapsed
+        )  # fmt: skip
 
     def vanish(self, ages: Floats) -> None:
         """Count the tracks that ended at these ages, in seconds."""
@@ -275,13 +283,14 @@ class Clutter:
 
 
 @njit(cache=True)
-def _count(density, watched, counts, unclaimed, pictures, since, least, elapsed):
+def _count(density, watched, counts, unclaimed, pictures, since, least, first, elapsed):
     keep = np.exp(-elapsed / _FLASH_MEMORY)
     for v in range(len(density)):
-        if pictures[v] and since[v] < np.inf:
+        if pictures[v]:
             # A plain mean until it is over the memory, so that a scene full of false detections is known at once.
-            share = 1.0 - np.exp(-since[v] / min(watched[v] + since[v], _DENSITY_MEMORY))
+            seconds = since[v] if since[v] < np.inf else first
+            share = 1.0 - np.exp(-seconds / min(watched[v] + seconds, _DENSITY_MEMORY))
             density[v] = max((1.0 - share) * density[v] + share * unclaimed[v], least)
-            watched[v] = min(watched[v] + since[v], _DENSITY_MEMORY)
+            watched[v] = min(watched[v] + seconds, _DENSITY_MEMORY)
     counts[0] = keep * counts[0] + (1.0 - keep) * _FLASHES * _WEIGHT
     counts[1] = keep * counts[1] + (1.0 - keep) * _WEIGHT + min(elapsed, FLASH)  # a gap shows no flashes

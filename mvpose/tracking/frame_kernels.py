@@ -11,13 +11,14 @@ import numpy as np
 from mvpose.kernels import njit
 from mvpose.reconstruction.poses import MISSING_SCORE
 from mvpose.tracking.bones import constrain, learn_lengths
+from mvpose.tracking.displacement import note_displacement
 from mvpose.tracking.existence import gather_evidence, log_odds, log_presence
 from mvpose.tracking.motion import predict
 from mvpose.tracking.pose_update import update_people
 
 _GIVEN_UP = -7.0  # log-odds below which a track is no longer followed: one in a thousand
 _ALONE = 0.5  # seconds for which one camera alone follows somebody who is likelier a ghost: the depth is a guess
-_SAME_POSE = 0.2  # metres: mean distance between the joints of two poses of one person
+_SAME_POSE = 0.2  # metres: distance between most joints of two poses of one person
 _ONE_PERSON = 0.12  # metres: the same, of two tracks; people who hug are further apart
 _FARTHEST_ODDS = 50.0  # log-odds beyond which a probability is 0 or 1 to the last digit
 
@@ -158,20 +159,22 @@ def _owners(labels, groups):
 
 @njit(cache=True)
 def judge_tracks(
-    state, covariance, span, origin, hits, misses, absent, found, reported, new, owner, view, cameras, sizes, pictures,
-    since, independent, memory, density, flashes, rates, presence, now, vague, first,
+    state, covariance, span, origin, hits, misses, absent, found, anchor, moved, reported, new, owner, view, cameras,
+    sizes, pictures, since, independent, memory, density, flashes, rates, presence, now, vague, first,
 ):  # fmt: skip
     """Gather the evidence of a frame for and against each track, and decide who is a person and who is present.
 
     Args:
         state: positions and velocities, (n, J, 6).
         covariance: their covariances, (n, J, 6, 6).
-        span: as in :class:`mvpose.tracking.tracks.Tracks`, and so the next six; updated in place.
+        span: as in :class:`mvpose.tracking.tracks.Tracks`, and so the next eight; updated in place.
         origin: the same.
         hits: the same.
         misses: the same.
         absent: the same.
         found: the same.
+        anchor: the same.
+        moved: the same.
         reported: the same.
         new: number of the last tracks that were born in this frame.
         owner: track of each detection, (m,), or -1.
@@ -200,17 +203,18 @@ def judge_tracks(
         hits, misses, absent, origin, fresh, state, owner, view, cameras, sizes, pictures, found, now, since,
         independent, memory,
     )  # fmt: skip
+    note_displacement(anchor, moved, state, found, now)
     departures, in_picture, seeable = presence
     odds, here, spread, agreed = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     shown, followed, everyone = np.zeros(n, np.bool_), np.zeros(n, np.bool_), True
     for t in range(n):
-        odds[t] = log_odds(span[t], origin[t], hits[t], misses[t], density, flashes, rates)
+        odds[t] = log_odds(span[t], origin[t], hits[t], misses[t], moved[t], density, flashes, rates)
         seen, agreed[t] = _latest_two(found[t])
         here[t] = log_presence(absent[t], now - seen, departures, in_picture, seeable)
         spread[t] = vagueness_of(state[t], covariance[t])
         shown[t] = first or (odds[t] > 0.0 and here[t] > 0.0 and spread[t] < vague)
         reported[t] = reported[t] or shown[t]
-    absorbed = _absorbed(state, spread)
+    absorbed = _absorbed(state, spread, hits, origin)
     for t in range(n):
         earned = odds[t] > 0.0 or (odds[t] > _GIVEN_UP and now - agreed[t] < _ALONE)
         followed[t] = earned and spread[t] < 2.0 * vague and not absorbed[t]
@@ -292,34 +296,43 @@ def vagueness_of(state, covariance):
 
 
 @njit(cache=True)
-def _absorbed(state, spread):
-    """Return which tracks lie within a mean distance of a better-known one, (n,): they follow its person."""
-    absorbed = np.zeros(len(state), np.bool_)
+def _absorbed(state, spread, hits, origin):
+    """Return which tracks share most joints with one of more pictures, (n,): they follow its person."""
+    absorbed, seen = np.zeros(len(state), np.bool_), np.empty(len(state))
+    for t in range(len(state)):
+        seen[t] = hits[t].sum() + origin[t].sum()
     for t in range(len(state)):
         for other in range(len(state)):
-            better = spread[other] < spread[t] or (spread[other] == spread[t] and other < t)
-            if better and not absorbed[other] and _mean_distance(state[t], state[other]) < _ONE_PERSON:
+            alike = seen[other] == seen[t]
+            better = seen[other] > seen[t] or (
+                alike and (spread[other] < spread[t] or (spread[other] == spread[t] and other < t))
+            )
+            if better and not absorbed[other] and _share_joints(state[t], state[other], _ONE_PERSON):
                 absorbed[t] = True
     return absorbed
 
 
 @njit(cache=True)
 def repeats(joints, state):
-    """Return which poses (k, J, 3) lie within a mean distance of those of a track (n, J, 6), (k,)."""
+    """Return which poses (k, J, 3) share most joints with a track (n, J, 6), (k,)."""
     result = np.zeros(len(joints), np.bool_)
     for k in range(len(joints)):
         for t in range(len(state)):
-            result[k] = result[k] or _mean_distance(joints[k], state[t]) < _SAME_POSE
+            result[k] = result[k] or _share_joints(joints[k], state[t], _SAME_POSE)
     return result
 
 
 @njit(cache=True, borrows=True)
-def _mean_distance(one, other):
-    """Return the mean distance of the joints that two poses (J, 3 or more) have; infinite if there are none."""
-    total, count = 0.0, 0
+def _share_joints(one, other, reach):
+    """Return whether most of the joints that two poses (J, 3 or more) have lie within a distance of each other.
+
+    No two people do: even those who hug face each other. A detection with the trunk of one person and the legs of
+    another is not a person of its own, though the mean distance of its joints may be large.
+    """
+    near, count = 0, 0
     for j in range(len(one)):
         if not np.isnan(one[j, 0]) and not np.isnan(other[j, 0]):
             x, y, z = one[j, 0] - other[j, 0], one[j, 1] - other[j, 1], one[j, 2] - other[j, 2]
-            total += np.sqrt(x * x + y * y + z * z)
+            near += x * x + y * y + z * z < reach * reach
             count += 1
-    return total / count if count else np.inf
+    return 2 * near > count

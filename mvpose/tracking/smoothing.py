@@ -220,7 +220,9 @@ def _improve(
                     after[k, j], after_covariance[k, j], gain[t, j], scratch,
                 )  # fmt: skip
         if k >= 0:
-            odds[t] = max(odds[t], later_odds[k]) if later_odds[k] > -np.inf else -np.inf
+            # Who has just appeared is judged by what later pictures say; of others they may say that they have left.
+            young = time - born_at[t] < FLASH and elapsed < FLASH
+            odds[t] = later_odds[k] if young or later_odds[k] == -np.inf else max(odds[t], later_odds[k])
             presence[t] = max(presence[t], later_presence[k])
         elif time - born_at[t] < FLASH and elapsed < FLASH:
             # A track that ends within half a second of its birth was a ghost, unless nobody looked for longer.

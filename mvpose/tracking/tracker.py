@@ -259,9 +259,9 @@ class Tracker:
             learn_looks(tracks.looks, tracks.described, sightings.owner, frame.ordered.descriptors, times.elapsed)
         *verdict, false = judge_tracks(
             tracks.state, tracks.covariance, tracks.span, tracks.origin, tracks.hits, tracks.misses, tracks.absent,
-            tracks.found, tracks.reported, len(tracks) - count, sightings.shown_by, sightings.in_view, rig.packed,
-            self._sizes, times.pictures, sightings.since, *existence.correlation, clutter.density, clutter.flashes,
-            existence.rates, existence.presence, times.now, existence.vague, first,
+            tracks.found, tracks.anchor, tracks.moved, tracks.reported, len(tracks) - count, sightings.shown_by,
+            sightings.in_view, rig.packed, self._sizes, times.pictures, sightings.since, *existence.correlation,
+            clutter.density, clutter.flashes, existence.rates, existence.presence, times.now, existence.vague, first,
         )  # fmt: skip
         clutter.count(false, times.pictures, sightings.since, times.elapsed)
         return tuple(verdict)

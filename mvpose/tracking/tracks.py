@@ -31,6 +31,8 @@ class Tracks:
         misses: effective number of pictures that should have and did not, (n, V).
         absent: effective number of pictures that should have found the person since one last did, (n, V).
         found: time at which each camera last found the track, (n, V), seconds; -inf if none ever did.
+        anchor: place of each joint when it was first known, (n, J, 3), metres; NaN before.
+        moved: how far the body as a whole has been from there, (n,), metres.
         reported: whether the track has ever been reported as a person, (n,).
         looks: mean of the unit descriptors of the track's detections, (n, D), zeros before there is any.
         described: seconds of detections with descriptors in this mean, (n,), 0 for none.
@@ -51,6 +53,8 @@ class Tracks:
     misses: Floats
     absent: Floats
     found: Floats
+    anchor: Floats
+    moved: Floats
     reported: Bools
     looks: Floats
     described: Floats
@@ -74,6 +78,8 @@ class Tracks:
             misses=np.empty((0, cameras), real),
             absent=np.empty((0, cameras), real),
             found=np.empty((0, cameras), real),
+            anchor=np.empty((0, joints, 3), real),
+            moved=np.empty(0, real),
             reported=np.empty(0, truth),
             looks=np.empty((0, dimensions), real),
             described=np.empty(0, real),
@@ -124,6 +130,8 @@ class Tracks:
             misses=np.zeros((n, cameras)),
             absent=np.zeros((n, cameras)),
             found=np.full((n, cameras), -np.inf),
+            anchor=np.full((n, count, 3), np.nan),
+            moved=np.zeros(n),
             reported=np.zeros(n, np.bool_),
             looks=np.zeros((n, dimensions)),
             described=np.zeros(n),

@@ -18,10 +18,10 @@ def test_lasting_false_detections_agree_anew_as_rarely_as_people_come():
     """Both are rates once they have lasted: the odds do not depend on how many pictures a second has."""
     rates = Existence(statues=1e-12).rates
     both, hits, misses, clutter = np.ones(2, np.bool_), np.full(2, 8.0), np.full(2, 0.5), np.full(2, 0.8)
-    often, rare = (log_odds(span, both, hits, misses, clutter, 1e-12, rates) for span in (0.005, 0.05))
+    often, rare = (log_odds(span, both, hits, misses, 0.0, clutter, 1e-12, rates) for span in (0.005, 0.05))
     assert often == pytest.approx(rare, abs=0.02)
     # At the start all those who came in the latest minute are there, but only as many false detections as ever.
-    start = log_odds(60.0, both, hits, misses, clutter, 1e-12, rates)
+    start = log_odds(60.0, both, hits, misses, 0.0, clutter, 1e-12, rates)
     assert start - rare == pytest.approx(np.log(60.0 / (Existence().memory / 2.0)), abs=0.02)
 
 
