@@ -81,7 +81,8 @@ class Pipeline:
         and trackers.
 
         Args:
-            name: name of the preset.
+            name: name of the preset; with "+repair" behind it, the rig and the clocks are repaired first
+                (:class:`mvpose.calibration.repaired_pipeline.RepairedPipeline`).
             appearance: scale of descriptor distances; for a re-ID network it is ``ReId.affinity``. The default is a
                 general scale.
             lag: seconds of later frames that an estimate of a tracker waits for; by default that of

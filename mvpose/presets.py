@@ -32,11 +32,24 @@ READ_HEATMAPS = frozenset({"full", "appearance", "geometry", "hungarian", "track
 TRACKING = frozenset({"track", "track-fast"})
 """Presets that are a :class:`mvpose.pipeline.SequenceEstimator`: frames come in order."""
 
+REPAIR = "+repair"
+"""Suffix of a preset with which the rig and the clocks of the whole recording are repaired first."""
+
+
+def without_repair(name: str) -> str:
+    """Return the name of the preset that estimates people: "full" of "full+repair"."""
+    return name.removesuffix(REPAIR)
+
 
 def preset(
     name: str, *, appearance: AppearanceAffinity | None = None, lag: float | None = None, period: float | None = None
 ) -> Estimator:
     """Return one of ``PRESETS``; see :meth:`mvpose.Pipeline.preset`."""
+    if name.endswith(REPAIR):
+        from mvpose.calibration.repaired_pipeline import RepairedPipeline  # only where it is used
+
+        estimator = preset(without_repair(name), appearance=appearance, lag=lag, period=period)
+        return RepairedPipeline(estimator) if period is None else RepairedPipeline(estimator, period=period)
     appearance = appearance or AppearanceAffinity()
     full = Pipeline(affinity=FusedAffinity(appearance=appearance))
     fast = replace(full, matching=Matcher(method="clustering"), reconstruction=Triangulation())

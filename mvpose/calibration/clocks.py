@@ -3,8 +3,8 @@
 Views of a moving joint agree on its place only where their pictures are of one time. Offsets of all cameras that make
 them agree are found in three steps: whole frames at which the rays of views meet (:mod:`.clock_search`), least squares
 with velocities of joints (:mod:`.clock_adjustment`), and changes by whole frames on the way (:mod:`.picture_order`).
-Only differences between clocks can be seen: the time of the cameras that agree is taken as right where they are more
-than half, else the mean time of all.
+Only differences between clocks can be seen: the time of the cameras that agree is taken as right where they are half
+of all or more, else the mean time of all.
 """
 
 from __future__ import annotations
@@ -208,7 +208,7 @@ def _clocks(
     halves[~known] = np.inf
     covariance[~known] = covariance[:, ~known] = 0.0
     covariance[~known, ~known] = np.inf
-    corrected = times + offsets
+    corrected = np.where(np.isfinite(times), np.fmax.accumulate(times + offsets, axis=0), np.nan)
     for frame in range(1, len(times)):
         corrected[frame] = np.where(repeated[frame], corrected[frame - 1], corrected[frame])
     return Clocks(
@@ -253,4 +253,5 @@ def _reference(offsets: Floats, covariance: Floats, known: Bools) -> Integers:
     variance = np.diag(covariance) + covariance[middle, middle] - 2.0 * covariance[middle]
     near = np.abs(offsets - offsets[middle]) <= _AGREE * np.sqrt(np.maximum(variance, 0.0))
     agreeing = np.flatnonzero(known & near)
-    return agreeing if 2 * len(agreeing) > known.sum() else np.flatnonzero(known)
+    most = len(agreeing) > 1 and 2 * len(agreeing) >= known.sum()
+    return agreeing if most else np.flatnonzero(known)

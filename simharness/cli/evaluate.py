@@ -61,14 +61,14 @@ def evaluate_recording(
     """A recording (the word [cyan]recording[/] may be left out): PCP of its actors, and errors that PCP ignores."""
     with exit_on_error():
         start = perf_counter()
-        from mvpose.presets import NEED_DESCRIPTORS
+        from mvpose.presets import NEED_DESCRIPTORS, without_repair
         from simharness.cli.evaluation_tables import print_evaluation
         from simharness.reality.evaluation import evaluate
         from simharness.reality.recording_file import read_recording
         from simharness.runtime.progress import reporter
 
         names = method or ["full"]
-        if blind := NEED_DESCRIPTORS & set(names):
+        if blind := [name for name in names if without_repair(name) in NEED_DESCRIPTORS]:
             raise ValueError(
                 f"--method {', '.join(blind)}: uses descriptors alone, and the detections of recordings carry none; "
                 "choose another variant"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from numba.core.registry import cpu_target
 from threadpoolctl import threadpool_limits
 
-from mvpose.presets import TRACKING
+from mvpose.presets import TRACKING, without_repair
 from simharness.gate.baseline import FRAMES, TIME, Measurement
 from simharness.gate.frame_times import relative_times
 from simharness.gate.gate_result import FailedCase
@@ -124,7 +124,7 @@ def fingerprint(study: Study) -> str:
         "variants": study.variants,
     }
     lags = {setting.scenario.method.lag for setting in study.settings}
-    if TRACKING.intersection(study.variants) and lags != {Method().lag}:
+    if TRACKING.intersection(map(without_repair, study.variants)) and lags != {Method().lag}:
         values["lags"] = [setting.scenario.method.lag for setting in study.settings]
     text = json.dumps(values, sort_keys=True)
     digest = hashlib.blake2b(digest_size=5)

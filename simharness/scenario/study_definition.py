@@ -187,9 +187,9 @@ def _check_variants(plan: Plan) -> None:
 
 def _without_descriptors(scenario: Scenario, plan: Plan) -> list[str]:
     """Return a message about variants that need descriptors in a scenario without them."""
-    from mvpose.presets import NEED_DESCRIPTORS
+    from mvpose.presets import NEED_DESCRIPTORS, without_repair
 
-    affected = NEED_DESCRIPTORS & set(scenario.method.variants)
+    affected = [name for name in scenario.method.variants if without_repair(name) in NEED_DESCRIPTORS]
     if not affected or scenario.appearance.source != "none":
         return []
     return [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mvpose.presets import TRACKING
+from mvpose.presets import TRACKING, without_repair
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scenario.study_definition import Setting, Study
 from simharness.trial.identity import entry_identity, estimator_code, trial_identity
@@ -42,7 +42,7 @@ def _planned(study: Study, setting: Setting, seed: int, codes: Mapping[str, str]
     trial = trial_identity(scenario)
     lag = scenario.method.lag
     entries = {
-        variant: entry_identity(trial, variant, code, lag=lag if variant in TRACKING else None)
+        variant: entry_identity(trial, variant, code, lag=lag if without_repair(variant) in TRACKING else None)
         for variant, code in codes.items()
     }
     return PlannedTrial(setting, seed, scenario, trial, entries)

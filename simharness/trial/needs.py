@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from mvpose.presets import without_repair
 from simharness.runtime.machine import memory
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.scenario import Scenario
@@ -63,7 +64,7 @@ def needs_of(scenario: Scenario) -> Needs:
     detections = views * (people + scenario.detector.phantoms.rate)
     width, height = scenario.cameras.size
     pixels = 0 if scenario.rendering.renderer == "rays" else width * height
-    relaxed = sum(variant in _MATCHING for variant in variants) * 8 * detections**2
+    relaxed = sum(without_repair(variant) in _MATCHING for variant in variants) * 8 * detections**2
     return Needs(
         frames=frames,
         views=views,
@@ -75,7 +76,7 @@ def needs_of(scenario: Scenario) -> Needs:
         seconds=_START
         + sights * _SIGHT_SECONDS
         + frames * views * pixels * _PIXEL_SECONDS
-        + frames * sum(_frame_seconds(variant, detections) for variant in variants),
+        + frames * sum(_frame_seconds(without_repair(variant), detections) for variant in variants),
         disk=frames * len(variants) * _STORED_FRAME + sights * _STORED_SIGHT,
     )
 

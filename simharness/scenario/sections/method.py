@@ -57,7 +57,8 @@ class Method(Section):
         ("full", "no-3dps"),
         min_length=1,
         max_length=100,
-        description="presets of mvpose.Pipeline, and names of method.estimators",
+        description="presets of mvpose.Pipeline, also with +repair behind them: the rig and the clocks are repaired "
+        "from the whole trial first; and names of method.estimators",
     )
     lag: Annotated[float, Field(ge=0.0, le=36_000.0)] = Field(
         0.2,
@@ -71,7 +72,7 @@ class Method(Section):
 
 def wrong_variants(method: Method) -> Iterator[tuple[str, str]]:
     """Yield the faulty keys of section [method], each with a message."""
-    from mvpose.presets import PRESETS  # only where a method is checked: it imports the whole method
+    from mvpose.presets import PRESETS, without_repair  # only where a method is checked: it imports the whole method
 
     estimators = method.estimators.places
     for name in estimators:
@@ -79,7 +80,7 @@ def wrong_variants(method: Method) -> Iterator[tuple[str, str]]:
             yield f"estimators.{name}", "this is the name of a preset of mvpose.Pipeline; choose another name"
     known = [*PRESETS, *estimators]
     for name in method.variants:
-        if name not in known:
+        if name not in known and without_repair(name) not in PRESETS:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
             yield "variants", f"unknown variant {name!r}; {hint}expected one of {', '.join(known)}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mvpose import Rig
 from mvpose.affinity import AppearanceAffinity
 from mvpose.pipeline import Estimator
-from mvpose.presets import NEED_DESCRIPTORS
+from mvpose.presets import NEED_DESCRIPTORS, without_repair
 from simharness.capture.rendering.renderer import Unavailable
 from simharness.detector.descriptors import DescriptorSettings
 from simharness.scenario.sections.scenario import Scenario
@@ -75,7 +75,7 @@ def build_variants(scenario: Scenario) -> dict[str, Estimator]:
     described = scenario.appearance.source != "none"
     appearance = re_id(scenario).affinity if described else AppearanceAffinity()
     pipelines = estimators_of(scenario.method, appearance=appearance, period=1.0 / scenario.rate)
-    if not described and (unusable := NEED_DESCRIPTORS & pipelines.keys()):
+    if not described and (unusable := [name for name in pipelines if without_repair(name) in NEED_DESCRIPTORS]):
         raise ValueError(
             f"method.variants: {', '.join(unusable)} needs descriptors, but detections have none; choose "
             'appearance.source = "pictures" or "drawn", or another variant'

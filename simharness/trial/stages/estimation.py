@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from mvpose import Detections, Estimate, Rig
 from mvpose.pipeline import Estimator, SequenceEstimator
-from mvpose.presets import PRESETS, READ_HEATMAPS
+from mvpose.presets import PRESETS, READ_HEATMAPS, without_repair
 from simharness.runtime.errors import RunError, naming_frame
 from simharness.runtime.frame_pool import chunks_of, map_jobs
 from simharness.runtime.stages import Stages
@@ -70,10 +70,10 @@ class EstimateFrames:
         peaks = self.detected[frame].peaks
         if plain.likelihoods is not None:
             plain = replace(plain, likelihoods=None)
-        elif peaks is not None and set(names) - _IGNORE_HEATMAPS:
+        elif peaks is not None and not all(_ignores_heatmaps(name) for name in names):
             mapped = replace(plain, likelihoods=peaks.heatmaps())
         for name in names:
-            yield name, plain if name in _IGNORE_HEATMAPS else mapped
+            yield name, plain if _ignores_heatmaps(name) else mapped
 
     def _sequence(self, variant: str, frames: Iterable[int]) -> Iterator[Detections]:
         """Yield the detections of frames as a variant gets them."""
@@ -96,7 +96,10 @@ class EstimateFrames:
 
 
 _warm: set[str] = set()  # variants that this process has run
-_IGNORE_HEATMAPS = PRESETS.keys() - READ_HEATMAPS
+
+
+def _ignores_heatmaps(variant: str) -> bool:
+    return without_repair(variant) in PRESETS.keys() - READ_HEATMAPS
 
 
 def estimate_variants(

@@ -1,0 +1,77 @@
+"""Estimation with the doctor in front: the rig and the clocks are repaired from the whole recording, then people are
+estimated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mvpose.arrays import Integers
+from mvpose.calibration.clocks import estimate_clocks
+from mvpose.calibration.repair import repair
+from mvpose.calibration.resampling import resampled
+from mvpose.camera import Rig
+from mvpose.detections import Detections
+from mvpose.estimate import Estimate
+from mvpose.pipeline import Estimator, SequenceEstimator
+
+
+@dataclass(frozen=True)
+class RepairedPipeline:
+    """Estimator of recordings (:class:`mvpose.pipeline.SequenceEstimator`) that repairs the rig first.
+
+    All frames are read before the first estimate. The repaired rig is used where the repair is not refused. Clocks are
+    corrected where one of them is wrong for certain: an estimator with memory gets the corrected times of pictures, an
+    estimator of single frames gets detections that are moved to the times of the frames.
+
+    Attributes:
+        estimator: what estimates people.
+        period: time between frames whose detections carry no time, seconds.
+    """
+
+    estimator: Estimator
+    period: float = 0.04
+
+    def estimate(self, rig: Rig, detections: Detections) -> Estimate:
+        """Estimate the people of one frame alone, without any repair: one frame does not tell what is wrong."""
+        return self.estimator.estimate(rig, detections)
+
+    def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
+        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
+
+        Args:
+            rig: calibrated cameras.
+            frames: detections of each frame, in the order of time.
+
+        Raises:
+            ValueError: as of the estimator.
+        """
+        given = list(frames)
+        if not given:
+            return
+        rig = repair(rig, given, period=self.period).rig
+        clocks = estimate_clocks(rig, given, period=self.period)
+        wrong = any(each.severity == "alarm" for each in clocks.findings())
+        if isinstance(self.estimator, SequenceEstimator):
+            yield from self.estimator.track(rig, clocks.corrected(given) if wrong else given)
+        elif not wrong:
+            yield from (self.estimator.estimate(rig, each) for each in given)
+        else:
+            moved = resampled(rig, given, clocks)
+            for each, rows in zip(moved.frames, moved.rows, strict=True):
+                yield _of_given(self.estimator.estimate(rig, each), rows, len(each))
+
+
+def _of_given(estimate: Estimate, rows: Integers, count: int) -> Estimate:
+    """Return the estimate with labels of the detections that were given.
+
+    Args:
+        estimate: estimate of ``count`` moved detections.
+        rows: the moved detection of each given one, -1 for none.
+        count: number of moved detections.
+    """
+    labels = np.append(estimate.matching.labels_of(count), -1)[rows]  # row -1 is the last
+    return replace(estimate, matching=replace(estimate.matching, labels=labels, P=None))
