@@ -98,8 +98,9 @@ def _whitening(joints: Floats, covariance: Floats | None) -> Floats:
     if covariance is None:
         return np.where(present[..., None, None], np.eye(3) / _UNKNOWN_ERROR, 0.0)
     present = present & np.isfinite(covariance).all(axis=(-1, -2))
-    whole = np.where(present[..., None, None], covariance, 0.0) + _MODEL_ERROR**2 * np.eye(3)
-    return np.where(present[..., None, None], np.linalg.inv(np.linalg.cholesky(whole)), 0.0)
+    variances, axes = np.linalg.eigh(np.where(present[..., None, None], covariance, 0.0))
+    scales = 1.0 / np.sqrt(np.maximum(variances, 0.0) + _MODEL_ERROR**2)
+    return np.where(present[..., None, None], scales[..., None] * axes.swapaxes(-1, -2), 0.0)
 
 
 def _filled(times: Floats, joints: Floats) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton_fit.body import Body
 from mvpose.skeleton_fit.kinematics import Pose
-from mvpose.skeleton_fit.rotations import frame
+from mvpose.skeleton_fit.rotations import frame, unit
 
 _STRAIGHT = 0.25  # sine of the angle at an elbow or knee; a straighter limb does not show its axis
 
@@ -65,11 +65,9 @@ def _axis(upper: Floats, lower: Floats, usual: Floats, front: Floats) -> Floats:
         front: direction toward which the limb bends when it is as usual, (T, 3); replaces the usual axis where that is
             along the limb.
     """
-    upper = upper / np.linalg.norm(upper, axis=-1, keepdims=True)
-    lower = lower / np.linalg.norm(lower, axis=-1, keepdims=True)
-    bent = np.cross(upper, lower)
-    usual = np.cross(upper, front) + 0.1 * usual
-    usual /= np.linalg.norm(usual, axis=-1, keepdims=True)
+    upper = unit(upper, np.cross(front, usual))
+    bent = np.cross(upper, unit(lower, upper))
+    usual = unit(np.cross(upper, front) + 0.1 * usual, usual)
     straightness = np.clip(1.0 - np.linalg.norm(bent, axis=-1, keepdims=True) / _STRAIGHT, 0.0, 1.0)
     axis = bent + straightness * _STRAIGHT * usual
     axis -= np.sum(axis * upper, axis=-1, keepdims=True) * upper

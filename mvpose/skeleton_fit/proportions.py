@@ -15,6 +15,7 @@ from mvpose.skeleton_fit.body import LENGTHS, STATURE, Body
 from mvpose.skeleton_fit.kinematics import Pose
 
 _FEWEST = 3  # frames in which a bone must be seen
+_SHORTEST = 0.01  # metres
 _SIDES = ("left", "right")
 
 
@@ -107,7 +108,8 @@ def _spans(body: Body, joints: Floats, name: str) -> Floats:
 
 
 def _completed(found: dict[str, float]) -> dict[str, float]:
-    """Return lengths with those that are NaN from the stature of which the others are the usual shares."""
+    """Return lengths; one that is NaN or impossibly short follows from the stature that the others have in adults."""
+    found = {name: length if length > _SHORTEST else float("nan") for name, length in found.items()}
     ratios = [found[name] / share for name, share in LENGTHS.items() if np.isfinite(found[name])]
     stature = float(np.median(ratios)) if ratios else STATURE
     return {name: found[name] if np.isfinite(found[name]) else share * stature for name, share in LENGTHS.items()}

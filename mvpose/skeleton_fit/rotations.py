@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 
+_NO_LENGTH = 1e-9  # metres
 _NEAR_HALF_TURN = -0.999  # cosine of an angle
 
 
@@ -57,17 +58,28 @@ def skew(vectors: Floats) -> Floats:
     return np.stack(rows, axis=-1).reshape(*vectors.shape, 3)
 
 
+def unit(vectors: Floats, usual: Floats) -> Floats:
+    """Return vectors (..., 3) with length 1; the usual ones where they have no length."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(lengths > _NO_LENGTH, vectors / np.maximum(lengths, _NO_LENGTH), usual)
+
+
+def _across(vectors: Floats, along: Floats) -> Floats:
+    """Return the parts of vectors (..., 3) at right angles to unit vectors."""
+    return vectors - np.sum(vectors * along, axis=-1, keepdims=True) * along
+
+
 def frame(primary: Floats, secondary: Floats, axes: tuple[int, int]) -> Floats:
     """Return right-handed frames, (..., 3, 3) with axes as columns, from two directions.
 
     Args:
-        primary: direction of the axis ``axes[0]``, (..., 3), any length above 0.
+        primary: direction of the axis ``axes[0]``, (..., 3); that of the world where its length is 0.
         secondary: direction of the axis ``axes[1]`` as far as it is at right angles to the first, (..., 3).
         axes: which axes they are, 0 to 2, different.
     """
-    first = primary / np.linalg.norm(primary, axis=-1, keepdims=True)
-    second = secondary - np.sum(secondary * first, axis=-1, keepdims=True) * first
-    second = second / np.linalg.norm(second, axis=-1, keepdims=True)
+    first = unit(primary, np.eye(3)[axes[0]])
+    other = np.eye(3)[np.abs(first).argmin(axis=-1)]  # where the second direction is along the first
+    second = unit(_across(secondary, first), unit(_across(other, first), other))
     third = np.cross(first, second)
     result = np.empty((*first.shape, 3))
     result[..., axes[0]], result[..., axes[1]] = first, second

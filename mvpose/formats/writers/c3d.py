@@ -41,7 +41,7 @@ def _points(people: People, axes: Floats) -> Floats:
     points[..., :3] = np.nan_to_num(1000.0 * people.joints @ axes.T)
     if people.covariance is not None:
         variance = np.trace(people.covariance, axis1=-2, axis2=-1) / 3.0
-        points[..., 3] = np.minimum(1000.0 * np.sqrt(np.nan_to_num(variance)), 255.0)
+        points[..., 3] = np.minimum(1000.0 * np.sqrt(np.maximum(np.nan_to_num(variance), 0.0)), 255.0)
     points[..., 3] = np.where(people.present, points[..., 3], -1.0)
     return points
 

@@ -223,3 +223,25 @@ class TestFit:
         arm = Skeleton("arm", ("left_elbow", "left_wrist"), (-1, 0), (0, 1), (0.1, 0.1))
         with pytest.raises(ValueError, match="skeleton 'arm' must have left_hip"):
             fit_bodies(People(np.zeros(0), [], np.zeros((0, 0, 2, 3)), np.zeros((0, 0, 2)), None, arm))
+
+    @pytest.mark.parametrize("odd", ["one point", "hips", "trunk", "elbow", "far", "covariances"])
+    def test_impossible_people_give_finite_bodies(self, odd):
+        joints = np.random.default_rng(3).normal(size=(6, 1, 17, 3))
+        covariance = np.broadcast_to(0.01 * np.eye(3), (6, 1, 17, 3, 3))
+        if odd == "one point":
+            joints[:] = 0.0
+        elif odd == "hips":
+            joints[2, 0, 11] = joints[2, 0, 12]
+        elif odd == "trunk":
+            joints[2, 0, 5:7] = joints[2, 0, 11:13]
+        elif odd == "elbow":
+            joints[:, 0, 7] = joints[:, 0, 5]
+        elif odd == "far":
+            joints *= 1e6
+        else:
+            covariance = -covariance
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            (fit,) = fit_bodies(People(np.arange(6) / 25, np.array([0]), joints, np.ones((6, 1, 17)), covariance))
+        assert np.isfinite(fit.pose.joints).all()
+        assert min(fit.lengths.values()) > 0.005
