@@ -75,6 +75,12 @@ def _write_page(folder: Path, inputs: Inputs, diagnosis: Diagnosis, files: tuple
     from mvpose.files.atomic_files import atomic_folder
     from mvpose.report.doctor_page import write_doctor_page
 
+    repaired = None
+    if diagnosis.verdict == "faults":  # the page draws them before and after
+        from mvpose.calibration import repair
+
+        with failing("the repair"):
+            repaired = repair(inputs.rig, inputs.frames, period=inputs.period)
     with atomic_folder(folder) as partial, failing("the page"):
         write_doctor_page(
             partial,
@@ -82,6 +88,7 @@ def _write_page(folder: Path, inputs: Inputs, diagnosis: Diagnosis, files: tuple
             rig=inputs.rig,
             frames=inputs.frames,
             diagnosis=diagnosis,
+            repair=repaired,
             period=inputs.period,
             files=files,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -54,12 +55,14 @@ def number(value: float, digits: int = 1) -> str:
 def joint_groups(skeleton: Skeleton) -> tuple[tuple[str, ...], Integers]:
     """Return names of groups of joints, and the group of each joint, (J,).
 
-    Both sides of a joint are a group. Of skeletons with hands and faces, all joints that COCO17 does not have are one.
+    Both sides of a joint are a group, and so are numbered points (``face_0`` to ``face_67``). Of skeletons with still
+    more groups, all joints that COCO17 does not have are one.
     """
-    parts = list(dict.fromkeys(skeleton.parts))
+    names = [re.sub(r"_\d+$", "", part) for part in skeleton.parts]
+    parts = list(dict.fromkeys(names))
     if len(parts) > _MOST_GROUPS:
         parts = [part for part in dict.fromkeys(COCO17.parts) if part in parts] + ["other joints"]
-    index = np.array([parts.index(part) if part in parts else len(parts) - 1 for part in skeleton.parts])
+    index = np.array([parts.index(part) if part in parts else len(parts) - 1 for part in names])
     return tuple(part.replace("_", " ") for part in parts), index
 
 
