@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats
 from mvpose.calibration.cameras import CameraFault, Fit
 from mvpose.calibration.findings import Finding, Severity
-from mvpose.camera import Rig
+from mvpose.camera import Camera, Rig
 
 _DEGREES, _METRES = 0.5, 0.04
 """Corrections from which a camera has moved: twice those that people ask for of careful, published calibrations (0.16
 to 0.28 degrees and 1 to 2.5 cm on Shelf)."""
 
-_PERCENT, _CENTER, _CORNER, _MS = 2.0, 10.0, 10.0, 10.0  # of the focal length; px; px at the corner; ms
+_PERCENT, _CENTER, _EDGE = 2.0, 10.0, 6.0  # of the focal length; px; px at the outermost tenth of the people
 
 _SYSTEMATIC = np.array([*[np.radians(0.1)] * 3, *[0.008] * 3, 0.003, 1.0, 1.0, 0.01, 0.002])
 """Standard deviations of what detectors add, who place joints differently from different sides (FACTS: hips are off by
@@ -38,7 +39,7 @@ def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined
     findings = []
     depth = _depths(fit, rig)
     for each in fit.faults:
-        finding = _finding(each, rig, starts, names, depth, undetermined)
+        finding = _finding(each, fit, rig, starts, names, depth, undetermined)
         if finding is not None:
             findings.append(finding)
     faulty = {each.fault.view for each in fit.faults}
@@ -49,7 +50,7 @@ def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined
 
 
 def _finding(
-    found: CameraFault, rig: Rig, starts: Floats, names: Sequence[str], depth: Floats, undetermined: bool
+    found: CameraFault, fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], depth: Floats, undetermined: bool
 ) -> Finding | None:
     view, kind, change = found.fault.view, found.fault.model.kind, found.change
     name = names[view]
@@ -85,11 +86,10 @@ def _finding(
         mend = f"K = rig[{view}].K.copy(); K[:2, 2] += [{change[7]:.1f}, {change[8]:.1f}]  # cropped pictures?"
     elif kind == "distortion-ignored":
         camera = rig[view]
-        radius = 0.5 * np.hypot(*camera.size) / camera.K[0, 0]
-        corner = abs(change[9]) * radius**3 * camera.K[0, 0]
+        corner = abs(change[9]) * _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
         size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
-        alarm, cost = corner >= _CORNER, 0.3 * corner / camera.K[0, 0] * depth[view]
-        text = f"the lens of {name} distorts otherwise than calibrated, by {corner:.0f} px in the corner"
+        alarm, cost = corner >= _EDGE, 0.3 * corner / camera.K[0, 0] * depth[view]
+        text = f"the lens of {name} distorts otherwise than calibrated, by {corner:.0f} px near the edge"
         kind = "distortion-model" if camera.distortion.any() else kind
         mend = f"distortion = rig[{view}].distortion + np.array([{change[9]:.3f}, 0, 0, 0, 0])"
     else:  # offsets of clocks are findings of mvpose.calibration.clocks
@@ -110,6 +110,27 @@ def _finding(
         cost=float(probability * cost / len(rig)),
         mend=mend,
     )
+
+
+def of_turn(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Sequence[str]) -> Finding:
+    """Return the finding of a camera that was turned so far that it had to be searched for.
+
+    Args:
+        rig: the cameras as calibrated.
+        cameras: packed cameras as people have them, (V, 22).
+        covariance: covariance of the parameters of this camera, (11, 11).
+        view: the camera.
+        names: names of the cameras.
+    """
+    change = np.zeros(len(covariance))
+    turn = cameras[view, 5:14].reshape(3, 3) @ rig[view].R.T
+    change[:3] = Rotation.from_matrix(turn).as_rotvec()
+    change[3:6] = cameras[view, 14:17] - rig[view].center
+    size, interval = _pose_size(change, _draws(change, covariance))
+    text = f"{names[view]} stands or looks elsewhere than calibrated, by {size['degrees']:.1f} degrees and "
+    text += f"{100 * size['metres']:.0f} cm"
+    cost = (np.radians(size["degrees"]) * 3.0 + size["metres"]) / len(rig)
+    return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, _REPAIR)
 
 
 def _note(fit: Fit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
@@ -144,6 +165,17 @@ def _draws(change: Floats, covariance: Floats) -> Floats:
 def _range(values: Floats) -> tuple[float, float]:
     low, high = np.quantile(values, [0.05, 0.95])
     return float(low), float(high)
+
+
+def _outer_radius(fit: Fit, camera: Camera) -> float:
+    """Return the distance from the axis, in focal lengths, beyond which a tenth of the joints in the picture are."""
+    joints = fit.equations.joints
+    pixels = camera.project(joints[np.isfinite(joints[:, 0])])
+    pixels = pixels[camera.inside(pixels)]
+    if not len(pixels):
+        return 0.0
+    away = (pixels - [camera.K[0, 2], camera.K[1, 2]]) / [camera.K[0, 0], camera.K[1, 1]]
+    return float(np.quantile(np.linalg.norm(away, axis=1), 0.9))
 
 
 def _depths(fit: Fit, rig: Rig) -> Floats:

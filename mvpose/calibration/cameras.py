@@ -44,7 +44,13 @@ _LEAST_TEMPER = 2.0  # keypoints of one pose are never independent of each other
 _UNKNOWN_TEMPER = 20.0  # in a recording too short to measure it
 _FEWEST_BATCHES = 5
 _ROUNDS = 4
-_LEAST_GAIN = 3.0  # log posterior odds from which a fault is added: 20 to 1
+_LEAST_ODDS = 0.0  # log posterior odds from which a camera has moved: more likely than not
+_LEAST_ODDS_INTRINSICS = 3.0  # of another fault: 20 to 1, because detectors imitate small ones
+_LEAST_ODDS_CHANGE = 30.0
+"""Log posterior odds from which a change in time is one of the camera. What detectors do to people changes with the
+place and the pose of people, over seconds, which the scatter between blocks of a short recording does not show; it
+imitates changes with odds of up to e^26, half a degree of a true one has e^100 and more."""
+
 _REST = 0.03  # share of the strongest fault's odds below which another may be what the model left of it
 _ALWAYS, _SINCE, _GROWING = "always", "since", "growing"
 _COURSES = {_ALWAYS: 0.6, _SINCE: 0.25, _GROWING: 0.15}  # prior of the course over time of a pose that is wrong
@@ -69,7 +75,7 @@ class Model:
 
 
 def _moved(degrees: float, metres: float) -> Model:
-    return Model("moved-camera", 0.015, (0, 1, 2, 3, 4, 5), (*[np.radians(degrees)] * 3, *[metres] * 3))
+    return Model("moved-camera", 0.05, (0, 1, 2, 3, 4, 5), (*[np.radians(degrees)] * 3, *[metres] * 3))
 
 
 MODELS = (
@@ -311,15 +317,21 @@ def _candidates(blocks: int, view: int) -> list[tuple[Fault, float]]:
 
 def _next(quadratic: Quadratic, found: list[Fault], views: int, strongest: float) -> tuple[Fault, float] | None:
     """Return the likeliest further fault and its log posterior odds; None if none is likely enough."""
-    base, best, most = quadratic.evidence(found), None, max(_LEAST_GAIN, _REST * strongest)
+    base, best, most = quadratic.evidence(found), None, -np.inf
     for view in range(views):
         if any(view == each.view for each in found):
             continue
         for fault, prior in _candidates(len(quadratic.H), view):
             gain = quadratic.evidence([*found, fault]) - base + prior
-            if gain > most:
+            if gain > max(_least_odds(fault), _REST * strongest, most):
                 best, most = (fault, gain), gain
     return best
+
+
+def _least_odds(fault: Fault) -> float:
+    if fault.course != _ALWAYS:
+        return _LEAST_ODDS_CHANGE
+    return _LEAST_ODDS if fault.model.kind == "moved-camera" else _LEAST_ODDS_INTRINSICS
 
 
 def _described(quadratic: Quadratic, found: list[Fault], fault: Fault, views: int) -> CameraFault:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
 from mvpose.arrays import Floats
@@ -28,7 +29,9 @@ that are compared), and joints of one person err together (17 joints as about fo
 _CERTAIN = 0.95  # posterior probability from which a mistake is named
 _AGREES = 0.5  # a mended camera must agree with the others at least this well, compared with the others among them
 _GAIN = 0.02  # least gain, as a share of all evidence: less is a question of millimetres, not of conventions
-_SUSPECT = 0.6  # a camera that agrees less than this share of the median is searched for crops and turns
+_SUSPECT = 0.6  # a camera that agrees less than this share of the median is searched for crops and turns as well
+_EXPLAINED = 0.7  # agreement, of all and of the worst camera over the median, from which no other mistake is searched
+_LEAST_OFFSET = 0.06  # of the size of the picture: nobody crops less, and smaller turns are found by the cameras' fit
 _LEAST_AGREEMENT = 0.2  # people who are not the same agree less, by chance
 _NOTHING = 0.8  # prior probability that the files are right
 
@@ -133,27 +136,61 @@ def hypotheses(reading: Reading, sizes: Sequence[Size]) -> Iterator[tuple[Mistak
                 yield replace(_SWAPPED, views=(j, i)), replace(reading, cameras=cameras)
 
 
-def crops(reading: Reading, sizes: Sequence[Size], agrees: Floats) -> Iterator[tuple[Mistake, Reading]]:
-    """Yield crops of the pictures of cameras that agree badly with the rest, with the readings that undo them."""
-    views = len(sizes)
-    suspects = agrees < max(_SUSPECT * float(np.median(agrees)), _LEAST_AGREEMENT)
+def _best(consistency: Consistency, reading: Reading, sizes: Sequence[Size]) -> tuple[Reading, Verdict] | None:
+    """Return the reading without the likeliest mistake, and the mistake; None if none is certain.
+
+    Crops and turns are searched only for cameras that agree badly and where no other mistake explains all of it.
+    """
+    best = _likeliest(consistency, reading, hypotheses(reading, sizes))
+    agrees = agreement(consistency, reading if best is None else best[0])
+    if best is not None and agrees.min() >= _EXPLAINED * np.median(agrees) and np.median(agrees) >= _EXPLAINED:
+        return best
+    other = _likeliest(consistency, reading, _offset_pictures(consistency, reading, sizes))
+    if best is None or (other is not None and other[1].gain > best[1].gain):
+        return other
+    return best
+
+
+def _offset_pictures(
+    consistency: Consistency, reading: Reading, sizes: Sequence[Size]
+) -> Iterator[tuple[Mistake, Reading]]:
+    """Yield for cameras that agree badly with the rest their likeliest crop and their likeliest turn."""
+    agrees, views = agreement(consistency, reading), len(sizes)
+    suspects = agrees < max(_SUSPECT * float(np.median(agrees)), _EXPLAINED)
     chosen_sets: list[tuple[int, ...]] = [(int(view),) for view in np.flatnonzero(suspects)] if views > 2 else []
     if suspects.sum() > 0.5 * views:
         chosen_sets.append(tuple(range(views)))
     for chosen in chosen_sets:
-        for dx, dy in _OFFSETS:
-            changed = _changed(reading, sizes, _shifted(dx, dy), chosen)
-            if changed is not None:
-                width, height = sizes[chosen[0]]
-                yield replace(_CROPPED, views=chosen, size=(("x_px", dx * width), ("y_px", dy * height))), changed
+        for mistake, change in ((_CROPPED, _shifted), (_TURNED, _turned)):
+            if mistake is _TURNED and len(chosen) > 1:
+                continue
+            found, (dx, dy) = _best_offset(consistency, reading, sizes, chosen, change)
+            if max(abs(dx), abs(dy)) < _LEAST_OFFSET:
+                continue
+            width, height = sizes[chosen[0]]
+            size = (("x_px", dx * width), ("y_px", dy * height)) if mistake is _CROPPED else ()
+            yield replace(mistake, views=chosen, size=size), found
 
 
-def _best(consistency: Consistency, reading: Reading, sizes: Sequence[Size]) -> tuple[Reading, Verdict] | None:
-    """Return the reading without the likeliest mistake, and the mistake; None if none is certain."""
-    best = _likeliest(consistency, reading, hypotheses(reading, sizes))
-    if best is None:
-        best = _likeliest(consistency, reading, crops(reading, sizes, agreement(consistency, reading)))
-    return best
+def _best_offset(
+    consistency: Consistency,
+    reading: Reading,
+    sizes: Sequence[Size],
+    views: tuple[int, ...],
+    change: Callable[[float, float], Change],
+) -> tuple[Reading, tuple[float, float]]:
+    """Return the likeliest reading with an offset of pictures, by shares of their size, and the offset."""
+
+    def at(offset: tuple[float, float]) -> tuple[float, Reading, tuple[float, float]]:
+        changed = _changed(reading, sizes, change(*offset), views) or reading
+        return float(consistency(changed).sum()), changed, offset
+
+    best = max((at(offset) for offset in _OFFSETS), key=lambda each: each[0])
+    for step in (0.02, 0.01, 0.01, 0.005, 0.0025):
+        x, y = best[2]
+        around = [(x + i * step, y + j * step) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+        best = max([best, *(at(offset) for offset in around)], key=lambda each: each[0])
+    return best[1], best[2]
 
 
 def _likeliest(
@@ -260,6 +297,21 @@ def _shifted(dx: float, dy: float) -> Change:
     return _pixels(lambda w, h: [[1, 0, dx * w], [0, 1, dy * h]])
 
 
+def _turned(dx: float, dy: float) -> Change:
+    """Return the turn of a camera that moves the centre of its picture by shares of the width and the height."""
+
+    def change(camera: Floats, size: Size) -> tuple[Floats, Floats | None, bool]:
+        fx, _, cx, fy, cy = camera[:5]
+        middle = 0.5 * np.array(size, float)
+        now, then = (
+            np.array([(x - cx) / fx, (y - cy) / fy, 1.0]) for x, y in (middle, middle + np.array([dx, dy]) * size)
+        )
+        turn = Rotation.align_vectors(now[None] / np.linalg.norm(now), then[None] / np.linalg.norm(then))[0]
+        return _posed(camera, turn.as_matrix() @ camera[5:14].reshape(3, 3), camera[14:17]), None, False
+
+    return change
+
+
 def _scaled(factor: float) -> Change:
     # The centre of the first pixel is at 0, its corner at -0.5.
     offset = 0.5 * (factor - 1.0)
@@ -274,7 +326,7 @@ _OFFSETS = [
     (dx, dy)
     for dx in np.arange(-0.40, 0.41, 0.04).round(2)
     for dy in np.arange(-0.40, 0.41, 0.04).round(2)
-    if max(abs(dx), abs(dy)) > 0.05
+    if max(abs(dx), abs(dy)) >= _LEAST_OFFSET
 ]
 _SWAPPED = Mistake(
     "cameras-swapped", 2.0, "the calibrations of {who} are exchanged", "exchange the calibration files of {who}"
@@ -284,6 +336,9 @@ _CROPPED = Mistake(
     0.01,
     "the pictures of {who} are cropped, the calibration is of the uncropped ones",
     "K[:2, 2] -= offset  # of the cropped picture's first pixel in the uncropped one",
+)
+_TURNED = Mistake(
+    "moved-camera", 0.05, "{who} looks elsewhere than calibrated", "mvpose repair CALIBRATION DETECTIONS --out NEW"
 )
 
 
@@ -383,7 +438,7 @@ def _changes() -> Iterator[tuple[Mistake, Change]]:
             ),
             _pixels(matrix),
         )
-    flipped = Mistake("axis-flipped", 0.5, "", "")
+    flipped = Mistake("axis-flipped", 0.5, "", "")  # of x in all pictures: the same to the views as mirrored pictures
     yield (
         replace(
             flipped,
@@ -397,6 +452,7 @@ def _changes() -> Iterator[tuple[Mistake, Change]]:
             flipped,
             text="x of the keypoints of {who} counts from the right edge; mvpose expects it from the left one",
             mend="keypoints[..., 0] = width - 1 - keypoints[..., 0]",
+            of_all=False,
         ),
         _pixels(lambda w, h: [[-1, 0, w - 1], [0, 1, 0]]),
     )

@@ -49,7 +49,8 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings = silent_views(detections, names)
     consistency = Consistency(cut(tracklets))
     reading, mistakes, _ = search(consistency, Reading.as_given(rig.packed), [camera.size for camera in rig])
-    findings += [convention_findings.of(each, names) for each in mistakes]
+    turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
+    findings += [convention_findings.of(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
     ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
     reading, unit = convention_findings.unit(reading, ratio)
     findings += unit
@@ -83,7 +84,12 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings += missing
     starts = np.array([times[first][joints.block == block].min(initial=np.inf) for block in range(joints.blocks)])
     undetermined = any(each.camera is None for each in missing)
-    findings += camera_findings.of(result, mended, starts, names, undetermined=undetermined)
+    of_cameras = camera_findings.of(result, mended, starts, names, undetermined=undetermined)
+    findings += [each for each in of_cameras if each.view not in turned or each.kind != "moved-camera"]
+    after = _corrected(reading, result).cameras
+    findings += [
+        camera_findings.of_turn(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)
+    ]
     clocks = estimate_clocks(mended, sightings, period=period)
     findings += [each for each in clocks.findings() if each.view not in useless]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)

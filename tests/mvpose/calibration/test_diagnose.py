@@ -122,3 +122,15 @@ def test_no_detections_are_no_error(recording):
     diagnosis = diagnose(rig, [each.select(each.view < 0) for each in frames])
     assert diagnosis.verdict == "cannot tell"
     assert np.isnan(diagnosis.residuals).all()
+
+
+def test_a_camera_that_was_turned_far_is_no_crop_and_a_crop_is_no_turned_camera(recording):
+    rig, frames = recording
+    camera = rig[2]
+    R = Rotation.from_rotvec(np.radians([2.0, 9.0, 1.0])).as_matrix() @ camera.R
+    turned, found = alarms(with_camera(rig, 2, R=R, t=-R @ camera.center), frames)
+    assert found == [("moved-camera", 2)]
+    assert abs(turned.alarms[0].size["degrees"] - np.sqrt(86.0)) < 0.5
+    K = camera.K + [[0.0, 0.0, 200.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    _, found = alarms(with_camera(rig, 2, K=K), frames)
+    assert ("image-cropped", 2) in found
