@@ -6,17 +6,16 @@ import time
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.doctor import faults
-from benchmarks.doctor.measures import camera_errors, pcp
+from benchmarks.doctor.measures import aligned, camera_errors, pcp
 from benchmarks.doctor.recordings import BenchRecording
 from mvpose import Detections, Rig
-from mvpose.calibration import Diagnosis, diagnose, estimate_clocks
+from mvpose.calibration import Diagnosis, Repair, diagnose, estimate_clocks, repair
 from mvpose.calibration.resampling import resampled
 
 EVERY = 5  # frames: of those that the slower variants estimate
@@ -147,14 +146,14 @@ def _repaired(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
     }  # fmt: skip
 
 
-def _repair(rig: Rig, frames: tuple[Detections, ...], recording: BenchRecording) -> Any:
-    return import_module("mvpose.calibration.repair").repair(rig, frames, period=recording.period)
+def _repair(rig: Rig, frames: tuple[Detections, ...], recording: BenchRecording) -> Repair:
+    return repair(rig, frames, period=recording.period)
 
 
 def _errors(rig: Rig, recording: BenchRecording, view: int | None) -> Result:
     result: Result = {}
-    for name, aligned in (("", False), ("aligned_", True)):
-        degrees, metres = camera_errors(rig, recording.rig, aligned=aligned)
+    for name, placed in (("", rig), ("aligned_", aligned(rig, recording.rig))):
+        degrees, metres = camera_errors(placed, recording.rig)
         result |= {
             f"{name}degrees": float(degrees.max() if view is None else degrees[view]),
             f"{name}metres": float(metres.max() if view is None else metres[view]),
@@ -188,7 +187,7 @@ def _coverage(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
     fixed = _repair(case.rig, case.frames, recording)
     if fixed.refused:
         return {"refused": fixed.refused}
-    turns, shifts = _true_corrections(case.rig, recording.rig)
+    turns, shifts = true_corrections(case.rig, recording.rig)
     missed = np.concatenate([turns, shifts], axis=1) - fixed.corrections
     deviations = np.sqrt(np.diagonal(fixed.covariance, axis1=1, axis2=2))
     free = deviations > 0
@@ -196,9 +195,9 @@ def _coverage(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
     return {"refused": None, "inside": int(inside[free].sum()), "parameters": int(free.sum())}
 
 
-def _true_corrections(believed: Rig, true: Rig) -> tuple[np.ndarray, np.ndarray]:
-    """Return rotation vectors (V, 3), radians, and shifts of the centres (V, 3), metres, that would be right."""
-    turns = Rotation.from_matrix([b.R @ a.R.T for a, b in zip(believed, true, strict=True)]).as_rotvec()
+def true_corrections(believed: Rig, true: Rig) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotation vectors in the world (V, 3), radians, and shifts (V, 3), metres, that would be right."""
+    turns = Rotation.from_matrix([b.R.T @ a.R for a, b in zip(believed, true, strict=True)]).as_rotvec()
     return turns, true.centers - believed.centers
 
 

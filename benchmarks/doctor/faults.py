@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.doctor.measures import aligned
 from benchmarks.doctor.recordings import BenchRecording
 from mvpose import Camera, Detections, Rig
 from mvpose.arrays import Floats
@@ -60,12 +61,15 @@ def move_one(recording: BenchRecording, view: int, degrees: float, metres: float
 
 
 def move_all(recording: BenchRecording, degrees: float, metres: float, rng: np.random.Generator) -> Case:
-    """Turn and shift every camera by normal errors of these standard deviations along each axis."""
+    """Turn and shift every camera by normal errors of these standard deviations along each axis.
+
+    What all have in common is taken out: a turn or a shift of the whole rig changes no picture, so nobody can mend it.
+    """
     cameras = [
         moved(camera, np.radians(degrees) * rng.standard_normal(3), metres * rng.standard_normal(3))
         for camera in recording.rig
     ]
-    return Case(Rig(cameras), recording.frames)
+    return Case(aligned(Rig(cameras), recording.rig), recording.frames)
 
 
 def _each(change: Callable[[Camera], Camera]) -> Fault:

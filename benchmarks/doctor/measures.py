@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -42,18 +43,16 @@ def pcp(
     return float(np.mean([each for each in scores if each is not None]))
 
 
-def camera_errors(rig: Rig, true: Rig, *, aligned: bool) -> tuple[Floats, Floats]:
-    """Return how far each camera is turned, (V,), degrees, and shifted, (V,), metres.
+def aligned(rig: Rig, true: Rig) -> Rig:
+    """Return the rig, turned and shifted as a whole so that its cameras stand as near as they can to the true ones."""
+    turn = Rotation.from_matrix([b.R.T @ a.R for a, b in zip(rig, true, strict=True)]).mean().as_matrix()
+    shift = (true.centers - rig.centers @ turn.T).mean(axis=0)
+    return Rig(
+        [replace(camera, R=camera.R @ turn.T, t=-camera.R @ turn.T @ (turn @ camera.center + shift)) for camera in rig]
+    )
 
-    Args:
-        rig: a calibration.
-        true: the right one.
-        aligned: do not count a turn and a shift of the whole rig, which nobody can see from its pictures.
-    """
-    turn, shift = np.eye(3), np.zeros(3)
-    if aligned:
-        turn = Rotation.from_matrix([b.R.T @ a.R for a, b in zip(rig, true, strict=True)]).mean().as_matrix()
-        shift = (true.centers - rig.centers @ turn.T).mean(axis=0)
-    turns = Rotation.from_matrix([a.R @ turn.T @ b.R.T for a, b in zip(rig, true, strict=True)]).magnitude()
-    shifts = np.linalg.norm(rig.centers @ turn.T + shift - true.centers, axis=1)
-    return np.degrees(turns), shifts
+
+def camera_errors(rig: Rig, true: Rig) -> tuple[Floats, Floats]:
+    """Return how far each camera is turned, (V,), degrees, and shifted, (V,), metres, from where it truly stands."""
+    turns = Rotation.from_matrix([a.R @ b.R.T for a, b in zip(rig, true, strict=True)]).magnitude()
+    return np.degrees(turns), np.linalg.norm(rig.centers - true.centers, axis=1)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks.doctor import faults, runner
-from benchmarks.doctor.experiments import TrialKey, trials
-from benchmarks.doctor.measures import camera_errors
+from benchmarks.doctor.experiments import TrialKey, trials, true_corrections
+from benchmarks.doctor.measures import aligned, camera_errors
 from benchmarks.doctor.recordings import BenchRecording, Recordings, write
 from benchmarks.doctor.report import confusion_of, rows_of
 from benchmarks.method.scenes import ring, stick_people
 from mvpose import Detections, Rig
 from mvpose.calibration.findings import KINDS
+from mvpose.calibration.tracklet_matching import corrected
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def test_recordings_come_back_from_disk(recording, tmp_path):
 
 def test_errors_of_a_moved_camera_are_those_it_was_moved_by(recording):
     case = faults.move_one(recording, 2, 2.0, 0.2, np.random.default_rng(1))
-    degrees, metres = camera_errors(case.rig, recording.rig, aligned=False)
+    degrees, metres = camera_errors(case.rig, recording.rig)
     np.testing.assert_allclose(degrees, [0, 0, 2, 0], atol=1e-5)
     np.testing.assert_allclose(metres, [0, 0, 0.2, 0], atol=1e-9)
 
@@ -49,7 +50,7 @@ def test_errors_of_a_moved_camera_are_those_it_was_moved_by(recording):
 def test_a_rig_that_is_moved_as_a_whole_has_no_error_when_aligned(recording):
     turn, shift = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([1.0, 2, 3])
     whole = Rig([type(c)(c.K, c.R @ turn.T, c.t - c.R @ turn.T @ shift, c.distortion, c.size) for c in recording.rig])
-    degrees, metres = camera_errors(whole, recording.rig, aligned=True)
+    degrees, metres = camera_errors(aligned(whole, recording.rig), recording.rig)
     np.testing.assert_allclose(degrees, 0.0, atol=1e-5)
     np.testing.assert_allclose(metres, 0.0, atol=1e-9)
 
@@ -110,3 +111,12 @@ def test_tables_count_alarms_by_fault():
     }
     (row,) = (row for row in rows_of(results) if "false alarms" in row.what)
     assert (row.measured, row.met) == ("50.0 %", False)
+
+
+def testtrue_corrections_turn_the_believed_rig_into_the_true_one(recording):
+    believed = faults.move_all(recording, 1.0, 0.05, np.random.default_rng(2)).rig
+    turns, shifts = true_corrections(believed, recording.rig)
+    for camera, turn, shift, true in zip(believed, turns, shifts, recording.rig, strict=True):
+        mended = corrected(camera, turn, shift)
+        np.testing.assert_allclose(mended.R, true.R, atol=1e-9)
+        np.testing.assert_allclose(mended.t, true.t, atol=1e-9)
