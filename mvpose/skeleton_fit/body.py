@@ -67,6 +67,10 @@ _HEAD = {
     "head": (0.0, 0.0, 0.30), "head_top": (0.0, 0.0, 0.30), "head_bottom": (0.0, 0.0, 0.08),
 }  # fmt: skip  # metres from the middle of the shoulders, an adult; only the start of the search
 _FOOT = {"big_toe": (0.16, -0.03, -0.07), "small_toe": (0.13, 0.05, -0.07), "heel": (-0.05, 0.0, -0.07)}
+_HAND = {
+    "hand_5": (0.03, 0.09, 0.0), "hand_9": (0.01, 0.09, 0.0), "hand_13": (-0.01, 0.085, 0.0),
+    "hand_17": (-0.03, 0.08, 0.0),
+}  # fmt: skip  # knuckles of the left hand with the palm down; fingers bend, and are no part of a rigid hand
 _CENTRES = {"mid_hip": "Hips", "hip": "Hips", "pelvis": "Hips", "neck": "Neck", "thorax": "Neck"}
 
 
@@ -145,10 +149,12 @@ class Body:
                 f"skeleton {skeleton.name!r} must have {', '.join(needed)} for joint rotations, got "
                 f"{', '.join(skeleton.joints)}"
             )
-        feet = {part for part in _FOOT for side in ("left", "right") if f"{side}_{part}" in skeleton.joints}
-        segments = tuple(
-            replace(each, axes=_BALL) if each.name.endswith("Foot") and len(feet) > 1 else each for each in SEGMENTS
-        )
+        seen = {
+            end: sum(f"{side}_{part}" in skeleton.joints for side in ("left", "right") for part in parts)
+            for end, parts in (("Foot", _FOOT), ("Hand", _HAND))
+        }
+        turning = tuple(end for end, count in seen.items() if count > 2)  # two joints or more of a side
+        segments = tuple(replace(each, axes=_BALL) if each.name.endswith(turning) else each for each in SEGMENTS)
         numbers = {each.name: k for k, each in enumerate(segments)}
         found: list[tuple[str, int, int, tuple[float, float, float]]] = []
         for row, joint in enumerate(skeleton.joints):
@@ -157,9 +163,9 @@ class Body:
                 found.append((joint, row, numbers[_ORIGINS.get(joint) or _CENTRES[joint]], (0.0, 0.0, 0.0)))
             elif joint in _HEAD:
                 found.append((joint, row, numbers["Neck"], _HEAD[joint]))
-            elif side in ("left", "right") and part in _FOOT:
-                x, y, z = _FOOT[part]
-                found.append((joint, row, numbers[f"{side.capitalize()}Foot"], (x, y if side == "left" else -y, z)))
+            elif side in ("left", "right") and (part in _FOOT or part in _HAND):
+                end, (x, y, z) = ("Foot", _FOOT[part]) if part in _FOOT else ("Hand", _HAND[part])
+                found.append((joint, row, numbers[f"{side.capitalize()}{end}"], (x, y if side == "left" else -y, z)))
         joints, rows, carriers, places = zip(*found, strict=True)
         lengths = {name: share * STATURE for name, share in LENGTHS.items()}
         return cls(segments, _offsets(segments, lengths), joints, rows, carriers, np.array(places))

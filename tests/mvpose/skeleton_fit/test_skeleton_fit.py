@@ -15,6 +15,7 @@ from mvpose.skeleton_fit.joint_limits import ELBOWS, GIRDLES, HIPS, KNEE, NECK, 
 from mvpose.skeleton_fit.kinematics import Freedom, Pose
 from mvpose.skeleton_fit.proportions import first_lengths
 from mvpose.skeleton_fit.rotations import frame, shortest, to_matrices, to_vectors
+from mvpose.wholebody import skeleton_by_name
 
 LIMITS = [SPINE, NECK, KNEE, *HIPS.values(), *GIRDLES.values(), *SHOULDERS.values(), *ELBOWS.values()]
 MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -245,3 +246,19 @@ class TestFit:
             (fit,) = fit_bodies(People(np.arange(6) / 25, np.array([0]), joints, np.ones((6, 1, 17)), covariance))
         assert np.isfinite(fit.pose.joints).all()
         assert min(fit.lengths.values()) > 0.005
+
+    def test_hands_turn_with_their_knuckles(self):
+        skeleton = skeleton_by_name("wholebody133")
+        times, pose = moving(20, skeleton=skeleton)
+        body = pose.body
+        rotations = pose.rotations.copy()
+        for side, sign in (("Left", 1.0), ("Right", -1.0)):
+            palm_up = np.radians(70.0) * np.sin(times)[:, None] * np.array([0.0, sign, 0.0])
+            rotations[:, body.index(f"{side}Hand")] = to_matrices(palm_up)
+        pose = Pose(body, pose.root, rotations)
+        (fit,) = fit_bodies(recorded(times, pose, skeleton=skeleton))
+        assert {"left_hand_5", "right_hand_17", "left_heel"} <= set(fit.body.joints)
+        assert distances(fit, pose.joints).max() < 0.02
+        hand = fit.body.index("LeftHand")
+        between = rotations[:, hand].swapaxes(1, 2) @ fit.pose.rotations[:, hand]
+        assert np.degrees(np.linalg.norm(to_vectors(between), axis=1)).max() < 15
