@@ -41,6 +41,13 @@ def estimate(
     formats: Annotated[
         str, typer.Option("--format", metavar="NAME,...", help="Formats beside poses.parquet and people.json.")
     ] = "trc,json",
+    files_up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS", help="Axis that points up in the files of --format, y or z, if not the usual one."
+        ),
+    ] = None,
+    together: Annotated[bool, typer.Option("--together", help="One C3D file for all people, with prefixes.")] = False,
     lag: Annotated[
         float, typer.Option(metavar="S", help="Seconds of later frames that an estimate uses; inf for all.")
     ] = 0.2,
@@ -58,15 +65,15 @@ def estimate(
     """Estimate the people of a recording in 3D, and write them for other programs."""
     with exit_on_error():
         from mvpose.cli.output_folder import check_writable
-        from mvpose.cli.results import formats_of, write_results
+        from mvpose.cli.results import formats_of, options_of, write_results
 
         check_writable(out)
-        chosen = formats_of(formats)
+        chosen, options = formats_of(formats), options_of(files_up, together=together)
         from mvpose.cli.estimation import estimate_people, estimator
 
         estimator(method, lag=lag, period=1.0)
         choices = Choices(fps, times, cameras, frames, skeleton, size, up, joints)
         inputs = read_inputs(calibration, detections, choices)
         people = estimate_people(inputs, estimator(method, lag=lag, period=inputs.period), trust=trust)
-        write_results(out, people, inputs, formats=chosen, command=command_line(), page=page)
+        write_results(out, people, inputs, formats=chosen, options=options, command=command_line(), page=page)
     typer.echo(f"{len(people)} people in {people.frames} frames: {out}")

@@ -10,7 +10,7 @@ from mvpose.cli.exit_codes import failing
 from mvpose.cli.inputs import Inputs
 from mvpose.cli.output_folder import RESULTS
 from mvpose.files.atomic_files import atomic_folder
-from mvpose.formats.writers import check_formats, write_people
+from mvpose.formats.writers import Options, check_formats, write_people
 from mvpose.recording import People
 
 ALWAYS = ("parquet", "json")
@@ -31,8 +31,26 @@ def formats_of(given: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*ALWAYS, *names)))
 
 
+def options_of(up: str | None, *, together: bool) -> Options:
+    """Return what the files of people are to be like.
+
+    Raises:
+        ValueError: another axis than y or z.
+    """
+    if up not in (None, "y", "z"):
+        raise ValueError(f"--files-up must be y or z, got {up!r}")
+    return Options(up="y" if up == "y" else "z" if up == "z" else None, together=together)
+
+
 def write_results(
-    folder: Path, people: People, inputs: Inputs, *, formats: Sequence[str], command: str, page: bool = True
+    folder: Path,
+    people: People,
+    inputs: Inputs,
+    *,
+    formats: Sequence[str],
+    options: Options,
+    command: str,
+    page: bool = True,
 ) -> None:
     """Write people in some formats, what they were estimated from, and the page of the recording.
 
@@ -40,7 +58,8 @@ def write_results(
         OSError: the folder cannot be written; nothing is left of it.
     """
     with atomic_folder(folder) as partial:
-        write_people(people, partial, formats=formats)
+        write_people(people, partial, formats=ALWAYS)  # in the axes of the cameras, which pages and commands expect
+        write_people(people, partial, formats=[each for each in formats if each not in ALWAYS], options=options)
         about = {
             "command": command,
             "cameras": [{"name": camera.name, "size": list(camera.size)} for camera in inputs.rig],
