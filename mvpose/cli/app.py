@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mvpose.cli import doctor, estimate, repair, view
+from mvpose.cli import detect, doctor, estimate, repair, view
 
 app = typer.Typer(
     name="mvpose",
@@ -42,6 +42,7 @@ def options(
 
 
 estimate.add_to(app)
+detect.add_to(app)
 doctor.add_to(app)
 repair.add_to(app)
 view.add_to(app)

@@ -15,6 +15,15 @@ from mvpose.skeleton import COCO17
 from mvpose.wholebody import body_of, body_part, whole_body
 
 
+def check_method(method: str, *, lag: float) -> None:
+    """Check the name of a method and the lag.
+
+    Raises:
+        ValueError: as :func:`estimator`.
+    """
+    estimator(method, lag=lag, period=1.0)
+
+
 def estimator(method: str, *, lag: float, period: float) -> Estimator:
     """Return the preset of a name.
 

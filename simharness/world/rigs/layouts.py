@@ -119,7 +119,7 @@ def _sized(rig: Rig, cameras: Cameras) -> Rig:
         if (np.abs(middle / cameras.size - 1.0) > _OFF_CENTER).any():
             raise ValueError(
                 f"{cameras.file}: does not state the size of the pictures, which cannot be {cameras.size[0]} x "
-                f"{cameras.size[1]}: the principal points are in the middle of about {middle[0]:.0f} x {middle[1]:.0f}; "
+                f"{cameras.size[1]}: principal points are in the middle of about {middle[0]:.0f} x {middle[1]:.0f}; "
                 "add cameras.size = [width, height], pixels"
             )
     return Rig([replace(each, size=cameras.size) if new else each for each, new in zip(rig, unknown, strict=True)])

@@ -1,0 +1,116 @@
+"""Pictures of one camera: a video, or a folder of pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.files.input_files import read_bytes
+from mvpose.formats.openpose import natural_order
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+"""Endings of pictures in folders."""
+
+_COMPLETE = 0.9  # of the frames that a video states: the number in its header is often somewhat wrong
+
+
+@dataclass(frozen=True)
+class PictureSource:
+    """Pictures of one camera in the order of time.
+
+    Attributes:
+        path: the video or folder.
+        name: its name without ending.
+        count: number of pictures, of a video as its header states it.
+        fps: frames per second of a video; NaN where unknown.
+        size: width and height of the first picture.
+    """
+
+    path: Path
+    name: str
+    count: int
+    fps: float
+    size: tuple[int, int]
+
+    def pictures(self, start: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Yield the pictures from a number on, (h, w, 3) uint8, red green blue.
+
+        Raises:
+            ValueError: a picture that cannot be read, or a video that ends long before its stated end.
+        """
+        return _of_folder(self.path, start) if self.path.is_dir() else _of_video(self, start)
+
+
+def open_pictures(path: Path) -> PictureSource:
+    """Open a video or a folder of pictures.
+
+    Raises:
+        ValueError: it does not exist, is no video that OpenCV reads, or a folder without pictures.
+    """
+    if path.is_dir():
+        files = _files(path)
+        if not files:
+            raise ValueError(
+                f"{path}: has no pictures ({', '.join(SUFFIXES)}); expected a video or a folder of pictures"
+            )
+        height, width = _read(files[0]).shape[:2]
+        return PictureSource(path, path.name, len(files), math.nan, (width, height))
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; expected a video or a folder of pictures")
+    capture = _capture(path)
+    fps, count = capture.get(cv2.CAP_PROP_FPS), int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+    good, first = capture.read()
+    capture.release()
+    if not good:
+        raise ValueError(f"{path}: a video without a picture that can be decoded; copy or convert it again")
+    return PictureSource(path, path.stem, count, fps if fps > 0 else math.nan, (first.shape[1], first.shape[0]))
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted((each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES), key=natural_order)
+
+
+def _capture(path: Path) -> cv2.VideoCapture:
+    capture = cv2.VideoCapture(str(path))
+    if not capture.isOpened():
+        raise ValueError(f"{path}: cannot be read as a video: damaged, or of a codec that OpenCV lacks; convert it")
+    return capture
+
+
+def _read(file: Path) -> NDArray[np.uint8]:
+    content = np.frombuffer(read_bytes(file, what="a picture"), np.uint8)
+    picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
+    if picture is None:
+        raise ValueError(f"{file}: cannot be read as a picture; it may be cut off: copy it again")
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _of_folder(folder: Path, start: int) -> Iterator[NDArray[np.uint8]]:
+    for file in _files(folder)[start:]:
+        yield _read(file)
+
+
+def _of_video(source: PictureSource, start: int) -> Iterator[NDArray[np.uint8]]:
+    capture = _capture(source.path)
+    number = 0
+    try:
+        while capture.grab():
+            if number >= start:
+                good, picture = capture.retrieve()
+                if not good:
+                    break
+                yield np.ascontiguousarray(picture[..., ::-1])
+            number += 1
+    finally:
+        capture.release()
+    if number < _COMPLETE * source.count:
+        raise ValueError(
+            f"{source.path}: only {number} of {source.count} pictures can be decoded: the video is damaged or cut off; "
+            "copy it again, or cut it before the fault"
+        )

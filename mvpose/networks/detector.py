@@ -1,0 +1,227 @@
+"""People in pictures by detectors in ONNX files: their boxes, and their keypoints from one-stage heads.
+
+The outputs of the file determine its kind:
+
+- ``yolox``: one output (1, A, 5 + C), cells of strides 8, 16 and 32 with box, objectness and classes (Ge et al., 2021);
+- ``yolo``: one output (1, 4 + C, A), or with keypoints (1, 5 + 3 J, A), of Ultralytics' YOLOv8 and later;
+- ``rtmo``: boxes (1, N, 5) and keypoints (1, N, J, 3), after non-maximum suppression (Lu et al., CVPR 2024);
+- boxes (1, N, 5) and labels (1, N) after non-maximum suppression, as MMDeploy exports: ``yolox`` or ``rtmdet`` (Lyu et
+  al., 2022), which take pictures of different normalisation, so that the name of the file or ``kind`` must say which.
+
+Class 0 is people, as in COCO.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from mvpose.networks.card import Card
+from mvpose.networks.crops import Pixels, Placement, cut
+from mvpose.networks.session import Provider, Session
+
+Kind = Literal["yolox", "rtmdet", "rtmo", "yolo"]
+
+CARDS: dict[Kind, Card] = {
+    "yolox": Card(mean=(0.0, 0.0, 0.0), std=(1 / 255,) * 3, color_order="bgr"),
+    "rtmdet": Card(color_order="bgr"),
+    "rtmo": Card(mean=(0.0, 0.0, 0.0), std=(1 / 255,) * 3, color_order="bgr"),
+    "yolo": Card(mean=(0.0, 0.0, 0.0), std=(1.0, 1.0, 1.0)),
+}
+"""Normalisation of the pictures that the public networks of each kind take."""
+
+_STRIDES = (8, 16, 32)
+_FILL = (114, 114, 114)  # around the picture, as in the training of all of them
+_USUAL_SIZE = 640  # of files that leave it open
+_PERSON = 0
+_BOX = 5  # columns of boxes after non-maximum suppression: corners and score
+
+
+@dataclass(frozen=True)
+class Found:
+    """People in one picture.
+
+    Attributes:
+        boxes: x, y, width, height, (m, 4), pixels.
+        scores: confidence of each box, 0 to 1, (m,).
+        keypoints: (m, J, 2), pixels, of one-stage heads; None for detectors.
+        keypoint_scores: (m, J), 0 to 1; None for detectors.
+    """
+
+    boxes: Floats
+    scores: Floats
+    keypoints: Floats | None = None
+    keypoint_scores: Floats | None = None
+
+    def select(self, rows: NDArray[np.int64]) -> Found:
+        """Return some people, in a given order."""
+        kept = [None if each is None else each[rows] for each in (self.keypoints, self.keypoint_scores)]
+        return Found(self.boxes[rows], self.scores[rows], *kept)
+
+
+class PersonDetector:
+    """Detector of people in an ONNX file.
+
+    Args:
+        path: ONNX file.
+        kind: its kind; None: by its outputs and its name.
+        least: least score of a person.
+        overlap: intersection over union above which the weaker of two boxes is left out.
+        provider: as of :class:`mvpose.networks.Session`.
+        threads: as of :class:`mvpose.networks.Session`.
+
+    Attributes:
+        kind: kind of the network.
+        one_stage: whether it gives keypoints as well.
+
+    Raises:
+        ValueError: as for :class:`mvpose.networks.Session`, or outputs of no known kind.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        kind: Kind | None = None,
+        least: float = 0.3,
+        overlap: float = 0.65,
+        provider: Provider = "cpu",
+        threads: int = 1,
+    ) -> None:
+        if kind is not None and kind not in get_args(Kind):
+            raise ValueError(f"kind of a detector must be one of {', '.join(get_args(Kind))}, got {kind!r}")
+        self._session = _PictureSession(path, provider=provider, threads=threads)
+        self._least, self._overlap = least, overlap
+        self.kind = kind or self._recognised()
+        if self._session.card == Card():  # the file has none
+            self._session.card = replace(CARDS[self.kind], size=self._session.size)
+        self.one_stage = self.find(np.zeros((64, 64, 3), np.uint8)).keypoints is not None
+
+    def find(self, picture: Pixels) -> Found:
+        """Return the people in a picture, (h, w, 3) uint8, red green blue, the most confident first."""
+        size = self._session.size
+        height, width = picture.shape[:2]
+        stride = max(width / size[0], height / size[1])
+        origin = np.full((1, 2), 0.5 * stride - 0.5)
+        placement = Placement(origin, np.full((1, 2), stride))
+        crop = cut([picture], np.zeros(1, np.int64), placement, size, fill=_FILL)
+        found = self._decoded(self._session.outputs_of(crop))
+        rows = np.argsort(-found.scores, kind="stable")
+        found = found.select(rows[found.scores[rows] >= self._least])
+        found = found.select(suppressed(found.boxes, overlap=self._overlap))
+        keypoints = None if found.keypoints is None else stride * found.keypoints
+        return Found(stride * found.boxes, np.minimum(found.scores, 1.0), keypoints, found.keypoint_scores)
+
+    def _decoded(self, outputs: Sequence[NDArray[Any]]) -> Found:
+        if len(outputs) == 1 and outputs[0].ndim == 3 and outputs[0].shape[2] != _BOX:
+            values = outputs[0][0].astype(float)
+            return decode_yolox(values, self._session.size) if self.kind == "yolox" else decode_yolo(values)
+        boxes = next(each for each in outputs if each.ndim == 3 and each.shape[2] == _BOX)[0].astype(float)
+        corners, scores = boxes[:, :4], boxes[:, 4]
+        labels = next((each[0] for each in outputs if each.ndim == 2), np.zeros(len(boxes)))
+        points = next((each[0] for each in outputs if each.ndim == 4), None)
+        found = Found(_of_corners(corners), np.where(labels == _PERSON, scores, 0.0))
+        if points is None:
+            return found
+        return replace(found, keypoints=points[..., :2].astype(float), keypoint_scores=np.clip(points[..., 2], 0, 1))
+
+    def _recognised(self) -> Kind:
+        """Return the kind of the network by the shapes of its outputs, or else by the name of its file."""
+        shapes = [each.shape for each in self._session.outputs_of(_blank(self._session.size))]
+        cells = _cells(self._session.size)
+        if any(len(shape) == 4 for shape in shapes):
+            return "rtmo"
+        if len(shapes) == 1 and len(shapes[0]) == 3:
+            if shapes[0][1] == cells and shapes[0][2] > 5:
+                return "yolox"
+            if shapes[0][2] == cells and shapes[0][1] > 4:
+                return "yolo"
+        name = self._session.path.name.lower()
+        if any(len(shape) == 3 and shape[2] == _BOX for shape in shapes):
+            for kind in get_args(Kind):
+                if kind in name:
+                    return kind
+            raise ValueError(
+                f"network {self._session.path}: boxes after non-maximum suppression, of YOLOX or RTMDet; name the kind "
+                "(--detector-kind yolox or rtmdet), because they take pictures of different normalisation"
+            )
+        raise ValueError(
+            f"network {self._session.path}: outputs {shapes} are of no detector; expected YOLOX (1, {cells}, 85), "
+            f"YOLO (1, 84, {cells}), or boxes (1, N, 5) with labels (RTMDet, YOLOX) or keypoints (RTMO)"
+        )
+
+
+class _PictureSession(Session):
+    """Session of a network that takes whole pictures, one at a time, and finds a different number of people in each."""
+
+    def outputs_of(self, crop: Pixels) -> list[NDArray[Any]]:
+        """Return the outputs for one picture of the input's size, (1, height, width, 3) uint8."""
+        feed = self._feed(crop, 1)
+        try:
+            return [np.asarray(each) for each in self._session.run(list(self.outputs), {self._input: feed})]
+        except Exception as error:  # onnxruntime's exceptions share no base class
+            self._refuse(f"fails on a picture. Message of onnxruntime: {error}", error)
+
+    def _output_shapes(self) -> tuple[tuple[int, ...], ...]:
+        if self._fixed > 1:
+            self._refuse(f"takes {self._fixed} pictures at a time; export it for one")
+        return ()
+
+    def _input_size(self, width: int | str | None, height: int | str | None) -> tuple[int, int]:
+        usual = self.card.size or (_USUAL_SIZE, _USUAL_SIZE)
+        sides = [each if isinstance(each, int) and each > 0 else usual[k] for k, each in enumerate((width, height))]
+        return sides[0], sides[1]
+
+
+def decode_yolox(values: Floats, size: tuple[int, int]) -> Found:
+    """Return the boxes of all cells, (A, 5 + C): x, y relative to the cell, log width and height, in strides."""
+    grids, strides = [], []
+    for each in _STRIDES:
+        rows, columns = np.divmod(np.arange((size[1] // each) * (size[0] // each)), size[0] // each)
+        grids.append(np.stack([columns, rows], axis=1))
+        strides.append(np.full(len(rows), each))
+    stride = np.concatenate(strides)[:, None]
+    middle = (values[:, :2] + np.concatenate(grids)) * stride
+    sides = np.exp(np.minimum(values[:, 2:4], 20.0)) * stride
+    return Found(np.concatenate([middle - sides / 2, sides], axis=1), values[:, 4] * values[:, 5 + _PERSON])
+
+
+def decode_yolo(values: Floats) -> Found:
+    """Return the boxes of all cells, (4 + C, A), and their keypoints, (5 + 3 J, A): middle, width, height in pixels."""
+    x, y, width, height, score = values[:5]
+    boxes = np.stack([x - width / 2, y - height / 2, width, height], axis=1)
+    points = values[5:]
+    if len(points) < 3 or len(points) % 3 or np.abs(points).max(initial=0.0) <= 1.0:  # other classes
+        return Found(boxes, score)
+    points = points.reshape(-1, 3, points.shape[1]).transpose(2, 0, 1)
+    return Found(boxes, score, points[..., :2], np.clip(points[..., 2], 0.0, 1.0))
+
+
+def suppressed(boxes: Floats, *, overlap: float) -> NDArray[np.int64]:
+    """Return the rows that remain after non-maximum suppression of boxes (m, 4) in the order of their scores."""
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+    areas = boxes[:, 2] * boxes[:, 3]
+    kept = np.zeros(0, np.int64)
+    for row in range(len(boxes)):
+        shared = np.clip(np.minimum(high[kept], high[row]) - np.maximum(low[kept], low[row]), 0, None).prod(axis=1)
+        if not (shared > overlap * (areas[kept] + areas[row] - shared)).any():
+            kept = np.append(kept, row)
+    return kept
+
+
+def _of_corners(corners: Floats) -> Floats:
+    return np.concatenate([corners[:, :2], np.maximum(corners[:, 2:] - corners[:, :2], 0.0)], axis=1)
+
+
+def _cells(size: tuple[int, int]) -> int:
+    return sum((size[0] // stride) * (size[1] // stride) for stride in _STRIDES)
+
+
+def _blank(size: tuple[int, int]) -> Pixels:
+    return np.full((1, size[1], size[0], 3), _FILL[0], np.uint8)
