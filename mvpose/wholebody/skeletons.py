@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mvpose.files.input_files import read_bytes
+from mvpose.files.input_files import parse_toml, read_bytes
 from mvpose.skeleton import COCO17, Skeleton
 
 _DATA = Path(__file__).parent / "data"
@@ -53,7 +53,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
     """
     path = Path(path)
     try:
-        content = tomllib.loads(read_bytes(path, what=_WHAT).decode("utf-8"))
+        content = parse_toml(read_bytes(path, what=_WHAT).decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: no TOML: {error}; expected {_WHAT}") from None
     name, joints = content.get("name"), content.get("joints")
