@@ -106,7 +106,7 @@ def run(
         stated = size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
         choices = Choices(rate, None, cameras, frames, None, stated, up, joints)
         files = [detections / f"{source.name}.json" for source in sources]
-        estimate_into(out, calibration, files, choices, method=method, formats=formats, lag=lag, page=page, trust=trust)
+        estimate_into(calibration, files, choices, wanted)
 
 
 def _check_folder(folder: Path) -> None:
