@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mvpose import Detections, Pipeline, Rig
+from mvpose import Detections, Estimate, Pipeline, Rig
 from mvpose.arrays import Floats
 from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.skeleton import coco17_to_shelf14
@@ -23,7 +23,7 @@ def pcp(
     Args:
         rig: calibration.
         frames: detections, F.
-        truth: joints on SHELF14, (F, P, 14, 3), metres.
+        truth: joints on SHELF14, (F, P, 14, 3), metres; frame k is at k times the period.
         variant: preset of the pipeline.
         every: every how many frames are estimated, by a variant without memory.
         period: time between frames without times, seconds.
@@ -35,12 +35,21 @@ def pcp(
         estimates = [estimator.estimate(rig, each) for each in frames[::every]]
     parts = np.stack(
         [
-            score_parts(true, coco17_to_shelf14(each.joints))
-            for true, each in zip(truth[::every], estimates, strict=True)
+            score_parts(_truth_at(truth, k * every, given, each, period), coco17_to_shelf14(each.joints))
+            for k, (given, each) in enumerate(zip(frames[::every], estimates, strict=True))
         ]
     )
     scores = [percent(parts[:, person]) for person in range(parts.shape[1])]
     return float(np.mean([each for each in scores if each is not None]))
+
+
+def _truth_at(truth: Floats, frame: int, given: Detections, estimate: Estimate, period: float) -> Floats:
+    """Return the true joints, (P, 14, 3), at the time of an estimate, which is that of the latest picture."""
+    if given.time is None or estimate.time is None:
+        return truth[frame]
+    place = float(np.clip(estimate.time / period, 0, len(truth) - 1))
+    before = min(int(place), len(truth) - 2)
+    return truth[before] + (place - before) * (truth[before + 1] - truth[before])
 
 
 def aligned(rig: Rig, true: Rig) -> Rig:
