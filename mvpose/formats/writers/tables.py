@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from mvpose.formats.writers.export import Export
-
-if TYPE_CHECKING:
-    import polars as pl
 
 _COVARIANCE = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
 
@@ -37,8 +34,8 @@ def write_parquet(export: Export) -> Iterator[tuple[str, bytes]]:
     yield "poses.parquet", content.getvalue()
 
 
-def table(export: Export) -> pl.DataFrame:
-    """Return the table of people: frame, time, person, joint, x, y, z, score and six columns of covariance."""
+def table(export: Export) -> Any:
+    """Return a ``polars.DataFrame``: frame, time, person, joint, x, y, z, score and six columns of covariance."""
     import polars as pl
 
     people, axes = export.people, export.axes("z")

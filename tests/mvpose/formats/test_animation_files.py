@@ -41,7 +41,7 @@ def people():
         vectors[:, body.index(f"{side}Leg"), 1] = 0.4 + 0.4 * sign * swing
         vectors[:, body.index(f"{side}Arm"), 0] = -1.3 * sign
         vectors[:, body.index(f"{side}ForeArm"), 2] = -sign * (0.5 + 0.3 * swing)
-    vectors[:, 0, 2] = 3.0 + times  # past a half turn
+    vectors[:, 0, 2] = 3.0 + 6.0 * times  # past several half turns
     root = np.stack([times, 0.3 * times, np.full(40, 0.9)], axis=-1)
     pose = Pose(body, root, to_matrices(vectors))
     joints = pose.joints[:, None] + 0.003 * np.random.default_rng(0).normal(size=(40, 1, 17, 3))

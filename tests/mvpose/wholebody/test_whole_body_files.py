@@ -51,7 +51,7 @@ def write_openpose(folder, pixels):
         (folder / name).mkdir(parents=True)
         for frame, people in enumerate(pixels[:, view]):
             bodies = [
-                {"pose_keypoints_2d": np.column_stack([person, np.full(len(person), 0.9)]).ravel().tolist()}
+                {"pose_keypoints_2d": np.column_stack([person, np.linspace(0.5, 1.0, len(person))]).ravel().tolist()}
                 for person in people
             ]
             content = {"people": bodies if frame else []}  # nobody in the first picture
