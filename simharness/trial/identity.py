@@ -33,6 +33,7 @@ from typing import Any
 
 import mvpose
 import simharness
+from mvpose.formats.calibration.camera_folder import calibration_files
 from simharness.runtime.code_digest import digest_of_folders
 from simharness.scenario.sections.scenario import FILE_KEYS, Scenario
 from simharness.trial.stages.estimators import sources_of
@@ -144,6 +145,8 @@ def _files(scenario: Scenario) -> dict[str, list[Path]]:
             files[key].append(file.with_suffix(".json"))
         elif suffix == ".amc":  # the skeleton beside a motion
             files[key] += _beside(file, ".asf")
+        elif file.is_dir():  # a calibration with a file for each camera, or in the folder of a project
+            files[key] = calibration_files(file)
         elif suffix in (".yml", ".yaml", ".xml"):  # calibrations in two files
             files[key] += _beside(file, ".yml", ".yaml", ".xml")
     return files

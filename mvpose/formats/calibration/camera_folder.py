@@ -48,6 +48,12 @@ def only_file(folder: Path) -> Path | None:
     return files[0] if len(files) == 1 else None
 
 
+def calibration_files(folder: Path) -> list[Path]:
+    """Return the files that a reader of a folder may read, also those of the folder ``calibration`` within it."""
+    inside = folder / "calibration"
+    return _files(folder) + (_files(inside) if inside.is_dir() else [])
+
+
 def read_folder(folder: Path, *, size: tuple[int, int], only: Sequence[str]) -> Rig:
     """Read a folder with a file for each camera.
 

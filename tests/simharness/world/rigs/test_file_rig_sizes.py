@@ -1,11 +1,14 @@
 """Sizes of the pictures of a rig in a file: of the file, or of the scenario, never of neither."""
 
+from dataclasses import replace
+
 import pytest
 from typer.testing import CliRunner
 
-from mvpose.formats.calibration import pose2sim, voxelpose
+from mvpose.formats.calibration import opencv, pose2sim, voxelpose
 from simharness.cli import app
 from simharness.scenario.load import load
+from simharness.trial.identity import trial_identity
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.rigs.presets import preset_rig
 
@@ -37,6 +40,17 @@ def test_a_size_without_effect_is_refused(files):
     with pytest.raises(ValueError, match=r"cameras\.size = \[640, 480\] has no effect, because .* states 1032 x 776"):
         rig_of(files / "sized.toml", "cameras.size=[640,480]")
     rig_of(files / "sized.toml", "cameras.size=[1032,776]")
+
+
+def test_a_folder_with_a_file_for_each_camera_is_a_rig_that_counts_by_its_content(files):
+    (files / "rig").mkdir()
+    for camera in RIG:
+        opencv.write_values(files / "rig" / f"{camera.name}.yml", camera)
+    scenario = load("quickstart", overrides=['cameras.layout="file"', f'cameras.file="{files / "rig"}"'])
+    assert build_rig(scenario.cameras)[3].size == (1032, 776)
+    before = trial_identity(scenario)
+    opencv.write_values(files / "rig" / f"{RIG[0].name}.yml", replace(RIG[0], size=(1040, 780)))
+    assert trial_identity(scenario) != before
 
 
 def test_show_names_the_keys_without_effect_and_can_be_read_again(files):
