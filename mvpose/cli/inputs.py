@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import mvpose
     from mvpose import Detections, Rig
+    from mvpose.formats.joint_names import JointNames
 
 Calibration = Annotated[
     Path,
@@ -49,7 +50,9 @@ Cameras = Annotated[
 Frames = Annotated[str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")]
 Skeleton = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..."),
+    typer.Option(
+        metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..., or a TOML file."
+    ),
 ]
 Joints = Annotated[
     str,
@@ -123,7 +126,6 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     """
     from mvpose.cli.progress import bar
     from mvpose.formats.calibration.registry import read_calibration
-    from mvpose.formats.joint_names import known_skeleton
     from mvpose.formats.views import plausibility
     from mvpose.formats.views.recording import read_recording
 
@@ -135,7 +137,7 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
     only = tuple(name.strip() for name in choices.cameras.split(",")) if choices.cameras else ()
     frames, size = _frames(choices.frames), _size(choices.size)
-    skeleton = known_skeleton(choices.skeleton) if choices.skeleton else None
+    skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
     rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=only, key="--cameras")
     names = [camera.name for camera in rig]
     with bar("read", len(rig)) as advance:
@@ -166,6 +168,18 @@ def _noted() -> Iterator[None]:
         yield
     except ValueError as error:
         note(str(error))
+
+
+def _skeleton(given: str) -> JointNames:
+    """Return the joints of a known skeleton, or of a TOML file."""
+    from mvpose.formats.joint_names import JointNames, known_skeleton
+    from mvpose.wholebody import read_skeleton, register
+
+    if not given.lower().endswith(".toml"):
+        return known_skeleton(given)
+    skeleton = read_skeleton(given)
+    register(skeleton)
+    return JointNames(skeleton.name, skeleton.joints)
 
 
 def _times(choices: Choices, numbers: NDArray[np.int64], cameras: int) -> tuple[NDArray[np.float64], float]:

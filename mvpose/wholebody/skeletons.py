@@ -30,14 +30,36 @@ _KEYS = {"parent", "sigma", "mirror"}
 SKELETONS = ("body25", "halpe26", "openpose137", "wholebody133")
 """Names of the shipped skeletons."""
 
+_REGISTERED: dict[str, Skeleton] = {}
 
-@cache
+
+def register(skeleton: Skeleton) -> None:
+    """Make a skeleton known by its name.
+
+    Raises:
+        ValueError: a shipped skeleton, or COCO17, has this name.
+    """
+    if skeleton.name in (*SKELETONS, COCO17.name):
+        raise ValueError(f"skeleton {skeleton.name!r}: the name is that of a shipped skeleton; choose another one")
+    _REGISTERED[skeleton.name] = skeleton
+
+
+def known_names() -> tuple[str, ...]:
+    """Return the names of the shipped and registered skeletons."""
+    return (*SKELETONS, *_REGISTERED)
+
+
 def skeleton_by_name(name: str) -> Skeleton:
-    """Return a shipped skeleton.
+    """Return a shipped or registered skeleton.
 
     Raises:
         ValueError: an unknown name.
     """
+    return _REGISTERED[name] if name in _REGISTERED else _shipped(name)
+
+
+@cache
+def _shipped(name: str) -> Skeleton:
     if name not in SKELETONS:
         raise ValueError(
             f"unknown skeleton {name!r}; expected one of {', '.join(SKELETONS)}, or a file for read_skeleton"

@@ -29,7 +29,7 @@ from mvpose.formats import coco_results, openpose
 from mvpose.formats.joint_names import KNOWN, JointNames, to_coco17
 from mvpose.formats.views.sources import SUFFIXES, Source
 from mvpose.skeleton import COCO17
-from mvpose.wholebody import SKELETONS
+from mvpose.wholebody import known_names
 
 USUAL = {
     len(KNOWN[name]): KNOWN[name] for name in ("coco17", "coco18", "body25", "halpe26", "wholebody133", "halpe136")
@@ -112,10 +112,10 @@ def _whole(path: Path, picture: Picture) -> Picture:
     joints = picture.joints
     if joints.name not in KNOWN and joints.joints[:17] == COCO17.joints:
         joints = USUAL.get(len(joints), joints)  # MMPose has other names for the points of hands and faces
-    if joints.name not in (*SKELETONS, "coco17"):
+    if joints.name not in (*known_names(), "coco17"):
         raise ValueError(
-            f"{path}: all joints of the skeleton {joints.name} are asked for; expected one of {', '.join(SKELETONS)}; "
-            "take those of the body only"
+            f"{path}: all joints of the skeleton {joints.name} are asked for; expected one of "
+            f"{', '.join(known_names())}, or a TOML file that describes it; or take those of the body only"
         )
     scores = np.clip(np.nan_to_num(picture.scores), 0.0, 1.0)
     keypoints = np.where(scores[..., None] > 0, picture.keypoints, np.nan)

@@ -13,7 +13,7 @@ from mvpose import COCO17, Detections
 from mvpose.cli.app import app
 from mvpose.formats.calibration import pose2sim
 from mvpose.formats.views.recording import read_recording
-from mvpose.wholebody import body_part, skeleton_by_name
+from mvpose.wholebody import body_part, read_skeleton, register, skeleton_by_name
 
 NAMES = ["cam0", "cam1", "cam2", "cam3"]
 
@@ -130,6 +130,24 @@ class TestCommand:
         distance = np.linalg.norm(truth - toes["x", "y", "z"].to_numpy()[:, None], axis=-1).min(axis=1)
         assert np.median(distance) < 0.02
         assert "LBigToe" in (tmp_path / "all" / "person_0.trc").read_text()
+
+    def test_a_skeleton_of_a_toml_file(self, tmp_path):
+        described = "".join(f"{joint} = {{}}\n" for joint in COCO17.joints)
+        described += (
+            'left_toe = { parent = "left_ankle", sigma = 0.07 }\nright_toe = { parent = "right_ankle", sigma = 0.07 }\n'
+        )
+        (tmp_path / "toes.toml").write_text('name = "toes"\n[joints]\n' + described)
+        skeleton = read_skeleton(tmp_path / "toes.toml")
+        rig, _, pixels = filmed(skeleton, frames=4)
+        pose2sim.write_calibration(tmp_path / "Calib.toml", rig)
+        write_mmpose(tmp_path / "poses", pixels)
+        given = ("--skeleton", tmp_path / "toes.toml", "--joints", "all", "--fps", 25, "--method", "fast", "--no-page")
+        result = self.run("estimate", tmp_path / "Calib.toml", tmp_path / "poses", "--out", tmp_path / "out", *given)
+        assert result.exit_code == 0, result.output
+        joints = json.loads((tmp_path / "out" / "people.json").read_text())["skeleton"]["joints"]
+        assert joints == [*COCO17.joints, "left_toe", "right_toe"]
+        with pytest.raises(ValueError, match="'halpe26': the name is that of a shipped skeleton"):
+            register(skeleton_by_name("halpe26"))
 
     def test_another_choice_is_refused(self, tmp_path):
         result = self.run("estimate", tmp_path, tmp_path, "--out", tmp_path / "out", "--joints", "hands")
