@@ -21,11 +21,12 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 import simharness
-from mvpose import Pipeline, Rig
+from mvpose import Rig
 from mvpose.calibration import diagnose, repair
 from mvpose.recording import People
 from mvpose.report.doctor_page import write_doctor_page
 from mvpose.report.recording_page import write_page
+from mvpose.tracking.tracking_pipeline import TrackingPipeline
 from simharness.trial.run_trial import TrialResult, run_trial
 from simharness.trial.stages.capture import picture_source_of
 from simharness.world.scene.playback import Playback
@@ -55,7 +56,7 @@ def _write_pages(folder: Path, result: TrialResult) -> None:
     recording = result.recording
     frames = recording.detections
     source = picture_source_of(result.scenario, Playback(result.trial.scene))
-    people = People.of_estimates(Pipeline.preset("track").track(recording.rig, frames))
+    people = People.of_estimates(TrackingPipeline().track(recording.rig, frames))
 
     def picture(frame: int, view: int) -> NDArray[np.uint8]:
         return source.picture(result.trial.exposures, frame, view, finer=2)
