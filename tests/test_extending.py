@@ -77,6 +77,7 @@ def test_every_extension_is_used():
         "A detector error",
         "A calibration format",
         "A format of detections or truth",
+        "A format of tracked people",
         "A score",
         "A plot",
         "A matching method",
