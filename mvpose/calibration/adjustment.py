@@ -38,10 +38,13 @@ from mvpose.camera import Rig
 _FREEDOM = 4.0  # of the Student distribution of each camera's error
 _PLACE = 0.5  # metres: in a smaller one a person is seen from the same side by all cameras
 _LEAST_EFFECT = 5.0  # errors that all people share in a view; measured on 12 simulated recordings of 10 s
-_ROUNDS = 4
+_ROUNDS = 5
 _STEPS = 6
 _CONVERGED = 0.01  # of a standard deviation
 _LARGEST_SCALE = 3.0
+_WIDE = 10.0  # spread of the errors of cameras in the first round: 2 degrees, 0.1 m
+_SCALE_STEPS = 20
+_SETTLED = 0.1  # relative change of the spread of errors of cameras
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Prior:
     """
 
     rotation: float = float(np.radians(0.2))
-    translation: float = 0.01
+    translation: float = 0.015
     clock: float = 0.01
     focal: float = 0.005
     center: float = 5.0
@@ -136,30 +139,32 @@ def adjust(
         parameters[:, CLOCK] = np.asarray(offsets)[:, None]
     parameters[~free] = 0.0
     believed_scale, factor, effect = seen.scale, np.ones(len(sightings.skeleton)), 5.0
-    converged = False
+    converged, spread = False, np.full(len(_GROUPS), np.inf)
     reduced = _reduced(rig, parameters, seen, clusters, None)
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
         factor = _joint_scales(seen, reduced, factor)
         seen = replace(seen, scale=believed_scale / factor[seen.joint])
         reduced = _reduced(rig, parameters, seen, clusters, reduced.points)
         damping = 1e-6
         for _ in range(_STEPS):
             effect = _design_effect(reduced, loose)
-            weight = _prior_weights(parameters, sigmas, free)
+            before, spread = spread, _spread(parameters, sigmas, free, start_wide=not turn)
+            weight = _prior_weights(parameters, sigmas, free, spread)
             step, converged = _step(reduced, parameters, weight, effect, loose, damping)
             proposed = (parameters.ravel() + step).reshape(parameters.shape)
             trial = _reduced(rig, proposed, seen, clusters, reduced.points)
             better = (
-                trial.cost / effect + _penalty(proposed, sigmas, free)
-                <= reduced.cost / effect + _penalty(parameters, sigmas, free) + 1e-9
+                trial.cost / effect + _penalty(proposed, sigmas, free, spread)
+                <= reduced.cost / effect + _penalty(parameters, sigmas, free, spread) + 1e-9
             )
             if better or converged:
                 parameters, reduced, damping = proposed, trial, 0.1 * damping
             else:
                 damping = max(100.0 * damping, 1e-3)
+            converged = converged and bool((np.abs(spread / before - 1.0) < _SETTLED).all())
             if converged:
                 break
-    weight = _prior_weights(parameters, sigmas, free)
+    weight = _prior_weights(parameters, sigmas, free, spread)
     effect = _design_effect(reduced, loose)
     covariance = np.zeros_like(reduced.information)
     matrix = reduced.information / effect + np.diag(weight)
@@ -243,25 +248,50 @@ def _size(reduced: Reduced, loose: Integers) -> Floats:
     return np.sqrt(np.maximum(np.diag(reduced.information)[loose], 1e-12))
 
 
-def _prior_weights(parameters: Floats, sigmas: Floats, free: Bools) -> Floats:
+def _squares(parameters: Floats, sigmas: Floats, free: Bools, group: slice) -> tuple[Integers, Floats]:
+    """Return for each camera the number of free parameters of a group, and their squared standardised sum, (V,)."""
+    scaled = parameters[:, group] / sigmas.reshape(parameters.shape)[:, group]
+    return free[:, group].sum(axis=1), (scaled**2 * free[:, group]).sum(axis=1)
+
+
+def _spread(parameters: Floats, sigmas: Floats, free: Bools, *, start_wide: bool) -> Floats:
+    """Return how much wider than that of a careful calibration the distribution of each group of errors is, at least 1.
+
+    This is the scale of a Student distribution, by expectation maximisation. It starts wide, where all cameras share
+    the correction: so a single camera that moved is found to be an outlier, and of cameras that are all off none is
+    taken to be right.
+    """
+    result = np.ones(len(_GROUPS))
+    for number, group in enumerate(_GROUPS):
+        size, square = _squares(parameters, sigmas, free, group)
+        if not (size > 0).all() or group in (FOCAL, CENTER):
+            continue  # no freedom of the whole rig, so that nothing has to be shared
+        if start_wide:
+            result[number] = _WIDE
+            continue
+        variance = max(float(square.max(initial=0.0)), 1.0)
+        for _ in range(_SCALE_STEPS):
+            weight = (_FREEDOM + size) / (_FREEDOM + square / variance)
+            variance = max(float((weight * square).sum() / size[1:].sum()), 1.0)
+        result[number] = np.sqrt(variance)
+    return result
+
+
+def _prior_weights(parameters: Floats, sigmas: Floats, free: Bools, spread: Floats) -> Floats:
     """Return the information of the prior on each parameter, reweighted by the errors found, (10 V,)."""
     weight = np.ones_like(parameters)
-    scaled = parameters / sigmas.reshape(parameters.shape)
-    for group in _GROUPS:
-        size = free[:, group].sum(axis=1)
-        square = (scaled[:, group] ** 2 * free[:, group]).sum(axis=1)
-        weight[:, group] = ((_FREEDOM + size) / (_FREEDOM + square))[:, None]
+    for number, group in enumerate(_GROUPS):
+        size, square = _squares(parameters, sigmas, free, group)
+        weight[:, group] = ((_FREEDOM + size) / (_FREEDOM * spread[number] ** 2 + square))[:, None]
     return weight.ravel() / sigmas**2
 
 
-def _penalty(parameters: Floats, sigmas: Floats, free: Bools) -> float:
+def _penalty(parameters: Floats, sigmas: Floats, free: Bools, spread: Floats) -> float:
     """Return minus the logarithm of the prior."""
-    scaled = parameters / sigmas.reshape(parameters.shape)
     total = 0.0
-    for group in _GROUPS:
-        size = free[:, group].sum(axis=1)
-        square = (scaled[:, group] ** 2 * free[:, group]).sum(axis=1)
-        total += float((0.5 * (_FREEDOM + size) * np.log1p(square / _FREEDOM)).sum())
+    for number, group in enumerate(_GROUPS):
+        size, square = _squares(parameters, sigmas, free, group)
+        total += float((0.5 * (_FREEDOM + size) * np.log1p(square / (_FREEDOM * spread[number] ** 2))).sum())
     return total
 
 

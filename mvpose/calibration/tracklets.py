@@ -27,7 +27,7 @@ _SPEED = 2.5  # m/s: a fast walk; 99 % of people walk slower (Bohannon, Age and 
 _SCATTER = 0.25  # in square roots of the person's area: mean error of a bad detection
 _RIVAL = 0.6  # a link must be shorter than this share of the distance to any other candidate
 _SATURATION = 1.0  # in square roots of the area: greatest distance that one joint counts for
-_WINDOW = 0.25  # seconds before and after, over which the velocity of a keypoint is fitted
+_WINDOW = 0.12  # seconds before and after, over which velocities are fitted: limbs swing once in a second
 
 
 @dataclass(frozen=True)
