@@ -244,7 +244,7 @@ def test_every_command_is_run_here():
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in _FENCE.findall(page))
-    assert languages == {"python": 11, "toml": 8, "yaml": 1}
+    assert languages == {"python": 12, "toml": 8, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -522,6 +522,14 @@ def test_the_workflow_is_valid():
     assert runs[1] in CHECKS
     (written,) = re.findall(r"--summary (\S+)", runs[1])
     assert f"cat {written} " in runs[2]
+
+
+def test_the_block_of_the_repair_runs(capsys):
+    made = runpy.run_path(str(ROOT / "tests" / "mvpose" / "people.py"))
+    rig = made["ring"](4)
+    (block,) = [block for block in blocks("python") if "found = repair(" in block]
+    exec(block, {"rig": rig, "frames": [made["detect"](rig, made["crowd"](1))[0]] * 20})
+    assert capsys.readouterr().out.startswith("cannot tell: people were in too few places")
 
 
 def test_the_block_of_the_tracker_runs():
