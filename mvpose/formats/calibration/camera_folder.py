@@ -38,7 +38,7 @@ def only_file(folder: Path) -> Path | None:
     """
     files = _files(folder)
     inside = folder / "calibration"
-    if not files and inside.is_dir():
+    if inside.is_dir() and _files(inside):  # beside it a project of Pose2Sim has Config.toml
         return only_file(inside) or inside
     if not files:
         raise ValueError(f"{folder}: has no {', '.join(f'*{each}' for each in SUFFIXES)}; expected {_WHAT}")

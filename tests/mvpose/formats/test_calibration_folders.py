@@ -114,10 +114,12 @@ class TestFolders:
     def test_a_folder_of_one_file_and_a_project_of_pose2sim(self, tmp_path):
         (tmp_path / "calibration").mkdir()
         pose2sim.write_calibration(tmp_path / "calibration" / "Calib.toml", RIG)
+        (tmp_path / "Config.toml").write_text("[project]\nframe_rate = 60\n")
         assert_same(read_calibration(tmp_path, size=SIZE))
         assert_same(read_calibration(tmp_path / "calibration", size=SIZE))
-        easymocap.write_calibration(tmp_path, RIG)
-        assert_same(read_calibration(tmp_path, size=SIZE))
+        (tmp_path / "easymocap").mkdir()
+        easymocap.write_calibration(tmp_path / "easymocap", RIG)
+        assert_same(read_calibration(tmp_path / "easymocap", size=SIZE))
 
     def test_an_empty_folder(self, tmp_path):
         with pytest.raises(ValueError, match=r"has no \*\.json, .*expected a folder of calibrations"):
