@@ -29,6 +29,9 @@ from mvpose.detections import Detections
 
 _SHARE = 0.9  # of the probability in an interval
 _VAGUE = 0.02  # s: half an interval beyond which a clock is not determined; a person who walks is 2.5 cm elsewhere
+_VAGUE_FRAMES = 0.2  # the same in frames, where these are slow
+_SLOW = 0.08  # s between frames, beyond which a parabola does not follow limbs between pictures
+_SLOW_SHARE = 0.12  # error by what frames are longer (simulated people who walk and run at 5 Hz, seeds 2001 to 2003)
 _STILL = 0.2  # least share of the motion that is not noise
 _AGREE = 3.0  # standard deviations within which a camera has the time of the reference
 _HARMLESS = 0.010  # s: people who walk are 1.3 cm elsewhere, less than a keypoint is wrong by
@@ -36,6 +39,7 @@ _TYPICAL_SPEED = 1.3  # m/s, of people who walk (Bohannon, Age and Ageing 1997)
 _MOST_STEPS = 20
 _FLOOR = 0.0018  # s: errors that every stride repeats (hidden joints that are guessed) do not average out; measured on
 # simulated detectors ("typical", seeds 1000 to 1011, one to four people who walk for ten seconds)
+_MOST_FRAMES = 3000  # two minutes at 25 Hz: more do not make an offset surer, and take memory
 _FEWEST = 40  # joints at times that two views share
 
 
@@ -48,7 +52,7 @@ class Clocks(Sealed):
             is not determined.
         interval: lowest and highest value of 90 % of the probability, (V, 2), seconds; infinite where nothing is known.
         covariance: of the offsets, (V, V), s²; infinite where nothing is known.
-        determined: whether the recording determines each clock, to 20 ms, (V,).
+        determined: whether the recording determines each clock, to 20 ms or a fifth of a frame, (V,).
         reference: indices of the cameras whose mean time is taken as right.
         steps: whole frames by which a clock is later from a frame on, because pictures were lost.
         repeated: pictures that repeat the one before, (F, V).
@@ -153,6 +157,9 @@ def estimate_clocks(
 ) -> Clocks:
     """Return the clocks of the cameras; ten seconds of people who walk are enough.
 
+    Of a long recording the 3000 frames in a row with most people are taken; pictures that were lost before or after are
+    not found.
+
     Args:
         rig: the calibrated cameras; it may be off by a few degrees.
         recording: detections of each frame in the order of time, or what :func:`.sightings.gather` makes of them.
@@ -161,20 +168,33 @@ def estimate_clocks(
     """
     sightings = recording if isinstance(recording, Sightings) else gather(rig, recording, period=period)
     repeated = repeated_pictures(sightings)
-    tracks = JointTracks.of(rig, sightings, without=repeated)
+    part, first = _busiest(sightings)
+    tracks = JointTracks.of(rig, part, without=repeated[first : first + len(part.times)])
     names = camera_names(rig)
     if not _comparable(tracks):
         return _unknown(names, repeated, sightings.times, tracks.period)
     adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
     steps: list[ClockStep] = []
+    corrected = sightings.times.copy()
     while len(steps) < _MOST_STEPS and (step := find_step(adjustment, tracks.times, tracks.period)) is not None:
-        steps.append(step)
+        steps.append(replace(step, frame=first + step.frame))
+        corrected[first + step.frame :, step.view] += step.frames * tracks.period
         times = tracks.times.copy()
         times[step.frame :, step.view] += step.frames * tracks.period
         tracks = replace(tracks, times=times)
         adjustment = adjust(rig, tracks, adjustment.offsets)
-    times = np.where(np.isfinite(sightings.times), tracks.times, np.nan)
-    return _clocks(names, adjustment, tuple(steps), repeated, times, tracks.period)
+    return _clocks(names, adjustment, tuple(steps), repeated, corrected, tracks.period)
+
+
+def _busiest(sightings: Sightings) -> tuple[Sightings, int]:
+    """Return the sightings of the frames in a row with most of them, numbered from 0, and the first of these frames."""
+    frames = len(sightings.times)
+    if frames <= _MOST_FRAMES:
+        return sightings, 0
+    total = np.cumsum(np.append(0, np.bincount(sightings.frame, minlength=frames)))
+    first = int((total[_MOST_FRAMES:] - total[:-_MOST_FRAMES]).argmax())
+    inside = sightings.select((sightings.frame >= first) & (sightings.frame < first + _MOST_FRAMES))
+    return replace(inside, frame=inside.frame - first, times=inside.times[first : first + _MOST_FRAMES]), first
 
 
 def _comparable(tracks: JointTracks) -> bool:
@@ -194,9 +214,12 @@ def _clocks(
     views = len(names)
     noise = np.maximum(adjustment.motion, _STILL)
     deviations = adjustment.deviations / noise
-    covariance = deviations.T @ deviations + _FLOOR**2 * np.eye(views)
+    floor = np.hypot(_FLOOR, _SLOW_SHARE * max(0.0, period - _SLOW))
+    covariance = deviations.T @ deviations + floor**2 * np.eye(views)
     mean = np.eye(views) - 1.0 / views
-    known = (adjustment.motion > _STILL) & (_half_widths(deviations, covariance, mean) < _VAGUE)
+    known = (adjustment.motion > _STILL) & (
+        _half_widths(deviations, covariance, mean) < max(_VAGUE, _VAGUE_FRAMES * period)
+    )
     if known.sum() < 2:
         return _unknown(names, repeated, times, period)
     reference = _reference(adjustment.offsets, covariance, known)

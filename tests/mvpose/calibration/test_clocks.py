@@ -87,6 +87,20 @@ def test_a_lost_picture_is_found_where_it_was_lost(motion):
     assert "dropped-pictures" in {each.kind for each in clocks.findings()}
 
 
+def test_a_long_recording_is_judged_by_its_busiest_part(motion, monkeypatch):
+    steps = steps_of(OFFSETS)
+    steps[120:, 2] += round(PERIOD / FINE)
+    whole = seen(motion, steps)
+    quiet = whole.select(whole.frame >= 60)
+    monkeypatch.setattr("mvpose.calibration.clocks._MOST_FRAMES", 140)
+    clocks = estimate_clocks(RIG, quiet)
+    (step,) = clocks.steps
+    assert abs(step.frame - 120) <= 8
+    truth = PERIOD / 8 * (steps - MARGIN)
+    away = (clocks.times - truth)[np.abs(np.arange(FRAMES) - 120) > 8]
+    assert np.ptp(away) < 0.008  # all clocks may be off by the same
+
+
 def test_repeated_pictures_are_those_that_show_the_same(motion):
     sightings = seen(motion, steps_of(np.zeros(4)))
     repeats = np.zeros((FRAMES, 4), bool)
