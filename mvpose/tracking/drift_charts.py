@@ -31,7 +31,9 @@ STRAY = TERMS
 """Row of the share of people in a picture whom its detections do not fit."""
 
 _BATCH = 1.0  # seconds: errors of poses are correlated over 0.3 s, so seconds are independent
-_INTERVAL = 0.2  # seconds between two looks at a camera: in less, errors repeat themselves
+INTERVAL = 0.25
+"""Seconds between two looks at a camera: in less, errors repeat themselves."""
+
 _LEAST_KEYPOINTS = 40  # of a batch: three people once, or one person three times
 _LEARNING, _REFERENCE = 5, 60  # batches before the first test, and until the mean shift is no longer learned
 _PRIOR = 0.05  # standard deviation of the numbers of a shift before anything is seen: 3 degrees
@@ -101,7 +103,7 @@ class Charts(NamedTuple):
 
 @njit(cache=True)
 def watch(
-    charts, now, elapsed, pictures, reported, labels, groups, view, origins, directions, weights, pixel, lead, state,
+    charts, now, since, pictures, reported, labels, groups, view, origins, directions, weights, pixel, lead, state,
     sigmas, cameras, sizes, smallest, floor, inflation, threshold,
 ):  # fmt: skip
     """Look at the cameras whose turn it is, and test those whose batch is full.
@@ -109,7 +111,7 @@ def watch(
     Args:
         charts: updated in place.
         now: time of the frame, seconds.
-        elapsed: time since the previous frame, seconds.
+        since: time since the latest look at any camera, seconds.
         pictures: whether each camera gave a picture, (V,).
         reported: as in :func:`mvpose.tracking.picture_shift.look`, and so the next eleven.
         labels: the same.
@@ -128,31 +130,35 @@ def watch(
         floor: standard deviation of the numbers between batches that no residual shows, (4,).
         inflation: factor of the variance of the mean of keypoints, which are not independent.
         threshold: sum at which a camera has moved.
+
+    Returns:
+        Whether there was a look.
     """
     count = len(pictures)
     trusted = np.isnan(charts.alarm)
-    turns = max(1, int(np.ceil(count * elapsed / _INTERVAL)))
-    for _ in range(turns):
+    turns = max(1, int(np.ceil(count * min(since / INTERVAL, 1.0))))
+    for turn in range(turns):
         watched = -1
         for v in range(count):
-            due = pictures[v] and now - charts.looked[v] > 0.5 * _INTERVAL
+            due = pictures[v] and now - charts.looked[v] > 0.5 * INTERVAL
             if due and (watched < 0 or charts.looked[v] < charts.looked[watched]):
                 watched = v
         if watched < 0:
-            return
+            return turn > 0
         v = watched
-        since = min(now - charts.looked[v], 1e6)
+        age = min(now - charts.looked[v], 1e6)
         charts.looked[v] = now
         if np.isnan(charts.start[v]):
             charts.start[v] = now
         charts.keypoints[v] += look(
-            v, charts.normal[v], charts.residual[v], since, trusted, reported, labels, groups, view, origins,
+            v, charts.normal[v], charts.residual[v], age, trusted, reported, labels, groups, view, origins,
             directions, weights, pixel, lead, state, sigmas, cameras,
         )  # fmt: skip
         _count_people(charts.people[v], v, reported, labels, groups, view, state, cameras[v], sizes[v])
         full = charts.keypoints[v] >= _LEAST_KEYPOINTS or charts.people[v].sum() >= 5.0
         if full and now - charts.start[v] >= _BATCH:
             _close_batch(charts, v, now, smallest, floor, inflation, threshold)
+    return True
 
 
 @njit(cache=True, borrows=True)

@@ -17,7 +17,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.checks import check_numbers
 from mvpose.rays import Rays
-from mvpose.tracking.drift_charts import NUMBERS, STRAY, Charts, watch
+from mvpose.tracking.drift_charts import INTERVAL, NUMBERS, STRAY, Charts, watch
 
 _OFF_CENTRE = math.tan(math.radians(20.0))  # people stand about as far from the image centre as 20 degrees
 _HOUR = 3600.0  # tests of each chart: one a second
@@ -117,6 +117,7 @@ class DriftWatch:
         self.charts = Charts.of(cameras)
         radians = math.radians(1.0) * np.array([1.0, 1.0, 1.0 / _OFF_CENTRE, 1.0 / _OFF_CENTRE])
         self._settings = model.smallest * radians, model.floor * radians, model.inflation, model.threshold(cameras)
+        self._latest = -math.inf  # time of the latest look
         self._enough = cameras >= _FEWEST_CAMERAS
 
     def take(
@@ -127,7 +128,6 @@ class DriftWatch:
         lead: Floats,
         *,
         now: float,
-        elapsed: float,
         pictures: Bools,
         reported: Bools,
         state: Floats,
@@ -143,7 +143,6 @@ class DriftWatch:
             groups: group of each track, (n,), or -1.
             lead: time from the frame to the picture of each detection, (m,), seconds.
             now: time of the frame, seconds.
-            elapsed: time since the previous frame, seconds.
             pictures: whether each camera gave a picture, (V,).
             reported: whether each track has been reported as a person, (n,).
             state: predicted positions and velocities of the tracks, (n, J, 6).
@@ -151,11 +150,13 @@ class DriftWatch:
             cameras: :attr:`mvpose.camera.Rig.packed`, (V, 22).
             sizes: width and height, (V, 2), pixels.
         """
-        if self._enough:
-            watch(
-                self.charts, now, elapsed, pictures, reported, labels, groups, rays.view, rays.origins,
+        since = now - self._latest
+        if self._enough and since >= INTERVAL / len(pictures):  # the cameras in turn, not all in every frame
+            looked = watch(
+                self.charts, now, since, pictures, reported, labels, groups, rays.view, rays.origins,
                 rays.directions, rays.weights, rays.pixel, lead, state, sigmas, cameras, sizes, *self._settings,
             )  # fmt: skip
+            self._latest = now if looked else self._latest
 
     @property
     def residuals(self) -> CameraResiduals:
@@ -200,4 +201,5 @@ class DriftWatch:
         """Return what was saved as arrays by :meth:`state`."""
         restored = cls(model, len(arrays["looked"]))
         restored.charts = Charts(*(arrays[name].copy() for name in Charts._fields))
+        restored._latest = float(restored.charts.looked.max())
         return restored

@@ -216,7 +216,7 @@ class Tracker:
         labels, groups = labels[:m], labels[m:]
         rays = self._at_once(ordered, frame.rays, labels, groups)
         self._watch.take(
-            rays, labels, groups, lead, now=times.now, elapsed=times.elapsed, pictures=times.pictures,
+            rays, labels, groups, lead, now=times.now, pictures=times.pictures,
             reported=tracks.reported, state=tracks.state, sigmas=self._sigmas, cameras=rig.packed, sizes=self._sizes,
         )  # fmt: skip
         placed = place_people(

@@ -174,7 +174,7 @@ def _look_for(seconds: int, watch: DriftWatch, *, seed: int, start: int = 0, bia
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         watch.take(
             replace(exact, directions=directions), order % 3, np.arange(3), np.zeros(15), now=float(start + second),
-            elapsed=1.0, pictures=np.ones(5, bool), reported=np.ones(3, bool), state=state, sigmas=SIGMAS,
+            pictures=np.ones(5, bool), reported=np.ones(3, bool), state=state, sigmas=SIGMAS,
             cameras=RIG.packed, sizes=sizes,
         )  # fmt: skip
 
