@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
 
 Videos = Annotated[
-    list[Path], typer.Argument(help="For each camera a video, or a folder of pictures.", metavar="VIDEO...")
+    list[Path], typer.Argument(help="For each camera a video, or a folder of pictures.", metavar="VIDEO")
 ]
 Detector = Annotated[
     Path,

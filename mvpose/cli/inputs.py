@@ -33,7 +33,7 @@ DetectionPaths = Annotated[
     typer.Argument(
         help="Detections: a folder or file for each camera, or a folder that holds them. OpenPose folders, COCO and "
         "AlphaPose results, MMPose predictions, arrays of RTMLib, the folder [cyan]pose[/] of Pose2Sim.",
-        metavar="DETECTIONS...",
+        metavar="DETECTIONS",
     ),
 ]
 Fps = Annotated[float | None, typer.Option(metavar="N", help="Frames per second. [dim]\\[default: 25][/]")]

@@ -36,7 +36,7 @@ def filmed(rig=None, *, frames=12, noise=1.0, seed=0):
 
 
 def scores_of(pixels, score=0.9):
-    return np.full(pixels.shape[:-1], score)
+    return np.where(np.isnan(pixels).any(axis=-1), 0.0, score)
 
 
 def write_openpose(folder, names, pixels, *, first=0, score=0.9):
