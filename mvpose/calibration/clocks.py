@@ -21,7 +21,7 @@ from mvpose.calibration.clock_adjustment import ClockAdjustment, adjust
 from mvpose.calibration.clock_search import coarse_offsets
 from mvpose.calibration.findings import Finding, camera_names
 from mvpose.calibration.joint_tracks import JointTracks
-from mvpose.calibration.picture_order import ClockStep, find_step, repeated_pictures
+from mvpose.calibration.picture_order import ClockStep, find_step, joined_steps, repeated_pictures
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.camera import Rig
 from mvpose.checks import Sealed
@@ -40,6 +40,7 @@ _MOST_STEPS = 20
 _FLOOR = 0.0018  # s: errors that every stride repeats (hidden joints that are guessed) do not average out; measured on
 # simulated detectors ("typical", seeds 1000 to 1011, one to four people who walk for ten seconds)
 _MOST_FRAMES = 3000  # two minutes at 25 Hz: more do not make an offset surer, and take memory
+_ONE_LOSS = 0.4  # s: steps of a clock that are nearer to each other are one, found in parts
 _FEWEST = 40  # joints at times that two views share
 
 
@@ -175,15 +176,17 @@ def estimate_clocks(
         return _unknown(names, repeated, sightings.times, tracks.period)
     adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
     steps: list[ClockStep] = []
-    corrected = sightings.times.copy()
     while len(steps) < _MOST_STEPS and (step := find_step(adjustment, tracks.times, tracks.period)) is not None:
         steps.append(replace(step, frame=first + step.frame))
-        corrected[first + step.frame :, step.view] += step.frames * tracks.period
         times = tracks.times.copy()
         times[step.frame :, step.view] += step.frames * tracks.period
         tracks = replace(tracks, times=times)
         adjustment = adjust(rig, tracks, adjustment.offsets)
-    return _clocks(names, adjustment, tuple(steps), repeated, corrected, tracks.period)
+    found = joined_steps(steps, within=round(_ONE_LOSS / tracks.period))
+    corrected = sightings.times.copy()
+    for step in found:
+        corrected[step.frame :, step.view] += step.frames * tracks.period
+    return _clocks(names, adjustment, found, repeated, corrected, tracks.period)
 
 
 def _busiest(sightings: Sightings) -> tuple[Sightings, int]:

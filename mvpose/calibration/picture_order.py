@@ -6,7 +6,8 @@ later ones come a frame too early, so the clock of the camera is a frame later f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,6 +80,19 @@ def find_step(adjustment: ClockAdjustment, times: Floats, period: float) -> Cloc
             frame = int(np.searchsorted(np.nanmedian(times, axis=1), adjustment.times[split]))
             best = ClockStep(view, frame, float(adjustment.times[split]), frames, float(deviations))
     return best
+
+
+def joined_steps(steps: Sequence[ClockStep], *, within: int) -> tuple[ClockStep, ...]:
+    """Return steps in the order of time, those of one camera that are at most ``within`` frames apart as one."""
+    result: list[ClockStep] = []
+    for step in sorted(steps, key=lambda each: (each.view, each.frame)):
+        last = result[-1] if result else None
+        if last is None or last.view != step.view or step.frame - last.frame > within:
+            result.append(step)
+            continue
+        surer = max(last, step, key=lambda each: each.deviations)
+        result[-1] = replace(surer, frames=last.frames + step.frames)
+    return tuple(sorted((each for each in result if each.frames), key=lambda each: each.frame))
 
 
 def _steepest(score: Floats, curvature: Floats, block: Floats) -> tuple[int, float, float]:

@@ -75,12 +75,13 @@ def test_people_who_stand_still_tell_nothing():
     assert {each.severity for each in clocks.findings()} == {"unknown"}
 
 
-def test_a_lost_picture_is_found_where_it_was_lost(motion):
+@pytest.mark.parametrize("lost", [1, 3])
+def test_lost_pictures_are_found_where_they_were_lost(motion, lost):
     steps = steps_of(np.zeros(4))
-    steps[120:, 2] += round(PERIOD / FINE)
+    steps[120:, 2] += lost * round(PERIOD / FINE)
     clocks = estimate_clocks(RIG, seen(motion, steps))
     (step,) = clocks.steps
-    assert (step.view, step.frames) == (2, 1)
+    assert (step.view, step.frames) == (2, lost)
     assert abs(step.frame - 120) <= 8
     truth = PERIOD / 8 * (steps - MARGIN)
     assert np.abs(clocks.times - truth)[np.abs(np.arange(FRAMES) - 120) > 8].max() < 0.004
