@@ -82,7 +82,7 @@ def write_people(
     Args:
         people: people of a recording.
         folder: folder of the files.
-        formats: names of formats in :data:`FORMATS`.
+        formats: names of formats in :data:`mvpose.formats.writers.registry.FORMATS`.
         options: choices that formats leave open.
 
     Returns:
