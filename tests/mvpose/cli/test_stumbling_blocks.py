@@ -15,6 +15,10 @@ NAMES = ["cam0", "cam1", "cam2", "cam3"]
 TO_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # x, y, z of ours from z, x, y of the file
 
 
+def without_camera_3(pixels):
+    return np.where(np.arange(4)[None, :, None, None, None] == 3, np.nan, pixels)
+
+
 RIGS = {
     "as it is": lambda camera: camera,
     "principal point": lambda camera: replace(camera, K=camera.K * [[1, 1, 10], [1, 1, 1], [1, 1, 1]]),
@@ -34,11 +38,7 @@ RIGS = {
         ("principal point", lambda p: p, "the principal point (6395, 479.5) lies outside its picture of 1280 x 960"),
         ("y up", lambda p: p, "where the y axis of the world points up; expected z. If this is so, give --up=y"),
         ("camera 1 as the world", lambda p: p, "where the -y axis of the world points up"),
-        (
-            "as it is",
-            lambda p: np.concatenate([p[:, :3], np.full_like(p[:, 3:], np.nan)], axis=1),
-            "nobody is detected in any frame of the camera cam3",
-        ),
+        ("as it is", without_camera_3, "nobody is detected in any frame of the camera cam3"),
     ],
 )
 def test_a_wrong_file_is_refused(tmp_path, rig, pixels, part):
