@@ -105,8 +105,8 @@ def run(
         sizes = {source.size for source in sources}
         stated = size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
         choices = Choices(rate, None, cameras, frames, None, stated, up, joints)
-        files = [detections / f"{source.name}.json" for source in sources]
-        estimate_into(calibration, files, choices, wanted)
+        files = {detections / f"{source.name}.json": source for source in sources}
+        estimate_into(calibration, list(files), choices, wanted, sources=files)
 
 
 def _check_folder(folder: Path) -> None:

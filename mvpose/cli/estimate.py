@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,6 +24,11 @@ from mvpose.cli.inputs import (
     Up,
     read_inputs,
 )
+
+if TYPE_CHECKING:
+    from mvpose.cli.inputs import Inputs
+    from mvpose.formats.pictures import PictureSource
+    from mvpose.report.picture_drawings import Pictures
 
 Method = Annotated[
     str, typer.Option(metavar="NAME", help="Method: track, track-fast, or full and fast, without identities.")
@@ -105,10 +110,17 @@ class Wanted:
         check_method(self.method, lag=self.lag)
 
 
-def estimate_into(calibration: Path, detections: Sequence[Path], choices: Choices, wanted: Wanted) -> None:
+def estimate_into(
+    calibration: Path,
+    detections: Sequence[Path],
+    choices: Choices,
+    wanted: Wanted,
+    *,
+    sources: Mapping[Path, PictureSource] | None = None,
+) -> None:
     """Estimate the people of a recording, write them into a folder, and print how many there are.
 
-    Options are checked before anything is read.
+    Options are checked before anything is read. ``sources`` are the pictures of each file of detections, for the page.
 
     Raises:
         ValueError: anything wrong with a file or an option.
@@ -131,5 +143,12 @@ def estimate_into(calibration: Path, detections: Sequence[Path], choices: Choice
         options=options_of(wanted.files_up, together=wanted.together),
         command=command_line(),
         page=wanted.page,
+        pictures=None if sources is None else _pictures(inputs, sources),
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
+
+
+def _pictures(inputs: Inputs, sources: Mapping[Path, PictureSource]) -> Pictures:
+    """Return the function of frame and view that reads a picture."""
+    views = [sources[path] for path in inputs.paths]
+    return lambda frame, view: views[view].picture(int(inputs.numbers[frame]))

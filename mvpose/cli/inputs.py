@@ -83,12 +83,14 @@ class Inputs:
         frames: detections of each of the T frames, with the times of the pictures, all on one skeleton.
         numbers: number of each frame in the files, (T,).
         period: time between frames, seconds.
+        paths: file or folder with the detections of each camera, V.
     """
 
     rig: Rig
     frames: list[Detections]
     numbers: NDArray[np.int64]
     period: float
+    paths: tuple[Path, ...] = ()
 
     @property
     def skeleton(self) -> mvpose.Skeleton:
@@ -158,7 +160,8 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
     elif not examined:
         plausibility.check_up(rig)
     times, period = _times(choices, recorded.numbers, len(rig))
-    return Inputs(rig, recorded.detections(times), recorded.numbers, period)
+    paths = tuple(source.path for source in recorded.assignment.sources)
+    return Inputs(rig, recorded.detections(times), recorded.numbers, period, paths)
 
 
 @contextlib.contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mvpose.cli.exit_codes import failing
 from mvpose.cli.inputs import Inputs
@@ -12,6 +13,9 @@ from mvpose.cli.output_folder import RESULTS
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.writers import Options, check_formats, write_people
 from mvpose.recording import People
+
+if TYPE_CHECKING:
+    from mvpose.report.picture_drawings import Pictures
 
 ALWAYS = ("parquet", "json")
 """Formats that every folder of results holds."""
@@ -51,6 +55,7 @@ def write_results(
     options: Options,
     command: str,
     page: bool = True,
+    pictures: Pictures | None = None,
 ) -> None:
     """Write people in some formats, what they were estimated from, and the page of the recording.
 
@@ -71,4 +76,11 @@ def write_results(
             from mvpose.report.recording_page import write_page
 
             with failing("the page"):
-                write_page(partial, name=folder.absolute().name, people=people, rig=inputs.rig, frames=inputs.frames)
+                write_page(
+                    partial,
+                    name=folder.absolute().name,
+                    people=people,
+                    rig=inputs.rig,
+                    frames=inputs.frames,
+                    pictures=pictures,
+                )

@@ -38,6 +38,13 @@ class PictureSource:
     fps: float
     size: tuple[int, int]
 
+    def picture(self, number: int) -> NDArray[np.uint8] | None:
+        """Return the picture of a number, (h, w, 3) uint8; None where there is none that can be read."""
+        try:
+            return next(self.pictures(number), None)
+        except ValueError:
+            return None
+
     def pictures(self, start: int = 0) -> Iterator[NDArray[np.uint8]]:
         """Yield the pictures from a number on, (h, w, 3) uint8, red green blue.
 

@@ -153,9 +153,10 @@ class TestRun:
         detector, pose = networks
         result = call(
             "run", tmp_path / "Calib.toml", *cameras, "--detector", detector, "--pose", pose, "--out", tmp_path / "out",
-            "--method", "fast", "--trust", "--no-page", "--fps", 25,
+            "--method", "fast", "--trust", "--fps", 25,
         )  # fmt: skip
         assert result.exit_code == 0, result.output
+        assert "data:image/jpeg" in (tmp_path / "out" / "recording.html").read_text(encoding="utf-8")
         table = pl.read_parquet(tmp_path / "out" / "poses.parquet")
         where = table.group_by("frame").agg(pl.col("x", "y", "z").median()).sort("frame")
         np.testing.assert_allclose(where["x", "y", "z"].to_numpy(), joints, atol=0.02)
