@@ -9,9 +9,11 @@ import pytest
 from benchmarks.tracking.losses import LOSSES, Loss, without
 from benchmarks.tracking.shelf import Figures, Shelf
 from benchmarks.tracking.trajectories import link, second_differences, short_ghosts
-from mvpose import Camera, Detections, Estimate, Rig
+from mvpose import Camera, Detections, Estimate, Pipeline, Rig
 from mvpose.skeleton import coco17_to_shelf14
+from mvpose.tracking import Tracker
 from simharness.reality.annotated_recording import AnnotatedRecording
+from simharness.reality.recording_file import read_recording
 
 BODY = np.random.default_rng(0).normal(size=(17, 3)) * [0.2, 0.2, 0.5]
 SHELF = Path(__file__).parents[4] / "shared" / "data" / "shelf"
@@ -95,3 +97,30 @@ def test_the_table_marks_what_misses_its_figure():
 def test_nobody_is_exchanged_on_shelf_with_lost_pictures():
     rows = Shelf(SHELF).measure(quick=True)
     assert [row.switches for row in rows if row.method != "full"] == [0] * 8
+
+
+def _turned(given: AnnotatedRecording, view: int, degrees: float, *, after: float) -> AnnotatedRecording:
+    """Return the detections as if one camera had turned by an angle about its vertical axis after some seconds."""
+    K, angle = given.rig[view].K, np.radians(degrees)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    homography, frames = K @ turn @ np.linalg.inv(K), []
+    for detections, time in zip(given.detections, given.time, strict=True):
+        keypoints = detections.keypoints.copy()
+        if time - given.time[0] >= after:
+            there = detections.view == view
+            points = (
+                np.concatenate([keypoints[there], np.ones((*keypoints[there].shape[:2], 1))], axis=2) @ homography.T
+            )
+            keypoints[there] = points[..., :2] / points[..., 2:]
+        frames.append(replace(detections, keypoints=keypoints))
+    return replace(given, detections=tuple(frames))
+
+
+@pytest.mark.skipif(not SHELF.exists(), reason="real Shelf is not here")
+def test_a_camera_of_shelf_that_turns_is_named_and_none_that_stands():
+    given = read_recording("shelf", SHELF)
+    for turned, expected in ((given, []), (_turned(given, 1, 1.0, after=6.0), [1])):
+        tracker = Tracker(Pipeline.preset("fast"))
+        for detections in turned.timed_detections:
+            tracker.advance(given.rig, detections)
+        assert [drift.view for drift in tracker.drifts] == expected
