@@ -15,6 +15,7 @@ from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.findings import Finding
 
 _SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
+_FEW = 0.20  # share of the median number of detections below which what a view sees may be nothing but mistakes
 _STRANGER = 0.50  # mean agreement with the other views, over theirs, below which a view sees other people
 _SHARED = 0.40  # agreement from which two views see the same people
 
@@ -91,7 +92,22 @@ def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) 
         return findings
     usual = float(np.median(agreement.best[agreement.best >= _SHARED]))
     alone = (agreement.mean < _STRANGER * usual) & (detections > 0)
+    many = _FEW * float(np.median(detections[detections > 0]))
     for view in np.flatnonzero(alone).tolist():
+        if detections[view] < many:
+            findings.append(
+                Finding(
+                    "silent-view",
+                    f"{names[view]} has {detections[view]} detections, and they fit none of the other cameras",
+                    severity="note",
+                    camera=names[view],
+                    view=view,
+                    size={"detections": float(detections[view])},
+                    cost=0.05,
+                    mend="a detector finds few people from steeply above or far away: move the camera or leave it out",
+                )
+            )
+            continue
         findings.append(
             Finding(
                 "other-people",
