@@ -14,12 +14,13 @@ from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading, cut
 from mvpose.calibration.conventions import search
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
-from mvpose.calibration.normal_equations import residuals_of_others, with_errors
+from mvpose.calibration.mismatches import without_mismatches
+from mvpose.calibration.normal_equations import JointViews, residuals_of_others, with_errors
 from mvpose.calibration.people_size import relative_size
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.sufficiency import RECORD, travelled, unknowns
-from mvpose.calibration.tracklets import link
+from mvpose.calibration.tracklets import Tracklets, link
 from mvpose.calibration.views import Agreement, silent_views, strangers
 from mvpose.camera import Rig
 from mvpose.detections import Detections
@@ -58,9 +59,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     if mended is None:  # the cameras of no reading stand in different places within 200 m
         mended, reading = rig, Reading.as_given(rig.packed)
     tracklets = reread_tracklets(tracklets, reading)
-    sightings = sightings_of(tracklets, match_over_time(mended, tracklets).person)
-    joints, rows = joint_views(sightings)
-    result = fit(mended.packed, joints)
+    sightings, joints, rows, result = _fitted(mended, tracklets)
     agreement = Agreement.of(consistency, reading, _corrected(reading, result))
     found_strangers = strangers(agreement, detections, names)
     if found_strangers:
@@ -102,6 +101,14 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
 
 
 _USELESS = ("silent-view", "other-people")
+
+
+def _fitted(rig: Rig, tracklets: Tracklets) -> tuple[Sightings, JointViews, Integers, Fit]:
+    """Return the matched sightings and what they say about the cameras."""
+    matched = sightings_of(tracklets, match_over_time(rig, tracklets).person)
+    sightings = without_mismatches(rig.packed, matched, *joint_views(matched))
+    joints, rows = joint_views(sightings)
+    return sightings, joints, rows, fit(rig.packed, joints)
 
 
 def _corrected(reading: Reading, result: Fit) -> Reading:
