@@ -1,5 +1,7 @@
 """Sphinx configuration: pages in Markdown, the API reference from the docstrings of both packages."""
 
+from typing import Any
+
 from simharness.runtime.version import code_version
 
 project = "simharness and mvpose"
@@ -42,3 +44,15 @@ nitpick_ignore_regex = [
     ("py:exc", r"(tomllib\.)?[A-Z]\w+"),  # exceptions of Python
 ]
 suppress_warnings = ["ref.python"]  # a short name in a signature that two modules have
+
+
+def _skip_namesakes(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+    """Leave a function out of its package where its module has the same name: the section of the module has it."""
+    module = app.env.temp_data.get("autodoc:module")
+    origin = getattr(obj, "__module__", None)
+    return True if module != origin and origin == f"{module}.{name}" else None
+
+
+def setup(app: Any) -> None:
+    """Connect the handlers."""
+    app.connect("autodoc-skip-member", _skip_namesakes)
