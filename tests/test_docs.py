@@ -107,6 +107,7 @@ SHELL = (". .venv/bin/activate",)
 MODULES = tuple(
     f"python -m {name}"
     for name in (
+        "benchmarks.doctor",
         "benchmarks.expected_error",
         "benchmarks.method",
         "benchmarks.simulator",

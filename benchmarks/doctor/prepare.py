@@ -29,7 +29,7 @@ def recordings(shelf: Path | None, *, some: int | None = None) -> Iterator[Bench
     """Yield the recordings.
 
     Args:
-        shelf: folder of real Shelf (``simharness evaluate shelf --data``); None leaves it out.
+        shelf: folder of real Shelf (as of ``simharness evaluate recording shelf FOLDER``); None leaves it out.
         some: most simulated recordings of a kind.
     """
     if shelf is not None:
