@@ -96,12 +96,8 @@ def _of_detections(frames: Sequence[Detections], tracklets: Tracklets) -> tuple[
 def _moved(detections: Detections, lead: float, velocity: Floats, number: Integers) -> tuple[Detections, Integers]:
     """Return detections some seconds later."""
     keypoints = detections.keypoints + lead * velocity
-    with np.errstate(invalid="ignore"):
-        middle = (
-            np.nan_to_num(np.nanmean(np.where(detections.detected[..., None], velocity, np.nan), axis=1))
-            if len(detections)
-            else np.zeros((0, 2))
-        )
+    count = np.maximum(detections.detected.sum(axis=1, keepdims=True), 1)
+    middle = np.where(detections.detected[..., None], velocity, 0.0).sum(axis=1) / count
     boxes = detections.boxes + lead * np.column_stack([middle, np.zeros_like(middle)])
     return replace(detections, keypoints=keypoints, boxes=boxes, likelihoods=None), number
 

@@ -1,5 +1,7 @@
 """Estimation with repair in front: clocks that are off cost nothing, and labels are those of the given detections."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from moving_people import disturbed, walk
@@ -88,3 +90,21 @@ def test_presets_take_the_suffix():
 
 def test_no_frames_give_no_estimates():
     assert list(RepairedPipeline(Pipeline.preset("fast")).track(RIG, [])) == []
+
+
+@pytest.mark.parametrize("what", ["nobody", "one view", "no keypoints", "late pictures", "no pictures"])
+def test_recordings_with_little_in_them_are_estimated(motion, what):
+    frames = filmed(motion, np.zeros(4))[:30]
+    if what == "nobody":
+        frames = [each.select(np.zeros(len(each), bool)) for each in frames]
+    elif what == "one view":
+        frames = [each.select(each.view == 1) for each in frames]
+    elif what == "no keypoints":
+        frames = [replace(each, scores=np.zeros_like(each.scores)) for each in frames]
+    elif what == "late pictures":
+        frames = [replace(each, time=PERIOD * k - np.array([0, 0.1, 0, 0])) for k, each in enumerate(frames)]
+    else:
+        nobody = [each.select(np.zeros(len(each), bool)) for each in frames]
+        frames = [replace(each, time=np.full(4, np.nan)) for each in nobody]
+    for name in ("fast+repair", "track-fast+repair"):
+        assert len(list(Pipeline.preset(name, period=PERIOD).track(RIG, frames))) == len(frames)
