@@ -128,7 +128,8 @@ def _detect(
 ) -> list[PictureSource]:
     """Write the detections of videos; return the videos."""
     from mvpose.cli.video_detection import common_rate, detect_videos, networks_text, open_videos
-    from mvpose.networks.people import PersonDetector, open_head
+    from mvpose.networks.detector import PersonDetector
+    from mvpose.networks.people import open_head
 
     sources = open_videos(videos)
     common_rate(sources)

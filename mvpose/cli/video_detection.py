@@ -16,7 +16,8 @@ from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
 from mvpose.formats.pictures import PictureSource, open_pictures
-from mvpose.networks.people import Found, PersonDetector, detect_people
+from mvpose.networks.detector import Found, PersonDetector
+from mvpose.networks.people import detect_people
 from mvpose.networks.pose import PoseHead
 
 MARK = ".mvpose-detections"

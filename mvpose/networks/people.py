@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mvpose.networks.crops import Pixels
-from mvpose.networks.detector import Found, Kind, PersonDetector
+from mvpose.networks.detector import Found, PersonDetector
 from mvpose.networks.pose import PoseHead
 from mvpose.networks.session import Provider, Session
 from mvpose.skeleton import COCO17, Skeleton
@@ -54,6 +54,3 @@ def open_head(path: str | Path, *, provider: Provider = "cpu", threads: int = 1)
 def _nobody(head: PoseHead | None) -> Found:
     joints = len(COCO17 if head is None else head.skeleton)
     return Found(np.zeros((0, 4)), np.zeros(0), np.zeros((0, joints, 2)), np.zeros((0, joints)))
-
-
-__all__ = ["Found", "Kind", "PersonDetector", "detect_people", "open_head"]
