@@ -17,7 +17,7 @@ demo: $(RUN)
 	$(BIN)/simharness run quickstart
 
 test: $(DEV)
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -11,7 +11,7 @@ from simharness.study.runner import run_study
 STUDY = """
 extends = "quickstart"
 name = "cameras"
-duration = 1.0
+duration = 0.5
 seeds = 3
 variants = ["full", "fast"]
 rendering.renderer = "rays"

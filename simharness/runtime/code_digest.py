@@ -7,6 +7,7 @@ import functools
 import hashlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 DIGEST_SIZE = 16  # bytes of a digest, so that no two codes share one by chance
 
@@ -58,13 +59,25 @@ def _meaning(file: Path, size: int, changed: int) -> bytes:
     if file.suffix != ".py":
         return content
     try:
-        return ast.dump(_Undocumented().visit(ast.parse(content))).encode()
+        return ast.dump(_Undocumented(b"Field" in content).visit(ast.parse(content))).encode()
     except SyntaxError:  # a file that is being edited
         return content
 
 
 class _Undocumented(ast.NodeTransformer):
-    """Removes docstrings, and the descriptions of pydantic fields, from a syntax tree; comments are not in it."""
+    """Removes docstrings, and the descriptions of pydantic fields, from a syntax tree; comments are not in it.
+
+    Args:
+        fields: whether the module has pydantic fields. Without them expressions, which are most of a tree, stay as they
+            are.
+    """
+
+    def __init__(self, fields: bool) -> None:
+        self._fields = fields
+
+    def visit(self, node: ast.AST) -> Any:
+        """Visit a node where something below it can be removed."""
+        return super().visit(node) if self._fields or not isinstance(node, ast.expr) else node
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
         """Drop a string that is a statement by itself."""

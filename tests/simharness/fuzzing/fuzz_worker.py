@@ -4,6 +4,7 @@ Its output is a line of JSON with the names of the readers, and then one for eac
 separated by a tab, with the result of that mutation.
 """
 
+import hashlib
 import json
 import random
 import resource
@@ -21,17 +22,39 @@ from reader_cases import CASES
 from mvpose.files.message_text import LONGEST
 
 MEMORY = 3 * 2**30  # bytes that a reader may take
+_answers: dict[tuple[str, str], dict] = {}  # by reader and digest of the mutated file
 
 
-def attempt(reader, number, seeds, folder):
-    """Return what a reader does with one mutation of its file."""
+def attempt_once(reader, number, seeds, folder):
+    """Return what a reader does with one mutation of its file; files that it has read before are not read again.
+
+    Many mutations have few results: there are six huge files of a reader, whatever the number.
+    """
+    what = place_mutation(reader, number, seeds, folder)
+    path = folder / CASES[reader].file
+    if what.startswith("special: "):
+        key = (reader, what)
+    else:
+        key = (reader, hashlib.sha256(path.read_bytes()).hexdigest())
+    if key not in _answers:
+        _answers[key] = attempt(reader, what, folder)
+    return {**_answers[key], "what": what}
+
+
+def place_mutation(reader, number, seeds, folder):
+    """Make a folder with the files of a reader, of which one is mutated, and return what was done to it."""
     case = CASES[reader]
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(seeds / reader, folder)
     path = folder / case.file
     original = path.read_bytes()
     path.unlink()
-    what = mutate(path, original, random.Random(f"{reader} {number}"), KINDS[number % len(KINDS)])
+    return mutate(path, original, random.Random(f"{reader} {number}"), KINDS[number % len(KINDS)])
+
+
+def attempt(reader, what, folder):
+    """Return what a reader does with the mutated file in a folder."""
+    case = CASES[reader]
     start, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     problem = ""
     with warnings.catch_warnings(record=True) as warned:
@@ -72,7 +95,7 @@ def main():
     print(json.dumps(list(CASES)), file=answers, flush=True)
     for line in sys.stdin:
         reader, number = line.rstrip("\n").split("\t")
-        print(json.dumps(attempt(reader, int(number), seeds, place / "files")), file=answers, flush=True)
+        print(json.dumps(attempt_once(reader, int(number), seeds, place / "files")), file=answers, flush=True)
 
 
 main()

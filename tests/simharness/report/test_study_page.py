@@ -44,9 +44,14 @@ class Reader(HTMLParser):
         return [attributes for name, attributes in self.tags if name == tag]
 
 
-@pytest.fixture
-def page(tmp_path):
-    return render_study(make_study(tmp_path, factors=GRID, cases=("crowd", "empty")))
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    return render_study(make_study(tmp_path_factory.mktemp("page"), factors=GRID, cases=("crowd", "empty")))
+
+
+@pytest.fixture(scope="module")
+def page_of_grid(tmp_path_factory):
+    return render_study(make_study(tmp_path_factory.mktemp("page"), factors=GRID))
 
 
 def cells_of(page, row):
@@ -157,9 +162,9 @@ def test_the_page_has_breaking_points_of_the_given_thresholds(tmp_path):
     assert "below 3.92" in page  # (80 - 60.375) / 5 = 3.925
 
 
-def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page):
+def test_two_factors_of_a_grid_have_heat_maps_and_one_at_a_time_has_none(tmp_path, page, page_of_grid):
     assert page.count("Both factors") == 2 * 2  # cases and variants
-    assert render_study(make_study(tmp_path, factors=GRID)).count("Both factors") == 2
+    assert page_of_grid.count("Both factors") == 2
     assert "Both factors" not in render_study(make_study(tmp_path, factors=GRID, one_at_a_time=True))
 
 
@@ -170,7 +175,7 @@ def test_every_case_has_a_row_for_each_variant(page, tmp_path):
     assert "<h2>Cases</h2>" not in render_study(make_study(tmp_path))
 
 
-def test_curves_and_breaking_points_are_of_one_case_each(tmp_path):
+def test_curves_and_breaking_points_are_of_one_case_each(tmp_path, page_of_grid):
     results = make_study(tmp_path, factors=GRID, cases=("crowd", "empty"))
     more = pl.when(pl.col("case") == "empty").then(10.0).otherwise(0.0)
     page = render_study(dataclasses.replace(results, trials=results.trials.with_columns(pcp=pl.col("pcp") + more)))
@@ -185,7 +190,7 @@ def test_curves_and_breaking_points_are_of_one_case_each(tmp_path):
     assert group == "cameras.count"
     rows = re.findall(r'<th scope="row">PCP under 90 %</th><td>(\w+)</td><td[^>]*>([^<]*)', rest)
     assert rows == [("crowd", "already at 5"), ("empty", "below 3.92")]  # (90 - 10 - 60.375) / 5
-    assert "<td>crowd</td>" not in render_study(make_study(tmp_path, factors=GRID))
+    assert "<td>crowd</td>" not in page_of_grid
 
 
 def test_text_of_the_user_is_escaped(tmp_path):
@@ -271,10 +276,10 @@ class TestCommand:
         assert "add --rerun FILE" in self.refused(ran.folder, "--trial", "0")
 
 
-def test_a_variant_that_tracks_people_has_curves_over_time(tmp_path):
+def test_a_variant_that_tracks_people_has_curves_over_time(tmp_path, page_of_grid):
     """Other variants have no line there, and heat maps without numbers; studies without such a variant have no tab."""
     page = render_study(make_study(tmp_path, factors=GRID, variants=("full", "track")))
     for key in ("hota", "idf1", "switches_per_minute", "jerk_ratio"):
         assert f'id="tab-{key}"' in page
         assert page.count(f'class="of of-{key}"') == 2 * 2 + 2  # plots and numbers of two factors, two heat maps
-    assert 'id="tab-hota"' not in render_study(make_study(tmp_path, factors=GRID))
+    assert 'id="tab-hota"' not in page_of_grid

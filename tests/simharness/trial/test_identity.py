@@ -1,6 +1,7 @@
 """Identities of trials and entries: what they depend on."""
 
 import ast
+import os
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -160,15 +161,31 @@ def test_files_count_by_their_content(tmp_path, quickstart, key, name, beside):
         assert at(copy) != before
 
 
+@pytest.fixture(scope="module")
+def copies(tmp_path_factory):
+    """Return a folder with copies of both packages, whose unchanged modules are read once in all tests."""
+    folder = tmp_path_factory.mktemp("copies")
+    for package in (simharness, mvpose):
+        source = Path(package.__file__).parent
+        shutil.copytree(source, folder / source.name, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
 class TestCode:
     @pytest.fixture
-    def copied(self, tmp_path, monkeypatch):
-        """Return copies of both packages, and a function that returns their current digests."""
+    def copied(self, copies, monkeypatch):
+        """Return the copies, and a function that returns their current digests; changes of a test are taken back."""
         for package in (simharness, mvpose):
-            source = Path(package.__file__).parent
-            shutil.copytree(source, tmp_path / source.name, ignore=shutil.ignore_patterns("__pycache__"))
-            monkeypatch.setattr(package, "__file__", str(tmp_path / source.name / "__init__.py"))
-        return tmp_path, identity.code.__wrapped__
+            monkeypatch.setattr(package, "__file__", str(copies / package.__name__ / "__init__.py"))
+        before = {file: (file.read_bytes(), file.stat()) for file in copies.rglob("*") if file.is_file()}
+        yield copies, identity.code.__wrapped__
+        for file in copies.rglob("*"):
+            if file.is_file() and file not in before:
+                file.unlink()
+        for file, (content, status) in before.items():
+            if not file.exists() or file.stat().st_mtime_ns != status.st_mtime_ns or file.stat().st_size != len(content):
+                file.write_bytes(content)
+                os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
     @pytest.mark.parametrize(
         ("file", "counts"),
