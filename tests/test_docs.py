@@ -312,7 +312,8 @@ def test_the_custom_suite(easy_workplace):
     for name in ("wrapped.py", "program.py"):
         (easy_workplace / name).symlink_to(ROOT / "tests" / "simharness" / "trial" / "foreign" / name)
     (easy_workplace / "my-ci.toml").write_text(toml_file("my-ci.toml"), encoding="utf-8")
-    (easy_workplace / "ci.toml").write_text(EASY.replace("duration = 0.4", "duration = 0.2"))  # a program for each frame
+    one_frame = EASY.replace("duration = 0.4", "duration = 0.2")  # a program is started for each
+    (easy_workplace / "ci.toml").write_text(one_frame)
     first, again = OWN_GATE
     done(first)
     trials = json.loads((easy_workplace / "my-ci.json").read_text())["trials"]

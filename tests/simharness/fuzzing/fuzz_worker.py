@@ -31,11 +31,9 @@ def attempt_once(reader, number, seeds, folder):
     Many mutations have few results: there are six huge files of a reader, whatever the number.
     """
     what = place_mutation(reader, number, seeds, folder)
-    path = folder / CASES[reader].file
-    if what.startswith("special: "):
-        key = (reader, what)
-    else:
-        key = (reader, hashlib.sha256(path.read_bytes()).hexdigest())
+    special = what.startswith("special: ")  # some of these files cannot be read
+    content = what if special else hashlib.sha256((folder / CASES[reader].file).read_bytes()).hexdigest()
+    key = (reader, content)
     if key not in _answers:
         _answers[key] = attempt(reader, what, folder)
     return {**_answers[key], "what": what}

@@ -183,7 +183,8 @@ class TestCode:
             if file.is_file() and file not in before:
                 file.unlink()
         for file, (content, status) in before.items():
-            if not file.exists() or file.stat().st_mtime_ns != status.st_mtime_ns or file.stat().st_size != len(content):
+            now = file.stat() if file.exists() else None
+            if now is None or (now.st_mtime_ns, now.st_size) != (status.st_mtime_ns, status.st_size):
                 file.write_bytes(content)
                 os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
