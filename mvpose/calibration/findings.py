@@ -64,7 +64,7 @@ class Finding:
     """One fault, of the whole rig or of one camera.
 
     Attributes:
-        kind: one of :data:`KINDS`.
+        kind: one of :data:`mvpose.calibration.findings.KINDS`.
         text: one sentence for the user.
         severity: ``"alarm"``, ``"note"`` or ``"unknown"``.
         probability: probability that the fault is there, 0 to 1.

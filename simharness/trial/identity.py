@@ -47,8 +47,12 @@ SIMULATION = ("types", "scenario/sections", "world", "capture", "detector", "tri
 CALIBRATION = ("formats/calibration",)
 """Folders of ``mvpose`` that read the rigs of simulations."""
 
-BESIDE_THE_METHOD = ("cli", "files", "formats", "recording.py", "report", "skeleton_fit")
-"""Folders and modules of ``mvpose`` that make no estimates: readers, writers, the command line, pages."""
+BESIDE_THE_METHOD = (
+    "cli", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report", "skeleton_fit",
+    "wholebody",
+)  # fmt: skip
+"""Folders and modules of ``mvpose`` that make no estimates of trials: readers, writers, detection in videos, hands and
+faces, the command line, pages."""
 
 SCORES = ("types", "pairing", "scoring")
 """Folders of ``simharness`` that score estimates."""
