@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from trials import measured, simulated
+from trials import measured
 
 from simharness.detector.detect import Detected
 from simharness.scenario.study_definition import Setting, Study, load_study
+from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.build_trial import Trial, build_trial, true_rig
 from simharness.types.sequence import Sequence
 from simharness.world.rigs.faults import schedule_exposures
@@ -37,6 +39,7 @@ LONGER = {"tracking": 150, "clocks": 90}  # frames: who is who shows over time, 
 assert set(LONGER) <= set(STUDIES)
 
 
+@cache
 def shipped(name: str) -> Study:
     return load_study(SCENARIOS / f"{name}.toml")
 
@@ -83,9 +86,8 @@ class Seen:
 
 def see(chosen: Setting, *, seed: int = 0) -> Seen:
     """A second of a setting."""
-    trial = build_trial(chosen.scenario.model_copy(update={"seed": seed, "duration": 1.0, "rate": 6.0}))
-    sequence, detected = simulated(trial.scenario)
-    seen = Seen(trial, sequence, detected)
+    result = run_trial(chosen.scenario.model_copy(update={"seed": seed, "duration": 1.0, "rate": 6.0}), until="detect")
+    seen = Seen(result.trial, result.simulation.sequence, list(result.detected.frames))
     assert len(seen.real) > 20, "hardly anybody was seen"
     return seen
 
