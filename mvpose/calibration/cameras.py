@@ -6,7 +6,7 @@ respect of one camera (it moved, its focal length is wrong, ...), all the time, 
 Gaussian priors the evidence of each model is a closed form (Bishop, Pattern Recognition and Machine Learning, section
 3.5), which weighs the better fit of a freer model against its freedom. All cameras are in one form, so each model
 explains the disagreements of all views at once, and a wrong camera is not blamed on the others. Models are added one by
-one as long as the evidence grows.
+one as long as the evidence grows, and stays whichever person is left out.
 
 Errors of detectors last for tenths of a second and are shared by joints, so keypoints count for less than their number:
 the scatter of the gradient between blocks of time says by how much (a sandwich estimate: White, Econometrica 1982).
@@ -14,7 +14,7 @@ the scatter of the gradient between blocks of time says by how much (a sandwich 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -239,6 +239,7 @@ def joint_views(sightings: Sightings) -> tuple[JointViews, Integers]:
     views = JointViews(
         np.append(start, len(rows)).astype(np.int64),
         number.astype(np.int64),
+        sightings.person[rows[start]],
         sightings.view[rows],
         np.ascontiguousarray(sightings.pixels[rows]),
         sightings.sigma[rows],
@@ -257,6 +258,7 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
     """
     views, blocks = len(cameras), sightings.blocks
     found: list[Fault] = []
+    refuted: set[int] = set()
     strongest = 0.0
     errors = np.zeros((blocks, PARAMETERS * views))
     equations = normal_equations(with_errors(cameras, errors), sightings)
@@ -270,10 +272,13 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
             if step[..., :3].max() < 2e-4 and step[..., 3:6].max() < 1e-3:
                 break
         quadratic = _quadratic(equations, errors)
-        best = _next(quadratic, found, views, strongest) if len(found) < max(views - 2, 1) else None
+        best = _next(quadratic, found, views, refuted, strongest) if len(found) < max(views - 2, 1) else None
         if best is None:
             break
         fault, gain = best
+        if not _rests_on_several(quadratic, found, fault.view, _of_people(cameras, errors, sightings, equations)):
+            refuted.add(fault.view)
+            continue
         found.append(fault)
         strongest = max(strongest, gain)
     faults = tuple(sorted((_described(quadratic, found, each, views) for each in found), key=lambda each: -each.gain))
@@ -315,17 +320,55 @@ def _candidates(blocks: int, view: int) -> list[tuple[Fault, float]]:
     return result
 
 
-def _next(quadratic: Quadratic, found: list[Fault], views: int, strongest: float) -> tuple[Fault, float] | None:
-    """Return the likeliest further fault and its log posterior odds; None if none is likely enough."""
+def _next(
+    quadratic: Quadratic, found: list[Fault], views: int, refuted: set[int], strongest: float
+) -> tuple[Fault, float] | None:
+    """Return the likeliest further fault and its log posterior odds; None if none is likely enough.
+
+    Args:
+        quadratic: log likelihood of all errors.
+        found: faults that are known already.
+        views: number of cameras, V.
+        refuted: cameras whose faults rest on one person.
+        strongest: log posterior odds of the clearest fault.
+    """
     base, best, most = quadratic.evidence(found), None, -np.inf
     for view in range(views):
-        if any(view == each.view for each in found):
+        if view in refuted or any(view == each.view for each in found):
             continue
         for fault, prior in _candidates(len(quadratic.H), view):
             gain = quadratic.evidence([*found, fault]) - base + prior
             if gain > max(_least_odds(fault), _REST * strongest, most):
                 best, most = (fault, gain), gain
     return best
+
+
+def _of_people(
+    cameras: Floats, errors: Floats, sightings: JointViews, equations: NormalEquations
+) -> Iterator[tuple[Floats, Floats]]:
+    """Yield what the joints of each person contribute to the log likelihood, not tempered: H and b by blocks."""
+    people = np.unique(sightings.person)
+    now = with_errors(cameras, errors)
+    for person in people if len(people) > 1 else ():
+        own = normal_equations(now, sightings.of_person(int(person)), scale=equations.scale)
+        yield own.H, _vector(own, errors)
+
+
+def _rests_on_several(
+    quadratic: Quadratic, found: list[Fault], view: int, people: Iterable[tuple[Floats, Floats]]
+) -> bool:
+    """Whether a camera has a fault, whichever person is left out.
+
+    A camera that is wrong is wrong for everybody. A correction that a single person asks for comes from a detection of
+    another person that was matched with this one, or from an error of the detector that lasts for this person.
+    """
+    for H, b in people:
+        rest = Quadratic(quadratic.H - H / quadratic.temper, quadratic.b - b / quadratic.temper, quadratic.temper)
+        base = rest.evidence(found)
+        candidates = _candidates(len(rest.H), view)
+        if max(rest.evidence([*found, fault]) - base + prior for fault, prior in candidates) < _LEAST_ODDS:
+            return False
+    return True
 
 
 def _least_odds(fault: Fault) -> float:
@@ -392,8 +435,13 @@ def _errors(mean: Floats, found: list[Fault], shape: tuple[int, ...]) -> Floats:
 
 def _quadratic(equations: NormalEquations, errors: Floats) -> Quadratic:
     temper = _temper(equations)
-    b = np.einsum("bij,bj->bi", equations.H, errors) - equations.g
-    return Quadratic(equations.H / temper, b / temper, temper)
+    return Quadratic(equations.H / temper, _vector(equations, errors) / temper, temper)
+
+
+def _vector(equations: NormalEquations, errors: Floats) -> Floats:
+    """Return the vector b of the log likelihood of errors in each block, (B, 11 V), not tempered."""
+    b: Floats = np.einsum("bij,bj->bi", equations.H, errors) - equations.g
+    return b
 
 
 def _temper(equations: NormalEquations) -> float:

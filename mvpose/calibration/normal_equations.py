@@ -35,6 +35,7 @@ class JointViews:
     Attributes:
         start: first sighting of each of G joints, and k at the end, (G + 1,).
         block: block of time of each joint, (G,).
+        person: person of each joint, (G,).
         view: view of each sighting, (k,).
         pixels: keypoints as detected, (k, 2).
         sigma: standard deviation of each keypoint, pixels, (k,).
@@ -44,11 +45,28 @@ class JointViews:
 
     start: Integers
     block: Integers
+    person: Integers
     view: Integers
     pixels: Floats
     sigma: Floats
     velocity: Floats
     blocks: int
+
+    def of_person(self, person: int) -> JointViews:
+        """Return the joints of one person, in the same blocks of time."""
+        joints = self.person == person
+        counts = np.diff(self.start)
+        rows = np.repeat(joints, counts)
+        return JointViews(
+            np.append(0, np.cumsum(counts[joints])),
+            self.block[joints],
+            self.person[joints],
+            self.view[rows],
+            self.pixels[rows],
+            self.sigma[rows],
+            self.velocity[rows],
+            self.blocks,
+        )
 
 
 @dataclass(frozen=True)
