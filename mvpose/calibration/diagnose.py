@@ -19,7 +19,7 @@ from mvpose.calibration.normal_equations import JointViews, residuals_of_others,
 from mvpose.calibration.people_size import relative_size
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
-from mvpose.calibration.sufficiency import RECORD, travelled, unknowns
+from mvpose.calibration.sufficiency import DIFFERENT, RECORD, travelled, unknowns
 from mvpose.calibration.tracklets import Tracklets, link
 from mvpose.calibration.views import Agreement, silent_views, strangers
 from mvpose.camera import Rig
@@ -91,6 +91,12 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     ]
     clocks = estimate_clocks(mended, sightings, period=period)
     findings += [each for each in clocks.findings() if each.view not in useless]
+    if any(DIFFERENT in each.text for each in missing):  # no reading of the files is right then
+        doubtful = {each.kind for each in findings} - set(_USELESS)
+        findings = [
+            replace(each, severity="unknown") if each.severity == "alarm" and each.kind in doubtful else each
+            for each in findings
+        ]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
     return Diagnosis.of(
         findings,
