@@ -85,7 +85,7 @@ def code() -> Code:
     """Return the digests of the code on disk at the first call in this process."""
     ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
     return Code(
-        simulation=digest_of_folders(ours, SIMULATION) + digest_of_folders(its, CALIBRATION),
+        simulation=_digest([digest_of_folders(ours, SIMULATION), digest_of_folders(its, CALIBRATION)]),
         method=digest_of_folders(its, ("",), without=BESIDE_THE_METHOD),
         scores=digest_of_folders(ours, SCORES),
         failures=digest_of_folders(ours, FAILURES),
