@@ -14,7 +14,7 @@ the scatter of the gradient between blocks of time says by how much (a sandwich 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -276,7 +276,7 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
         if best is None:
             break
         fault, gain = best
-        if not _rests_on_several(quadratic, found, fault.view, _of_people(cameras, errors, sightings, equations)):
+        if not _rests_on_several(fault.view, found, cameras, errors, sightings, equations):
             refuted.add(fault.view)
             continue
         found.append(fault)
@@ -343,29 +343,40 @@ def _next(
     return best
 
 
-def _of_people(
-    cameras: Floats, errors: Floats, sightings: JointViews, equations: NormalEquations
-) -> Iterator[tuple[Floats, Floats]]:
-    """Yield what the joints of each person contribute to the log likelihood, not tempered: H and b by blocks."""
-    people = np.unique(sightings.person)
-    now = with_errors(cameras, errors)
-    for person in people if len(people) > 1 else ():
-        own = normal_equations(now, sightings.of_person(int(person)), scale=equations.scale)
-        yield own.H, _vector(own, errors)
-
-
 def _rests_on_several(
-    quadratic: Quadratic, found: list[Fault], view: int, people: Iterable[tuple[Floats, Floats]]
+    view: int, found: list[Fault], cameras: Floats, errors: Floats, sightings: JointViews, now: NormalEquations
 ) -> bool:
     """Whether a camera has a fault, whichever person is left out.
 
     A camera that is wrong is wrong for everybody. A correction that a single person asks for comes from a detection of
     another person that was matched with this one, or from an error of the detector that lasts for this person.
+
+    Args:
+        view: the camera.
+        found: faults that are known already.
+        cameras: packed cameras as calibrated, (V, 22).
+        errors: errors of all cameras in each block, (B, 11 V).
+        sightings: joints seen by several views.
+        now: normal equations at these errors.
     """
-    for H, b in people:
-        rest = Quadratic(quadratic.H - H / quadratic.temper, quadratic.b - b / quadratic.temper, quadratic.temper)
+    people = np.unique(sightings.person).tolist()
+    if len(people) < 2:
+        return True
+    states, temper = with_errors(cameras, errors), _temper(now)
+
+    def likelihood(person: int) -> tuple[Floats, Floats]:
+        own = normal_equations(states, sightings.of_person(person), scale=now.scale)
+        return own.H / temper, _vector(own, errors) / temper
+
+    H, b = likelihood(people[0])
+    for person in people[1:]:
+        own = likelihood(person)
+        H, b = H + own[0], b + own[1]
+    candidates = _candidates(len(H), view)
+    for person in people:
+        own = likelihood(person)
+        rest = Quadratic(H - own[0], b - own[1], temper)
         base = rest.evidence(found)
-        candidates = _candidates(len(rest.H), view)
         if max(rest.evidence([*found, fault]) - base + prior for fault, prior in candidates) < _LEAST_ODDS:
             return False
     return True

@@ -91,12 +91,9 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     ]
     clocks = estimate_clocks(mended, sightings, period=period)
     findings += [each for each in clocks.findings() if each.view not in useless]
-    if any(DIFFERENT in each.text for each in missing):  # no reading of the files is right then
-        doubtful = {each.kind for each in findings} - set(_USELESS)
-        findings = [
-            replace(each, severity="unknown") if each.severity == "alarm" and each.kind in doubtful else each
-            for each in findings
-        ]
+    if undetermined:
+        different = any(DIFFERENT in each.text for each in missing)  # then no reading of the files is right
+        findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
     return Diagnosis.of(
         findings,
@@ -107,6 +104,18 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
 
 
 _USELESS = ("silent-view", "other-people")
+_SUBTLE = ("distortion-ignored", "distortion-model", "image-cropped", "clock-offset", "dropped-pictures")
+"""Kinds that small errors of poses imitate."""
+
+
+def _doubtful(finding: Finding, different: bool) -> bool:
+    """Whether a recording that does not determine the calibration leaves a finding open.
+
+    Args:
+        finding: the finding.
+        different: whether the cameras do not see the same people.
+    """
+    return finding.severity == "alarm" and finding.kind not in _USELESS and (different or finding.kind in _SUBTLE)
 
 
 def _fitted(rig: Rig, tracklets: Tracklets) -> tuple[Sightings, JointViews, Integers, Fit]:
