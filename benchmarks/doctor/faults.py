@@ -29,7 +29,7 @@ class Case:
     Attributes:
         rig: believed calibration.
         frames: detections.
-        view: index of the camera at fault; None for all of them or for none.
+        view: index of the camera at fault, the first of two; None for all of them or for none.
     """
 
     rig: Rig
@@ -133,7 +133,7 @@ def _swapped_files(recording: BenchRecording, rng: np.random.Generator) -> Case:
         replace(cameras[b], name=cameras[a].name),
         replace(cameras[a], name=cameras[b].name),
     )
-    return Case(Rig(cameras), recording.frames, int(a))
+    return Case(Rig(cameras), recording.frames, int(min(a, b)))  # findings about a pair have its first camera
 
 
 def _transposed_pictures(recording: BenchRecording, rng: np.random.Generator) -> Case:

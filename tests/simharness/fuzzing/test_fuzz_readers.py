@@ -24,7 +24,7 @@ def test_no_mutated_file_gets_past_a_reader(tmp_path):
 
 @pytest.mark.slow
 def test_no_file_of_many_mutations_gets_past_a_reader(tmp_path):
-    run(range(3 * len(KINDS), 8 * len(KINDS)), tmp_path)
+    run(range(3 * len(KINDS), 20 * len(KINDS)), tmp_path)
 
 
 @pytest.mark.slow
