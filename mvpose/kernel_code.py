@@ -23,7 +23,7 @@ _SCALARS = (bool, int, float, complex, str, bytes, types.NoneType, types.Ellipsi
 
 
 class UnknownDependencyError(Exception):
-    """A kernel refers to something whose effect on the compiled code cannot be told."""
+    """A kernel refers to something whose effect on the compiled code cannot be determined."""
 
 
 def code_digest(kernel: Any) -> str:

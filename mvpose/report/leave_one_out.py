@@ -42,7 +42,7 @@ def leave_one_out(rig: Rig, sightings: Sightings, *, offsets: Floats | None = No
         rig: V cameras.
         sightings: k sightings.
         offsets: what to add to the times of each camera, (V,), seconds; keypoints are moved along their velocity to the
-            time that they are said to be of. None: clocks are right.
+            time that the clock of the camera states. None: clocks are right.
     """
     pixels = sightings.pixels
     if offsets is not None and sightings.velocity is not None:

@@ -21,7 +21,7 @@ from mvpose.recording import People
 MOST_FRAMES = 3000
 """Frames that numbers of a page are taken from; of longer recordings every second one, every third one, and so on."""
 
-_BESIDE = 0.25  # metres; half the breadth of an adult, so that two people who touch are told apart
+_BESIDE = 0.25  # metres; half the breadth of an adult, so that two people who touch are separated
 _LEAST_JOINTS = 3  # in common; fewer do not say who it is
 _FAR = 1e6  # metres; cost of a pair that cannot be
 

@@ -127,7 +127,7 @@ def annotate_simulation(scenario: Scenario, sequence: Sequence, rig: Rig) -> Flo
 class AnnotationFit:
     """Annotation of a recording, and the bias that the detector has against all its actors alike.
 
-    The two cannot be told apart from one recording: an offset that all actors share is booked on the detector, because
+    The two cannot be separated with one recording: an offset that all actors share is booked on the detector, because
     annotators and detectors define joints (hips, above all) differently; what differs between actors is the annotation.
 
     Attributes:

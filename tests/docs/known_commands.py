@@ -1,0 +1,104 @@
+"""Commands that the pages of the documentation may have, and what makes each cheap to run."""
+
+from __future__ import annotations
+
+# What each simharness command gets in addition, to be cheap; the last of an option given twice counts.
+SMALL_SCENE = "--set people.count=2 --set duration=0.4 --set rate=5"
+RAYS = f"{SMALL_SCENE} --set cameras.count=3 --set cameras.size=[160,120] --set rendering.renderer=rays"
+PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --set clutter.shelves=0"
+LAB = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
+ALONE = {
+    "simharness run quickstart": RAYS,
+    "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
+    "simharness export gathering benchmark": f"{PICTURES} --every 2",
+    "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
+    "simharness run passage": RAYS,
+    "simharness scenarios": "",
+    "simharness schema": "",
+    "simharness show FILE": "",
+    "simharness show passage": "",
+    "simharness show quickstart": "",
+}
+# Commands that read a file of the user, which the test makes.
+USER_FILES = {
+    "clip.bvh": ("simharness run quickstart --set 'people.activities=[\"mocap\"]' --set people.motion.file=clip.bvh"),
+    "calibration.json": (
+        "simharness run quickstart --set cameras.layout=file --set cameras.file=calibration.json "
+        "--set 'cameras.size=[1032,776]'"
+    ),
+    "night.toml": "simharness run quickstart --set detector.profile=night.toml",
+}
+NAMES = ("simharness check", "simharness export", "simharness fit-detector", "simharness evaluate seeds")  # mentioned
+CHECKS = (
+    "simharness check ci --baseline results/baselines/ci.json --workers 2",
+    "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",
+)
+CHECK_OF_TRACKING = "simharness check ci_tracking --baseline results/baselines/ci_tracking.json --workers 2"
+SHELF = (
+    "simharness evaluate shelf FOLDER",
+    "simharness evaluate twin shelf FOLDER",
+    "simharness fit-detector shelf FOLDER --out fitted.toml",
+    "simharness validate shelf FOLDER",
+)
+OWN_RECORDING = "simharness evaluate hall.toml"
+OWN_STUDY = {
+    "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
+    "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
+    "simharness report results/studies/my-lab --rerun my-lab.rrd": "",
+    "simharness report STUDY --digest FOLDER": "",
+}
+OWN_GATE = (
+    "simharness check my-ci.toml --baseline my-ci.json --update-baseline",
+    "simharness check my-ci.toml --baseline my-ci.json",
+)
+IN_PARTS = {
+    "simharness study my-lab.toml --shard 1/3 --store part1": f"{LAB} --seeds 2",
+    "simharness merge part1 part2 part3 --into results/studies/store": "",
+    "simharness study my-lab.toml": f"{LAB} --seeds 2",
+}
+MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
+CI = ".ci/run"
+PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
+MVPOSE = (  # run by tests/mvpose/cli
+    "mvpose estimate CALIBRATION DETECTIONS --out results",
+    "mvpose doctor CALIBRATION DETECTIONS",
+    "mvpose repair CALIBRATION DETECTIONS --out NEW",
+    "mvpose detect VIDEO... --detector det.onnx --pose pose.onnx --out FOLDER",
+    "mvpose run CALIBRATION VIDEO... --detector det.onnx --pose pose.onnx --out results",
+)
+SHELL = (". .venv/bin/activate",)
+MODULES = tuple(
+    f"python -m {name}"
+    for name in (
+        "benchmarks.doctor",
+        "benchmarks.expected_error",
+        "benchmarks.method",
+        "benchmarks.simulator",
+        "benchmarks.tracking",
+        "benchmarks.planted_bugs",
+        "tools.page_pictures",
+        "tools.reid",
+    )
+)
+ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
+BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
+KNOWN = {
+    *ALONE,
+    *USER_FILES.values(),
+    *NAMES,
+    *CHECKS,
+    CHECK_OF_TRACKING,
+    *SHELF,
+    OWN_RECORDING,
+    *OWN_STUDY,
+    *OWN_GATE,
+    *IN_PARTS,
+    *MAKE,
+    *MODULES,
+    ON_SHELF,
+    BAKE,
+    CI,
+    *PYTEST,
+    *SHELL,
+    *MVPOSE,
+}
