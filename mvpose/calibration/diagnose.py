@@ -9,14 +9,16 @@ import numpy as np
 
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration import camera_findings, convention_findings
-from mvpose.calibration.cameras import Fit, fit, joint_views
+from mvpose.calibration.cameras import Fit, fit
 from mvpose.calibration.clocks import estimate_clocks
-from mvpose.calibration.consistency import Consistency, Reading, cut
+from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.conventions import search
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
+from mvpose.calibration.joint_views import joint_views
 from mvpose.calibration.mismatches import without_mismatches
 from mvpose.calibration.normal_equations import JointViews, residuals_of_others, with_errors
 from mvpose.calibration.people_size import relative_size
+from mvpose.calibration.pieces import cut
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.sufficiency import DIFFERENT, RECORD, travelled, unknowns

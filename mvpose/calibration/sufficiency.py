@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mvpose.arrays import Floats
-from mvpose.calibration.cameras import MODELS, Fault, Fit
+from mvpose.calibration.camera_models import MODELS, Fault
+from mvpose.calibration.cameras import Fit
 from mvpose.calibration.findings import Finding
 from mvpose.calibration.views import Agreement
 
