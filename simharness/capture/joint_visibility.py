@@ -68,13 +68,13 @@ def classify(owner: ArrayLike, in_front: ArrayLike, inside: ArrayLike, *, radii:
         owner: owner of the surface, (..., P, J) int: 0 to P - 1 a person, P or more an object, -1 no surface.
         in_front: distance of the surface in front of the joint along the ray, metres, (..., P, J); negative behind it.
         inside: whether the joint is inside the picture, (..., P, J).
-        radii: largest distance of the skin in front of each joint, (P, J), metres.
+        radii: largest distance of the skin in front of each joint, (..., P, J), metres.
 
     Returns:
         :class:`Visibility`, (..., P, J) int8.
     """
     owner, in_front, radii = np.asarray(owner), np.asarray(in_front), np.asarray(radii, float)
-    people = len(radii)
+    people = radii.shape[-2]
     same_person = owner == np.arange(people)[:, None]
     person = (owner >= 0) & (owner < people)
     hidden = np.where(person, int(Visibility.OCCLUDED_BY_PERSON), int(Visibility.OCCLUDED_BY_CLUTTER))

@@ -63,6 +63,11 @@ class RayCaster:
             self._data.mocap_quat[self._moving] = state.placements[:, 3:]
             mujoco.mj_kinematics(self._model, self._data)
 
+    def capsules_of(self, person: int) -> tuple[Floats, Floats]:
+        """Return ends (c, 2, 3) and radii (c,), metres, of the capsules of a person in the state placed last."""
+        own = slice(self._first[person], self._first[person + 1])
+        return self._placed[own].copy(), self._radii[own]
+
     def cast(self, camera: Camera, targets: Floats) -> tuple[Integers, Floats]:
         """Cast rays from a camera to targets (n, 3), starting ``NEAR`` in front of it; return the first hits.
 
@@ -78,7 +83,7 @@ class RayCaster:
         length = np.sqrt((direction * direction).sum(axis=1))
         direction /= length[:, None]
         near = NEAR / (direction @ camera.R[2])
-        _hit_people(
+        hit_people(
             camera.center,
             direction,
             near,
@@ -153,7 +158,7 @@ def _place(rest, bone, radii, first, bones, placed, around):
 
 
 @njit(cache=True)
-def _hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
+def hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
     """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
     for i in range(len(direction)):
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]

@@ -1,0 +1,290 @@
+"""People of the fast layer: a pool of poses, and scenes in which people in these poses stand in the volume.
+
+Bodies and poses are those of the simulator. A scene is one moment: everyone in it stands at a place, turned somewhere,
+in a pose of the pool, and everyone both hides others and is looked at. All cameras see the same scenes, so that sets of
+cameras are compared on the same people (common random numbers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Self
+
+import numpy as np
+
+from mvpose.arrays import Bools, Floats, Integers
+from simharness.detector.bias import body_axes
+from simharness.planning.volume import Volume
+from simharness.types.random_streams import stream
+
+ACTIVITIES = ("walk", "wave", "turn", "talk", "reach", "point")
+"""Activities from which poses are taken unless others are given: people who walk, stand and use their arms."""
+
+APART = 0.6
+"""Least distance of two people in a scene, metres, unless the volume is too small for so many."""
+
+_BODIES, _POSES = 6, 48  # bodies of the pool, and poses of each
+_FIRST, _LAST = 0.5, 9.5  # seconds of the motion from which poses are taken
+_AREA = 6.0  # metres, half the side of the square in which the people of the pool move
+_NOWHERE = np.array([0.0, 0.0, -1e4])  # position of absent people: no ray goes there
+_TRIES = 40  # open scenes that a person is tried in before the rule of the least distance is dropped
+
+
+@dataclass(frozen=True)
+class PosePool:
+    """Poses of a few bodies, each standing over the origin and facing +x: K poses, C capsules.
+
+    Attributes:
+        landmarks: positions of ``simharness.types.landmarks.LANDMARKS``, (K, L, 3), metres.
+        capsules: ends of the axes of the capsules that hide, (K, C, 2, 3), metres.
+        radii: radii of the capsules, (K, C), metres.
+        depths: largest distance of the skin in front of each COCO-17 joint, (K, 17), metres.
+        body: body of each pose, (K,).
+        outlines: outermost vertices of the skin by pose, K arrays (n, 3) float32, metres.
+        edges: edges of these outlines by body, arrays (e, 2).
+    """
+
+    landmarks: Floats
+    capsules: Floats
+    radii: Floats
+    depths: Floats
+    body: Integers
+    outlines: tuple[np.ndarray, ...]
+    edges: tuple[Integers, ...]
+
+    def __len__(self) -> int:
+        return len(self.landmarks)
+
+    def nearest(self, joints: Floats) -> Integers:
+        """Return the pose nearest to each of n poses (n, 17, 3) that face +x over the origin, (n,)."""
+        own = self.landmarks[:, :17].reshape(len(self), -1)
+        given = np.nan_to_num(joints.reshape(len(joints), -1))
+        return ((given**2).sum(axis=1)[:, None] - 2 * given @ own.T + (own**2).sum(axis=1)).argmin(axis=1)
+
+
+@cache
+def pose_pool(activities: tuple[str, ...] = ACTIVITIES, *, children: float = 0.0, seed: int = 0) -> PosePool:
+    """Simulate the poses of a pool; the result is kept, because this takes a second or two.
+
+    Args:
+        activities: activities of the simulator, assigned to the bodies in turn.
+        children: share of children.
+        seed: seed of bodies and motions.
+    """
+    from simharness.capture.body_outlines import Outline
+    from simharness.capture.ray_casting import RayCaster
+    from simharness.scenario.sections.cameras import Cameras
+    from simharness.scenario.sections.people import People
+    from simharness.scenario.sections.room import Clutter, Room
+    from simharness.scenario.sections.scenario import Scenario
+    from simharness.world.rigs.layouts import build_rig
+    from simharness.world.scene.build import build
+    from simharness.world.scene.playback import Playback
+
+    scenario = Scenario(
+        name="planning",
+        seed=seed,
+        duration=_LAST + 0.5,
+        room=Room.model_validate({"size": (2 * _AREA + 2, 2 * _AREA + 2, 3.0), "walls": False}),
+        people=People.model_validate({"count": _BODIES, "activities": activities, "area": _AREA, "children": children}),
+        clutter=Clutter(),
+        cameras=Cameras(),
+    )
+    scene = build(scenario, build_rig(scenario.cameras, seed=seed, room=None))
+    caster, outlines = RayCaster(scene), [Outline.of(body) for body in scene.bodies]
+    landmarks, capsules, radii, depths, bodies, skins = [], [], [], [], [], []
+    for state in Playback(scene).over(np.linspace(_FIRST, _LAST, _POSES)):
+        caster.place(state)
+        for person, body in enumerate(scene.bodies):
+            ends, radius = caster.capsules_of(person)
+            here, turn = _frame(state.joints[person])
+            landmarks.append((state.landmarks[person] - here) @ turn)
+            capsules.append((ends - here) @ turn)
+            radii.append(radius)
+            depths.append(body.joint_radii)
+            bodies.append(person)
+            skins.append(((outlines[person].at(state.bones[person]) - here) @ turn).astype(np.float32))
+    return PosePool(
+        np.array(landmarks),
+        np.array(capsules),
+        np.array(radii),
+        np.array(depths),
+        np.array(bodies),
+        tuple(skins),
+        tuple(outline.edges for outline in outlines),
+    )
+
+
+def _frame(joints: Floats) -> tuple[Floats, Floats]:
+    """Return the origin (3,) of a person on the floor, under the hips, and the axes ahead, left, up as columns."""
+    here = np.append(joints[11:13, :2].mean(axis=0), 0.0)
+    return here, _turns(bearings_of(joints))
+
+
+def bearings_of(joints: Floats) -> Floats:
+    """Return the directions in which people (..., 17, 3) face, (...), radians from +x."""
+    ahead = body_axes(joints)[..., 0, :]
+    return np.arctan2(ahead[..., 1], ahead[..., 0])
+
+
+def _turns(angle: Floats) -> Floats:
+    """Return rotations about z by angles (...), (..., 3, 3); ``points @ turn`` turns them back."""
+    cos, sin, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    rows = [[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+@dataclass(frozen=True)
+class StandingScenes:
+    """S scenes of Q people who stand in a volume.
+
+    Attributes:
+        pool: the poses.
+        places: places of the map, (P, 2), metres.
+        place: index of the place of each person, (S, Q).
+        pose: index of the pose of each person, (S, Q).
+        position: position on the floor, (S, Q, 3), metres; far below it for absent people.
+        turn: rotation about z, (S, Q, 3, 3).
+        present: who is in each scene, (S, Q).
+        landmarks: positions of all landmarks, (S, Q, L, 3), metres.
+        capsules: ends of the axes of all capsules, (S, Q, C, 2, 3), metres.
+    """
+
+    pool: PosePool
+    places: Floats
+    place: Integers
+    pose: Integers
+    position: Floats
+    turn: Floats
+    present: Bools
+    landmarks: Floats
+    capsules: Floats
+
+    @classmethod
+    def of(
+        cls, pool: PosePool, places: Floats, place: Integers, pose: Integers, position: Floats, angle: Floats
+    ) -> Self:
+        """Return the scenes with people at positions (S, Q, 2), NaN where absent, facing angles (S, Q), radians."""
+        present = np.isfinite(position).all(axis=-1) & np.isfinite(angle)
+        turn = _turns(np.where(present, angle, 0.0))
+        flat = np.concatenate([position, np.zeros((*position.shape[:2], 1))], axis=-1)
+        here = np.where(present[..., None], flat, _NOWHERE)
+        landmarks = np.einsum("sqij,sqlj->sqli", turn, pool.landmarks[pose]) + here[:, :, None]
+        capsules = np.einsum("sqij,sqcej->sqcei", turn, pool.capsules[pose]) + here[:, :, None, None]
+        return cls(pool, places, place, pose, here, turn, present, landmarks, capsules)
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def people(self) -> int:
+        """Q, the number of people of a scene."""
+        return self.place.shape[1]
+
+    @property
+    def joints(self) -> Floats:
+        """COCO-17 joints, (S, Q, 17, 3), metres."""
+        return self.landmarks[:, :, :17]
+
+    def mean_by_place(self, values: Floats) -> Floats:
+        """Return the mean at each place, (P,), of values (S, Q), without NaN and absent people; NaN without values."""
+        known = self.present & np.isfinite(values)
+        count = np.bincount(self.place[known], minlength=len(self.places))
+        total = np.bincount(self.place[known], values[known], minlength=len(self.places))
+        return np.divide(total, count, out=np.full(len(self.places), np.nan), where=count > 0)
+
+
+def standing_scenes(
+    volume: Volume,
+    pool: PosePool,
+    *,
+    people: int = 4,
+    spacing: float = 0.5,
+    repeats: int = 16,
+    blocked: Sequence[Volume] = (),
+    seed: int = 0,
+) -> StandingScenes:
+    """Draw scenes in which every place of the volume is taken ``repeats`` times, facing evenly spread directions.
+
+    The others in a scene stand at other places, at random. Where the volume has tracks, scenes are recorded frames:
+    ``repeats`` times as many people as there are places, with the pool's poses that are nearest to the recorded ones.
+
+    Args:
+        volume: where people stand.
+        pool: their poses.
+        people: number of people of a scene.
+        spacing: metres between places.
+        repeats: number of times that somebody stands at each place.
+        blocked: floor taken by obstacles, where nobody stands.
+        seed: seed of the draws.
+
+    Raises:
+        ValueError: no people, no repeats, or no place where a person can stand.
+    """
+    if people < 1 or repeats < 1:
+        raise ValueError(f"expected at least 1 person and 1 repeat, got {people} people and {repeats} repeats")
+    places = volume.places(spacing)
+    for taken in blocked:
+        places = places[~taken.contains(places)]
+    if not len(places):
+        raise ValueError("obstacles take the whole floor of the volume: nobody can stand in it; move or remove some")
+    if volume.tracks is not None:
+        return _recorded_scenes(volume.tracks, pool, places, repeats=repeats, seed=seed)
+    rng = stream(seed, "planning", "places")
+    target = np.tile(np.arange(len(places)), repeats)
+    position = places[target] + spacing * (rng.random((len(target), 2)) - 0.5)
+    position = np.where(volume.contains(position)[:, None], position, places[target])
+    for taken in blocked:
+        position = np.where(taken.contains(position)[:, None], places[target], position)
+    # The directions of one place are evenly spread, and begin at a random one.
+    angle = rng.random(len(places))[target] + np.repeat(rng.permutation(repeats) / repeats, len(places))
+    group = _grouped(position, rng.permutation(len(target)), people)
+    pose = stream(seed, "planning", "poses").integers(len(pool), size=group.shape)
+    return StandingScenes.of(pool, places, target[group], pose, position[group], 2 * np.pi * (angle[group] + 0.0))
+
+
+def _grouped(position: Floats, order: Integers, people: int) -> Integers:
+    """Return groups of people, (S, Q), who are apart as far as possible; the last group is filled up with others."""
+    count = -(-len(order) // people)
+    groups: list[list[int]] = []
+    unfilled: list[int] = []
+    for person in order.tolist():
+        chosen = -1
+        for group in unfilled[:_TRIES]:
+            away = position[groups[group]] - position[person]
+            if ((away**2).sum(axis=1) >= APART**2).all():
+                chosen = group
+                break
+        if chosen < 0 and len(groups) < count:
+            chosen = len(groups)
+            groups.append([])
+            unfilled.append(chosen)
+        elif chosen < 0:
+            chosen = unfilled[0]
+        groups[chosen].append(person)
+        if len(groups[chosen]) == people:
+            unfilled.remove(chosen)
+    spare = iter(order.tolist() * people)
+    for incomplete in groups:
+        while len(incomplete) < people:
+            incomplete.append(next(spare))
+    return np.array(groups)
+
+
+def _recorded_scenes(tracks: Floats, pool: PosePool, places: Floats, *, repeats: int, seed: int) -> StandingScenes:
+    """Return scenes whose people stand as in recorded frames, evenly spread over the recording."""
+    here = np.asarray(np.isfinite(tracks[..., [5, 6, 11, 12], :]).all(axis=(-1, -2)))
+    frames = np.flatnonzero(here.any(axis=1))
+    wanted = max(1, round(repeats * len(places) / max(here[frames].sum(axis=1).mean(), 1.0)))
+    offset = stream(seed, "planning", "frames").random()
+    chosen = frames[((np.arange(wanted) + offset) / wanted * len(frames)).astype(int)]
+    joints, present = tracks[chosen], here[chosen]
+    position = np.where(present[..., None], joints[:, :, 11:13, :2].mean(axis=2), np.nan)
+    angle = np.where(present, bearings_of(joints), np.nan)
+    local = joints - np.concatenate([position, np.zeros((*present.shape, 1))], axis=-1)[:, :, None]
+    local = np.einsum("sqji,sqlj->sqli", _turns(np.nan_to_num(angle)), local)
+    pose = pool.nearest(local.reshape(-1, 17, 3)).reshape(present.shape)
+    away = ((np.nan_to_num(position)[:, :, None] - places) ** 2).sum(axis=-1)
+    return StandingScenes.of(pool, places, away.argmin(axis=-1), pose, position, angle)

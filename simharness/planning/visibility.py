@@ -1,0 +1,230 @@
+"""What one camera sees of the people of all scenes: pixels, visibility of joints, boxes.
+
+The rule of visibility, the capsules and the outlines are those of the simulator without pictures
+(:mod:`simharness.capture.ray_visibility`); only obstacles are boxes here, because a user who plans knows no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mvpose.arrays import Bools, Floats
+from mvpose.camera import Camera
+from mvpose.checks import as_array
+from mvpose.kernels import njit
+from simharness.capture.body_outlines import bounding_box, packed
+from simharness.capture.joint_visibility import classify
+from simharness.capture.ray_casting import hit_people
+from simharness.capture.rendering.renderer import NEAR
+from simharness.planning.standing_people import StandingScenes
+from simharness.planning.volume import Volume
+from simharness.types.views import Views, Visibility
+from simharness.world.rigs.projection import project_to_image
+
+_CLEARANCE = 0.25  # metres around an obstacle where nobody stands: half the width of a person
+_OVERHEAD = 1.9  # metres: people stand under an obstacle that begins higher
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Box that hides what is behind it.
+
+    Attributes:
+        center: (3,), metres.
+        size: extent along its own x, y and z, (3,), metres.
+        yaw: rotation about z, radians.
+
+    Raises:
+        ValueError: a wrong shape, a value that is not finite, or a size that is not positive.
+    """
+
+    center: Floats
+    size: Floats
+    yaw: float = 0.0
+
+    def __post_init__(self) -> None:
+        for key in ("center", "size"):
+            array = as_array(getattr(self, key), (3,), f"{key} of an obstacle")
+            if not np.isfinite(array).all() or (key == "size" and (array <= 0).any()):
+                raise ValueError(f"{key} of an obstacle must be finite, and sizes positive, metres, got {array}")
+            object.__setattr__(self, key, array)
+
+    @property
+    def floor(self) -> Volume:
+        """Floor on which nobody stands because of it: its footprint and a quarter of a metre around."""
+        x, y = self.size[:2] / 2 + _CLEARANCE
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) @ np.array([[cos, sin], [-sin, cos]])
+        return Volume(corners + self.center[:2])
+
+    @property
+    def blocks(self) -> bool:
+        """Whether nobody can stand where it is; False for an obstacle that hangs overhead."""
+        return bool(self.center[2] - self.size[2] / 2 < _OVERHEAD)
+
+
+def see(camera: Camera, scenes: StandingScenes, obstacles: Sequence[Obstacle] = ()) -> Views:
+    """Return what a camera sees of everyone: the views of S frames in one camera.
+
+    Args:
+        camera: the camera, which must not be inside an obstacle.
+        scenes: S scenes of Q people.
+        obstacles: boxes that hide people.
+    """
+    joints, pool = scenes.joints, scenes.pool
+    pixels = project_to_image(camera, joints)
+    pixels[~scenes.present] = np.nan
+    inside = camera.inside(pixels)
+    direction = joints - camera.center
+    length = np.linalg.norm(direction, axis=-1)
+    direction = direction / length[..., None]
+    shape = inside.shape
+    owner, in_front = np.full(shape, -1), np.full(shape, -np.inf)
+    boxes_of_objects = np.array([[*o.center, *o.size / 2, np.cos(o.yaw), np.sin(o.yaw)] for o in obstacles])
+    _cast(
+        camera.center,
+        camera.R[2],
+        inside,
+        direction,
+        length,
+        scenes.capsules,
+        pool.radii[scenes.pose],
+        boxes_of_objects.reshape(-1, 8),
+        owner,
+        in_front,
+    )
+    labels = classify(owner, in_front, inside, radii=pool.depths[scenes.pose])
+    boxes = _boxes(camera, scenes)
+    return Views(
+        pixels=pixels[:, None],
+        visibility=labels[:, None],
+        boxes=boxes[:, None],
+        area_visible=np.zeros((*shape[:1], 1, shape[1]), np.int64),  # no step of the detector reads it
+        source=np.arange(len(scenes))[:, None],
+    )
+
+
+def seen_joints(views: Views) -> Bools:
+    """Return which joints a camera sees, itself unhidden or behind the person's own body alone, (S, Q, J)."""
+    return np.isin(views.visibility[:, 0], (Visibility.VISIBLE, Visibility.SELF_OCCLUDED))
+
+
+@njit(cache=True)
+def _cast(center, forward, inside, direction, length, capsules, radii, objects, owner, in_front):
+    """Write owner and distance of the surface in front of each joint that is inside the picture, (S, Q, J).
+
+    Args:
+        center: of the camera, (3,).
+        forward: direction of its axis, (3,).
+        inside: which joints are inside the picture, (S, Q, J).
+        direction: of the rays to the joints, (S, Q, J, 3).
+        length: of these rays, (S, Q, J).
+        capsules: ends of the axes of everyone's capsules, (S, Q, C, 2, 3).
+        radii: their radii, (S, Q, C).
+        objects: centre, half sizes, cosine and sine of the yaw of each obstacle, (n, 8).
+        owner: output: person, Q for an obstacle; unchanged without a surface.
+        in_front: output: distance of the surface before the joint, metres; unchanged without a surface.
+    """
+    scenes, people, joints = inside.shape
+    count = capsules.shape[2]
+    first, around = np.arange(people + 1) * count, np.empty((people, 4))
+    rays = people * joints
+    which = np.empty(rays, np.int64)
+    way, reach, near = np.empty((rays, 3)), np.empty(rays), np.empty(rays)
+    hit, distance = np.empty(rays, np.int64), np.empty(rays)
+    for s in range(scenes):
+        for q in range(people):
+            low, high = np.full(3, np.inf), np.full(3, -np.inf)
+            for c in range(count):
+                for e in range(2):
+                    for k in range(3):
+                        at = capsules[s, q, c, e, k]
+                        low[k], high[k] = min(low[k], at - radii[s, q, c]), max(high[k], at + radii[s, q, c])
+            around[q, :3] = (low + high) / 2
+            around[q, 3] = np.sqrt(((high - low) ** 2).sum()) / 2
+        n = 0
+        for r in range(rays):
+            q, j = r // joints, r % joints
+            if inside[s, q, j]:
+                which[n], reach[n] = r, length[s, q, j]
+                along = 0.0
+                for k in range(3):
+                    way[n, k] = direction[s, q, j, k]
+                    along += way[n, k] * forward[k]
+                near[n], hit[n], distance[n] = NEAR / along, -1, np.inf
+                n += 1
+        placed = capsules[s].copy().reshape(people * count, 2, 3)
+        hit_people(
+            center, way[:n], near[:n], reach[:n], placed, radii[s].copy().ravel(), first, around, hit[:n], distance[:n]
+        )
+        for i in range(n):
+            for b in range(len(objects)):
+                entry = _enter_box(center, way[i], objects[b])
+                if near[i] <= entry < min(distance[i], reach[i]):
+                    hit[i], distance[i] = people, entry
+            if hit[i] >= 0:
+                q, j = which[i] // joints, which[i] % joints
+                owner[s, q, j], in_front[s, q, j] = hit[i], reach[i] - distance[i]
+
+
+@njit(cache=True)
+def _enter_box(start, way, box):
+    """Return where a ray enters a box, metres; infinite where it misses it or starts inside."""
+    low, high = -np.inf, np.inf
+    x, y = start[0] - box[0], start[1] - box[1]
+    for k in range(3):
+        if k == 2:
+            at, along = start[2] - box[2], way[2]
+        elif k == 0:
+            at, along = box[6] * x + box[7] * y, box[6] * way[0] + box[7] * way[1]
+        else:
+            at, along = -box[7] * x + box[6] * y, -box[7] * way[0] + box[6] * way[1]
+        if abs(along) < 1e-12:
+            if abs(at) > box[3 + k]:
+                return np.inf
+            continue
+        one, two = (-box[3 + k] - at) / along, (box[3 + k] - at) / along
+        low, high = max(low, min(one, two)), min(high, max(one, two))
+    return low if 0.0 <= low <= high else np.inf
+
+
+def _boxes(camera: Camera, scenes: StandingScenes) -> Floats:
+    """Return the boxes of everyone in the image, (S, Q, 4); zeros where nothing of the person is inside."""
+    pool, result = scenes.pool, np.zeros((len(scenes), scenes.people, 4))
+    table, limits = packed(camera)[None], np.empty((1, 4))
+    near = _may_be_inside(camera, scenes)
+    for s, q in np.argwhere(near).tolist():
+        pose = scenes.pose[s, q]
+        _box(
+            pool.outlines[pose],
+            scenes.turn[s, q],
+            scenes.position[s, q],
+            pool.edges[pool.body[pose]],
+            table,
+            limits,
+        )
+        low, high = limits[0, :2], limits[0, 2:]
+        if (high >= low).all():
+            result[s, q] = *low, *(high - low)
+    return result
+
+
+def _may_be_inside(camera: Camera, scenes: StandingScenes) -> Bools:
+    """Return who may have a part inside the image, (S, Q): everyone not wholly behind the camera or absent."""
+    return scenes.present & (camera.depth(scenes.joints) > 0).any(axis=-1)
+
+
+@njit(cache=True)
+def _box(vertices, turn, position, edges, camera, limits):
+    """Write left, top, right, bottom of the outline (n, 3) of one person who is turned and moved, (1, 4)."""
+    moved = np.empty_like(vertices)
+    for i in range(len(vertices)):
+        for k in range(3):
+            at = position[k]
+            for m in range(3):
+                at += turn[k, m] * vertices[i, m]
+            moved[i, k] = at
+    bounding_box(moved, edges, camera, 0.0, 1.0, limits)
