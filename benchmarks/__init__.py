@@ -1,1 +1,1 @@
-"""Benchmarks of the running time of the method and the simulator; never imported by the packages."""
+"""Benchmarks of running time and of figures that tests are too short for; never imported by the packages."""

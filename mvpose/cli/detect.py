@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from mvpose.formats.pictures import PictureSource
 
 Videos = Annotated[
-    list[Path], typer.Argument(help="For each camera a video, or a folder of pictures.", metavar="VIDEO")
+    list[Path],
+    typer.Argument(
+        help="For each camera a video or a folder of pictures, or a folder that holds these.", metavar="VIDEO"
+    ),
 ]
 Detector = Annotated[
     Path,
@@ -61,8 +64,8 @@ def detect(
     """Detect people in videos by networks in ONNX files. An interrupted run goes on where it stopped."""
     with exit_on_error():
         _check_folder(out)
-        _detect(videos, out, detector, pose, detector_kind, min_score, provider, threads)
-    typer.echo(f"detections of {len(videos)} videos: {out}")
+        sources = _detect(videos, out, detector, pose, detector_kind, min_score, provider, threads)
+    typer.echo(f"detections of {len(sources)} videos: {out}")
 
 
 def run(

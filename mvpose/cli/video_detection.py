@@ -15,7 +15,7 @@ from mvpose.cli.exit_codes import failing
 from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
-from mvpose.formats.pictures import PictureSource, open_pictures
+from mvpose.formats.pictures import PictureSource, of_cameras, open_pictures
 from mvpose.networks.detector import Found, PersonDetector
 from mvpose.networks.people import detect_people
 from mvpose.networks.pose import PoseHead
@@ -33,7 +33,7 @@ def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
     Raises:
         ValueError: a video that cannot be read, or two of one name, whose detections would share a file.
     """
-    sources = [open_pictures(path) for path in paths]
+    sources = [open_pictures(path) for path in of_cameras(paths)]
     names = [each.name for each in sources]
     for source in sources:
         if names.count(source.name) > 1:

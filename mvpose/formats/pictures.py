@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,9 @@ from mvpose.formats.openpose import natural_order
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of pictures in folders."""
+
+VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".m2ts")
+"""Endings of videos in folders that hold those of several cameras."""
 
 _COMPLETE = 0.9  # of the frames that a video states: the number in its header is often somewhat wrong
 
@@ -54,6 +57,22 @@ class PictureSource:
         return _of_folder(self.path, start) if self.path.is_dir() else _of_video(self, start)
 
 
+def of_cameras(paths: Sequence[Path]) -> list[Path]:
+    """Return the video or folder of pictures of each camera.
+
+    A folder without pictures stands for the videos and the folders of pictures in it, in natural order; one that has
+    neither stays, and so do videos and folders of pictures.
+    """
+    found: list[Path] = []
+    for path in paths:
+        inside: list[Path] = []
+        if path.is_dir() and not _files(path):
+            children = sorted(path.iterdir(), key=natural_order)
+            inside = [each for each in children if (_files(each) if each.is_dir() else each.suffix.lower() in VIDEOS)]
+        found += inside or [path]
+    return found
+
+
 def open_pictures(path: Path) -> PictureSource:
     """Open a video or a folder of pictures.
 
@@ -64,7 +83,8 @@ def open_pictures(path: Path) -> PictureSource:
         files = _files(path)
         if not files:
             raise ValueError(
-                f"{path}: has no pictures ({', '.join(SUFFIXES)}); expected a video or a folder of pictures"
+                f"{path}: has no pictures ({', '.join(SUFFIXES)}) and no videos; expected a video or a folder of "
+                "pictures for each camera, or a folder that holds these"
             )
         height, width = _read(files[0]).shape[:2]
         return PictureSource(path, path.name, len(files), math.nan, (width, height))

@@ -28,19 +28,22 @@ class HeadMapping(enum.StrEnum):
 
 app = recording_group("Score the method on a recording, or compare recordings with simulation.")
 
+Head = Annotated[
+    HeadMapping,
+    typer.Option(help="Rule that converts the head from COCO-17 to the 14 joints; it changes PCP by one point."),
+]
+SummaryFile = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False),
+]
+
 
 @app.command("recording")
 def evaluate_recording(
     recording: RecordingFile,
     folder: RecordingFolder = None,
-    json_file: Annotated[
-        Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the summary to this file as well.", dir_okay=False),
-    ] = None,
-    head: Annotated[
-        HeadMapping,
-        typer.Option(help="Rule that converts the head from COCO-17 to the 14 joints; it changes PCP by one point."),
-    ] = HeadMapping.VOXELPOSE,
+    json_file: SummaryFile = None,
+    head: Head = HeadMapping.VOXELPOSE,
     method: Annotated[
         list[str] | None,
         typer.Option(
@@ -85,6 +88,46 @@ def evaluate_recording(
             evaluation = evaluate(data, pipelines, head=head.value, progress=lambda *_: advance(1))
         if json_file is not None:
             _write(evaluation.summary(), json_file, seeds=(), variants=pipelines, start=start)
+    print_evaluation(evaluation, Console())
+
+
+@app.command("poses")
+def evaluate_poses(
+    recording: RecordingFile,
+    poses: Annotated[
+        Path,
+        typer.Argument(
+            help="Results of [cyan]mvpose estimate[/] or [cyan]mvpose run[/]: their folder, or poses.parquet.",
+            metavar="POSES",
+        ),
+    ],
+    folder: RecordingFolder = None,
+    json_file: SummaryFile = None,
+    head: Head = HeadMapping.VOXELPOSE,
+    first: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Number of the first frame of POSES in the recording. "
+            "[dim]\\[default: that of its first detections][/]",
+        ),
+    ] = None,
+) -> None:
+    """Tracked people in files against the truth of a recording, such as an export: PCP, MPJPE, recall, identities."""
+    with exit_on_error():
+        start = perf_counter()
+        from mvpose.formats.people_table import read_people
+        from simharness.cli.evaluation_tables import print_evaluation
+        from simharness.reality.people_evaluation import evaluate_people
+        from simharness.reality.recording_file import find_recording, read_keys, read_recording
+
+        people = read_people(poses)
+        data = read_recording(recording, folder, head=head.value)
+        if first is None:
+            first = read_keys(find_recording(recording)).detections.first
+        evaluation = evaluate_people(data, people, first=first, head=head.value)
+        if json_file is not None:
+            _write(evaluation.summary(), json_file, seeds=(), variants=evaluation.variants, start=start)
     print_evaluation(evaluation, Console())
 
 

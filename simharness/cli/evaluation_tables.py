@@ -55,7 +55,7 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         *([_variants_table(evaluation)] if len(tables) > 1 else []),
         _people_table(summaries),
         *([_identities_table(tracked)] if tracked else []),
-        _time_table(summaries),
+        *([_time_table(summaries)] if any(map(any, (each.timings for each in evaluation.variants.values()))) else []),
         notes,
     ]
     console.print(Group(*(Padding(block, (0, 0, 1, 0)) for block in blocks)))
@@ -168,7 +168,7 @@ def _people_table(summaries: Mapping[str, Any]) -> Table:
             _number(scores["missed_per_frame"], 2),
             _number(scores["mpjpe_mm"]["mean"], 1),
             _number(scores["mpjpe_mm"]["median"], 1),
-            str(scores["same_view_violations"]),
+            _number(scores["same_view_violations"], 0),
         )
     return table
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mvpose import Detections, Estimate
+from mvpose import Detections, Estimate, Matching
 from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.skeleton import HeadMapping
 from simharness.reality.annotated_recording import AnnotatedRecording
@@ -29,7 +29,8 @@ class Evaluation:
         frames: number of frames that the variants were given.
         annotated: number of these frames that have truth and are scored.
         variants: scores by variant.
-        violations: by variant, the number of detections that share a label with another detection of their view.
+        violations: by variant, the number of detections that share a label with another detection of their view; None
+            for a method that does not report which detections belong to its people.
         actors: indices of the actors whose PCP is averaged.
     """
 
@@ -38,7 +39,7 @@ class Evaluation:
     frames: int
     annotated: int
     variants: Mapping[str, VariantScores]
-    violations: Mapping[str, int]
+    violations: Mapping[str, int | None]
     actors: tuple[int, ...]
 
     def summary(self) -> dict[str, Any]:
@@ -122,14 +123,11 @@ def score_estimates(
     """
     annotated = np.any(np.isfinite(recording.truth), axis=(1, 2, 3))
     variants: dict[str, VariantScores] = {}
-    violations: dict[str, int] = {}
+    violations: dict[str, int | None] = {}
     for name, of_frames in estimates.items():
-        scores, violations[name] = [], 0
-        for frame, (detections, estimate) in enumerate(zip(recording.detections, of_frames, strict=True)):
-            if len(estimate.matching.labels):  # a method without matching has no labels
-                violations[name] += count_violations(detections.view, estimate.matching.labels)
-            if annotated[frame]:
-                scores.append(score_frame(recording.truth[frame], estimate.joints, head=head))
+        violations[name] = _violations(recording.detections, [estimate.matching for estimate in of_frames])
+        rows = np.flatnonzero(annotated).tolist()
+        scores = [score_frame(recording.truth[row], of_frames[row].joints, head=head) for row in rows]
         scored = [estimate for estimate, known in zip(of_frames, annotated, strict=True) if known]
         variants[name] = VariantScores(
             tuple(scores),
@@ -141,3 +139,11 @@ def score_estimates(
     return Evaluation(
         recording.name, head, len(recording), int(annotated.sum()), variants, violations, recording.scored
     )
+
+
+def _violations(frames: Sequence[Detections], matchings: Sequence[Matching]) -> int | None:
+    """Count the detections that share a label with another one of their view; None if labels are not reported."""
+    pairs = list(zip(frames, matchings, strict=True))
+    if not all(matching.covers(len(frame)) for frame, matching in pairs):
+        return None
+    return sum(count_violations(frame.view, matching.labels_of(len(frame))) for frame, matching in pairs)

@@ -41,6 +41,12 @@ SHELF = (
     "simharness validate shelf FOLDER",
 )
 OWN_RECORDING = "simharness evaluate hall.toml"
+FROM_PICTURES = (  # run by tests/benchmarks/pictures and tests/simharness/reality/test_people_evaluation.py
+    "cd benchmark/gathering",
+    "mvpose run calibration_gathering.json hdImgs --detector det.onnx --pose pose.onnx --out results",
+    "simharness evaluate poses . results",
+    "simharness evaluate poses RECORDING RESULTS",
+)
 OWN_STUDY = {
     "simharness study my-lab.toml --workers 2": f"{LAB} --seeds 1",
     "simharness study my-lab.toml --seeds 40": f"{LAB} --seeds 2",
@@ -73,6 +79,7 @@ MODULES = tuple(
         "benchmarks.doctor",
         "benchmarks.expected_error",
         "benchmarks.method",
+        "benchmarks.pictures",
         "benchmarks.simulator",
         "benchmarks.tracking",
         "benchmarks.planted_bugs",
@@ -90,6 +97,7 @@ KNOWN = {
     CHECK_OF_TRACKING,
     *SHELF,
     OWN_RECORDING,
+    *FROM_PICTURES,
     *OWN_STUDY,
     *OWN_GATE,
     *IN_PARTS,

@@ -91,6 +91,19 @@ class TestDetect:
             assert found.shape == (frames, 17, 2)
             np.testing.assert_allclose(found, [[spot(k)] * 17 for k in range(frames)], atol=1.5)
 
+    def test_a_folder_of_cameras_stands_for_its_videos_and_folders(self, detect, tmp_path):
+        write_folder(tmp_path / "hall" / "cam10", spots(2))
+        write_folder(tmp_path / "hall" / "cam2", spots(2))
+        write_video(tmp_path / "hall" / "cam1.avi", spots(2))
+        (tmp_path / "hall" / "notes").mkdir()
+        (tmp_path / "hall" / "notes.txt").write_text("Tuesday")
+        result = detect(tmp_path / "hall")
+        assert result.exit_code == 0, result.output
+        assert "detections of 3 videos" in result.stdout
+        assert sorted(each.name for each in (tmp_path / "found").glob("*.json")) == [
+            "cam1.json", "cam10.json", "cam2.json",
+        ]  # fmt: skip
+
     def test_an_interrupted_run_goes_on_where_it_stopped(self, detect, tmp_path):
         write_folder(tmp_path / "cam1", spots(6))
         whole = detect(tmp_path / "cam1")
@@ -119,7 +132,7 @@ class TestDetect:
         (tmp_path / "empty").mkdir()
         ends(detect(tmp_path / "nothing.mp4"), 2, "nothing.mp4: no such file")
         ends(detect(tmp_path / "broken.mp4"), 2, "broken.mp4: cannot be read as a video")
-        ends(detect(tmp_path / "empty"), 2, "expected a video or a folder of pictures")
+        ends(detect(tmp_path / "empty"), 2, "empty: has no pictures")
         ends(detect(tmp_path / "cam1", tmp_path / "cam1"), 2, "two videos are called cam1")
         write_video(tmp_path / "a.avi", spots(2), fps=20)
         write_video(tmp_path / "b.avi", spots(2), fps=25)
