@@ -6,10 +6,10 @@ the pipeline know of it: detections are on a skeleton with more joints, and so a
 """
 
 from mvpose.wholebody.detections import body_part, with_body_boxes
-from mvpose.wholebody.estimator import WholeBody, WholeBodyTracking, body_of, whole_body
+from mvpose.wholebody.estimator import WholeBody, WholeBodyTracking, body_of, complete, whole_body
 from mvpose.wholebody.skeletons import SKELETONS, known_names, read_skeleton, register, skeleton_by_name
 
 __all__ = [
-    "SKELETONS", "WholeBody", "WholeBodyTracking", "body_of", "body_part", "known_names", "read_skeleton", "register",
-    "skeleton_by_name", "whole_body", "with_body_boxes",
+    "SKELETONS", "WholeBody", "WholeBodyTracking", "body_of", "body_part", "complete", "known_names", "read_skeleton",
+    "register", "skeleton_by_name", "whole_body", "with_body_boxes",
 ]  # fmt: skip

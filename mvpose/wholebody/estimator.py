@@ -49,44 +49,8 @@ class WholeBody:
         Raises:
             ValueError: as the estimator; a skeleton without joints of COCO17; an estimator that reports no labels.
         """
-        return self._completed(rig, detections, self.estimator.estimate(rig, body_part(detections)))
-
-    def _completed(self, rig: Rig, detections: Detections, body: Estimate) -> Estimate:
-        """Return the people of an estimate on COCO17 on the skeleton of the detections."""
-        skeleton = detections.skeleton
-        if skeleton == COCO17:
-            return body
-        start = time.perf_counter()
-        rows, others = rows_of(skeleton)
-        if len(body) and not body.matching.covers(len(detections)):
-            raise ValueError("the estimator reports no labels of detections, without which other joints have no person")
-        labels = body.matching.labels_of(len(detections))
-        used = np.flatnonzero((labels >= 0) & (labels < len(body)))
-        rays = viewing_rays(rig, _columns(detections, used, others))
-        found = self.triangulation(rays, labels[used], _part(skeleton))
-        count, known = len(found.joints), rows >= 0
-        shape = len(body), len(skeleton)
-        joints, scores = np.full((*shape, 3), np.nan), np.zeros(shape)
-        covariance, freedom = np.full((*shape, 3, 3), np.nan), np.full(shape, np.nan)
-
-        def place(whole: Floats, of_body: Floats, of_others: Floats) -> Floats:
-            whole[:, rows[known]] = of_body[:, known]
-            whole[:count, others] = of_others
-            seal(whole)
-            return whole
-
-        seconds = time.perf_counter() - start
-        timings = body.timings | {"whole body": seconds}
-        if "total" in timings:
-            timings["total"] += seconds
-        return replace(
-            body,
-            joints=place(joints, body.joints, found.joints),
-            scores=place(scores, body.scores, found.scores),
-            covariance=None if body.covariance is None else place(covariance, body.covariance, found.covariance),
-            freedom=None if body.freedom is None else place(freedom, body.freedom, found.freedom),
-            timings=timings,
-        )
+        body = self.estimator.estimate(rig, body_part(detections))
+        return complete(rig, detections, body, triangulation=self.triangulation)
 
 
 @dataclass(frozen=True)
@@ -113,7 +77,57 @@ class WholeBodyTracking(WholeBody):
                 yield body_part(detections)
 
         for body in self.estimator.track(rig, bodies()):
-            yield self._completed(rig, waiting.popleft(), body)
+            yield complete(rig, waiting.popleft(), body, triangulation=self.triangulation)
+
+
+def complete(
+    rig: Rig, detections: Detections, body: Estimate, *, triangulation: Triangulation | None = None
+) -> Estimate:
+    """Return an estimate on COCO17 on the skeleton of the detections, with the other joints triangulated.
+
+    Args:
+        rig: calibrated cameras.
+        detections: 2D poses of all views, on COCO17 or a skeleton that holds some of its joints.
+        body: estimate of people on COCO17 from these detections.
+        triangulation: reconstruction of the other joints; ``Triangulation()`` by default.
+
+    Raises:
+        ValueError: a skeleton without joints of COCO17; an estimate without labels of these detections.
+    """
+    skeleton = detections.skeleton
+    if skeleton == COCO17:
+        return body
+    start = time.perf_counter()
+    rows, others = rows_of(skeleton)
+    if len(body) and not body.matching.covers(len(detections)):
+        raise ValueError("the estimator reports no labels of detections, without which other joints have no person")
+    labels = body.matching.labels_of(len(detections))
+    used = np.flatnonzero((labels >= 0) & (labels < len(body)))
+    rays = viewing_rays(rig, _columns(detections, used, others))
+    found = (triangulation or Triangulation())(rays, labels[used], _part(skeleton))
+    count, known = len(found.joints), rows >= 0
+    shape = len(body), len(skeleton)
+    joints, scores = np.full((*shape, 3), np.nan), np.zeros(shape)
+    covariance, freedom = np.full((*shape, 3, 3), np.nan), np.full(shape, np.nan)
+
+    def place(whole: Floats, of_body: Floats, of_others: Floats) -> Floats:
+        whole[:, rows[known]] = of_body[:, known]
+        whole[:count, others] = of_others
+        seal(whole)
+        return whole
+
+    seconds = time.perf_counter() - start
+    timings = body.timings | {"whole body": seconds}
+    if "total" in timings:
+        timings["total"] += seconds
+    return replace(
+        body,
+        joints=place(joints, body.joints, found.joints),
+        scores=place(scores, body.scores, found.scores),
+        covariance=None if body.covariance is None else place(covariance, body.covariance, found.covariance),
+        freedom=None if body.freedom is None else place(freedom, body.freedom, found.freedom),
+        timings=timings,
+    )
 
 
 def body_of(estimate: Estimate, skeleton: Skeleton) -> Estimate:

@@ -139,7 +139,7 @@ def film(
     names = lookalikes.names
     lookalike_pixels = np.full((*shape[:2], len(names), joints, 2), np.nan)
     lookalike_visible = np.zeros(lookalike_pixels.shape[:-1], bool)
-    for f, view_group, states in _simultaneous_exposures(playback, exposures, frames):
+    for f, view_group, states in simultaneous_exposures(playback, exposures, frames):
         cameras = [exposures.camera(frames[f], view) for view in view_group]
         for view, one in zip(view_group, observer.observe(states, cameras), strict=True):
             here = np.all([state.present for state in states], axis=0)
@@ -167,7 +167,7 @@ def film(
 _BLOCK = 64  # frames for which motions are sampled together
 
 
-def _simultaneous_exposures(
+def simultaneous_exposures(
     playback: Playback, exposures: ExposureSchedule, frames: Many[int]
 ) -> Iterator[tuple[int, NDArray[np.int64], list[State]]]:
     """Yield an index into ``frames``, the views exposed at the same time, and the scene at the times of their bands."""

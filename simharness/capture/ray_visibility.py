@@ -60,7 +60,7 @@ class RayObserver:
         for v, camera in enumerate(cameras):
             targets[v, people:], shown = self._lookalikes.targets(camera.center, targets[v, people:])
             in_picture[v, people:] &= shown
-        owner, in_front = self._cast(states, cameras, pixels, targets, in_picture)
+        owner, in_front = cast_bands(self._caster, states, cameras, pixels, targets, in_picture)
         inside = in_picture[:, :people]
         labels = classify(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
         same_object = (owner == people) & (in_front <= self._allowed[:, None])
@@ -77,17 +77,35 @@ class RayObserver:
             for at, label, box, area, shown in zip(pixels, labels, framed, areas, visible, strict=True)
         ]
 
-    def _cast(
-        self, states: Sequence[State], cameras: Sequence[Camera], pixels: Floats, targets: Floats, in_picture: Bools
-    ) -> tuple[Integers, Floats]:
-        """Return the results of :meth:`RayCaster.cast` for targets (V, n, 17, 3), each at the time of its row."""
-        owner, in_front = np.full(in_picture.shape, -1), np.full(in_picture.shape, -np.inf)
-        for k, state in enumerate(states):
-            self._caster.place(state)
-            for v, camera in enumerate(cameras):
-                in_band = in_picture[v]
-                if len(states) > 1:
-                    share = (pixels[v, ..., 1] + 0.5) / camera.size[1]
-                    in_band = in_band & (np.floor(np.where(in_band, share, -1.0) * len(states)) == k)
-                owner[v, in_band], in_front[v, in_band] = self._caster.cast(camera, targets[v][in_band])
-        return owner, in_front
+
+def cast_bands(
+    caster: RayCaster,
+    states: Sequence[State],
+    cameras: Sequence[Camera],
+    pixels: Floats,
+    targets: Floats,
+    in_picture: Bools,
+) -> tuple[Integers, Floats]:
+    """Cast a ray to each target in a picture, each at the time of its row; results as of :meth:`RayCaster.cast`.
+
+    Args:
+        caster: ray caster of the scene.
+        states: scene at the times of the bands of a picture.
+        cameras: the V cameras.
+        pixels: pixels of the targets, (V, n, J, 2).
+        targets: targets in the world, (V, n, J, 3).
+        in_picture: which targets get a ray, (V, n, J).
+
+    Returns:
+        Owner and distance in front of the target, (V, n, J) each; -1 and -inf without a ray.
+    """
+    owner, in_front = np.full(in_picture.shape, -1), np.full(in_picture.shape, -np.inf)
+    for k, state in enumerate(states):
+        caster.place(state)
+        for v, camera in enumerate(cameras):
+            in_band = in_picture[v]
+            if len(states) > 1:
+                share = (pixels[v, ..., 1] + 0.5) / camera.size[1]
+                in_band = in_band & (np.floor(np.where(in_band, share, -1.0) * len(states)) == k)
+            owner[v, in_band], in_front[v, in_band] = caster.cast(camera, targets[v][in_band])
+    return owner, in_front

@@ -102,8 +102,8 @@ def render(
 
 
 def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
-    """Return the headline scores of a run, and those of identities where a variant has any."""
-    from simharness.report.run.headline import COLUMNS
+    """Return the headline scores of a run, and those of identities, and of feet and hands, where there are any."""
+    from simharness.report.run.headline import COLUMNS, WHOLE_BODY_COLUMNS, has_whole_body
     from simharness.report.run.tracked_people import IDENTITY_COLUMNS, has_identities
 
     variants: Mapping[str, Any] = summary["variants"]
@@ -111,6 +111,8 @@ def _tables(summary: Mapping[str, Any]) -> list[ScoreTable]:
     tables = [_table(title, COLUMNS, variants)]
     if tracked := {name: scores for name, scores in variants.items() if has_identities(scores)}:
         tables.append(_table("identities, within 0.5 m", IDENTITY_COLUMNS, tracked))
+    if has_whole_body(summary):
+        tables.append(_table("feet and hands", WHOLE_BODY_COLUMNS, variants))
     return tables
 
 

@@ -50,7 +50,7 @@ class Conditions:
     @classmethod
     def of(cls, views: Views) -> Self:
         """Return the viewing conditions in the pictures of a sequence."""
-        occlusion = _BY_VISIBILITY[views.visibility]
+        occlusion = occlusion_classes(views.visibility)
         area = BOX_SHARE * views.boxes[..., 2] * views.boxes[..., 3]
         outside = views.visibility == Visibility.OUTSIDE
         valid = (occlusion <= SELF_OCCLUDED).sum(axis=-1)
@@ -72,6 +72,11 @@ class Conditions:
 def oks_units(boxes: Floats) -> Floats:
     """Return OKS sigma x sqrt(area) of each joint, (..., 17) pixels, for boxes x, y, width, height (..., 4)."""
     return np.sqrt(BOX_SHARE * boxes[..., 2] * boxes[..., 3])[..., None] * np.asarray(COCO17.sigmas)
+
+
+def occlusion_classes(visibility: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Return the occlusion classes of joints, VISIBLE to OUTSIDE, from their visibility (...)."""
+    return _BY_VISIBILITY[visibility]
 
 
 def overlaps(boxes: Floats) -> Floats:

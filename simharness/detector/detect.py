@@ -10,21 +10,25 @@ changes no other draw.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mvpose import COCO17, Detections
+from mvpose.arrays import Floats
 from mvpose.camera import Rig
+from mvpose.skeleton import Skeleton
 from simharness.detector.descriptors import DescriptorSampler, DescriptorSettings
 from simharness.detector.detection_block import DetectionBlock
 from simharness.detector.draws import KeyedDraws
 from simharness.detector.heatmaps import Peaks
+from simharness.detector.outer_joints import detect_outer_joints
 from simharness.detector.steps import Context, registered_steps
 from simharness.scenario.sections.detector import Detector
 from simharness.types.sequence import Sequence
 from simharness.types.truth import Truth
 from simharness.types.views import Views
+from simharness.types.whole_body import OuterTruth, WholeFrame, whole_joints
 
 
 @dataclass(frozen=True)
@@ -35,11 +39,20 @@ class Detected:
         detections: ordered by view, then by falling box score, as detectors report them.
         truth: the truth about them.
         peaks: parameters of their heat maps; None without heat maps.
+        whole: the same detections with feet and hands, and their truth; None where the detector reports COCO17 alone.
     """
 
     detections: Detections
     truth: Truth
     peaks: Peaks | None = None
+    whole: WholeFrame | None = None
+
+    def at_times(self, time: Floats | None) -> Detected:
+        """Return the detections with the times of their pictures, (V,) seconds; None: with none."""
+        whole = self.whole
+        if whole is not None:
+            whole = replace(whole, detections=replace(whole.detections, time=time))
+        return replace(self, detections=replace(self.detections, time=time), whole=whole)
 
 
 def detect(
@@ -50,6 +63,7 @@ def detect(
     *,
     seed: int,
     descriptors: DescriptorSettings | None = None,
+    outer: OuterTruth | None = None,
 ) -> list[Detected]:
     """Detect the people of every frame in every view.
 
@@ -62,6 +76,7 @@ def detect(
         config: parameters of the detector.
         seed: seed of the scenario.
         descriptors: how descriptors are drawn; None: detections without descriptors.
+        outer: true feet and hands, for detectors that report them (``config.skeleton``).
 
     Returns:
         One :class:`Detected` for each frame, (T,).
@@ -74,10 +89,12 @@ def detect(
     if descriptors is not None:
         life = config.correlation.scatter_life
         sampler = DescriptorSampler(sequence, views, rig, descriptors, context.draws, life=life)
-    return _frames(block, context, sampler)
+    return _frames(block, context, sampler, outer)
 
 
-def _frames(block: DetectionBlock, context: Context, sampler: DescriptorSampler | None) -> list[Detected]:
+def _frames(
+    block: DetectionBlock, context: Context, sampler: DescriptorSampler | None, outer: OuterTruth | None
+) -> list[Detected]:
     """Return the detections of a block frame by frame."""
     sequence, views, config = context.sequence, context.views, context.config
     frame, view, slot = np.nonzero(block.present)
@@ -88,6 +105,7 @@ def _frames(block: DetectionBlock, context: Context, sampler: DescriptorSampler 
         for key in ("keypoints", "scores", "boxes", "box_scores", "person", "error", "rivals")
     }
     descriptors = None if sampler is None else sampler(frame, view, block.origin[where], block.number[where])
+    found = None if outer is None else detect_outer_joints(block, context, outer, where)
     has_heatmaps = config.heatmaps.size != "none"
     result = []
     for t, (start, end) in enumerate(itertools.pairwise(np.searchsorted(frame, np.arange(len(sequence) + 1)))):
@@ -110,5 +128,23 @@ def _frames(block: DetectionBlock, context: Context, sampler: DescriptorSampler 
             error=rows["error"],
         )
         peaks = Peaks(detections.boxes, detections.keypoints, detections.scores, rows["rivals"], config.heatmaps)
-        result.append(Detected(detections, truth, peaks if has_heatmaps else None))
+        whole = None
+        if outer is not None and found is not None:
+            whole = WholeFrame(
+                _with_outer(detections, found.keypoints[start:end], found.scores[start:end], outer.skeleton),
+                whole_joints(truth.joints, outer.joints[t], outer.skeleton),
+            )
+        result.append(Detected(detections, truth, peaks if has_heatmaps else None, whole))
     return result
+
+
+def _with_outer(detections: Detections, keypoints: Floats, scores: Floats, skeleton: Skeleton) -> Detections:
+    """Return detections on COCO17 with outer joints (m, E, 2), (m, E), on their common skeleton."""
+    return Detections(
+        detections.view,
+        whole_joints(detections.keypoints, keypoints, skeleton),
+        whole_joints(detections.scores[..., None], scores[..., None], skeleton)[..., 0],
+        detections.boxes,
+        detections.box_scores,
+        skeleton,
+    )

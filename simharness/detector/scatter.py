@@ -41,20 +41,33 @@ class Scatter:
             occlusion: occlusion classes of the person's joints, (T, V, 17).
             axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
         """
-        sigma = np.array(self.config.scatter.by_joint())
+        near = _near_joints(self.correlation.scatter_near)
+        return self.of_joints(person, np.array(self.config.scatter.by_joint()), occlusion, axes, near=near)
+
+    def of_joints(
+        self, key: Key, sigma: Floats, occlusion: NDArray[np.int8], axes: Floats, *, near: Floats | None = None
+    ) -> Floats:
+        """Return the displacements of J joints of a person, (T, V, J, 2) units: Gaussian, truncated at 1.14.
+
+        Args:
+            key: name of the joints and of the person.
+            sigma: deviations of visible joints, (J,) units.
+            occlusion: occlusion classes of the joints, (T, V, J).
+            axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
+            near: factor (J, J) that correlates the joints of one picture; None: independent joints.
+        """
         if not sigma.any():
             return np.zeros((*occlusion.shape, 2))
         if self.config.scatter_hidden != 1.0:
             sigma = np.where(occlusion == VISIBLE, sigma, self.config.scatter_hidden * sigma)
-        return _truncated(self._normal(person, occlusion.shape, axes), np.maximum(sigma, 1e-9))
+        return _truncated(self._normal(key, occlusion.shape, axes, near), np.maximum(sigma, 1e-9))
 
-    def _normal(self, person: int, shape: tuple[int, ...], axes: Floats) -> Floats:
-        """Return standard normal displacements, (T, V, 17, 2)."""
+    def _normal(self, person: Key, shape: tuple[int, ...], axes: Floats, near: Floats | None) -> Floats:
+        """Return standard normal displacements, (T, V, J, 2)."""
         correlation = self.correlation
         single = 1 - correlation.scatter_views
         normal = np.zeros((*shape, 2))
         if single > 0:
-            near = _near_joints(correlation.scatter_near)
             for view in range(shape[1]):
                 drawn = self._drawn(person, "view", view, shape=(shape[2], 2))
                 normal[:, view] = np.sqrt(single) * (drawn if near is None else near @ drawn)

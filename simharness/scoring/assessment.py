@@ -23,6 +23,7 @@ from simharness.scoring.pcp import Part
 from simharness.scoring.registry import ScoreInput, compute_scores
 from simharness.scoring.reprojection import reprojection_errors
 from simharness.scoring.summary import STAGES, VariantScores
+from simharness.scoring.whole_body import WholeBodyInput, whole_body_scores
 from simharness.types.recording import Recording
 from simharness.types.views import Visibility
 
@@ -61,12 +62,13 @@ class Assessment:
     variant_scores: VariantScores
 
 
-def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
+def assess(recording: Recording, estimates: Sequence[Estimate], *, whole: WholeBodyInput | None = None) -> Assessment:
     """Score one variant on a recording, with the true joints at the times of the estimates where they have times.
 
     Args:
         recording: the input of the variant, and the truth.
         estimates: estimates of the variant, one for each frame.
+        whole: true and estimated people with feet and hands, where there are any.
 
     Raises:
         ValueError: another number of estimates than frames, or labels that do not fit the frame's detections.
@@ -87,6 +89,7 @@ def assess(recording: Recording, estimates: Sequence[Estimate]) -> Assessment:
         | _precision_scores(truth, estimates)
         | _pck_scores(errors)
         | compute_scores(ScoreInput(recording, tuple(estimates), truth, placed, partner))
+        | whole_body_scores(whole, partner)
         | _picture_scores(recording, placed)
         | _matching_scores(summary, groups)
         | _time_scores(summary)

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from mvpose import COCO17
 from simharness.scoring.pcp import GROUPS
 from simharness.scoring.registry import ScoreInfo, registered_scores
+from simharness.scoring.whole_body import WHOLE_BODY_MM
 
 __all__ = ["AP_MM", "HEADLINE", "PCK_MM", "SCORES", "ScoreInfo"]
 
@@ -63,6 +64,11 @@ def _pose() -> Iterator[ScoreInfo]:
         yield _higher(f"pck{limit}", f"PCK {limit}", f"true joints of all people estimated within {limit} mm")
     yield _higher("pck_auc", "PCK area", f"mean of PCK over all limits from 0 to {PCK_MM[-1]} mm")
     yield from (info for group in registered_scores() for info in group.infos)
+    for limb in ("feet", "hands"):
+        about = f"mean error of the joints of the {limb} of the people found; where the detector reports them"
+        yield _lower(f"{limb}_mm", f"Error {limb}", "mm", about)
+        about = f"joints of the {limb} of all people estimated within {WHOLE_BODY_MM} mm"
+        yield _higher(f"{limb}_pck", f"PCK {limb}", about)
     about = "median error of the reprojected estimates at visible, detected joints"
     yield _lower("reprojection_px", "Reprojection", "px", about, digits=2)
     about = "median error of the detections at the joints of Reprojection; should be the larger one"

@@ -26,6 +26,7 @@ class VariantScores:
         frames: scores of the frames, all with the same P people in the same order.
         timings: ``Estimate.timings`` of every timed frame, seconds by stage.
         tracking: scores over time, where people are tracked: :mod:`simharness.scoring.tracking.summary`.
+        whole_body: scores of feet and hands, where the detector reports them: :mod:`simharness.scoring.whole_body`.
 
     Raises:
         ValueError: frames with different numbers of people.
@@ -34,6 +35,7 @@ class VariantScores:
     frames: tuple[FrameScore, ...]
     timings: tuple[Mapping[str, float], ...] = ()
     tracking: Mapping[str, Any] | None = None
+    whole_body: Mapping[str, float | None] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", tuple(self.frames))
@@ -52,8 +54,8 @@ class VariantScores:
             ``pcp`` and ``pcp_parts`` (percent; means over the actors, so that all actors have equal weight in however
             many frames they are present), ``pcp_actors``, ``precision`` and ``recall`` of people, ``ghosts_per_frame``,
             ``missed_per_frame``, ``mpjpe_mm`` over all one-to-one pairs, ``matching`` over all pairs of detections,
-            ``timings_ms`` by stage, and ``tracking`` where there are scores over time. None where a score does not
-            apply; never NaN.
+            ``timings_ms`` by stage, ``tracking`` where there are scores over time, and ``whole_body`` where there are
+            scores of feet or hands. None where a score does not apply; never NaN.
         """
         pairings = [frame.pairing for frame in self.frames]
         found, people = sum(p.found for p in pairings), sum(p.people for p in pairings)
@@ -61,7 +63,7 @@ class VariantScores:
         errors = np.concatenate([np.zeros(0), *(p.error for p in pairings)]) * 1000.0
         errors = errors[np.isfinite(errors)]
         table = self.pcp_table(actors=actors)
-        over_time = {} if self.tracking is None else {"tracking": self.tracking}
+        more = {"tracking": self.tracking, "whole_body": self.whole_body}
         return {
             "pcp": _mean(row["all"] for row in table),
             "pcp_parts": {group: _mean(row[group] for row in table) for group in GROUPS},
@@ -73,7 +75,7 @@ class VariantScores:
             "mpjpe_mm": {"mean": _statistic(np.mean, errors), "median": _statistic(np.median, errors)},
             "matching": self._matching(),
             "timings_ms": {stage: self._timing(stage) for stage in STAGES},
-            **over_time,
+            **{key: value for key, value in more.items() if value is not None},
         }
 
     def pcp_table(self, *, actors: Sequence[int] | None = None) -> list[dict[str, float | None]]:

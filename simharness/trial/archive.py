@@ -29,6 +29,8 @@ from simharness.trial.arrays import (
     timings_of,
     truth_arrays,
     truth_of,
+    whole_arrays,
+    whole_of,
 )
 from simharness.trial.stages.detected_sequence import DetectedSequence
 
@@ -61,6 +63,7 @@ def pack_detected(detected: DetectedSequence) -> bytes:
     arrays |= _prefixed("truth", truth_arrays(detected.time, recording.truth))
     if all(frame.peaks is not None for frame in frames):
         arrays["rivals"] = np.concatenate([frame.peaks.rivals for frame in frames if frame.peaks is not None])
+    arrays |= _prefixed("whole", whole_arrays([frame.whole for frame in frames]))
     return _packed(arrays)
 
 
@@ -78,7 +81,8 @@ def unpack_detected(content: bytes, scenario: Scenario) -> DetectedSequence:
     truth = truth_of(truth_part, detection["frame"])
     frames = []
     rows = rows_of_frames(detection["frame"], len(detections))
-    for frame_detections, frame_truth, row in zip(detections, truth, rows, strict=True):
+    whole = whole_of(_part("whole", arrays), detections)
+    for frame_detections, frame_truth, row, frame_whole in zip(detections, truth, rows, whole, strict=True):
         peaks = None
         if "rivals" in arrays:
             rivals = arrays["rivals"][row]
@@ -89,7 +93,7 @@ def unpack_detected(content: bytes, scenario: Scenario) -> DetectedSequence:
                 rivals,
                 scenario.detector.heatmaps,
             )
-        frames.append(Detected(frame_detections, frame_truth, peaks))
+        frames.append(Detected(frame_detections, frame_truth, peaks, frame_whole))
     return DetectedSequence(truth_part["time"], rig_of_arrays(_part("rig", arrays)), tuple(frames))
 
 

@@ -17,7 +17,9 @@ from mvpose.camera import Camera, Rig
 from mvpose.detections import Detections
 from mvpose.estimate import Estimate, Matching
 from mvpose.skeleton import COCO17, SHELF14
+from mvpose.wholebody import skeleton_by_name
 from simharness.types.truth import Truth
+from simharness.types.whole_body import WholeFrame
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -108,6 +110,50 @@ def truth_of(arrays: Arrays, frame: NDArray[np.int64]) -> tuple[Truth, ...]:
         )
         for index, rows in enumerate(rows_of_frames(frame, len(arrays["time"])))
     )
+
+
+def whole_arrays(frames: Sequence[WholeFrame | None]) -> Arrays:
+    """Return detections and truth of T frames on a skeleton with feet and hands; no arrays where there are none.
+
+    ``skeleton`` () is its name; ``keypoints`` (n, J, 2) px and ``scores`` (n, J) of the n detections of all frames;
+    ``joints`` (T, P, J, 3), metres, the true ones.
+    """
+    known = [frame for frame in frames if frame is not None]
+    if not known or len(known) < len(frames):
+        return {}
+    return {
+        "skeleton": np.array(known[0].detections.skeleton.name),
+        **_joined([frame.detections for frame in known], ("keypoints", "scores")),
+        "joints": np.stack([frame.joints for frame in known]),
+    }
+
+
+def whole_of(arrays: Arrays, detections: Sequence[Detections]) -> list[WholeFrame | None]:
+    """Restore detections and truth from :func:`whole_arrays`, one for each frame; None where there are none.
+
+    Args:
+        arrays: the arrays.
+        detections: the detections of each frame on COCO17.
+    """
+    if not arrays:
+        return [None] * len(detections)
+    skeleton = skeleton_by_name(str(arrays["skeleton"]))
+    rows = rows_of_frames(_frame_index(map(len, detections)), len(detections))
+    return [
+        WholeFrame(
+            Detections(
+                body.view,
+                arrays["keypoints"][row],
+                arrays["scores"][row],
+                body.boxes,
+                body.box_scores,
+                skeleton,
+                time=body.time,
+            ),
+            joints,
+        )
+        for body, row, joints in zip(detections, rows, arrays["joints"], strict=True)
+    ]
 
 
 def estimate_arrays(estimates: Sequence[Estimate]) -> Arrays:

@@ -3,7 +3,7 @@
 A trial is a scenario at a seed. Its results are made in steps, and each step has an identity:
 
 - detections and truth: the values of the resolved scenario with its seed, the content of the files that it names, the
-  code of the folders in :data:`SIMULATION` and :data:`CALIBRATION`, the versions of :data:`PACKAGES`;
+  code of the folders in :data:`SIMULATION` and :data:`BORROWED`, the versions of :data:`PACKAGES`;
 - estimates of a variant: the identity of the trial, the variant, and the code of ``mvpose`` without
   :data:`BESIDE_THE_METHOD`; for presets that track also ``method.lag`` (the time between frames is in the trial's
   identity); for a user-defined estimator also its place and the sources that
@@ -44,15 +44,15 @@ PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless", "onnx
 SIMULATION = ("types", "scenario/sections", "world", "capture", "detector", "trial/stages")
 """Folders of ``simharness`` that make detections and estimates. Scenarios count as resolved, not how they are read."""
 
-CALIBRATION = ("formats/calibration",)
-"""Folders of ``mvpose`` that read the rigs of simulations."""
+BORROWED = ("formats/calibration", "wholebody")
+"""Folders of ``mvpose`` that simulations use: readers of rigs, skeletons with feet and hands and their estimates."""
 
 BESIDE_THE_METHOD = (
     "cli", "files", "formats", "networks/detector.py", "networks/people.py", "recording.py", "report", "skeleton_fit",
     "wholebody",
 )  # fmt: skip
-"""Folders and modules of ``mvpose`` that make no estimates of trials: readers, writers, detection in videos, hands and
-faces, the command line, pages."""
+"""Folders and modules of ``mvpose`` that make no estimates of bodies in trials: readers, writers, detection in videos,
+hands and faces, the command line, pages."""
 
 SCORES = ("types", "pairing", "scoring")
 """Folders of ``simharness`` that score estimates."""
@@ -68,7 +68,7 @@ class Code:
     """Digests of the code that makes results, hexadecimal.
 
     Attributes:
-        simulation: of the folders :data:`SIMULATION` and :data:`CALIBRATION`.
+        simulation: of the folders :data:`SIMULATION` and :data:`BORROWED`.
         method: of ``mvpose`` without :data:`BESIDE_THE_METHOD`.
         scores: of the folders :data:`SCORES`.
         failures: of the folders :data:`FAILURES`.
@@ -85,7 +85,7 @@ def code() -> Code:
     """Return the digests of the code on disk at the first call in this process."""
     ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
     return Code(
-        simulation=_digest([digest_of_folders(ours, SIMULATION), digest_of_folders(its, CALIBRATION)]),
+        simulation=_digest([digest_of_folders(ours, SIMULATION), digest_of_folders(its, BORROWED)]),
         method=digest_of_folders(its, ("",), without=BESIDE_THE_METHOD),
         scores=digest_of_folders(ours, SCORES),
         failures=digest_of_folders(ours, FAILURES),

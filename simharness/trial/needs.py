@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mvpose.presets import without_repair
+from mvpose.skeleton import COCO17
+from mvpose.wholebody import skeleton_by_name
 from simharness.runtime.machine import memory
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.scenario import Scenario
@@ -20,6 +22,7 @@ from simharness.trial.stages.build_trial import true_rig
 _PROCESS = 400e6  # bytes: Python, libraries, compiled kernels, a scene
 _FRAME, _FRAME_OF_VARIANT = 50e3, 30e3  # bytes for each frame, and for each frame of a variant
 _SIGHT = 2.5e3  # bytes for each sight of a person: truth and detection
+_OUTER, _OUTER_SECONDS = 120.0, 10e-6  # bytes and seconds for each joint of feet and hands in each sight of a person
 _PIXEL = 20.0  # bytes for each pixel of the one picture that is rendered at a time
 _MATCHING = frozenset({"full", "appearance", "geometry", "no-3dps"})  # variants that keep the relaxed matrix (m, m)
 
@@ -61,6 +64,8 @@ def needs_of(scenario: Scenario) -> Needs:
         raise ValueError(too_large[1])
     frames, people, variants = scenario.frames, scenario.people.count, scenario.method.variants
     sights = frames * views * people
+    name = scenario.detector.skeleton
+    outer = 0 if name == COCO17.name else sights * (len(skeleton_by_name(name)) - len(COCO17))
     detections = views * (people + scenario.detector.phantoms.rate)
     width, height = scenario.cameras.size
     pixels = 0 if scenario.rendering.renderer == "rays" else width * height
@@ -72,9 +77,11 @@ def needs_of(scenario: Scenario) -> Needs:
         memory=_PROCESS
         + frames * (_FRAME + len(variants) * _FRAME_OF_VARIANT + relaxed)
         + sights * _SIGHT
+        + outer * _OUTER
         + pixels * _PIXEL,
         seconds=_START
         + sights * _SIGHT_SECONDS
+        + outer * _OUTER_SECONDS
         + frames * views * pixels * _PIXEL_SECONDS
         + frames * sum(_frame_seconds(without_repair(variant), detections) for variant in variants),
         disk=frames * len(variants) * _STORED_FRAME + sights * _STORED_SIGHT,

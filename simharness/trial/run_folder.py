@@ -22,6 +22,12 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
     where the variant has them; ``NAME/labels`` (n,) of the detections; and of the matching of each frame
     ``NAME/iterations`` (T,), ``NAME/residuals`` (T, 2), ``NAME/objective`` (T,), ``NAME/converged`` (T,). The relaxed
     P is not stored.
+`whole_body.npz`
+    only where the detector reports feet or hands (``detector.skeleton``): ``skeleton`` (), the name of a skeleton with
+    J joints; ``keypoints`` (n, J, 2) px and ``scores`` (n, J) of the detections in the order of `detections.npz`;
+    ``joints`` (T, P, J, 3) m, the true ones, NaN where the body model has none; and for each variant, for its k
+    estimated people in the order of `estimates.npz`, ``NAME/joints`` (k, J, 3) m, ``NAME/scores`` (k, J) and
+    ``NAME/covariance`` (k, J, 3, 3) m² where the variant has it.
 `scores.parquet`
     a row for each frame and variant: :mod:`simharness.scoring.summary`.
 `timings.parquet`
@@ -37,7 +43,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +90,7 @@ class Record:
         estimates: estimates of each variant for each frame, T.
         scores: a row for each frame and variant.
         summary: the headline scores.
+        whole_body: arrays of people with feet and hands, as in `whole_body.npz`; empty where there are none.
     """
 
     scenario: Scenario
@@ -94,6 +101,7 @@ class Record:
     estimates: Mapping[str, tuple[Estimate, ...]]
     scores: pl.DataFrame
     summary: Mapping[str, Any]
+    whole_body: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         counts = {len(self.time), len(self.detections), len(self.truth), *map(len, self.estimates.values())}
@@ -114,6 +122,8 @@ def write_run(record: Record, folder: Path) -> None:
     }
     for name, arrays in tables.items():
         np.savez(folder / f"{name}.npz", allow_pickle=False, **arrays)
+    if record.whole_body:
+        np.savez(folder / "whole_body.npz", allow_pickle=False, **record.whole_body)
     record.scores.write_parquet(folder / "scores.parquet")
     timings_table(record.estimates).write_parquet(folder / "timings.parquet")
     text = json.dumps(record.summary, indent=2, ensure_ascii=False, allow_nan=False)
@@ -134,6 +144,7 @@ def read_run(folder: Path | str) -> Record:
     scenario = load(folder / "scenario.toml", folder=Path())
     summary = read_json_object(folder / "summary.json", what="the summary of a run")
     contents = {name: read_bytes(folder / name, what=_WHAT) for name in (*names[1:], "timings.parquet")}
+    whole = folder / "whole_body.npz"
     try:
         rig, detected, true, estimated = (arrays_of(contents[name]) for name in names[1:5])
         scores, timings = table_of(contents["scores.parquet"]), table_of(contents["timings.parquet"])
@@ -146,6 +157,7 @@ def read_run(folder: Path | str) -> Record:
             estimates=_estimates(estimated, detected["frame"], timings),
             scores=scores,
             summary=summary,
+            whole_body=arrays_of(read_bytes(whole, what=_WHAT)) if whole.is_file() else {},
         )
     except Exception as error:  # arrays and columns that are missing, or of another shape or type
         why = one_line(f"{type(error).__name__}: {error}", 200)

@@ -12,12 +12,14 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, get_args
 
+import numpy as np
 import polars as pl
 import threadpoolctl
 
 from mvpose import Estimate
 from mvpose.pipeline import Estimator, SequenceEstimator
 from mvpose.presets import PRESETS
+from mvpose.wholebody import complete
 from simharness.failures.blame import blame_frames, failure_scores, failure_table
 from simharness.failures.classification import find_failures
 from simharness.runtime.progress import Reporter, Silence
@@ -25,6 +27,7 @@ from simharness.runtime.stages import Stages
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.scoring.catalogue import SCORES
+from simharness.scoring.whole_body import WholeBodyInput
 from simharness.trial.audit import audit
 from simharness.trial.kernel_compilation import Compilation
 from simharness.trial.needs import require_memory
@@ -69,6 +72,7 @@ class TrialResult:
         simulation: scene and views from which detections were made; None where detections were known.
         pipelines: variants of the method by name.
         estimates: estimates of each variant, one for each frame; empty before the goal ``estimate``.
+        whole: the same people with feet and hands, where the detector reports them; empty otherwise.
         assessments: scores of each variant; empty before the goal ``score``.
         failures: table of failures of each variant; empty before the goal ``classify``.
         seconds: duration of each stage that ran.
@@ -79,6 +83,7 @@ class TrialResult:
     simulation: Simulation | None
     pipelines: Mapping[str, Estimator] = field(default_factory=dict)
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    whole: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     assessments: Mapping[str, Assessment] = field(default_factory=dict)
     failures: Mapping[str, pl.DataFrame] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -164,6 +169,7 @@ def run_trial(
             result = replace(
                 result, estimates=estimate_variants(detected, pipelines, stages, known=known.estimates, workers=workers)
             )
+            result = replace(result, whole=_with_feet_and_hands(result, stages))
         if goal >= _GOALS.index("score"):
             result = replace(result, assessments=_score(result, stages))
         if goal >= _GOALS.index("classify"):
@@ -199,11 +205,42 @@ def _simulate(
     return simulation, detected, trial.pipelines
 
 
+def _with_feet_and_hands(result: TrialResult, stages: Stages) -> dict[str, tuple[Estimate, ...]]:
+    """Return the people of all variants on the skeleton of the detector; none where it reports COCO17 alone.
+
+    The other joints are triangulated from the detections of each person, after and apart from the body.
+    """
+    frames = [frame.whole for frame in result.detected.frames]
+    if any(frame is None for frame in frames):
+        return {}
+    whole = {}
+    with stages.stage("whole body", len(result.estimates)) as advance:
+        for variant, estimates in result.estimates.items():
+            pairs = zip(frames, estimates, strict=True)
+            rig = result.detected.rig
+            whole[variant] = tuple(complete(rig, frame.detections, body) for frame, body in pairs if frame is not None)
+            advance(1)
+    return whole
+
+
+def _whole_body(result: TrialResult, variant: str) -> WholeBodyInput | None:
+    """Return what the scores of feet and hands of a variant need; None where there are none."""
+    frames = [frame.whole for frame in result.detected.frames]
+    if variant not in result.whole:
+        return None
+    skeleton = next(frame.detections.skeleton for frame in frames if frame is not None)
+    return WholeBodyInput(
+        skeleton,
+        np.stack([frame.joints for frame in frames if frame is not None]),
+        [estimate.joints for estimate in result.whole[variant]],
+    )
+
+
 def _score(result: TrialResult, stages: Stages) -> dict[str, Assessment]:
     assessments = {}
     with stages.stage("score", len(result.estimates)) as advance:
         for variant, estimates in result.estimates.items():
-            assessments[variant] = assess(result.recording, estimates)
+            assessments[variant] = assess(result.recording, estimates, whole=_whole_body(result, variant))
             advance(1)
     return assessments
 

@@ -9,6 +9,7 @@ PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --
 LAB = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
 ALONE = {
     "simharness run quickstart": RAYS,
+    "simharness run quickstart --set detector.skeleton=halpe26": RAYS,
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
@@ -88,7 +89,10 @@ MODULES = tuple(
     )
 )
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
-BAKE = "python -m tools.body.bake"  # takes no arguments: it would go and bake
+BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")  # without arguments, they start to bake
+    "python -m tools.body.bake",
+    "python -m tools.body.hands_and_feet",
+)  # take no arguments: they would start to bake
 KNOWN = {
     *ALONE,
     *USER_FILES.values(),
@@ -104,7 +108,7 @@ KNOWN = {
     *MAKE,
     *MODULES,
     ON_SHELF,
-    BAKE,
+    *BAKE,
     CI,
     *PYTEST,
     *SHELL,

@@ -181,8 +181,9 @@ def test_modules_have_a_command_line(command):
     assert process.stdout.startswith(f"usage: {command} ")
 
 
-def test_the_command_that_bakes_the_body_is_a_program():
-    spec = importlib.util.find_spec(BAKE.rsplit(maxsplit=1)[-1])
+@pytest.mark.parametrize("command", BAKE)
+def test_the_commands_that_bake_the_body_are_programs(command):
+    spec = importlib.util.find_spec(command.rsplit(maxsplit=1)[-1])
     assert '\nif __name__ == "__main__":\n' in Path(spec.origin).read_text(encoding="utf-8")
 
 

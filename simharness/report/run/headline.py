@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from simharness.runtime.number_text import fixed
+from simharness.scoring.catalogue import SCORES
+from simharness.scoring.whole_body import WHOLE_BODY_SCORES
 
 NOTHING = "–"
 """Text of a score that does not apply."""
@@ -55,3 +57,17 @@ COLUMNS: tuple[Column, ...] = (
     Column("Match F1", "", "pairs of detections matched correctly", lambda s: s["matching"]["f1"], 3),
     Column("Time", "ms", "median time per frame", lambda s: s["timings_ms"]["total"]["median"], 1),
 )
+
+
+def _whole_body(key: str) -> Column:
+    info = SCORES[key]
+    return Column(info.title, info.unit, info.about, lambda scores: scores["whole_body"][key], info.digits)
+
+
+WHOLE_BODY_COLUMNS = tuple(map(_whole_body, WHOLE_BODY_SCORES))
+"""Scores of feet and hands, for runs whose detector reports them."""
+
+
+def has_whole_body(summary: Mapping[str, Any]) -> bool:
+    """Return whether a summary has scores of feet and hands."""
+    return all("whole_body" in scores for scores in summary["variants"].values())

@@ -18,7 +18,7 @@ from simharness.report.documents import fill_template
 from simharness.report.run import plots
 from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Animation
-from simharness.report.run.headline import COLUMNS, NOTHING
+from simharness.report.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
 from simharness.report.run.pictures import Picture
 from simharness.report.run.standard_figures import person_errors
 from simharness.report.run.tracked_people import TRACKING_COLUMNS, tracked_variants
@@ -58,6 +58,7 @@ def render(
         facts=_facts(record),
         cards=[{"title": column.title, "about": column.about, "text": column.text(scores)} for column in COLUMNS],
         columns=COLUMNS,
+        whole_body_columns=WHOLE_BODY_COLUMNS if has_whole_body(summary) else (),
         parts=_parts_table(summary["variants"]),
         people=_people_table(record, main),
         pictures=pictures,

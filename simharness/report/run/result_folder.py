@@ -20,6 +20,8 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.summary import VariantScores, summarize
 from simharness.scoring.tracking.summary import tracking_summary
 from simharness.scoring.tracking.tracked_frames import ids_of
+from simharness.scoring.whole_body import WHOLE_BODY_SCORES
+from simharness.trial.arrays import Arrays, estimate_arrays, whole_arrays
 from simharness.trial.needs import require_memory
 from simharness.trial.run_folder import Record, write_run
 from simharness.trial.run_trial import TrialResult, run_trial
@@ -94,6 +96,10 @@ def _record(result: TrialResult, about: Mapping[str, Any]) -> Record:
             truth = np.stack([true.joints for true in timed.truth])
             over_time = tracking_summary(truth, result.estimates[variant], timed.time)
             scores[variant] = replace(scored, tracking=over_time)
+    for variant, assessment in result.assessments.items():
+        if variant in result.whole:
+            limbs = {key: assessment.scores[key] for key in WHOLE_BODY_SCORES}
+            scores[variant] = replace(scores[variant], whole_body=limbs)
     summary = summarize(
         scenario.name,
         scores,
@@ -112,7 +118,17 @@ def _record(result: TrialResult, about: Mapping[str, Any]) -> Record:
         estimates=result.estimates,
         scores=score_table(scores),
         summary=summary,
+        whole_body=_whole_body(result),
     )
+
+
+def _whole_body(result: TrialResult) -> Arrays:
+    """Return people with feet and hands as arrays for the result folder; none where there are none."""
+    arrays = whole_arrays([frame.whole for frame in result.detected.frames])
+    for variant, estimates in result.whole.items():
+        found = estimate_arrays(estimates)
+        arrays |= {f"{variant}/{key}": found[key] for key in ("joints", "scores", "covariance") if key in found}
+    return arrays
 
 
 def score_table(scores: Mapping[str, VariantScores]) -> pl.DataFrame:

@@ -316,6 +316,11 @@ class Detector(Section):
         description="ONNX file of a top-down pose head, relative to the scenario file, which computes the keypoints in "
         "the simulated boxes from the rendered pictures; empty: keypoints are simulated, too",
     )
+    skeleton: Literal["coco17", "body25", "halpe26", "openpose137", "wholebody133"] = Field(
+        "coco17",
+        description="joints that the detector reports; those beyond COCO17, such as feet and hands, belong to the "
+        "ankles and wrists and are estimated after the body",
+    )
     keypoints: Keypoints = Keypoints()
     bias: Bias = Bias()
     correlation: Correlation = Correlation()
@@ -324,3 +329,12 @@ class Detector(Section):
     phantoms: Phantoms = Phantoms()
     decoys: DecoyHits = DecoyHits()
     heatmaps: HeatmapHead = HeatmapHead()
+
+    @model_validator(mode="after")
+    def _network_reads_the_body(self) -> Detector:
+        if self.onnx and self.skeleton != "coco17":
+            raise ValueError(
+                f'skeleton = "coco17" with the network of onnx, which reads these 17 joints, got "{self.skeleton}": '
+                "leave skeleton or onnx out"
+            )
+        return self

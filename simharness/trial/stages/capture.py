@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from mvpose.arrays import Floats
+    from mvpose.skeleton import Skeleton
     from simharness.capture.film import Observer
+    from simharness.capture.outer_joints import OuterJointFilm
     from simharness.capture.picture import PictureSource
     from simharness.capture.rendering.renderer import Renderer, RendererName
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.views import Views
+    from simharness.types.whole_body import OuterViews
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
     from simharness.world.scene.build import Scene
     from simharness.world.scene.playback import Playback
@@ -59,6 +63,37 @@ class CaptureFrames:
     def _observer(self) -> Observer:
         """The observer of this process. It is made once: the outlines of bodies take longer than some frames."""
         return observer_of(self.scenario, self._playback)
+
+
+@dataclass(frozen=True)
+class FilmOuterJoints:
+    """Frame function that films joints beyond COCO17, such as feet and hands.
+
+    Attributes:
+        scene: the built scene.
+        exposures: time and camera of every picture.
+        skeleton: the skeleton that has them.
+    """
+
+    scene: Scene
+    exposures: ExposureSchedule
+    skeleton: Skeleton
+
+    def __call__(self, frames: range) -> OuterViews:
+        """Return the joints in the pictures of these frames."""
+        return self._film.views(self.exposures, frames)
+
+    def truth(self) -> Floats:
+        """Return the true joints at the times of all frames, (T, P, E, 3), metres."""
+        return self._film.truth()
+
+    @functools.cached_property
+    def _film(self) -> OuterJointFilm:
+        """The film of this process."""
+        from simharness.capture.outer_joints import OuterJointFilm
+        from simharness.world.scene.playback import Playback
+
+        return OuterJointFilm(Playback(self.scene), self.skeleton)
 
 
 def observer_of(scenario: Scenario, playback: Playback) -> Observer:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from mvpose.skeleton import COCO17
+from mvpose.wholebody import skeleton_by_name
 from simharness.detector.detect import detect
 from simharness.runtime.frame_pool import map_frames
 from simharness.runtime.stages import Stages
 from simharness.trial.stages.build_trial import Trial
-from simharness.trial.stages.capture import CaptureFrames
+from simharness.trial.stages.capture import CaptureFrames, FilmOuterJoints
 from simharness.trial.stages.detected_sequence import DetectedSequence
 from simharness.trial.stages.networks import ReadFrames
 from simharness.types.sequence import Sequence
 from simharness.types.views import Views
+from simharness.types.whole_body import OuterTruth, OuterViews
 from simharness.world.scene.playback import simulate
 
 
@@ -25,11 +28,13 @@ class Simulation:
         trial: the built scenario.
         sequence: the true poses.
         views: the truth in the pictures, with previews where they were requested.
+        outer: true feet and hands, where the detector reports them.
     """
 
     trial: Trial
     sequence: Sequence
     views: Views
+    outer: OuterTruth | None = None
 
 
 def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: Collection[int] = ()) -> Simulation:
@@ -37,7 +42,7 @@ def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: C
 
     Args:
         trial: the built scenario.
-        stages: timer and reporter of the stages ``simulate`` and ``film``.
+        stages: timer and reporter of the stages ``simulate``, ``film`` and ``feet and hands``.
         workers: number of processes that share the frames.
         previews: frames whose colour pictures are kept.
     """
@@ -47,7 +52,14 @@ def capture_trial(trial: Trial, stages: Stages, *, workers: int = 1, previews: C
     with stages.stage("film", len(frames)) as advance:
         capture = CaptureFrames(trial.scenario, trial.scene, trial.exposures, frozenset(previews))
         views = Views.concatenate(map_frames(capture, frames, workers=workers, progress=advance))
-    return Simulation(trial, sequence, views)
+    outer = None
+    if (name := trial.scenario.detector.skeleton) != COCO17.name:
+        skeleton = skeleton_by_name(name)
+        with stages.stage("feet and hands", len(frames)) as advance:
+            film = FilmOuterJoints(trial.scene, trial.exposures, skeleton)
+            parts = map_frames(film, frames, workers=workers, progress=advance)
+            outer = OuterTruth(skeleton, film.truth(), OuterViews.concatenate(parts))
+    return Simulation(trial, sequence, views, outer)
 
 
 def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) -> DetectedSequence:
@@ -71,14 +83,12 @@ def detect_trial(simulation: Simulation, stages: Stages, *, workers: int = 1) ->
             scenario.detector,
             seed=scenario.seed,
             descriptors=trial.descriptors,
+            outer=simulation.outer,
         )
     if ReadFrames.needed(scenario):
         with stages.stage("read", len(frames)) as advance:
             reading = ReadFrames(scenario, trial.scene, exposures, tuple(detected))
             parts = map_frames(reading, frames, workers=workers, progress=advance)
             detected = [each for part in parts for each in part]
-    detected = [
-        replace(each, detections=replace(each.detections, time=time))
-        for each, time in zip(detected, exposures.known_time, strict=True)
-    ]
+    detected = [each.at_times(time) for each, time in zip(detected, exposures.known_time, strict=True)]
     return DetectedSequence(sequence.time, exposures.believed_rig, tuple(detected))

@@ -1,0 +1,66 @@
+"""Scores of feet and hands: the joints beyond COCO17 of people who are paired by their bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Bools, Floats
+from mvpose.skeleton import Skeleton
+from simharness.scoring.joint_errors import joint_errors
+from simharness.scoring.registry import finite_mean
+
+LIMBS = {"feet": ("big_toe", "small_toe", "heel"), "hands": ("hand_",)}
+"""Beginnings of the names, without the side, of the joints of each limb."""
+
+WHOLE_BODY_MM = 50
+"""Limit of PCK of feet and hands, mm."""
+
+WHOLE_BODY_SCORES = tuple(f"{limb}_{kind}" for limb in LIMBS for kind in ("mm", "pck"))
+"""Keys of the scores of feet and hands."""
+
+
+@dataclass(frozen=True)
+class WholeBodyInput:
+    """True and estimated people of T frames on a skeleton with feet or hands.
+
+    Attributes:
+        skeleton: the skeleton of J joints.
+        truth: true joints, (T, P, J, 3), metres; NaN where undefined.
+        joints: joints of the estimates of each frame, (n, J, 3), metres; NaN where missing.
+    """
+
+    skeleton: Skeleton
+    truth: Floats
+    joints: Sequence[Floats]
+
+
+def whole_body_scores(given: WholeBodyInput | None, partner: NDArray[np.int64]) -> dict[str, float | None]:
+    """Return error and PCK of feet and hands; None without true joints of the limb.
+
+    Args:
+        given: people with feet and hands; None where there are none.
+        partner: index of the estimate that is paired with each true person by the body, (T, P); -1 where missed.
+    """
+    scores: dict[str, float | None] = dict.fromkeys(WHOLE_BODY_SCORES)
+    if given is None:
+        return scores
+    paired = np.full(given.truth.shape, np.nan)
+    for row, mine, joints in zip(paired, partner, given.joints, strict=True):
+        row[mine >= 0] = joints[mine[mine >= 0]]
+    errors = 1000.0 * joint_errors(given.truth, paired)
+    for limb in LIMBS:
+        of_limb = errors[..., joints_of(given.skeleton, limb)]
+        defined = of_limb[~np.isnan(of_limb)]
+        if len(defined):
+            scores[f"{limb}_mm"] = finite_mean(defined)
+            scores[f"{limb}_pck"] = 100.0 * float(np.mean(defined <= WHOLE_BODY_MM))
+    return scores
+
+
+def joints_of(skeleton: Skeleton, limb: str) -> Bools:
+    """Return which joints of a skeleton belong to a limb of :data:`LIMBS`, (J,)."""
+    return np.array([part.startswith(LIMBS[limb]) for part in skeleton.parts])

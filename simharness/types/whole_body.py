@@ -1,0 +1,85 @@
+"""Ground truth and detections of people on skeletons with feet and hands, beside those on COCO17."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose import Detections
+from mvpose.arrays import Floats
+from mvpose.checks import as_array
+from mvpose.skeleton import Skeleton
+from mvpose.wholebody.detections import rows_of
+
+
+@dataclass(frozen=True)
+class OuterViews:
+    """Outer joints in the pictures that V cameras deliver: E joints of a skeleton beyond COCO17, in T frames.
+
+    Attributes:
+        pixels: pixel of each joint, (T, V, P, E, 2); NaN behind the camera, of absent people, in pictures that never
+            arrive, and of joints that the body model does not have.
+        visibility: :class:`simharness.types.views.Visibility`, (T, V, P, E) int8; OUTSIDE where the pixel is unknown.
+    """
+
+    pixels: Floats
+    visibility: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        pixels = as_array(self.pixels, ("T", "V", "P", "E", 2), "pixels")
+        object.__setattr__(self, "pixels", pixels)
+        object.__setattr__(self, "visibility", as_array(self.visibility, pixels.shape[:4], "visibility", np.int8))
+
+    @classmethod
+    def concatenate(cls, parts: Many[Self]) -> Self:
+        """Join the views of consecutive frames."""
+        return cls(*(np.concatenate([getattr(part, key) for part in parts]) for key in ("pixels", "visibility")))
+
+
+@dataclass(frozen=True)
+class OuterTruth:
+    """True outer joints of a sequence.
+
+    Attributes:
+        skeleton: skeleton whose joints beyond COCO17 they are.
+        joints: in the world, (T, P, E, 3), metres; NaN of absent people and of joints that the body model does not
+            have.
+        views: the same joints in the pictures.
+    """
+
+    skeleton: Skeleton
+    joints: Floats
+    views: OuterViews
+
+
+@dataclass(frozen=True)
+class WholeFrame:
+    """Detections and truth of one frame on a skeleton with feet and hands.
+
+    Attributes:
+        detections: the detections of the frame, in the order and with the body of those on COCO17.
+        joints: true joints, (P, J, 3), metres; NaN of absent people and of joints that the body model does not have.
+
+    Raises:
+        ValueError: joints of another skeleton than the detections.
+    """
+
+    detections: Detections
+    joints: Floats
+
+    def __post_init__(self) -> None:
+        shape = ("P", len(self.detections.skeleton), 3)
+        object.__setattr__(self, "joints", as_array(self.joints, shape, "joints"))
+
+
+def whole_joints(body: Floats, outer: Floats, skeleton: Skeleton) -> Floats:
+    """Return values of the joints of a skeleton, (..., J, k), from those of COCO17, (..., 17, k), and the others."""
+    rows, others = rows_of(skeleton)
+    known = rows >= 0
+    whole = np.empty((*body.shape[:-2], len(skeleton), body.shape[-1]))
+    whole[..., rows[known], :], whole[..., others, :] = body[..., known, :], outer
+    return whole
