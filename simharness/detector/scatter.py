@@ -41,8 +41,8 @@ class Scatter:
             occlusion: occlusion classes of the person's joints, (T, V, 17).
             axes: right and down in the pictures as directions in the world, (T, V, 2, 3).
         """
-        near = _near_joints(self.correlation.scatter_near)
-        return self.of_joints(person, np.array(self.config.scatter.by_joint()), occlusion, axes, near=near)
+        sigma = np.array(self.config.scatter.by_joint())
+        return self.of_joints(person, sigma, occlusion, axes, near=_near_joints(self.correlation.scatter_near))
 
     def of_joints(
         self, key: Key, sigma: Floats, occlusion: NDArray[np.int8], axes: Floats, *, near: Floats | None = None

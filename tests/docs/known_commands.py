@@ -89,10 +89,8 @@ MODULES = tuple(
     )
 )
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
-BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")  # without arguments, they start to bake
-    "python -m tools.body.bake",
-    "python -m tools.body.hands_and_feet",
-)  # take no arguments: they would start to bake
+# Without arguments these begin to bake the body.
+BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
 KNOWN = {
     *ALONE,
     *USER_FILES.values(),
