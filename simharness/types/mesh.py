@@ -27,6 +27,8 @@ class Mesh:
             whole texture from 0 to 1; outside this range it repeats. Required with a texture, forbidden without.
         parts: label of each face, -1 for none, (k,) int8; for a body the
             :class:`simharness.world.humans.segments.Segment`. None if no face has a label.
+        still: whether the mesh stays where it is as long as the scene lasts: renderers draw it once for each camera
+            that stays too.
 
     Raises:
         ValueError: a wrong shape, a vertex or texture coordinate that is not finite, a face that refers to a missing
@@ -40,6 +42,7 @@ class Mesh:
     texture: NDArray[np.uint8] | None = None
     uv: NDArray[np.float32] | None = None
     parts: NDArray[np.int8] | None = None
+    still: bool = False
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, "n")
@@ -73,7 +76,7 @@ class Mesh:
             object.__setattr__(self, "parts", parts)
 
     def moved(self, vertices: ArrayLike) -> Self:
-        """Return the mesh with other vertex positions, (n, 3).
+        """Return the mesh with other vertex positions, (n, 3); it is not ``still``.
 
         All other arrays are shared: they are not checked again, and renderers reuse what they computed from them.
 
@@ -83,6 +86,7 @@ class Mesh:
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         object.__setattr__(other, "vertices", _checked_vertices(vertices, len(self.vertices)))
+        object.__setattr__(other, "still", False)
         return other
 
 

@@ -38,19 +38,19 @@ def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tupl
 
 @njit(cache=True, error_model="numpy")
 def casters(
-    vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, light: np.ndarray
+    vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, light: np.ndarray, box: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the faces (m, 3) that may cast shadows, and the lowest and highest coordinates of their vertices, (3,).
 
-    These are the faces turned to ``light`` (3,) behind which the bounding box of all vertices reaches by more than
-    ``_BOUND``.
+    These are the faces turned to ``light`` (3,) behind which the bounding box of the scene, that of ``vertices`` and
+    ``box`` (2, 3), reaches by more than ``_BOUND``. Without such a face the coordinates are those of ``vertices``.
     """
-    low, high = np.zeros(3), np.zeros(3)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for i in range(len(vertices)):
         for k in range(3):
-            value = vertices[i, k]
-            low[k] = value if i == 0 or value < low[k] else low[k]
-            high[k] = value if i == 0 or value > high[k] else high[k]
+            value = np.float64(vertices[i, k])
+            low[k], high[k] = min(low[k], value), max(high[k], value)
+    around_low, around_high = np.minimum(low, box[0]), np.maximum(high, box[1])
     kept, count = np.empty_like(faces), 0
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
     for t in range(len(faces)):
@@ -58,9 +58,9 @@ def casters(
         if not nx * light[0] + ny * light[1] + nz * light[2] > 0:
             continue
         a = faces[t, 0]
-        behind = nx * ((low[0] if nx > 0 else high[0]) - vertices[a, 0])
-        behind += ny * ((low[1] if ny > 0 else high[1]) - vertices[a, 1])
-        behind += nz * ((low[2] if nz > 0 else high[2]) - vertices[a, 2])
+        behind = nx * ((around_low[0] if nx > 0 else around_high[0]) - vertices[a, 0])
+        behind += ny * ((around_low[1] if ny > 0 else around_high[1]) - vertices[a, 1])
+        behind += nz * ((around_low[2] if nz > 0 else around_high[2]) - vertices[a, 2])
         if behind > -_BOUND:
             continue
         for j in range(3):

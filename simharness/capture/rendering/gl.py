@@ -23,8 +23,10 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.face_kernels import normals
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, Unavailable, check_count
-from simharness.capture.rendering.scene_geometry import SceneGeometry, Shadows, pyramid
+from simharness.capture.rendering.scene_geometry import SceneGeometry
+from simharness.capture.rendering.scene_topology import pyramid
 from simharness.capture.rendering.shading_kernels import LEAST_COSINE
+from simharness.capture.rendering.shadow_maps import Shadows
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
@@ -223,10 +225,10 @@ def _renderer() -> Any:
             program.set_uniform("light", np.array(lighting.direction))
             program.set_uniform("strengths", np.array([lighting.key, lighting.sky, lighting.fill]))
             program.set_uniform("tint", np.array(lighting.tint))
-            for name, row in zip(("light_x", "light_y", "light_w"), shadows.P, strict=True):
+            for name, row in zip(("light_x", "light_y", "light_w"), shadows.light.P, strict=True):
                 program.set_uniform(name, row)
             program.set_uniform("shadow_map", _SHADOW_UNIT)
-            program.set_uniform("bias", float(shadows.bias))
+            program.set_uniform("bias", float(shadows.light.bias))
             program.set_uniform("least_cosine", LEAST_COSINE)
 
         def _configure_main_framebuffer(self) -> None:

@@ -78,6 +78,7 @@ def reflected(mesh: Mesh, mirror: Mirror) -> Mesh:
     """Return the mirror image of a mesh: its part in front of the plane of the glass, reflected; may have no faces."""
     cut = _in_front(mesh, mirror)
     changed: dict[str, Any] = {"vertices": mirror.reflect(cut.vertices).astype(np.float32), "faces": cut.faces[:, ::-1]}
+    changed["still"] = False  # a new mesh for every picture
     if cut.uv is not None:
         changed["uv"] = cut.uv[:, ::-1]
     return replace(cut, **changed)

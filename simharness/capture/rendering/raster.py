@@ -2,33 +2,52 @@
 
 Depth and ids are exact at pixel centres: the ray of every pixel is intersected with the triangles in float64 (see
 :func:`simharness.capture.rendering.raster_kernels.rasterise`), without a sampling pattern or fixed-point grid.
+
+Meshes that stay where they are (``Mesh.still``) are drawn first, and the others over them, so that what a camera sees
+of the former can be kept for its next picture; a picture is the same to the bit whether it was kept or not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.camera import Camera
+from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
 from simharness.capture.rendering.lens import through_lens
-from simharness.capture.rendering.raster_kernels import rasterise, resolve
+from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
-from simharness.capture.rendering.shading_kernels import shade
+from simharness.capture.rendering.shading_kernels import shade, shadow_places
+from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.rigs.projection import projection_matrix
 
 _MOST_MESHES = np.iinfo(np.int16).max
+_KEPT_SCENES = 2  # a scene and its reflection in a mirror
+
+
+@dataclass
+class _Scene:
+    """Scene at the time of the last picture, and what cameras see of its still meshes."""
+
+    geometry: SceneGeometry
+    backgrounds: Backgrounds = field(default_factory=Backgrounds)
 
 
 class RasterRenderer:
-    """Renderer on one CPU core. The last scene is kept, so all views of a frame share its shadows."""
+    """Renderer on one CPU core.
+
+    It keeps the last scenes, so that all views of a frame share its shadows, and what cameras see of meshes that stay
+    where they are, within a limit of memory.
+    """
 
     def __init__(self) -> None:
-        self._geometry = SceneGeometry.of(())
+        self._scenes: list[_Scene] = []
         self._inverse_depth, self._triangle = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
 
     def render(
@@ -42,49 +61,94 @@ class RasterRenderer:
     ) -> Image:
         """Render ``meshes`` from ``camera``: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
         check_count(meshes, most=_MOST_MESHES)
-        self._geometry = SceneGeometry.of(meshes, self._geometry)
-        return through_lens(camera, lambda pinhole: self._picture(pinhole, color, lighting, parts))
+        scene = self._scene(meshes)
+        return through_lens(camera, lambda pinhole: self._picture(scene, pinhole, color, lighting, parts))
 
-    def _picture(self, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
-        geometry, shape = self._geometry, camera.size[::-1]
-        inverse_depth, triangle = self._buffers(shape)
-        projection = projection_matrix(camera)
-        q = rasterise(geometry.vertices, geometry.topology.faces, projection, NEAR, inverse_depth, triangle)
-        depth, ids = resolve(inverse_depth, triangle, geometry.topology.mesh)
-        return Image(
-            rgb=_shaded(geometry, camera, lighting, inverse_depth, triangle, q)
-            if color
-            else np.zeros((*shape, 3), np.uint8),
-            depth=depth,
-            ids=ids,
-            parts=geometry.topology.parts[triangle] if parts else None,
+    def _scene(self, meshes: Sequence[Mesh]) -> _Scene:
+        """Return the scene of these meshes: the last one with the same still meshes, moved on."""
+        for scene in self._scenes:
+            if scene.geometry.still.holds(meshes):
+                scene.geometry = SceneGeometry.of(meshes, scene.geometry)
+                return scene
+        scene = _Scene(SceneGeometry.of(meshes))
+        self._scenes = [scene, *self._scenes][:_KEPT_SCENES]
+        return scene
+
+    def _picture(self, scene: _Scene, camera: Camera, color: bool, lighting: Lighting, parts: bool) -> Image:
+        geometry, background = scene.geometry, _background(scene, camera)
+        topology, projection = geometry.topology, projection_matrix(camera)
+        inverse_depth, triangle = self._buffers(background)
+        first = topology.still[0]
+        corners = rasterise(
+            geometry.vertices, topology.faces, projection, NEAR, inverse_depth, triangle, background.corners, first
         )
+        depth, ids = resolve(inverse_depth, triangle, topology.mesh)
+        if color:
+            lit = _lit(background, geometry, camera, lighting)
+            rgb = lit.rgb.copy()
+            seen, moving = (triangle, inverse_depth, corners), geometry.shadows(lighting).moving
+            _shade(geometry, camera, lighting, *seen, moving, lit.shadow_place, lit.shadow_depth, first, rgb)
+        else:
+            rgb = np.zeros((*triangle.shape, 3), np.uint8)
+        return Image(rgb=rgb, depth=depth, ids=ids, parts=topology.parts[triangle] if parts else None)
 
-    def _buffers(self, shape: tuple[int, int]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Return cleared buffers of inverse depth and face per pixel; they reuse the memory of the last picture."""
-        if self._triangle.shape != shape:
-            self._inverse_depth, self._triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
-        self._inverse_depth.fill(0)
-        self._triangle.fill(-1)
+    def _buffers(self, background: Background) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Return copies of the inverse depth and the faces of a background, in the memory of the last picture."""
+        if self._triangle.shape != background.triangle.shape:
+            self._inverse_depth = np.empty_like(background.inverse_depth)
+            self._triangle = np.empty_like(background.triangle)
+        np.copyto(self._inverse_depth, background.inverse_depth)
+        np.copyto(self._triangle, background.triangle)
         return self._inverse_depth, self._triangle
 
 
-def _shaded(
+def _background(scene: _Scene, camera: Camera) -> Background:
+    """Return what a camera sees of the still meshes of a scene."""
+    projection, shape = projection_matrix(camera), camera.size[::-1]
+    found = scene.backgrounds.find(projection, camera.size)
+    if found is None:
+        still = scene.geometry.still
+        inverse_depth, triangle = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
+        faces = still.topology.faces
+        corners = rasterise(still.vertices, faces, projection, NEAR, inverse_depth, triangle, NOTHING_DRAWN, 0)
+        found = Background(inverse_depth, triangle, corners)
+        scene.backgrounds.keep(projection, camera.size, found)
+    return found
+
+
+def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighting: Lighting) -> LitBackground:
+    """Return the background in a light; the last one is kept."""
+    view, seen = geometry.shadows(lighting).light, (background.triangle, background.inverse_depth)
+    if background.lit is None or (background.lit.lighting, background.lit.view) != (lighting, view):
+        empty = np.round(255 * np.array(lighting.background)).astype(np.uint8)
+        rgb = np.full((*background.triangle.shape, 3), empty, np.uint8)
+        place, depth = shadow_places(*seen, camera.center, _rays(camera), view.P, SHADOW_SIZE)
+        _shade(geometry, camera, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
+        background.lit = LitBackground(lighting, view, rgb, place, depth)
+    return background.lit
+
+
+def _shade(
     geometry: SceneGeometry,
     camera: Camera,
     lighting: Lighting,
-    inverse_depth: NDArray[np.float32],
     triangle: NDArray[np.int32],
-    q: NDArray[np.float64],
-) -> NDArray[np.uint8]:
-    empty = np.round(255 * np.array(lighting.background))
-    if not len(geometry.topology.faces):
-        return np.full((*triangle.shape, 3), empty, np.uint8)
+    inverse_depth: NDArray[np.float32],
+    corners: NDArray[np.float64],
+    moving: ShadowMap,
+    shadow_place: NDArray[np.uint16],
+    shadow_depth: NDArray[np.float32],
+    first_face: int,
+    rgb: NDArray[np.uint8],
+) -> None:
+    """Colour a picture in place; see :func:`~simharness.capture.rendering.shading_kernels.shade`."""
     topology, shadows = geometry.topology, geometry.shadows(lighting)
-    return shade(
+    if not len(topology.faces):
+        return
+    shade(
         triangle,
         inverse_depth,
-        q,
+        corners,
         topology.faces,
         topology.colors,
         topology.smooth,
@@ -93,13 +157,23 @@ def _shaded(
         topology.uv,
         *topology.pyramids,
         camera.center,
-        np.ascontiguousarray(np.linalg.inv(projection_matrix(camera)[:, :3])),
+        _rays(camera),
         np.array(lighting.direction),
         np.array([lighting.key, lighting.sky, lighting.fill]),
         255 * np.sqrt(lighting.tint),  # sRGB is about the square root of linear light
-        empty,
-        shadows.P,
-        shadows.nearest,
-        shadows.blocks,
-        shadows.bias,
+        shadows.light.P,
+        shadows.light.bias,
+        shadows.still.nearest,
+        shadows.still.blocks,
+        moving.nearest,
+        moving.blocks,
+        shadow_place,
+        shadow_depth,
+        first_face,
+        rgb,
     )
+
+
+def _rays(camera: Camera) -> NDArray[np.float64]:
+    """Return the matrix, (3, 3), such that ``center + depth * matrix @ (x, y, 1)`` is the point at a pixel."""
+    return np.ascontiguousarray(np.linalg.inv(projection_matrix(camera)[:, :3]))

@@ -23,6 +23,8 @@ from mvpose.kernels import njit
 # The kernels are typed by the arrays of the first call. Indices are unsigned or count from 0: an index that may be
 # negative would be checked at every use, and prevents vectorisation of loops.
 
+NOTHING_DRAWN = np.zeros((0, 3))  # pixel coordinates of no vertices
+
 _SLACK = 4e-3  # pixels: bounding boxes are in single precision; the edges decide
 _TILE = 4  # pixels
 _SMALL = 12  # pixels: larger triangles are drawn row by row
@@ -39,8 +41,13 @@ def rasterise(
     near: float,
     inverse_depth: np.ndarray,
     triangle: np.ndarray,
+    drawn: np.ndarray,
+    first: int,
 ) -> np.ndarray:
     """Write the nearest triangle at every pixel centre into ``inverse_depth`` and ``triangle``, in place.
+
+    A call may add triangles to what an earlier call has written: those that come first in ``faces``, with their own
+    vertices, which come first in ``vertices``. At equal depth the earlier ones stay.
 
     Both sides of triangles are drawn, but those seen from behind last: most of them, the far sides of bodies and half
     of all triangles, are then known to be hidden and skipped.
@@ -52,6 +59,8 @@ def rasterise(
         near: depth below which nothing is drawn.
         inverse_depth: (h, w) float32, zeros before the first call.
         triangle: index of the visible face, (h, w) int32; -1 before the first call.
+        drawn: homogeneous pixel coordinates of the first vertices, (m, 3), as an earlier call returned them.
+        first: number of triangles that an earlier call has drawn; those that follow have none of the first m vertices.
 
     Returns:
         Homogeneous pixel coordinates of the vertices, (n, 3).
@@ -62,7 +71,8 @@ def rasterise(
     p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
     p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
     p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
-    for i in range(len(vertices)):
+    q[: len(drawn)] = drawn
+    for i in range(len(drawn), len(vertices)):
         x, y, z = np.float64(vertices[i, 0]), np.float64(vertices[i, 1]), np.float64(vertices[i, 2])
         q[i, 0], q[i, 1] = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
         q[i, 2] = p20 * x + p21 * y + p22 * z + p23
@@ -71,7 +81,7 @@ def rasterise(
         seen[i, 0], seen[i, 1] = q[i, 0] * scale, q[i, 1] * scale
         seen[i, 2] = scale if q[i, 2] >= near else 0.0
 
-    lists, counts = _select(faces, seen, width, height)
+    lists, counts = _select(faces, first, seen, width, height)
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
     for averted in range(2):
@@ -86,16 +96,18 @@ def rasterise(
 
 
 @njit(cache=True, error_model="numpy")
-def _select(faces: np.ndarray, seen: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return triangles that may cover a pixel centre: four lists of indices, (4, k), and their lengths.
+def _select(
+    faces: np.ndarray, first_face: int, seen: np.ndarray, width: int, height: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return triangles from ``first_face`` on that may cover a pixel centre: four lists, (4, k), and their lengths.
 
     Small triangles that face the camera; large ones, and all that the near plane cuts; then small and large ones seen
     from behind.
     """
-    lists, counts = np.empty((4, len(faces) + 1), np.uint32), np.zeros(4, np.int64)
+    lists, counts = np.empty((4, len(faces) - first_face + 1), np.uint32), np.zeros(4, np.int64)
     facing_small, facing_large, averted_small, averted_large, slack = 0, 0, 0, 0, np.float32(_SLACK)
     right, bottom, most = np.float32(width), np.float32(height), np.float32(_SMALL)
-    for t in range(len(faces)):
+    for t in range(first_face, len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
         ahead_a, ahead_b, ahead_c = seen[a, 2] > 0, seen[b, 2] > 0, seen[c, 2] > 0

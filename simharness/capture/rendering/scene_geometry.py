@@ -1,208 +1,160 @@
-"""Geometry of a whole scene for shading: merged triangles, normals, texture pyramids, shadow map.
+"""Geometry of a whole scene: merged triangles, normals, shadow maps.
 
-Between frames mostly vertices move. So everything that depends on the faces of the meshes is in :class:`SceneTopology`,
-reused while they are the same, and everything that depends on the vertices in :class:`SceneGeometry`.
+Between frames mostly vertices of people move. So everything that depends on the faces of the meshes is in
+:class:`~simharness.capture.rendering.scene_topology.SceneTopology`, reused while they are the same, everything that
+depends on the vertices of meshes that stay where they are is in :class:`StillGeometry`, and the rest in
+:class:`SceneGeometry`.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.face_kernels import casters, normals
-from simharness.capture.rendering.raster_kernels import rasterise
-from simharness.capture.rendering.shading_kernels import BIAS, nearest_blocks, packed
-from simharness.types.lighting import Lighting, facing
+from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.shadow_maps import LightView, ShadowMap, Shadows, shadow_map
+from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
 
-SHADOW_SIZE = 768  # pixels
-_LIGHT_DISTANCE = 1000.0  # in radii of the shadow casters: rays are almost parallel
-
 
 @dataclass(frozen=True)
-class SceneTopology:
-    """Faces of a scene with n vertices and k faces in total."""
+class StillGeometry:
+    """Triangles of the meshes that stay where they are; computed once for a scene."""
 
     meshes: tuple[Mesh, ...]
 
-    def matches(self, meshes: Sequence[Mesh]) -> bool:
-        """Return whether meshes are the same except for their vertex positions."""
-        return len(meshes) == len(self.meshes) and all(map(_same_topology, meshes, self.meshes))
+    def holds(self, meshes: Sequence[Mesh]) -> bool:
+        """Return whether the still ones among ``meshes`` are these, in this order."""
+        return _same([mesh for mesh in meshes if mesh.still], self.meshes)
 
     @cached_property
-    def faces(self) -> NDArray[np.uint32]:
-        """Indices of all faces into all vertices, (k, 3)."""
-        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in self.meshes)]).astype(np.int32)
-        faces = [mesh.faces + start for mesh, start in zip(self.meshes, starts, strict=False)]
-        return np.concatenate([np.zeros((0, 3), np.int32), *faces]).view(np.uint32)
-
-    @cached_property
-    def mesh(self) -> NDArray[np.int16]:
-        """Mesh index of every face, then -1 for face -1 (no face), (k + 1,)."""
-        return np.append(self._per_face(range(len(self.meshes))), -1).astype(np.int16)
-
-    @cached_property
-    def parts(self) -> NDArray[np.int8]:
-        """Part label of every face, then -1 for face -1 (no face), (k + 1,)."""
-        none = (np.full(len(mesh.faces), -1, np.int8) for mesh in self.meshes)
-        labels = [rest if mesh.parts is None else mesh.parts for mesh, rest in zip(self.meshes, none, strict=True)]
-        return np.concatenate([*labels, np.array([-1], np.int8)])
-
-    @cached_property
-    def colors(self) -> Floats:
-        """Colours of the faces, (k, 3)."""
-        return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.colors for mesh in self.meshes)])
-
-    @cached_property
-    def smooth(self) -> NDArray[np.bool_]:
-        """Whether each face has interpolated normals, (k,)."""
-        return self._per_face(mesh.smooth for mesh in self.meshes).astype(bool)
-
-    @cached_property
-    def texture(self) -> NDArray[np.int16]:
-        """Index of the texture of every face, -1 for none, (k,)."""
-        index = {id(texture): k for k, texture in enumerate(self._textures)}
-        return self._per_face(index.get(id(mesh.texture), -1) for mesh in self.meshes).astype(np.int16)
-
-    @cached_property
-    def uv(self) -> Floats:
-        """Texture coordinates of the corners, (k, 3, 2); zeros for faces without texture, (1, 3, 2) if none has one."""
-        if not self._textures:
-            return np.zeros((1, 3, 2), np.float32)
-        corners = [
-            np.zeros((len(mesh.faces), 3, 2), np.float32) if mesh.uv is None else mesh.uv for mesh in self.meshes
-        ]
-        return np.concatenate(corners)
-
-    @cached_property
-    def pyramids(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
-        """Packed texels of all textures at all mipmap levels, (m,), and first texel, height and width of each level.
-
-        The latter is (textures, levels, 3); small textures repeat their last level. Every level has a border of one
-        texel, copied from the opposite side.
-        """
-        pyramids = [list(pyramid(texture)) for texture in self._textures] or [[np.full((1, 1, 3), 255, np.uint8)]]
-        table = np.zeros((len(pyramids), max(map(len, pyramids)), 3), np.int64)
-        texels: list[NDArray[np.uint8]] = []
-        first = 0
-        for k, pictures in enumerate(pyramids):
-            for level, picture in enumerate(pictures):
-                table[k, level:] = first, *picture.shape[:2]
-                texels.append(np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="wrap").reshape(-1, 3))
-                first += len(texels[-1])
-        return packed(np.concatenate(texels)), table
-
-    @cached_property
-    def _textures(self) -> list[NDArray[np.uint8]]:
-        """Distinct textures."""
-        return list({id(mesh.texture): mesh.texture for mesh in self.meshes if mesh.texture is not None}.values())
-
-    def _per_face(self, values: Iterable[int]) -> NDArray:
-        return np.repeat(np.array(list(values), int), [len(mesh.faces) for mesh in self.meshes])
-
-
-@dataclass(frozen=True)
-class SceneGeometry:
-    """Triangles of a scene at their positions; what only shading needs is computed on first use."""
-
-    topology: SceneTopology
-    meshes: tuple[Mesh, ...]
-
-    @classmethod
-    def of(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
-        """Return the geometry of a scene; reuses the ``last`` one as far as it is unchanged."""
-        if last is not None and len(meshes) == len(last.meshes) and all(map(operator.is_, meshes, last.meshes)):
-            return last  # the same frozen objects: nothing changed
-        kept = last is not None and last.topology.matches(meshes)
-        return cls(last.topology if last is not None and kept else SceneTopology(tuple(meshes)), tuple(meshes))
+    def topology(self) -> SceneTopology:
+        """Faces of these meshes."""
+        return SceneTopology(self.meshes)
 
     @cached_property
     def vertices(self) -> Floats:
         """Vertices in the world, (n, 3)."""
-        return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.vertices for mesh in self.meshes)])
+        return _vertices(self.meshes)
 
     @cached_property
     def normals(self) -> tuple[Floats, Floats]:
         """Normals of the faces, (k, 3), and of the vertices, (n, 3)."""
         return normals(self.vertices, self.topology.faces, self.topology.smooth)
 
-    def shadows(self, lighting: Lighting) -> Shadows:
-        """Return the shadow map for a lighting; the last one is cached."""
-        kept: Shadows | None = self.__dict__.get("_shadows")
-        if kept is None or kept.direction != lighting.direction:
-            kept = cast_shadows(self, lighting)
-            self.__dict__["_shadows"] = kept
-        return kept
+    @cached_property
+    def box(self) -> NDArray[np.float64]:
+        """Lowest and highest coordinates of the vertices, (2, 3); inf and -inf without vertices."""
+        if not len(self.vertices):
+            return np.array([[np.inf] * 3, [-np.inf] * 3])
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], float)
+
+    def shadow(self, light: LightView) -> ShadowMap:
+        """Return the shadow map of these meshes; the last one is cached."""
+        kept: tuple[LightView, ShadowMap] | None = self.__dict__.get("_shadow")
+        if kept is None or kept[0] != light:
+            direction = np.array(light.direction)
+            faces, _, _ = casters(self.vertices, self.topology.faces, self.normals[0], direction, self.box)
+            kept = light, shadow_map(light, self.vertices, faces)
+            self.__dict__["_shadow"] = kept
+        return kept[1]
 
 
 @dataclass(frozen=True)
-class Shadows:
-    """Shadow map of a distant light.
+class SceneGeometry:
+    """Triangles of a scene at their positions; what only shading needs is computed on first use.
 
     Attributes:
-        direction: unit vector to the light.
-        P: projection into the map, (3, 4).
-        nearest: inverse depth from the light of the first surface, (s, s) float32, 0 if there is none.
-        bias: least lead in inverse depth of a surface that shades another one that faces the light.
+        topology: faces of all meshes, those of still meshes first.
+        meshes: meshes in the order of the topology.
+        still: triangles of the still meshes.
     """
 
-    direction: tuple[float, float, float]
-    P: NDArray[np.float64]
-    nearest: Floats
-    bias: float
+    topology: SceneTopology
+    meshes: tuple[Mesh, ...]
+    still: StillGeometry
+
+    @classmethod
+    def of(cls, meshes: Sequence[Mesh], last: SceneGeometry | None = None) -> SceneGeometry:
+        """Return the geometry of a scene; reuses the ``last`` one as far as it is unchanged."""
+        order = sorted(range(len(meshes)), key=lambda k: not meshes[k].still)
+        ordered = tuple(meshes[k] for k in order)
+        still = tuple(mesh for mesh in ordered if mesh.still)
+        if last is None:
+            return cls(SceneTopology(ordered, tuple(order)), ordered, StillGeometry(still))
+        if tuple(order) == last.topology.order and _same(ordered, last.meshes):
+            return last  # the same frozen objects: nothing changed
+        return cls(
+            last.topology if last.topology.matches(ordered, order) else SceneTopology(ordered, tuple(order)),
+            ordered,
+            last.still if _same(still, last.still.meshes) else StillGeometry(still),
+        )
 
     @cached_property
-    def blocks(self) -> Floats:
-        """Highest inverse depth in every block of the map, for the rasteriser."""
-        return nearest_blocks(self.nearest)
+    def moving_vertices(self) -> Floats:
+        """Vertices of the meshes that are not still, (n, 3)."""
+        return _vertices(self.meshes[len(self.still.meshes) :])
+
+    @cached_property
+    def vertices(self) -> Floats:
+        """Vertices in the world, (n, 3)."""
+        return np.concatenate([self.still.vertices, self.moving_vertices])
+
+    @cached_property
+    def normals(self) -> tuple[Floats, Floats]:
+        """Normals of the faces, (k, 3), and of the vertices, (n, 3)."""
+        of_faces, of_vertices = self._moving_normals
+        return (
+            np.concatenate([self.still.normals[0], of_faces]),
+            np.concatenate([self.still.normals[1], of_vertices]),
+        )
+
+    @cached_property
+    def _moving_normals(self) -> tuple[Floats, Floats]:
+        smooth = self.topology.smooth[self.topology.still[0] :]
+        return normals(self.moving_vertices, self.topology.moving_faces, smooth)
+
+    def shadows(self, lighting: Lighting) -> Shadows:
+        """Return the shadow maps for a lighting; the last ones are cached."""
+        kept: Shadows | None = self.__dict__.get("_shadows")
+        if kept is None or kept.light.direction != lighting.direction:
+            kept = self._cast(lighting.direction)
+            self.__dict__["_shadows"] = kept
+        return kept
+
+    def _cast(self, direction: tuple[float, float, float]) -> Shadows:
+        """Render the shadow maps of the scene from the light.
+
+        Only faces turned to the light cast shadows: this is sufficient for closed bodies, and lets the light into a
+        room, whose walls face inwards. The floor and the walls that receive light have nothing behind them. The maps
+        cover what stands still, and the rest to the next metre if it reaches beyond: so the still one is reused.
+        Without still meshes they cover the faces that cast shadows.
+        """
+        vertices, still = self.moving_vertices, self.still
+        faces, low, high = casters(
+            vertices, self.topology.moving_faces, self._moving_normals[0], np.array(direction), still.box
+        )
+        if len(still.vertices):
+            outer = np.array([np.floor(low), np.ceil(high)])
+            inside = (low >= still.box[0]) & (high <= still.box[1])
+            low = np.where(inside, still.box[0], np.minimum(still.box[0], outer[0]))
+            high = np.where(inside, still.box[1], np.maximum(still.box[1], outer[1]))
+        light = LightView.of(direction, low, high)
+        return Shadows(light, still.shadow(light), shadow_map(light, vertices, faces))
 
 
-def cast_shadows(geometry: SceneGeometry, lighting: Lighting) -> Shadows:
-    """Render the shadow map of a scene from the light.
-
-    Only faces turned to the light cast shadows: this is sufficient for closed bodies, and lets the light into a room,
-    whose walls face inwards. The floor and the walls that receive light have nothing behind them. The map covers just
-    the remaining faces.
-    """
-    vertices, direction = geometry.vertices, np.array(lighting.direction)
-    nearest = np.zeros((SHADOW_SIZE, SHADOW_SIZE), np.float32)
-    faces, low, high = casters(vertices, geometry.topology.faces, geometry.normals[0], direction)
-    middle, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
-    R, half = facing(direction), SHADOW_SIZE / 2
-    K = np.array([[half * (_LIGHT_DISTANCE - 1), 0, half], [0, half * (_LIGHT_DISTANCE - 1), half], [0, 0, 1]])
-    P = K @ np.column_stack([R, -R @ (middle + _LIGHT_DISTANCE * radius * direction)])
-    rasterise(vertices, faces, P, radius, nearest, np.full(nearest.shape, -1, np.int32))
-    bias = BIAS * (radius / half) / (_LIGHT_DISTANCE * radius) ** 2  # as inverse depth, which is nearly constant here
-    return Shadows(lighting.direction, P, nearest, bias)
+def _vertices(meshes: Iterable[Mesh]) -> Floats:
+    return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.vertices for mesh in meshes)])
 
 
-def _same_topology(one: Mesh, other: Mesh) -> bool:
-    return (
-        one.faces is other.faces
-        and one.colors is other.colors
-        and one.texture is other.texture
-        and one.uv is other.uv
-        and one.parts is other.parts
-        and one.smooth == other.smooth
-        and len(one.vertices) == len(other.vertices)
-    )
-
-
-def pyramid(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
-    """Yield a texture and its halved versions (mipmap levels) down to one texel."""
-    picture = texture
-    while True:
-        yield picture
-        height, width = picture.shape[:2]
-        if height == width == 1:
-            return
-        size = (max(1, width // 2), max(1, height // 2))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+def _same(meshes: Sequence[Mesh], others: Sequence[Mesh]) -> bool:
+    """Return whether two lists hold the same frozen objects."""
+    return len(meshes) == len(others) and all(map(operator.is_, meshes, others))

@@ -1,8 +1,8 @@
 """Compiled shading pass of the rasteriser: private, on plain arrays, single-threaded.
 
-One row of the picture at a time. Computations with the same rule for every pixel (its position in the shadow map, its
-colour from light and albedo) are loops over the row that the compiler vectorises; values that depend on the triangle
-are computed once for every run of pixels that show the same triangle.
+One row of the picture at a time, and of it the spans of pixels that are new. Computations with the same rule for every
+pixel (its position in the shadow map, its colour from light and albedo) are loops that the compiler vectorises; values
+that depend on the triangle are computed once for every run of pixels that show the same triangle.
 
 Over a triangle the weights of its corners are ``edge . d`` up to a common factor, in the notation of
 :mod:`simharness.capture.rendering.raster_kernels`. So attributes of the corners (normals, texture coordinates) and all
@@ -55,13 +55,18 @@ def shade(
     light: np.ndarray,
     strengths: np.ndarray,
     gains: np.ndarray,
-    empty: np.ndarray,
     light_P: np.ndarray,
+    bias: float,
+    still_shadow: np.ndarray,
+    still_blocks: np.ndarray,
     shadow: np.ndarray,
     blocks: np.ndarray,
-    bias: float,
-) -> np.ndarray:
-    """Colour every pixel by the rule of :class:`simharness.types.lighting.Lighting`.
+    shadow_place: np.ndarray,
+    shadow_depth: np.ndarray,
+    first_face: int,
+    rgb: np.ndarray,
+) -> None:
+    """Colour pixels in place, by the rule of :class:`simharness.types.lighting.Lighting`.
 
     Args:
         triangle: visible face or -1, (h, w) int32.
@@ -82,17 +87,20 @@ def shade(
         light: unit direction to the key light, (3,).
         strengths: strengths of key, sky and fill light, (3,).
         gains: 255 times the factor of the light colour on the albedo, sRGB, (3,).
-        empty: background colour, 0 to 255, (3,).
-        light_P: projection into the shadow map, (3, 4).
-        shadow: shadow map: inverse depth from the light, (s, s) float32, 0 if nothing blocks the light.
-        blocks: highest inverse depth in every block of the map, see :func:`nearest_blocks`.
+        light_P: projection into the shadow maps, (3, 4).
         bias: ``BIAS`` as inverse depth, for a surface that faces the light.
-
-    Returns:
-        Picture, (h, w, 3) uint8, sRGB.
+        still_shadow: shadow map of still meshes: inverse depth from the light, (s, s) float32, 0 if nothing blocks the
+            light.
+        still_blocks: highest inverse depth in every block of it, see :func:`nearest_blocks`.
+        shadow: shadow map of the other meshes, (s, s) float32.
+        blocks: highest inverse depth in every block of it.
+        shadow_place: place in the shadow maps of what each pixel shows of still meshes, see :func:`shadow_places`.
+        shadow_depth: its inverse depth from the light.
+        first_face: first face of the meshes that are not still. Only pixels that show them are coloured, and those of
+            still meshes on which their shadows may fall.
+        rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
     height, width = triangle.shape
-    rgb = np.empty((height, width, 3), np.uint8)
     key, fill = np.float32(strengths[0]), np.float32(strengths[2])
     sky_all, sky_up = np.float32(0.65 * strengths[1]), np.float32(0.35 * strengths[1])
     light_x, light_y, light_z = np.float32(light[0]), np.float32(light[1]), np.float32(light[2])
@@ -115,6 +123,7 @@ def shade(
     red, green, blue = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     steps_x, steps_y = np.empty(_STRIDE, np.int32), np.empty(_STRIDE, np.int32)
     mixed, half = np.empty(_STRIDE, np.uint64), np.int32(_STEPS // 2)
+    fresh, shaded_from = np.empty(width, np.bool_), np.append(blocks.ravel(), np.float32(0.0))
     base, rows, columns, stride, wide, high = 0, 1, 1, 3, 1.0, 1.0
     edge, across = np.zeros((3, 3)), np.zeros((3, 3))
     normal, turning = np.zeros(3, np.float32), np.zeros(3, np.float32)
@@ -126,135 +135,178 @@ def shade(
         ray_y = np.float32(rays[1, 1] * y + rays[1, 2])
         ray_z = np.float32(rays[2, 1] * y + rays[2, 2])
         for x in range(width):
-            w, place = inverse_depth[y, x], np.float32(x)
-            scale = np.float32(1.0) / (away_w * w + (seen_w * place + from_w))
-            map_x[x] = (away_x * w + (seen_x * place + from_x)) * scale - np.float32(1.0)
-            map_y[x] = (away_y * w + (seen_y * place + from_y)) * scale - np.float32(1.0)
-            near[x] = w * scale
+            fresh[x] = (triangle[y, x] >= first_face) | (shaded_from[shadow_place[y, x]] > shadow_depth[y, x])
 
-        kept, kept_until = -1, 0
-        end = 0
-        while end < width:
-            start, label = end, triangle[y, end]
-            end += 1
-            if label < 0:
-                while end < width and triangle[y, end] == label:
-                    end += 1
-                shade_light[start:end], key_light[start:end] = 1.0, 0.0
-                red[start:end], green[start:end], blue[start:end] = empty[0], empty[1], empty[2]
-                continue
-            t = np.uint32(label)
+        last = 0
+        while last < width:
+            first_fresh = last
+            while first_fresh < width and not fresh[first_fresh]:
+                first_fresh += 1
+            last = first_fresh
+            while last < width and fresh[last]:
+                last += 1
+            for x in range(first_fresh, last):
+                w, place = inverse_depth[y, x], np.float32(x)
+                scale = np.float32(1.0) / (away_w * w + (seen_w * place + from_w))
+                map_x[x] = (away_x * w + (seen_x * place + from_x)) * scale - np.float32(1.0)
+                map_y[x] = (away_y * w + (seen_y * place + from_y)) * scale - np.float32(1.0)
+                near[x] = w * scale
+            end, kept, kept_until = first_fresh, -1, 0
+            while end < last:
+                start, label = end, triangle[y, end]
+                end += 1
+                t = np.uint32(label)
 
-            textured = texture[t]
-            a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-            is_smooth = smooth[t]
-            if is_smooth or textured >= 0:
-                ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
-                cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
-                edge[0, 0], edge[0, 1], edge[0, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-                edge[1, 0], edge[1, 1], edge[1, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-                edge[2, 0], edge[2, 1], edge[2, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+                textured = texture[t]
+                a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+                is_smooth = smooth[t]
+                if is_smooth or textured >= 0:
+                    ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
+                    cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
+                    edge[0, 0], edge[0, 1], edge[0, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+                    edge[1, 0], edge[1, 1], edge[1, 2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+                    edge[2, 0], edge[2, 1], edge[2, 2] = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
-            dye_red, dye_green = np.float32(gains[0] * colors[t, 0]), np.float32(gains[1] * colors[t, 1])
-            dye_blue = np.float32(gains[2] * colors[t, 2])
-            if is_smooth:
-                # The weights are negative where the triangle faces the camera, so this normal always does.
-                wa = -(edge[0, 0] * start + (edge[0, 1] * y + edge[0, 2]))
-                wb = -(edge[1, 0] * start + (edge[1, 1] * y + edge[1, 2]))
-                wc = -(edge[2, 0] * start + (edge[2, 1] * y + edge[2, 2]))
-                for k in range(3):
-                    na, nb, nc = vertex_normals[a, k], vertex_normals[b, k], vertex_normals[c, k]
-                    normal[k] = np.float32(wa * na + wb * nb + wc * nc)
-                    turning[k] = np.float32(-(edge[0, 0] * na + edge[1, 0] * nb + edge[2, 0] * nc))
-                nx, ny, nz = normal[0], normal[1], normal[2]
-                # Runs are often one or two pixels long: a separate loop for the end would add a mispredicted branch.
-                end = start
-                while end < width and triangle[y, end] == label:
-                    x, place = end, np.float32(end)
-                    end += 1
-                    scale = _UNIT / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), _TINY)
-                    cosine = (nx * light_x + ny * light_y + nz * light_z) * scale
-                    # The ray to the pixel is slightly longer than 1; the error is negligible.
-                    glance = nx * (rise_x * place + ray_x) + ny * (rise_y * place + ray_y)
-                    glance += nz * (rise_z * place + ray_z)
-                    key_light[x] = key * max(cosine, _ZERO)
-                    shade_light[x] = sky_up * nz * scale + sky_all + fill * min(max(-glance * scale, _ZERO), _UNIT)
-                    near[x] += slope_bias / max(cosine, least_cosine)
-                    red[x], green[x], blue[x] = dye_red, dye_green, dye_blue
-                    nx, ny, nz = nx + turning[0], ny + turning[1], nz + turning[2]
+                dye_red, dye_green = np.float32(gains[0] * colors[t, 0]), np.float32(gains[1] * colors[t, 1])
+                dye_blue = np.float32(gains[2] * colors[t, 2])
+                if is_smooth:
+                    # The weights are negative where the triangle faces the camera, so this normal always does.
+                    wa = -(edge[0, 0] * start + (edge[0, 1] * y + edge[0, 2]))
+                    wb = -(edge[1, 0] * start + (edge[1, 1] * y + edge[1, 2]))
+                    wc = -(edge[2, 0] * start + (edge[2, 1] * y + edge[2, 2]))
+                    for k in range(3):
+                        na, nb, nc = vertex_normals[a, k], vertex_normals[b, k], vertex_normals[c, k]
+                        normal[k] = np.float32(wa * na + wb * nb + wc * nc)
+                        turning[k] = np.float32(-(edge[0, 0] * na + edge[1, 0] * nb + edge[2, 0] * nc))
+                    nx, ny, nz = normal[0], normal[1], normal[2]
+                    # Runs are often one or two pixels long: another loop for the end would add a mispredicted branch.
+                    end = start
+                    while end < last and triangle[y, end] == label:
+                        x, place = end, np.float32(end)
+                        end += 1
+                        scale = _UNIT / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), _TINY)
+                        cosine = (nx * light_x + ny * light_y + nz * light_z) * scale
+                        # The ray to the pixel is slightly longer than 1; the error is negligible.
+                        glance = nx * (rise_x * place + ray_x) + ny * (rise_y * place + ray_y)
+                        glance += nz * (rise_z * place + ray_z)
+                        key_light[x] = key * max(cosine, _ZERO)
+                        shade_light[x] = sky_up * nz * scale + sky_all + fill * min(max(-glance * scale, _ZERO), _UNIT)
+                        near[x] += slope_bias / max(cosine, least_cosine)
+                        red[x], green[x], blue[x] = dye_red, dye_green, dye_blue
+                        nx, ny, nz = nx + turning[0], ny + turning[1], nz + turning[2]
+                    if textured < 0:
+                        continue
+                else:
+                    while end < last and triangle[y, end] == label:
+                        end += 1
+                    nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
+                    more = nx * rise_x + ny * rise_y + nz * rise_z
+                    first = nx * ray_x + ny * ray_y + nz * ray_z + more * np.float32(start)
+                    turn = -_UNIT if first > 0 else _UNIT  # seen from behind: the other side of the face
+                    cosine = turn * (nx * light_x + ny * light_y + nz * light_z)
+                    lit, nearer = key * max(cosine, _ZERO), slope_bias / max(cosine, least_cosine)
+                    least = sky_all + sky_up * turn * nz
+                    first, more = -fill * turn * first, -fill * turn * more
+                    run, nears = shade_light[start:end], near[start:end]
+                    for x in range(len(run)):
+                        glance = first + more * np.float32(x)
+                        run[x] = least + (glance if glance < fill else fill)
+                        nears[x] += nearer
+                    key_light[start:end] = lit
+
                 if textured < 0:
+                    red[start:end], green[start:end], blue[start:end] = dye_red, dye_green, dye_blue
                     continue
-            else:
-                while end < width and triangle[y, end] == label:
-                    end += 1
-                nx, ny, nz = face_normals[t, 0], face_normals[t, 1], face_normals[t, 2]
-                more = nx * rise_x + ny * rise_y + nz * rise_z
-                first = nx * ray_x + ny * ray_y + nz * ray_z + more * np.float32(start)
-                turn = -_UNIT if first > 0 else _UNIT  # seen from behind: the other side of the face
-                cosine = turn * (nx * light_x + ny * light_y + nz * light_z)
-                lit, nearer = key * max(cosine, _ZERO), slope_bias / max(cosine, least_cosine)
-                least = sky_all + sky_up * turn * nz
-                first, more = -fill * turn * first, -fill * turn * more
-                run, nears = shade_light[start:end], near[start:end]
-                for x in range(len(run)):
-                    glance = first + more * np.float32(x)
-                    run[x] = least + (glance if glance < fill else fill)
-                    nears[x] += nearer
-                key_light[start:end] = lit
+                for k in range(3):
+                    across[0, k] = edge[0, k] * uv[t, 0, 0] + edge[1, k] * uv[t, 1, 0] + edge[2, k] * uv[t, 2, 0]
+                    across[1, k] = edge[0, k] * uv[t, 0, 1] + edge[1, k] * uv[t, 1, 1] + edge[2, k] * uv[t, 2, 1]
+                    across[2, k] = edge[0, k] + edge[1, k] + edge[2, k]
+                u_rise, u_first = across[0, 0], across[0, 1] * y + across[0, 2]
+                v_rise, v_first = across[1, 0], across[1, 1] * y + across[1, 2]
+                sum_rise, sum_first = across[2, 0], across[2, 1] * y + across[2, 2]
+                share = 1.0 / (255.0 * _STEPS * _STEPS)
+                dye_red, dye_green = np.float32(share * dye_red), np.float32(share * dye_green)
+                dye_blue = np.float32(share * dye_blue)
+                stop = start
+                while stop < end:
+                    begin = stop
+                    if textured != kept or begin >= kept_until:
+                        kept, kept_until = textured, begin + _STRIDE
+                        level = _level(across, begin, y, pyramids[textured])
+                        base = pyramids[textured, level, 0]
+                        rows, columns = pyramids[textured, level, 1], pyramids[textured, level, 2]
+                        stride = columns + 2
+                        wide, high = np.float64(_STEPS * columns), np.float64(_STEPS * rows)
+                    stop = min(kept_until, end)
+                    count = stop - begin
+                    for n in range(count):
+                        column = np.float64(begin + n)
+                        scale = 1.0 / (sum_rise * column + sum_first)
+                        u, v = (u_rise * column + u_first) * scale, (v_rise * column + v_first) * scale
+                        # In steps between texel centres; each level has a border of one texel.
+                        steps_x[n] = np.int32((u - np.floor(u)) * wide) + half
+                        steps_y[n] = np.int32((v - np.floor(v)) * high) + half
+                    for n in range(count):
+                        i, j = steps_x[n], steps_y[n]
+                        one = np.uint64(base + (j >> _SHIFT) * stride + (i >> _SHIFT))
+                        two = one + np.uint64(stride)
+                        weight_x, weight_y = np.uint64(i & (_STEPS - 1)), np.uint64(j & (_STEPS - 1))
+                        rest_x, rest_y = np.uint64(_STEPS) - weight_x, np.uint64(_STEPS) - weight_y
+                        mix = rest_y * (rest_x * texels[one] + weight_x * texels[one + _ONE])
+                        mixed[n] = mix + weight_y * (rest_x * texels[two] + weight_x * texels[two + _ONE])
+                    reds, greens, blues = red[begin:stop], green[begin:stop], blue[begin:stop]
+                    for n in range(count):
+                        reds[n] = dye_red * np.float32(np.int32(mixed[n] & _MASK))
+                        greens[n] = dye_green * np.float32(np.int32((mixed[n] >> _LANE) & _MASK))
+                        blues[n] = dye_blue * np.float32(np.int32(mixed[n] >> _TWO_LANES))
 
-            if textured < 0:
-                red[start:end], green[start:end], blue[start:end] = dye_red, dye_green, dye_blue
-                continue
-            for k in range(3):
-                across[0, k] = edge[0, k] * uv[t, 0, 0] + edge[1, k] * uv[t, 1, 0] + edge[2, k] * uv[t, 2, 0]
-                across[1, k] = edge[0, k] * uv[t, 0, 1] + edge[1, k] * uv[t, 1, 1] + edge[2, k] * uv[t, 2, 1]
-                across[2, k] = edge[0, k] + edge[1, k] + edge[2, k]
-            u_rise, u_first = across[0, 0], across[0, 1] * y + across[0, 2]
-            v_rise, v_first = across[1, 0], across[1, 1] * y + across[1, 2]
-            sum_rise, sum_first = across[2, 0], across[2, 1] * y + across[2, 2]
-            share = 1.0 / (255.0 * _STEPS * _STEPS)
-            dye_red, dye_green = np.float32(share * dye_red), np.float32(share * dye_green)
-            dye_blue = np.float32(share * dye_blue)
-            stop = start
-            while stop < end:
-                begin = stop
-                if textured != kept or begin >= kept_until:
-                    kept, kept_until = textured, begin + _STRIDE
-                    level = _level(across, begin, y, pyramids[textured])
-                    base = pyramids[textured, level, 0]
-                    rows, columns = pyramids[textured, level, 1], pyramids[textured, level, 2]
-                    stride = columns + 2
-                    wide, high = np.float64(_STEPS * columns), np.float64(_STEPS * rows)
-                stop = min(kept_until, end)
-                count = stop - begin
-                for n in range(count):
-                    column = np.float64(begin + n)
-                    scale = 1.0 / (sum_rise * column + sum_first)
-                    u, v = (u_rise * column + u_first) * scale, (v_rise * column + v_first) * scale
-                    # In steps between texel centres; each level has a border of one texel.
-                    steps_x[n] = np.int32((u - np.floor(u)) * wide) + half
-                    steps_y[n] = np.int32((v - np.floor(v)) * high) + half
-                for n in range(count):
-                    i, j = steps_x[n], steps_y[n]
-                    one = np.uint64(base + (j >> _SHIFT) * stride + (i >> _SHIFT))
-                    two = one + np.uint64(stride)
-                    weight_x, weight_y = np.uint64(i & (_STEPS - 1)), np.uint64(j & (_STEPS - 1))
-                    rest_x, rest_y = np.uint64(_STEPS) - weight_x, np.uint64(_STEPS) - weight_y
-                    mix = rest_y * (rest_x * texels[one] + weight_x * texels[one + _ONE])
-                    mixed[n] = mix + weight_y * (rest_x * texels[two] + weight_x * texels[two + _ONE])
-                reds, greens, blues = red[begin:stop], green[begin:stop], blue[begin:stop]
-                for n in range(count):
-                    reds[n] = dye_red * np.float32(np.int32(mixed[n] & _MASK))
-                    greens[n] = dye_green * np.float32(np.int32((mixed[n] >> _LANE) & _MASK))
-                    blues[n] = dye_blue * np.float32(np.int32(mixed[n] >> _TWO_LANES))
+            span = slice(first_fresh, last)
+            _darken(key_light[span], map_x[span], map_y[span], near[span], still_shadow, still_blocks, shadow, blocks)
+            for x in range(first_fresh, last):
+                gain = np.float32(math.sqrt(min(shade_light[x] + key_light[x], np.float32(_BRIGHTEST))))
+                rgb[y, x, 0] = np.uint8(min(gain * red[x] + np.float32(0.5), np.float32(255.0)))
+                rgb[y, x, 1] = np.uint8(min(gain * green[x] + np.float32(0.5), np.float32(255.0)))
+                rgb[y, x, 2] = np.uint8(min(gain * blue[x] + np.float32(0.5), np.float32(255.0)))
 
-        _darken(key_light, map_x, map_y, near, shadow, blocks)
+
+@njit(cache=True, error_model="numpy")
+def shadow_places(
+    triangle: np.ndarray,
+    inverse_depth: np.ndarray,
+    center: np.ndarray,
+    rays: np.ndarray,
+    light_P: np.ndarray,
+    side: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each pixel lies in a shadow map: index of the block (h, w) uint16, and inverse depth (h, w) float32.
+
+    Args:
+        triangle: visible face or -1, (h, w) int32.
+        inverse_depth: inverse depth, 1/m, (h, w) float32.
+        center: camera centre in the world, (3,).
+        rays: matrix, (3, 3), such that ``center + depth * rays @ (x, y, 1)`` is the point at a pixel.
+        light_P: projection into the shadow map, (3, 4).
+        side: side of the map in pixels. The index after the last block stands for a pixel without a surface, and for a
+            place outside of the map.
+    """
+    height, width = triangle.shape
+    count, end = (side + _BLOCK - 1) // _BLOCK, side - _FILTER + 1
+    place, depth = np.full((height, width), count * count, np.uint16), np.ones((height, width), np.float32)
+    for y in range(height):
         for x in range(width):
-            gain = np.float32(math.sqrt(min(shade_light[x] + key_light[x], np.float32(_BRIGHTEST))))
-            rgb[y, x, 0] = np.uint8(min(gain * red[x] + np.float32(0.5), np.float32(255.0)))
-            rgb[y, x, 1] = np.uint8(min(gain * green[x] + np.float32(0.5), np.float32(255.0)))
-            rgb[y, x, 2] = np.uint8(min(gain * blue[x] + np.float32(0.5), np.float32(255.0)))
-    return rgb
+            if triangle[y, x] < 0:
+                continue
+            far = 1.0 / inverse_depth[y, x]
+            px = center[0] + far * (rays[0, 0] * x + rays[0, 1] * y + rays[0, 2])
+            py = center[1] + far * (rays[1, 0] * x + rays[1, 1] * y + rays[1, 2])
+            pz = center[2] + far * (rays[2, 0] * x + rays[2, 1] * y + rays[2, 2])
+            w = 1.0 / (light_P[2, 0] * px + light_P[2, 1] * py + light_P[2, 2] * pz + light_P[2, 3])
+            u = (light_P[0, 0] * px + light_P[0, 1] * py + light_P[0, 2] * pz + light_P[0, 3]) * w - 1.0
+            v = (light_P[1, 0] * px + light_P[1, 1] * py + light_P[1, 2] * pz + light_P[1, 3]) * w - 1.0
+            if 0 <= u < end and 0 <= v < end:
+                place[y, x] = int(v) // _BLOCK * count + int(u) // _BLOCK
+                depth[y, x] = w
+    return place, depth
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
@@ -282,10 +334,12 @@ def _darken(
     map_x: np.ndarray,
     map_y: np.ndarray,
     near: np.ndarray,
+    still_shadow: np.ndarray,
+    still_blocks: np.ndarray,
     shadow: np.ndarray,
     blocks: np.ndarray,
 ) -> None:
-    """Remove the key light, in place, from the shaded pixels of a row, with soft edges."""
+    """Remove the key light, in place, from the shaded pixels of a row, with soft edges; the two maps are one."""
     end = np.float32(len(shadow) - _FILTER + 1)
     for x in range(len(key_light)):
         if key_light[x] <= 0:
@@ -294,32 +348,56 @@ def _darken(
         if not ((u >= 0) & (u < end) & (v >= 0) & (v < end)):
             continue
         i, j = np.uint32(u), np.uint32(v)
-        if blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] <= here:  # no surface nearby is nearer to the light
+        of_still = still_blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] > here
+        of_others = blocks[j >> _BLOCK_SHIFT, i >> _BLOCK_SHIFT] > here
+        if not (of_still | of_others):  # no surface nearby is nearer to the light
             continue
-        # Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3; mostly the four corners agree,
-        # and their result is used for all.
-        corners = int(shadow[j, i] > here) + int(shadow[j, i + _LAST] > here)
-        corners += int(shadow[j + _LAST, i] > here) + int(shadow[j + _LAST, i + _LAST] > here)
-        blocked = 0.25 * corners
-        if 0 < corners < 4:
-            du, dv = u - i, v - j
-            blocked = 0.0
-            for m in range(_FILTER):
-                row = 0.0
-                for n in range(_FILTER):
-                    if shadow[j + np.uint32(m), i + np.uint32(n)] > here:
-                        row += (1.0 - du) if n == 0 else (du if n == _FILTER - 1 else 1.0)
-                blocked += row * ((1.0 - dv) if m == 0 else (dv if m == _FILTER - 1 else 1.0)) / 9.0
+        if not of_others:
+            blocked = _blocked(still_shadow, still_shadow, i, j, u - i, v - j, here)
+        elif not of_still:
+            blocked = _blocked(shadow, shadow, i, j, u - i, v - j, here)
+        else:
+            blocked = _blocked(still_shadow, shadow, i, j, u - i, v - j, here)
         key_light[x] *= 1.0 - blocked
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def nearest_blocks(shadow: np.ndarray) -> np.ndarray:
-    """Return the highest inverse depth under all filters that begin in each block of 8 x 8 pixels of the shadow map."""
+def _blocked(
+    one: np.ndarray, other: np.ndarray, i: np.uint32, j: np.uint32, du: float, dv: float, here: float
+) -> float:
+    """Return the share of the light that surfaces of two shadow maps block at a place.
+
+    Percentage-closer filtering: 4 x 4 comparisons under a sliding box of 3 x 3; mostly the four corners agree, and
+    their result is used for all.
+    """
+    corners = int((one[j, i] > here) | (other[j, i] > here))
+    corners += int((one[j, i + _LAST] > here) | (other[j, i + _LAST] > here))
+    corners += int((one[j + _LAST, i] > here) | (other[j + _LAST, i] > here))
+    corners += int((one[j + _LAST, i + _LAST] > here) | (other[j + _LAST, i + _LAST] > here))
+    if corners == 0 or corners == 4:
+        return 0.25 * corners
+    blocked = 0.0
+    for m in range(_FILTER):
+        row = 0.0
+        for n in range(_FILTER):
+            y, x = j + np.uint32(m), i + np.uint32(n)
+            if (one[y, x] > here) | (other[y, x] > here):
+                row += (1.0 - du) if n == 0 else (du if n == _FILTER - 1 else 1.0)
+        blocked += row * ((1.0 - dv) if m == 0 else (dv if m == _FILTER - 1 else 1.0)) / 9.0
+    return blocked
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def nearest_blocks(shadow: np.ndarray, first: int, end: int) -> np.ndarray:
+    """Return the highest inverse depth under all filters that begin in each block of 8 x 8 pixels of a shadow map.
+
+    Only the rows from ``first`` to before ``end`` have a surface.
+    """
     side = len(shadow)
     count = (side + _BLOCK - 1) // _BLOCK
     bands, blocks = np.zeros((count, side), np.float32), np.zeros((count, count), np.float32)
-    for block in range(count):
+    first_block = max(first - _FILTER + 1, 0) // _BLOCK
+    for block in range(first_block, min((end + _BLOCK - 1) // _BLOCK, count)):
         band = bands[block]
         for y in range(_BLOCK * block, min(_BLOCK * (block + 1) + _FILTER - 1, side)):
             row = shadow[y]

@@ -71,7 +71,8 @@ class Solid:
     Attributes:
         kind: "room" (floor, walls), "clutter", "prop" (used by people) or "decoy" (may be taken for a person).
         name: name in messages and in the MuJoCo model.
-        mesh: mesh for pictures, in the world; in the frame of the trajectory if the solid moves.
+        mesh: mesh for pictures, in the world; in the frame of the trajectory if the solid moves. It is ``still`` if
+            the solid does not move.
         geoms: geoms for rays and contacts, in the same frame as the mesh.
         hull: bounding box in the world, over the whole trajectory of a moving solid; it includes empty space, such as
             that between the boards of a shelf.
@@ -88,6 +89,9 @@ class Solid:
     trajectory: Trajectory | None = None
     figure: Floats | None = None
     mirror: Mirror | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mesh", replace(self.mesh, still=self.trajectory is None))
 
     def hull_at(self, time: float) -> Box:
         """Return the bounding box in the world at one time in seconds; axis-aligned if the solid is tilted."""
