@@ -35,7 +35,7 @@ class Lens:
         size: width and height of its picture in pixels.
         columns, rows: position of each pixel of the distorted picture in the pinhole picture, (h, w) float32; far
             outside if the lens images nothing at the pixel.
-        nearest: index of the nearest pixel of the flattened pinhole picture, (h, w) intp; 0 if there is none.
+        nearest: index of the nearest pixel of the flattened pinhole picture, (h, w) int32; 0 if there is none.
         dark: pixels at which the lens images nothing, (h, w) bool; None if there are none.
     """
 
@@ -43,7 +43,7 @@ class Lens:
     size: tuple[int, int]
     columns: NDArray[np.float32]
     rows: NDArray[np.float32]
-    nearest: NDArray[np.intp]
+    nearest: NDArray[np.int32]
     dark: NDArray[np.bool_] | None
 
     def pinhole(self, camera: Camera) -> Camera:
@@ -120,7 +120,7 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
         size=(int(shape[0]), int(shape[1])),
         columns=np.ascontiguousarray(places[..., 0], np.float32),
         rows=np.ascontiguousarray(places[..., 1], np.float32),
-        nearest=row * int(shape[0]) + column,
+        nearest=(row * int(shape[0]) + column).astype(np.int32),
         dark=None if imaged.all() else ~imaged,
     )
 
