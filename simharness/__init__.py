@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simharness.interface import TrialResult, load_scenario, run_trial, score, simulate
+    from simharness.interface import Blame, TrialResult, blame, load_scenario, run_trial, score, simulate
     from simharness.scenario.sections.scenario import Scenario
     from simharness.types.recording import Recording
     from simharness.types.sequence import Sequence
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from simharness.types.views import Views, Visibility
 
 _MODULES = {
+    "Blame": "simharness.interface",
     "KeypointError": "simharness.types.truth",
     "Recording": "simharness.types.recording",
     "Scenario": "simharness.scenario.sections.scenario",
@@ -22,6 +23,7 @@ _MODULES = {
     "Truth": "simharness.types.truth",
     "Views": "simharness.types.views",
     "Visibility": "simharness.types.views",
+    "blame": "simharness.interface",
     "load_scenario": "simharness.interface",
     "run_trial": "simharness.interface",
     "score": "simharness.interface",
@@ -29,6 +31,7 @@ _MODULES = {
 }
 
 __all__ = [
+    "Blame",
     "KeypointError",
     "Recording",
     "Scenario",
@@ -37,6 +40,7 @@ __all__ = [
     "Truth",
     "Views",
     "Visibility",
+    "blame",
     "load_scenario",
     "run_trial",
     "score",

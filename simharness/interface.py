@@ -1,4 +1,4 @@
-"""Python interface: load a scenario, simulate it, run a trial of it, score estimates.
+"""Python interface: load a scenario, simulate it, run a trial of it, score estimates, find what cost the score.
 
 ::
 
@@ -10,6 +10,7 @@
     pipeline = Pipeline.preset("fast")
     estimates = [pipeline.estimate(recording.rig, detections) for detections in recording.detections]
     simharness.score(recording, estimates).scores["pcp"]
+    simharness.blame(scenario, seeds=5).shares[0].cause
 
 Studies and gates have interfaces of their own: :func:`simharness.study.runner.run_study`,
 :func:`simharness.testing.assert_robust`.
@@ -21,13 +22,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mvpose import Estimate
+from simharness.causes.blame import Blame, blame
 from simharness.scenario.load import load
 from simharness.scenario.sections.scenario import Scenario
 from simharness.scoring.assessment import Assessment, assess
 from simharness.trial.run_trial import TrialResult, run_trial
 from simharness.types.recording import Recording
 
-__all__ = ["TrialResult", "load_scenario", "run_trial", "score", "simulate"]
+__all__ = ["Blame", "TrialResult", "blame", "load_scenario", "run_trial", "score", "simulate"]
 
 
 def load_scenario(name: str | Path, *, overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:

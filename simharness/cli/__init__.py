@@ -6,7 +6,7 @@ traceback), 130 interrupted. Commands import heavy modules only when they run.
 
 from __future__ import annotations
 
-from simharness.cli import check, evaluate, export, fit_detector, report, run, scenarios, study, validate
+from simharness.cli import blame, check, evaluate, export, fit_detector, report, run, scenarios, study, validate
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
@@ -15,6 +15,7 @@ run.add_to(app)
 export.add_to(app)
 scenarios.add_to(app)
 check.add_to(app)
+blame.add_to(app)
 report.add_to(app)
 study.add_to(app)
 app.add_typer(evaluate.app, name="evaluate")

@@ -8,6 +8,7 @@ RAYS = f"{SMALL_SCENE} --set cameras.count=3 --set cameras.size=[160,120] --set 
 PICTURES = f"{SMALL_SCENE} --set cameras.count=2 --set cameras.size=[160,120] --set clutter.shelves=0"
 LAB = f"{RAYS} --set sweep.cameras.height=[1.7] --set sweep.people.count=[2] --variant fast --workers 1"
 ALONE = {
+    "simharness blame quickstart --seeds 10 --workers 2": f"{RAYS} --seeds 1 --workers 1 --cause swaps --cause noise",
     "simharness run quickstart": RAYS,
     "simharness run quickstart --set detector.skeleton=halpe26": RAYS,
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
@@ -29,7 +30,13 @@ USER_FILES = {
     ),
     "night.toml": "simharness run quickstart --set detector.profile=night.toml",
 }
-NAMES = ("simharness check", "simharness export", "simharness fit-detector", "simharness evaluate seeds")  # mentioned
+NAMES = (  # mentioned
+    "simharness blame",
+    "simharness check",
+    "simharness export",
+    "simharness fit-detector",
+    "simharness evaluate seeds",
+)
 CHECKS = (
     "simharness check ci --baseline results/baselines/ci.json --workers 2",
     "simharness check ci --baseline results/baselines/ci.json --workers 2 --junit junit.xml --summary summary.md",

@@ -1,0 +1,77 @@
+"""Sentences and numbers of a blame, for pages and terminals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from simharness.causes.blame import RESTORED, Blame
+from simharness.runtime.number_text import fixed, signed
+from simharness.scoring.catalogue import SCORES
+from simharness.statistics.intervals import Interval
+
+
+def points(interval: Interval, digits: int = 1) -> str:
+    """Return a difference of scores with its interval: "2.5 (−1.4 to 6.9)"."""
+    return f"{_minus(fixed(interval.mean, digits))}{_ends(interval, digits)}"
+
+
+def heading(blame: Blame) -> str:
+    """Return what was found in a line: the score as it is, and with all causes mended."""
+    info = SCORES[blame.score]
+    return f"{info.title} {_value(blame, blame.before)}, {_value(blame, blame.after)} with all causes mended"
+
+
+def conclusion(blame: Blame) -> str:
+    """Return what to mend first, in a sentence or two."""
+    info = SCORES[blame.score]
+    if blame.mending is None:
+        return f"Nothing is to be gained: mending all causes together does not improve {info.title}."
+    mending = blame.mending
+    after = f"{info.title} {_value(blame, mending.score)}{_ends(mending.score, info.digits)}"
+    part = f"{100 * mending.restored:.0f} % of what mending everything would gain"
+    what = listing([cause.title for cause in mending.about])
+    if mending.restored < RESTORED:
+        return f"No few causes restore it: with {what} mended it is {after}, {part}."
+    return f"Mend {what}: {after}, {part}."
+
+
+def surest(blame: Blame) -> str:
+    """Return whether the largest share is above zero for certain, in a sentence; empty where nothing is lost."""
+    if blame.mending is None or not blame.shares:
+        return ""
+    first = blame.shares[0]
+    if not np.isfinite(first.share.low):
+        return "A single seed has no intervals: run more seeds before you decide."
+    if first.share.low > 0:
+        return f"The largest cause is {first.about.title}, {points(first.share)} points."
+    return (
+        f"The largest cause is {first.about.title}, {points(first.share)} points, but its interval reaches below zero: "
+        "run more seeds before you decide."
+    )
+
+
+def listing(names: Sequence[str]) -> str:
+    """Return names as people list them: "a, b and c"."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def gain(interval: Interval, digits: int = 1) -> str:
+    """Return a gain with its sign and interval."""
+    return f"{_minus(signed(interval.mean, digits))}{_ends(interval, digits)}"
+
+
+def _value(blame: Blame, interval: Interval) -> str:
+    info = SCORES[blame.score]
+    return f"{fixed(interval.mean, info.digits)}{f' {info.unit}' if info.unit else ''}"
+
+
+def _ends(interval: Interval, digits: int) -> str:
+    if not np.isfinite([interval.low, interval.high]).all():
+        return ""
+    return f" ({_minus(fixed(interval.low, digits))} to {_minus(fixed(interval.high, digits))})"
+
+
+def _minus(number: str) -> str:
+    return number.replace("-", "−")

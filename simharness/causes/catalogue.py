@@ -1,0 +1,199 @@
+"""Catalogue of the causes of a lost score, and what takes the place of each when it is mended.
+
+A mended cause is one that the scenario does not have: a class of detector errors whose shares are zero, a rig without
+a fault, joints that nobody hides. Every error has random draws of its own, so mending one changes no other draw: two
+results that differ in one cause are paired.
+
+How to add a cause: one :class:`Cause` in :data:`CAUSES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mvpose.files.message_text import listed
+from simharness.scenario.sections.detector import Bias, Boxes, Drop, Face, Guess, Keypoints, Scores, Shares
+from simharness.scenario.sections.scenario import Cameras, Faults, Scenario
+from simharness.scenario.sections.section import Section
+from simharness.types.views import Visibility
+
+
+def _unchanged(scenario: Scenario) -> Scenario:
+    return scenario
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Cause of a lost score.
+
+    Attributes:
+        name: name for command lines and files.
+        title: name for people.
+        mended: what the system has when the cause is mended, for users who decide what to buy or mend.
+        change: function that takes the cause out of a scenario.
+        reveals: visibility of joints that become visible; None: of none.
+        labels: whether the true labels replace affinity and matching.
+        camera: whether the rig has one more camera.
+    """
+
+    name: str
+    title: str
+    mended: str
+    change: Callable[[Scenario], Scenario] = _unchanged
+    reveals: Visibility | None = None
+    labels: bool = False
+    camera: bool = False
+
+
+def _sections(scenario: Scenario, **changes: dict[str, Any]) -> Scenario:
+    """Return the scenario with other values of keys, by section."""
+    sections = {name: getattr(scenario, name).model_copy(update=values) for name, values in changes.items()}
+    return scenario.model_copy(update=sections)
+
+
+def _detector(scenario: Scenario, section: str, **values: Any) -> Scenario:
+    """Return the scenario with other values in a section of [detector]."""
+    changed = getattr(scenario.detector, section).model_copy(update=values)
+    return _sections(scenario, detector={section: changed})
+
+
+def _defaults(section: type[Section], *keys: str) -> dict[str, Any]:
+    """Return the defaults of keys of a section, with which its errors do not occur."""
+    values = section()
+    return {key: getattr(values, key) for key in keys}
+
+
+def _without_gross_errors(scenario: Scenario) -> Scenario:
+    none = Shares()
+    return _detector(
+        scenario, "keypoints", miss=none, miss_some=None, miss_few=None, stray=none, guess=Guess(), border=0.0
+    )
+
+
+def _without_swaps(scenario: Scenario) -> Scenario:
+    return _detector(scenario, "keypoints", inversion=Shares(), swap=Shares(), swap_crowded=None)
+
+
+def _without_phantoms(scenario: Scenario) -> Scenario:
+    phantoms = scenario.detector.phantoms.model_copy(update={"rate": 0.0})
+    decoys = scenario.detector.decoys.model_copy(update={"share": 0.0})
+    return _sections(scenario, detector={"phantoms": phantoms, "decoys": decoys})
+
+
+def _without_clock_errors(scenario: Scenario) -> Scenario:
+    faults = _defaults(Faults, "clock_offset", "clock_jitter", "rolling_shutter")
+    return _sections(scenario, faults=faults, cameras=_defaults(Cameras, "trigger"))
+
+
+def _with_all_pictures(scenario: Scenario) -> Scenario:
+    return _sections(
+        scenario, faults=_defaults(Faults, "dropped", "frozen", "dead"), cameras=_defaults(Cameras, "every")
+    )
+
+
+_BOXES = ("missed", "missed_hidden", "least_visible", "merged", "split", "duplicates", "jitter")
+_SCORES = ("overconfident", "underconfident", "deviation")
+_CALIBRATION = ("focal", "center", "rotation", "translation", "rotation_drift", "translation_drift", "swapped")
+
+CAUSES: tuple[Cause, ...] = (
+    Cause(
+        "dropped-joints",
+        "dropped joints",
+        "a detector that reports every joint in the picture",
+        lambda scenario: _detector(scenario, "keypoints", drop=Drop(), face=Face()),
+    ),
+    Cause(
+        "gross-errors",
+        "gross errors",
+        "a detector without far misses, and without guesses of joints that it does not see",
+        _without_gross_errors,
+    ),
+    Cause(
+        "swaps", "inversions and swaps", "a detector that confuses no left with right, and no people", _without_swaps
+    ),
+    Cause(
+        "noise",
+        "noise",
+        "keypoints at the true pixel: higher resolution, or a more exact detector",
+        lambda scenario: _detector(scenario, "keypoints", **_defaults(Keypoints, "scatter", "jitter")),
+    ),
+    Cause(
+        "bias",
+        "other joint centres",
+        "a detector whose joints are those of the truth",
+        lambda scenario: _sections(scenario, detector={"bias": Bias()}),
+    ),
+    Cause(
+        "boxes",
+        "missed and merged boxes",
+        "a detector that finds every person once, in one box",
+        lambda scenario: _detector(scenario, "boxes", **_defaults(Boxes, *_BOXES)),
+    ),
+    Cause("phantoms", "phantoms", "a detector that finds nobody where nobody is", _without_phantoms),
+    Cause(
+        "scores",
+        "misleading scores",
+        "keypoint scores that say exactly which error a keypoint has",
+        lambda scenario: _detector(scenario, "scores", **_defaults(Scores, *_SCORES)),
+    ),
+    Cause(
+        "hidden-by-people",
+        "hidden by people",
+        "people who do not hide each other: cameras further up",
+        reveals=Visibility.OCCLUDED_BY_PERSON,
+    ),
+    Cause(
+        "hidden-by-things",
+        "hidden by things",
+        "a room without things in the way",
+        reveals=Visibility.OCCLUDED_BY_CLUTTER,
+    ),
+    Cause(
+        "calibration",
+        "calibration",
+        "a true calibration that stays true",
+        lambda scenario: _sections(scenario, faults=_defaults(Faults, *_CALIBRATION)),
+    ),
+    Cause(
+        "clocks",
+        "clocks",
+        "all cameras triggered at once, with a global shutter",
+        _without_clock_errors,
+    ),
+    Cause("lost-pictures", "lost pictures", "every camera delivers every picture", _with_all_pictures),
+    Cause("matching", "matching", "a matching without mistakes", labels=True),
+    Cause("one-more-camera", "too few cameras", "one more camera, in the widest gap between the others", camera=True),
+)
+"""Causes in the order of tables."""
+
+_BY_NAME = {cause.name: cause for cause in CAUSES}
+
+
+def causes_by_name(names: Sequence[str]) -> tuple[Cause, ...]:
+    """Return causes by name, in the order of :data:`CAUSES`.
+
+    Raises:
+        ValueError: no such cause; the message lists all.
+    """
+    if unknown := [name for name in names if name not in _BY_NAME]:
+        raise ValueError(f"causes: {listed(unknown)}: no such cause; expected some of {', '.join(_BY_NAME)}")
+    return tuple(cause for cause in CAUSES if cause.name in names)
+
+
+def present_causes(scenario: Scenario, causes: Sequence[Cause] = CAUSES, *, labelled: bool = True) -> tuple[Cause, ...]:
+    """Return the causes that a scenario may have; the others change nothing of it.
+
+    Args:
+        scenario: a resolved scenario.
+        causes: causes to choose from.
+        labelled: whether the method takes true labels in place of its matching.
+    """
+
+    def present(cause: Cause) -> bool:
+        if cause.labels:
+            return labelled
+        return cause.camera or cause.reveals is not None or cause.change(scenario) != scenario
+
+    return tuple(cause for cause in causes if present(cause))
