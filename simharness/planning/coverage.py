@@ -1,0 +1,116 @@
+"""Coverage of the floor by the pictures alone: how many cameras have a point, or a standing person, in the picture.
+
+Geometry without people, obstacles or a detector: what :class:`~simharness.planning.layer.FastLayer` begins with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mvpose import Rig
+from mvpose.arrays import Bools, Floats, Integers
+
+STANDING = (0.05, 1.75)
+"""Heights of the soles and the crown of a standing person, metres."""
+
+_STEP = 0.25  # metres between places where a volume is sought
+_AHEAD = 4.0  # metres ahead of every camera to which it may reach
+_LEAST_PIXELS = 60.0  # of a person in the picture: smaller ones are not found by common detectors
+_BODY = 0.25  # metres: half the width of a person
+_LARGEST = 8.0  # metres: longest side of a volume that is found
+_SMALLEST = 1.0  # metres
+_ENOUGH = 3  # cameras: one of them may lose a person whom somebody hides
+
+
+def seen(rig: Rig, points: Floats) -> Bools:
+    """Return which cameras have points (..., 3) in the picture, (V, ...)."""
+    return np.stack([camera.inside(camera.project(points)) for camera in rig])
+
+
+def coverage(rig: Rig, places: Floats, heights: tuple[float, ...]) -> Integers:
+    """Return the number of cameras that have a point over each place in the picture, by height.
+
+    Args:
+        rig: the cameras.
+        places: places on the floor, (P, 2), metres.
+        heights: heights over the floor, (H,), metres.
+
+    Returns:
+        Numbers of cameras, (H, P).
+    """
+    points = np.stack([np.column_stack([places, np.full(len(places), height)]) for height in heights])
+    return seen(rig, points).sum(axis=0)
+
+
+def whole_people(rig: Rig, places: Floats) -> Bools:
+    """Return which cameras have a person who stands at places (P, 2) whole in the picture, and large enough, (V, P)."""
+    result = np.ones((len(rig), len(places)), bool)
+    for v, camera in enumerate(rig):
+        aside = np.array([-camera.R[2, 1], camera.R[2, 0]])
+        aside /= max(float(np.linalg.norm(aside)), 1e-9)
+        ends = []
+        for height in STANDING:
+            for side in (-_BODY, _BODY):
+                pixels = camera.project(np.column_stack([places + side * aside, np.full(len(places), height)]))
+                result[v] &= camera.inside(pixels)
+                ends.append(pixels)
+        with np.errstate(invalid="ignore"):
+            result[v] &= np.linalg.norm(ends[2] - ends[0], axis=1) >= _LEAST_PIXELS
+    return result
+
+
+def covered_rectangle(rig: Rig) -> tuple[Floats, int]:
+    """Return the largest upright rectangle in which enough cameras have a standing person whole in the picture.
+
+    Enough are three, or two where there is no such rectangle or the rig has no more than three cameras.
+
+    Returns:
+        Corners (4, 2), metres, and the number of cameras that see every place of it.
+
+    Raises:
+        ValueError: two cameras nowhere see one person whole.
+    """
+    forward = np.stack([camera.R[2, :2] for camera in rig])
+    corners = np.concatenate([rig.centers[:, :2], rig.centers[:, :2] + _AHEAD * forward])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    xs, ys = (np.arange(low[axis], high[axis] + _STEP, _STEP) for axis in (0, 1))
+    grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1)
+    count = whole_people(rig, grid.reshape(-1, 2)).sum(axis=0).reshape(grid.shape[:2])
+    for needed in range(max(2, min(_ENOUGH, len(rig) - 1)), 1, -1):
+        found = largest_rectangle(count >= needed, longest=round(_LARGEST / _STEP))
+        if found is not None and min(found[1] - found[0], found[3] - found[2]) * _STEP >= _SMALLEST:
+            x0, x1, y0, y1 = xs[found[0]], xs[found[1]], ys[found[2]], ys[found[3]]
+            return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), needed
+    raise ValueError(
+        "nowhere on the floor do two cameras see one standing person whole: the cameras look past each other, or the "
+        "floor of the calibration is not at z = 0; give --volume to rehearse anyway, or check the calibration"
+    )
+
+
+def largest_rectangle(mask: Bools, *, longest: int) -> tuple[int, int, int, int] | None:
+    """Return first and last row, first and last column of the largest rectangle of true cells; None without any.
+
+    Args:
+        mask: cells, (rows, columns).
+        longest: one less than the largest number of rows or columns.
+    """
+    best, area = None, 0
+    for first in range(len(mask)):
+        columns = np.ones(mask.shape[1], bool)
+        for last in range(first, min(len(mask), first + longest + 1)):
+            columns &= mask[last]
+            if not columns.any():
+                break
+            start, stop = _longest_run(columns)
+            stop = min(stop, start + longest + 1)
+            if (last - first + 1) * (stop - start) > area:
+                best, area = (first, last, start, stop - 1), (last - first + 1) * (stop - start)
+    return best
+
+
+def _longest_run(row: Bools) -> tuple[int, int]:
+    """Return start and stop of the longest run of true cells of a row that has one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], row.astype(int), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    k = int((stops - starts).argmax())
+    return int(starts[k]), int(stops[k])

@@ -1,0 +1,283 @@
+"""Result of a rehearsal, and its JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mvpose import Camera, Rig
+from mvpose.arrays import Bools, Floats, Integers
+from simharness.planning.tolerance import CLIFF, Tolerance
+from simharness.planning.volume import Volume
+from simharness.statistics.intervals import Interval
+
+if TYPE_CHECKING:
+    from simharness.planning.prediction import Prediction
+    from simharness.planning.simulation import SceneResult
+
+HEIGHTS = (0.1, 0.9, 1.7, 2.2)
+"""Heights of coverage maps, metres: feet, hips, crown, and a raised hand."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a place must reach to be good.
+
+    Attributes:
+        pcp: least PCP, percent.
+        error_mm: largest expected joint error, mm.
+    """
+
+    pcp: float = 95.0
+    error_mm: float = 40.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.pcp <= 100.0:
+            raise ValueError(f"target: PCP must be above 0 and at most 100 percent, got {self.pcp:g}")
+        if not self.error_mm > 0.0:
+            raise ValueError(f"target: the joint error must be above 0 mm, got {self.error_mm:g}")
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A set of cameras, as the fast layer predicts it and as the simulator shows it.
+
+    Attributes:
+        layer_pcp: PCP of the fast layer, percent.
+        layer_error_mm: its expected joint error, mm.
+        pcp: simulated PCP, percent.
+        mpjpe_mm: simulated joint error, mm.
+        recall: simulated recall of people, percent.
+    """
+
+    layer_pcp: float
+    layer_error_mm: float
+    pcp: Interval
+    mpjpe_mm: Interval
+    recall: Interval
+
+
+@dataclass(frozen=True)
+class CameraWorth:
+    """What one camera contributes.
+
+    Attributes:
+        camera: the camera.
+        sees: share of the places at which it sees a standing person whole, 0 to 1 (fast layer).
+        without: the rig without it; None of a rig of two cameras.
+        worth: points of PCP that its failure costs in simulation, paired by scene.
+        worth_mm: what its failure adds to the joint error, mm.
+        layer_worth: points of PCP that its failure costs by the fast layer.
+    """
+
+    camera: Camera
+    sees: float
+    without: Estimated | None
+    worth: Interval
+    worth_mm: Interval
+    layer_worth: float
+
+    @property
+    def redundant(self) -> bool:
+        """Whether the rig does as well without it: less than half a point of PCP and a twentieth of the error."""
+        return self.without is not None and self.worth.high < 1.0 and self.worth.mean < 0.5
+
+
+@dataclass(frozen=True)
+class ExtraCamera:
+    """The best place found for one more camera.
+
+    Attributes:
+        camera: the camera, at its place.
+        places: number of places and directions that were compared by the fast layer.
+        rig: the rig with it.
+        gain: points of PCP that it adds in simulation, paired by scene.
+        gain_mm: what it takes from the joint error, mm.
+        layer_gain: points of PCP that it adds by the fast layer.
+    """
+
+    camera: Camera
+    places: int
+    rig: Estimated
+    gain: Interval
+    gain_mm: Interval
+    layer_gain: float
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """A number of people in the volume.
+
+    Attributes:
+        people: their number.
+        layer_pcp: PCP of the fast layer, percent.
+        layer_error_mm: its expected joint error, mm.
+        layer_risk: its mean probability of a wrong match, 0 to 1.
+        pcp: simulated PCP, percent; None where so many were not simulated or do not fit.
+        mixed: simulated percentage of matched groups that hold two people; None likewise.
+    """
+
+    people: int
+    layer_pcp: float
+    layer_error_mm: float
+    layer_risk: float
+    pcp: Interval | None = None
+    mixed: Interval | None = None
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """What a rig will give in a volume, before its cameras hang.
+
+    Attributes:
+        name: name of the rig.
+        rig: its cameras.
+        volume: where people are.
+        room: polygon of the room, (n, 2), metres; empty where it is unknown.
+        people: number of people.
+        detector: name of the detector profile.
+        target: what a place must reach.
+        prediction: fast layer, all cameras.
+        coverage: number of cameras that have a point over each place in the picture, by :data:`HEIGHTS`, (H, P).
+        good: which places reach the target, (P,) (fast layer).
+        whole: all cameras.
+        cameras: worth of each camera, by name.
+        subsets: sets of cameras by the names of their cameras; with those of leave-one-out and all cameras.
+        extra: one more camera; None where no place improves the rig.
+        crowds: the same with other numbers of people, ascending.
+        tolerances: what errors of calibration and clocks cost.
+        scenes: simulated scenes, for the maps of the simulation.
+        mixed: simulated percentage of matched groups that hold two people, all cameras.
+        seconds: time that the fast layer and the simulation took.
+        sentences: the result in plain sentences, the most important first.
+    """
+
+    name: str
+    rig: Rig
+    volume: Volume
+    room: Floats
+    people: int
+    detector: str
+    target: Target
+    prediction: Prediction
+    coverage: Integers
+    good: Bools
+    whole: Estimated
+    cameras: Mapping[str, CameraWorth]
+    subsets: Mapping[tuple[str, ...], Estimated]
+    extra: ExtraCamera | None
+    crowds: tuple[Crowd, ...]
+    tolerances: tuple[Tolerance, ...]
+    scenes: tuple[SceneResult, ...]
+    mixed: Interval
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    sentences: tuple[str, ...] = ()
+
+    @property
+    def good_share(self) -> float:
+        """Share of the places that reach the target, 0 to 1."""
+        return float(self.good.mean()) if len(self.good) else 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the rehearsal as JSON: see ``docs/guide/rehearse.md``. A value that does not apply is null."""
+        prediction = self.prediction
+        return {
+            "name": self.name,
+            "sentences": list(self.sentences),
+            "people": self.people,
+            "detector": self.detector,
+            "target": {"pcp": self.target.pcp, "mpjpe_mm": self.target.error_mm, "share": _plain(self.good_share)},
+            "volume": {"outline": _plain(self.volume.outline), "height": self.volume.height},
+            **_estimated(self.whole),
+            "mixed": _interval(self.mixed),
+            "map": {
+                "places": _plain(prediction.places),
+                "pcp": _plain(prediction.pcp),
+                "recall": _plain(prediction.recall),
+                "error_mm": _plain(prediction.error_mm),
+                "views": _plain(prediction.views),
+                "ellipse": _plain(prediction.ellipse),
+                "risk": _plain(prediction.risk),
+                "good": self.good.tolist(),
+                "cameras_by_height": {
+                    f"{height:g}": row.tolist() for height, row in zip(HEIGHTS, self.coverage, strict=True)
+                },
+            },
+            "cameras": {name: _worth(each) for name, each in self.cameras.items()},
+            "subsets": [{"cameras": list(names)} | _estimated(each) for names, each in self.subsets.items()],
+            "extra": None if self.extra is None else _extra(self.extra),
+            "crowds": [
+                {
+                    "people": each.people,
+                    "pcp": None if each.pcp is None else _interval(each.pcp),
+                    "mixed": None if each.mixed is None else _interval(each.mixed),
+                    "layer": {
+                        "pcp": _plain(each.layer_pcp),
+                        "error_mm": _plain(each.layer_error_mm),
+                        "risk": _plain(each.layer_risk),
+                    },
+                }
+                for each in self.crowds
+            ],
+            "tolerance": {each.fault.key: _tolerance(each) for each in self.tolerances},
+            "layer_seconds": _plain(self.seconds.get("layer", float("nan"))),
+        }
+
+
+def _estimated(each: Estimated) -> dict[str, Any]:
+    return {
+        "pcp": _interval(each.pcp),
+        "mpjpe_mm": _interval(each.mpjpe_mm),
+        "recall": _interval(each.recall),
+        "layer": {"pcp": _plain(each.layer_pcp), "error_mm": _plain(each.layer_error_mm)},
+    }
+
+
+def _worth(each: CameraWorth) -> dict[str, Any]:
+    return {
+        "worth": _interval(each.worth),
+        "worth_mm": _interval(each.worth_mm),
+        "layer_worth": _plain(each.layer_worth),
+        "sees": _plain(each.sees),
+        "redundant": each.redundant,
+        "position": _plain(each.camera.center),
+        "without": None if each.without is None else _estimated(each.without),
+    }
+
+
+def _extra(extra: ExtraCamera) -> dict[str, Any]:
+    return {
+        "position": _plain(extra.camera.center),
+        "direction": _plain(extra.camera.R[2]),
+        "gain": _interval(extra.gain),
+        "gain_mm": _interval(extra.gain_mm),
+        "layer_gain": _plain(extra.layer_gain),
+        "places": extra.places,
+        "rig": _estimated(extra.rig),
+    }
+
+
+def _tolerance(each: Tolerance) -> dict[str, Any]:
+    return {
+        "unit": each.fault.unit,
+        "cliff": _plain(each.cliff) if each.cliff is not None else None,
+        "cliff_points": CLIFF,
+        "levels": [
+            {"level": level, "pcp": _interval(pcp), "mpjpe_mm": _interval(error), "loss": _interval(loss)}
+            for level, pcp, error, loss in zip(each.fault.levels, each.pcp, each.mpjpe_mm, each.loss, strict=True)
+        ],
+    }
+
+
+def _interval(value: Interval) -> dict[str, Any]:
+    return {"mean": _plain(value.mean), "low": _plain(value.low), "high": _plain(value.high), "scenes": value.n}
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers and arrays as JSON with four significant decimals; NaN becomes null."""
+    if isinstance(value, np.ndarray):
+        return [_plain(each) for each in value]
+    return round(float(value), 4) if np.isfinite(value) else None

@@ -1,0 +1,400 @@
+"""Rehearsal of a rig: the fast layer for maps and comparisons, then scenes of the simulator where it matters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from mvpose import Camera, Rig
+from simharness.planning.coverage import coverage, covered_rectangle
+from simharness.planning.extra_camera import candidate_cameras
+from simharness.planning.layer import CameraTerms, FastLayer
+from simharness.planning.prediction import Prediction
+from simharness.planning.rehearsal import (
+    HEIGHTS,
+    CameraWorth,
+    Crowd,
+    Estimated,
+    ExtraCamera,
+    Rehearsal,
+    Target,
+)
+from simharness.planning.rig_checks import check_rig
+from simharness.planning.sentences import sentences
+from simharness.planning.simulation import Condition, SceneResult, SceneSettings, interval_of, loss_of, simulate_scenes
+from simharness.planning.tolerance import fault_conditions, tolerances
+from simharness.planning.visibility import Obstacle
+from simharness.planning.volume import Volume
+from simharness.reality.validation.subsets import camera_subsets
+from simharness.runtime.progress import Reporter, Silence
+from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.room import Clutter
+from simharness.statistics.intervals import Interval
+
+T = TypeVar("T")
+
+_SPACING = 0.5  # metres between the places of the maps
+_COARSE = 1.0  # metres between places where sets of cameras are compared
+_COARSE_TURNS = 12  # directions in which people stand there
+_VARIANT = "full"  # of the method
+_UNKNOWN = Interval(np.nan, np.nan, np.nan, 0)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is simulated.
+
+    Attributes:
+        scenes: scenes of the rig, at the seeds 0, 1, ... from the seed of the rehearsal on.
+        crowd_scenes: scenes of each other number of people.
+        crowds: other numbers of people that are simulated; the fast layer has all from 1 to ``most``.
+        most: largest number of people.
+        workers: processes; the results do not depend on it.
+    """
+
+    scenes: int = 16
+    crowd_scenes: int = 4
+    crowds: tuple[int, ...] = (1, 2, 6, 8, 10)
+    most: int = 10
+    workers: int = 1
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is rehearsed.
+
+    Attributes:
+        name: name of the rig.
+        rig: cameras in the world, floor at z = 0.
+        volume: where people are.
+        detector: profile of the detector.
+        people: number of people in the volume.
+        room: floor and height of the room; None where it is unknown.
+        obstacles: boxes that hide people.
+        clutter: objects that the simulator places around the people.
+        target: what a place must reach.
+        subsets: score all sets of two cameras and more, instead of the rig and the rig without each camera.
+        seed: seed of everything.
+    """
+
+    name: str
+    rig: Rig
+    volume: Volume
+    detector: Detector
+    people: int = 4
+    room: Volume | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    clutter: Clutter = field(default_factory=Clutter)
+    target: Target = Target()
+    subsets: bool = False
+    seed: int = 0
+
+
+def rehearse(
+    rig: Rig,
+    *,
+    detector: Detector,
+    volume: Volume | None = None,
+    people: int = 4,
+    room: Volume | None = None,
+    obstacles: Sequence[Obstacle] = (),
+    clutter: Clutter | None = None,
+    target: Target | None = None,
+    subsets: bool = False,
+    seed: int = 0,
+    effort: Effort | None = None,
+    name: str = "rig",
+    reporter: Reporter | None = None,
+) -> Rehearsal:
+    """Rehearse a rig: what the method will give with it, before its cameras hang.
+
+    Args:
+        rig: two or more cameras, metres, floor at z = 0.
+        detector: profile of the detector (:func:`simharness.scenario.presets.read_profile`).
+        volume: where people are; by default the largest rectangle that three cameras see
+            (:func:`simharness.planning.coverage.covered_rectangle`).
+        people: number of people in it.
+        room: floor and height of the room; None where it is unknown.
+        obstacles: boxes that hide people.
+        clutter: objects that the simulator places around the people.
+        target: what a place must reach; PCP 95 and 40 mm by default.
+        subsets: score all sets of two cameras and more.
+        seed: seed of everything.
+        effort: how much is simulated.
+        name: name of the rig in the result.
+        reporter: receiver of progress.
+
+    Raises:
+        ValueError: a camera under the floor, outside of the room or inside an obstacle, a volume outside of the room,
+            nobody visible to two cameras, or people who do not fit into the volume.
+        RunError: any error of the simulation.
+    """
+    volume = Volume(covered_rectangle(rig)[0]) if volume is None else volume
+    check_rig(rig, volume, room=room, obstacles=obstacles)
+    if people < 1:
+        raise ValueError(f"people: expected 1 or more, got {people}")
+    question = Question(
+        name,
+        rig,
+        volume,
+        detector,
+        people,
+        room,
+        tuple(obstacles),
+        Clutter() if clutter is None else clutter,
+        Target() if target is None else target,
+        subsets,
+        seed,
+    )
+    return _Rehearsing(question, effort or Effort(), reporter or Silence()).run()
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """Predictions of the fast layer on its coarse scenes: sets of cameras, one more camera, numbers of people."""
+
+    sets: dict[tuple[int, ...], Prediction]
+    extra: tuple[Camera, Prediction, int] | None
+    crowds: dict[int, Prediction]
+
+
+@dataclass(frozen=True)
+class _Rehearsing:
+    """Steps of a rehearsal."""
+
+    question: Question
+    effort: Effort
+    reporter: Reporter
+
+    def run(self) -> Rehearsal:
+        """Run all steps."""
+        question, rig = self.question, self.question.rig
+        start = perf_counter()
+        prediction, whole_places = self._maps()
+        layer_seconds = perf_counter() - start
+        compared = self._compare()
+        base = compared.sets[self.whole]
+        scenes = self._simulate(compared)
+        good = (prediction.pcp >= question.target.pcp) & (prediction.error_mm <= question.target.error_mm)
+        mixed = interval_of(scenes, Condition(self.whole), "mixed")
+        rehearsal = Rehearsal(
+            name=question.name,
+            rig=rig,
+            volume=question.volume,
+            room=np.zeros((0, 2)) if question.room is None else question.room.outline,
+            people=question.people,
+            detector=question.detector.name,
+            target=question.target,
+            prediction=prediction,
+            coverage=coverage(rig, prediction.places, HEIGHTS),
+            good=good,
+            whole=self._estimated(scenes, self.whole, prediction),
+            cameras={camera.name: self._worth(k, whole_places[k], scenes, compared) for k, camera in enumerate(rig)},
+            subsets={
+                tuple(rig[k].name for k in cameras): self._estimated(scenes, cameras, each)
+                for cameras, each in compared.sets.items()
+            },
+            extra=self._extra(scenes, compared, base),
+            crowds=self._crowds(scenes, compared),
+            tolerances=tolerances(scenes, self.whole),
+            scenes=tuple(scenes),
+            mixed=mixed,
+            seconds={"layer": layer_seconds, "all": perf_counter() - start},
+        )
+        return replace(rehearsal, sentences=sentences(rehearsal))
+
+    @property
+    def whole(self) -> tuple[int, ...]:
+        """Indices of all cameras."""
+        return tuple(range(len(self.question.rig)))
+
+    def _layer(self, *, people: int, coarse: bool) -> FastLayer:
+        question = self.question
+        return FastLayer.of(
+            question.volume,
+            detector=question.detector,
+            people=people,
+            spacing=_COARSE if coarse else _SPACING,
+            orientations=_COARSE_TURNS if coarse else 8,
+            draws=1 if coarse else 2,
+            obstacles=question.obstacles,
+            seed=question.seed,
+        )
+
+    def _maps(self) -> tuple[Prediction, list[float]]:
+        """Return the prediction of all cameras, and the share of the places at which each sees a person whole.
+
+        Raises:
+            ValueError: two cameras see nobody.
+        """
+        rig = self.question.rig
+        with self.reporter.stage("maps", len(rig) + 1) as advance:
+            layer = self._layer(people=self.question.people, coarse=False)
+            terms = [_advanced(layer.terms(camera), advance) for camera in rig]
+            if not any(each.seen.any() for each in terms):
+                raise ValueError(
+                    "nothing is visible: no camera has anybody in the volume in its picture; check the volume, the "
+                    "directions of the cameras, and that the calibration has metres with z up"
+                )
+            prediction = layer.predict(terms, variant=_VARIANT)
+            advance(1)
+        if not np.nansum(prediction.recall):
+            raise ValueError(
+                "nothing is visible: no person in the volume is seen by two cameras; check the volume and the "
+                "directions of the cameras"
+            )
+        return prediction, [float(np.nanmean(each.whole)) for each in terms]
+
+    def _compare(self) -> _Compared:
+        """Return what the fast layer says of other sets of cameras and numbers of people."""
+        question, rig = self.question, self.question.rig
+        sets = self._sets()
+        candidates = candidate_cameras(rig, question.volume, room=question.room)
+        numbers = range(1, self.effort.most + 1)
+        with self.reporter.stage("compare", len(sets) + len(candidates) + len(numbers)) as advance:
+            layer = self._layer(people=question.people, coarse=True)
+            terms = [layer.terms(camera) for camera in rig]
+            predicted = {
+                each: _advanced(layer.predict([terms[k] for k in each], variant=_VARIANT), advance)
+                for each in sets
+                if len(each) > 1
+            }
+            extra = None
+            for camera in candidates:
+                prediction = layer.predict([*terms, layer.terms(camera)], variant=_VARIANT)
+                if extra is None or _better(prediction, extra[1]):
+                    extra = (camera, prediction, len(candidates))
+                advance(1)
+            crowds = {}
+            for number in numbers:
+                crowds[number] = self._with_people(number, layer, terms)
+                advance(1)
+        return _Compared(predicted, extra, crowds)
+
+    def _with_people(self, number: int, layer: FastLayer, terms: Sequence[CameraTerms]) -> Prediction:
+        if number != self.question.people:
+            layer = self._layer(people=number, coarse=True)
+            terms = [layer.terms(camera) for camera in self.question.rig]
+        return layer.predict(terms, variant=_VARIANT)
+
+    def _sets(self) -> list[tuple[int, ...]]:
+        """Return the sets of cameras that are scored: all cameras, and all without each, or all sets."""
+        if self.question.subsets:
+            return camera_subsets(len(self.whole))
+        return [self.whole, *(self._without(k) for k in self.whole)]
+
+    def _without(self, camera: int) -> tuple[int, ...]:
+        return tuple(k for k in self.whole if k != camera)
+
+    def _simulate(self, compared: _Compared) -> list[SceneResult]:
+        """Simulate the scenes of the rig; the additional camera is one more camera of them."""
+        sets = dict.fromkeys([*compared.sets, *(self._without(k) for k in self.whole)])
+        conditions = [Condition(each) for each in sets] + fault_conditions(self.whole)
+        rig = self.question.rig
+        if compared.extra is not None:
+            rig = Rig([*rig, compared.extra[0]])
+            conditions.append(Condition((*self.whole, len(self.whole))))
+        return self._scenes("simulate", rig, self.question.people, conditions, self.effort.scenes)
+
+    def _scenes(
+        self, stage: str, rig: Rig, people: int, conditions: Sequence[Condition], count: int
+    ) -> list[SceneResult]:
+        question = self.question
+        settings = SceneSettings(
+            rig,
+            question.volume,
+            people,
+            question.detector,
+            clutter=question.clutter,
+            obstacles=question.obstacles,
+            whole=self.whole,
+        )
+        seeds = range(question.seed, question.seed + count)
+        with self.reporter.stage(stage, count) as advance:
+            return simulate_scenes(settings, conditions, seeds=seeds, workers=self.effort.workers, progress=advance)
+
+    def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:
+        summary, condition = prediction.summary(), Condition(cameras)
+        return Estimated(
+            float(summary["pcp"].value),
+            float(summary["mpjpe_mm"].value),
+            interval_of(scenes, condition, "pcp"),
+            interval_of(scenes, condition, "mpjpe_mm"),
+            interval_of(scenes, condition, "recall"),
+        )
+
+    def _worth(self, k: int, sees: float, scenes: Sequence[SceneResult], compared: _Compared) -> CameraWorth:
+        rest, base = Condition(self._without(k)), Condition(self.whole)
+        predicted = compared.sets.get(rest.cameras)
+        layer = compared.sets[self.whole].summary()["pcp"].value
+        gained = loss_of(scenes, base, rest, "mpjpe_mm")
+        return CameraWorth(
+            camera=self.question.rig[k],
+            sees=sees,
+            without=None if predicted is None else self._estimated(scenes, rest.cameras, predicted),
+            worth=loss_of(scenes, rest, base),
+            worth_mm=gained,
+            layer_worth=float(layer if predicted is None else layer - predicted.summary()["pcp"].value),
+        )
+
+    def _extra(self, scenes: Sequence[SceneResult], compared: _Compared, base: Prediction) -> ExtraCamera | None:
+        if compared.extra is None:
+            return None
+        camera, prediction, places = compared.extra
+        more, whole = (*self.whole, len(self.whole)), Condition(self.whole)
+        return ExtraCamera(
+            camera,
+            places,
+            self._estimated(scenes, more, prediction),
+            loss_of(scenes, whole, Condition(more)),
+            loss_of(scenes, Condition(more), whole, "mpjpe_mm"),
+            float(prediction.summary()["pcp"].value - base.summary()["pcp"].value),
+        )
+
+    def _crowds(self, scenes: Sequence[SceneResult], compared: _Compared) -> tuple[Crowd, ...]:
+        """Return the figures by number of people; those who do not fit into the volume are not simulated."""
+        simulated = {self.question.people: list(scenes)}
+        for number in self.effort.crowds:
+            if number == self.question.people or number > self.effort.most:
+                continue
+            try:
+                simulated[number] = self._scenes(
+                    f"{number} people", self.question.rig, number, [Condition(self.whole)], self.effort.crowd_scenes
+                )
+            except ValueError:
+                continue
+        crowds = []
+        for number, prediction in compared.crowds.items():
+            summary, of = prediction.summary(), simulated.get(number)
+            crowds.append(
+                Crowd(
+                    number,
+                    float(summary["pcp"].value),
+                    float(summary["mpjpe_mm"].value),
+                    _mean(prediction.risk),
+                    None if of is None else interval_of(of, Condition(self.whole), "pcp"),
+                    None if of is None else interval_of(of, Condition(self.whole), "mixed"),
+                )
+            )
+        return tuple(crowds)
+
+
+def _better(one: Prediction, other: Prediction) -> bool:
+    """Return whether a prediction has more PCP than another; of equal ones, to a tenth, the smaller error."""
+    mine, theirs = one.summary(), other.summary()
+    key = (round(float(mine["pcp"].value), 1), -float(mine["mpjpe_mm"].value))
+    return key > (round(float(theirs["pcp"].value), 1), -float(theirs["mpjpe_mm"].value))
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _advanced(value: T, advance: Callable[[int], None]) -> T:
+    advance(1)
+    return value

@@ -1,0 +1,78 @@
+"""Scenes of a rehearsal: scored by sets of cameras, and as wide as the volume."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mvpose import Rig
+from simharness.planning.rig_file import read_rig
+from simharness.planning.simulation import Condition, SceneSettings, loss_of, simulate_scenes
+from simharness.planning.visibility import Obstacle
+from simharness.planning.volume import Volume
+from simharness.scenario.presets import read_profile
+
+WHOLE = (0, 1, 2, 3, 4)
+WORSE = Condition(WHOLE, "rotation", 2.0)
+LATE = Condition(WHOLE, "clock_offset", 0.5)
+
+
+def settings(**changes):
+    content = dict(
+        rig=read_rig("ring5"), volume=Volume.box(4.0, 2.0), people=2, detector=read_profile("typical"), frames=4
+    )
+    return SceneSettings(**content | changes)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    conditions = [Condition(WHOLE), Condition((0, 1)), Condition((3,)), WORSE, LATE]
+    return simulate_scenes(settings(), conditions, seeds=[3])[0]
+
+
+def test_people_are_in_the_volume_and_use_its_length(scene):
+    assert scene.inside.mean() > 0.95
+    spread = np.ptp(scene.places.reshape(-1, 2), axis=0)
+    assert spread[0] > 1.5 * spread[1] > 0.7
+
+
+def test_fewer_cameras_and_wrong_calibrations_and_clocks_score_less(scene):
+    whole = scene.scores[Condition(WHOLE)]
+    assert whole.pcp > 95
+    assert whole.recall == 100
+    assert scene.scores[Condition((0, 1))].mpjpe_mm > whole.mpjpe_mm
+    assert scene.scores[WORSE].pcp < whole.pcp - 20
+    assert scene.scores[LATE].mpjpe_mm > whole.mpjpe_mm + 20
+    assert loss_of([scene], WORSE, Condition(WHOLE)).mean == pytest.approx(whole.pcp - scene.scores[WORSE].pcp)
+
+
+def test_one_camera_finds_nobody(scene):
+    alone = scene.scores[Condition((3,))]
+    assert alone.pcp == alone.recall == 0.0
+    assert np.isnan(alone.mpjpe_mm)
+
+
+def test_the_world_may_be_moved_with_its_rig_and_volume(scene):
+    turn, shift = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([7.0, -3.0, 0.0])
+    rig = Rig([replace(each, R=each.R @ turn.T, t=each.t - each.R @ turn.T @ shift) for each in read_rig("ring5")])
+    volume = Volume(Volume.box(4.0, 2.0).outline @ turn[:2, :2].T + shift[:2])
+    moved = simulate_scenes(settings(rig=rig, volume=volume), [Condition(WHOLE)], seeds=[3])[0]
+    assert moved.inside.mean() > 0.95
+    assert moved.scores[Condition(WHOLE)].pcp > 95
+
+
+def test_an_obstacle_before_two_cameras_costs_what_their_failure_does():
+    walls = []
+    for camera in list(read_rig("ring5"))[:2]:
+        x, y, _ = 0.9 * camera.center
+        walls.append(Obstacle(np.array([x, y, 1.5]), np.array([0.1, 3.0, 3.0]), float(np.arctan2(y, x))))
+    failed = Condition((2, 3, 4))
+    hidden = simulate_scenes(settings(obstacles=tuple(walls)), [Condition(WHOLE), failed], seeds=[3])[0]
+    assert hidden.scores[Condition(WHOLE)].mpjpe_mm == pytest.approx(hidden.scores[failed].mpjpe_mm, abs=8)
+
+
+def test_people_who_do_not_fit_are_named():
+    with pytest.raises(ValueError, match="30 people do not fit"):
+        simulate_scenes(settings(people=30, volume=Volume.box(1.5, 1.5)), [Condition(WHOLE)], seeds=[0])

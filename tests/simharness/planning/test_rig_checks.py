@@ -1,0 +1,79 @@
+"""Checks of a rig before its rehearsal: one message that names the camera, where it is, and what to change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mvpose import Rig
+from simharness.planning.coverage import covered_rectangle, whole_people
+from simharness.planning.rig_checks import check_rig
+from simharness.planning.rig_file import read_rig
+from simharness.planning.visibility import Obstacle
+from simharness.planning.volume import Volume
+from simharness.world.rigs.layouts import look_at
+
+K = np.array([[500.0, 0, 400], [0, 500, 300], [0, 0, 1]])
+
+
+def camera(x, y, z=2.0, *, aim=(0.0, 0.0, 1.0), name="left"):
+    return look_at((x, y, z), aim, K=K, size=(800, 600), name=name)
+
+
+def rig_with(one):
+    return Rig([one, camera(-2.0, 1.5, name="other")])
+
+
+ROOM, VOLUME = Volume.box(6.0, 4.0, height=3.0), Volume.box(2.0, 2.0)
+
+
+def test_a_rig_inside_the_room_and_on_its_walls_passes():
+    check_rig(rig_with(camera(2.5, 1.0)), VOLUME, room=ROOM)
+    check_rig(rig_with(camera(3.0, 1.0)), VOLUME, room=ROOM)
+
+
+@pytest.mark.parametrize(
+    ("placed", "message"),
+    [
+        (camera(3.4, 0.0), r"camera 'left' at \(3.40, 0.00, 2.00\) m is 0.40 m outside of the room"),
+        (camera(2.0, 0.0, 3.5), "above the ceiling, which is 3 m high"),
+        (camera(2.0, 0.0, -0.5), "not above the floor"),
+    ],
+)
+def test_a_camera_that_is_not_in_the_room(placed, message):
+    with pytest.raises(ValueError, match=message):
+        check_rig(rig_with(placed), VOLUME, room=ROOM)
+
+
+def test_a_camera_inside_a_turned_obstacle():
+    shelf = Obstacle(np.array([2.0, 1.0, 1.0]), np.array([2.0, 0.4, 2.5]), yaw=np.pi / 2)
+    check_rig(rig_with(camera(2.6, 1.0)), VOLUME, obstacles=[shelf])  # inside only if it were not turned
+    with pytest.raises(ValueError, match="inside obstacle 0"):
+        check_rig(rig_with(camera(2.0, 1.7)), VOLUME, obstacles=[shelf])
+
+
+def test_a_volume_that_leaves_the_room():
+    with pytest.raises(ValueError, match="outside of the room"):
+        check_rig(rig_with(camera(2.5, 1.0)), Volume.box(2.0, 5.0), room=ROOM)
+
+
+def test_one_camera_is_no_rig(tmp_path):
+    file = tmp_path / "one.toml"
+    file.write_text('layout = "free"\npositions = [[3.0, 0.0, 2.0]]\n')
+    with pytest.raises(ValueError, match=r"one.toml: .*at least 2 cameras"):
+        read_rig(file)
+
+
+def test_cameras_that_look_away_from_each_other_see_nobody_together():
+    apart = Rig([camera(-5.0, 0.0, aim=(-9.0, 0.0, 1.0)), camera(5.0, 0.0, aim=(9.0, 0.0, 1.0), name="right")])
+    with pytest.raises(ValueError, match="nowhere on the floor"):
+        covered_rectangle(apart)
+
+
+def test_everywhere_in_the_covered_rectangle_enough_cameras_see_a_person_whole():
+    rig = read_rig("ring5")
+    corners, needed = covered_rectangle(rig)
+    assert needed == 3
+    assert (whole_people(rig, Volume(corners).places(0.25)).sum(axis=0) >= needed).all()
+    wider = Volume(corners * 1.5 - 0.5 * corners.mean(axis=0)).places(0.25)
+    assert not (whole_people(rig, wider).sum(axis=0) >= needed).all()
