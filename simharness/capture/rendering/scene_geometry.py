@@ -24,6 +24,8 @@ from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
 
+_AROUND = 0.2  # metres around what stands still that shadow maps cover: feet sink in, hands reach through walls
+
 
 @dataclass(frozen=True)
 class StillGeometry:
@@ -135,7 +137,8 @@ class SceneGeometry:
 
         Only faces turned to the light cast shadows: this is sufficient for closed bodies, and lets the light into a
         room, whose walls face inwards. The floor and the walls that receive light have nothing behind them. The maps
-        cover what stands still, and the rest to the next metre if it reaches beyond: so the still one is reused.
+        cover what stands still with a margin, and the rest to the next metre if it reaches beyond: so the map of still
+        meshes serves many frames.
         Without still meshes they cover the faces that cast shadows.
         """
         vertices, still = self.moving_vertices, self.still
@@ -143,10 +146,9 @@ class SceneGeometry:
             vertices, self.topology.moving_faces, self._moving_normals[0], np.array(direction), still.box
         )
         if len(still.vertices):
-            outer = np.array([np.floor(low), np.ceil(high)])
-            inside = (low >= still.box[0]) & (high <= still.box[1])
-            low = np.where(inside, still.box[0], np.minimum(still.box[0], outer[0]))
-            high = np.where(inside, still.box[1], np.maximum(still.box[1], outer[1]))
+            covered = still.box + [[-_AROUND], [_AROUND]]
+            low = np.where(low < covered[0], np.floor(low), covered[0])
+            high = np.where(high > covered[1], np.ceil(high), covered[1])
         light = LightView.of(direction, low, high)
         return Shadows(light, still.shadow(light), shadow_map(light, vertices, faces))
 
