@@ -1,31 +1,34 @@
-"""What the keypoints of people say about errors of the cameras: normal equations with the joints eliminated.
+"""Normal equations of the errors of cameras, with the joints eliminated by the Schur complement.
 
-Each joint is seen by two views or more. Its place is free, so only what the views disagree about says something about
-the cameras: the Schur complement of bundle adjustment (Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000).
-The equations of separate times are kept apart, so that a camera that moved at some time can be found, and the
-scatter between times shows how much less than the error model says a keypoint is worth.
+Each joint is seen by two views or more. Its position is free, so only the disagreement of the views is evidence about
+the cameras: bundle adjustment with a Schur complement (Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000).
+Errors of keypoints have a Student distribution. Both the diagnosis, which compares faults of single cameras over time
+(:mod:`.cameras`), and the repair, which adjusts all cameras (:mod:`.adjustment`), use these equations.
 
 Parameters of a camera, :data:`PARAMETERS`: rotation about its own axes (rad; ``R' = exp(w) R``), centre along the axes
 of the world (m), logarithm of the focal length, principal point (pixels), k1 of the lens, and the offset of the clock
-(true minus given time of its pictures, s), by which keypoints go on with their velocity.
+(true minus given time of its pictures, s): keypoints move back by their velocity times the offset.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Floats, Integers
-from mvpose.kernels import njit
+from mvpose.calibration.joint_elimination import PARAMETERS, accumulate, triangulate
+from mvpose.camera import Camera
 
-PARAMETERS = 11
-"""Parameters of a camera: rotation 0 to 2, centre 3 to 5, focal length 6, principal point 7 and 8, k1 9, clock 10."""
+ROTATION, TRANSLATION, POSE = slice(0, 3), slice(3, 6), slice(0, 6)
+FOCAL, CENTER, K1, CLOCK = slice(6, 7), slice(7, 9), slice(9, 10), slice(10, 11)
+"""Places of the parameters of a camera."""
 
-_FREEDOM = 4.0  # of the t distribution of keypoints, whose tails are those of real detectors
-_STEPS = 8  # of the reweighted triangulation
-_MOST_VIEWS = 64
+FREEDOM = 4.0
+"""Degrees of freedom of the Student distribution of keypoints, whose tails are those of real detectors."""
+
+_UNSEEN = 400.0  # squared residual of a keypoint that no joint explains, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class JointViews:
         sigma: standard deviation of each keypoint, pixels, (k,).
         velocity: velocity of each keypoint in its picture, pixels/s, (k, 2); 0 where it is unknown.
         blocks: number of blocks, B.
+        cluster: cluster of each joint, (G,), for which gradients are summed; by default its block.
+        importance: weight of the evidence of each joint, (G,); by default 1.
     """
 
     start: Integers
@@ -51,6 +56,13 @@ class JointViews:
     sigma: Floats
     velocity: Floats
     blocks: int
+    cluster: Integers | None = None
+    importance: Floats | None = None
+
+    @property
+    def joint(self) -> Integers:
+        """Joint of each sighting, (k,)."""
+        return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
 
     def of_person(self, person: int) -> JointViews:
         """Return the joints of one person, in the same blocks of time."""
@@ -66,6 +78,8 @@ class JointViews:
             self.sigma[rows],
             self.velocity[rows],
             self.blocks,
+            None if self.cluster is None else self.cluster[joints],
+            None if self.importance is None else self.importance[joints],
         )
 
 
@@ -75,11 +89,12 @@ class NormalEquations:
 
     Attributes:
         H: curvature of each block of time, (B, 11 V, 11 V).
-        g: gradient of each block, (B, 11 V).
+        g: gradient of each cluster, (clusters, 11 V).
         joints: places of the joints, (G, 3), metres.
         residuals: projected minus detected pixels, (k, 2); NaN where the joint has no place.
         weights: weights of the sightings relative to their error model, (k,).
         scale: standard deviation of keypoints relative to the error model.
+        cost: minus the logarithm of the likelihood, up to a constant.
     """
 
     H: Floats
@@ -88,21 +103,27 @@ class NormalEquations:
     residuals: Floats
     weights: Floats
     scale: float
+    cost: float
 
 
-def normal_equations(cameras: Floats, sightings: JointViews, *, scale: float = 0.0) -> NormalEquations:
+def normal_equations(
+    cameras: Floats, sightings: JointViews, *, scale: float = 0.0, joints: Floats | None = None
+) -> NormalEquations:
     """Return the normal equations of all cameras at a state.
 
     Args:
         cameras: cameras in each block of time, from :func:`with_errors`, (B, V, 23).
         sightings: sightings of joints.
         scale: standard deviation of keypoints relative to the error model; 0: estimated.
+        joints: places from which the search for the joints starts, (G, 3), NaN where unknown; by default they are
+            triangulated.
     """
     s = sightings
     scale_now = scale or 0.5
+    first = np.full((len(s.start) - 1, 3), np.nan) if joints is None else joints
     for _ in range(1 if scale else 2):
-        joints, residuals, weights, squared, freedom = _triangulate(
-            cameras, s.start, s.block, s.view, s.pixels, s.velocity, s.sigma, scale_now, _FREEDOM
+        found, residuals, weights, squared, freedom = triangulate(
+            cameras, s.start, s.block, s.view, s.pixels, s.velocity, s.sigma, scale_now, FREEDOM, first
         )
         kept = freedom > 0
         if not scale and kept.any():
@@ -111,9 +132,40 @@ def normal_equations(cameras: Floats, sightings: JointViews, *, scale: float = 0
             f = freedom[kept]
             scale_now = float(np.clip(np.sqrt(np.median(squared[kept] / (f * (1 - 2 / (9 * f)) ** 3))), 0.1, 3.0))
     size = PARAMETERS * cameras.shape[1]
-    H, g = np.zeros((s.blocks, size, size)), np.zeros((s.blocks, size))
-    _accumulate(H, g, cameras, (s.start, s.block, s.view, s.velocity, s.sigma), joints, residuals, weights, scale_now)
-    return NormalEquations(H, g, joints, residuals, weights, scale_now)
+    cluster = s.block if s.cluster is None else s.cluster
+    importance = np.ones(len(first)) if s.importance is None else s.importance
+    H = np.zeros((s.blocks, size, size))
+    g = np.zeros((s.blocks if s.cluster is None else int(cluster.max(initial=0)) + 1, size))
+    accumulate(
+        H, g, cameras, s.start, s.block, s.view, s.velocity, s.sigma, cluster, importance,
+        found, residuals, weights, scale_now,
+    )  # fmt: skip
+    square = np.nan_to_num((residuals**2).sum(axis=1) / (scale_now * s.sigma) ** 2, nan=_UNSEEN)
+    cost = 0.5 * (FREEDOM + 2.0) * float(importance[s.joint] @ np.log1p(square / FREEDOM))
+    return NormalEquations(H, g, found, residuals, weights, scale_now, cost)
+
+
+def changed(camera: Camera, change: Floats) -> Camera:
+    """Return a camera with changed parameters, (11,); the same one where all are 0 but that of the clock."""
+    if not np.delete(change, CLOCK).any():
+        return camera
+    R = Rotation.from_rotvec(change[ROTATION]).as_matrix() @ camera.R
+    K, distortion = camera.K.copy(), camera.distortion.copy()
+    K[:2, :2] *= np.exp(change[FOCAL])
+    K[:2, 2] += change[CENTER]
+    distortion[0] += change[K1].item()
+    return replace(camera, K=K, R=R, t=-R @ (camera.center + change[TRANSLATION]), distortion=distortion)
+
+
+def difference(given: Camera, other: Camera) -> Floats:
+    """Return the parameters that change a camera into another one, (11,), with 0 for the clock."""
+    result = np.zeros(PARAMETERS)
+    result[ROTATION] = Rotation.from_matrix(other.R @ given.R.T).as_rotvec()
+    result[TRANSLATION] = other.center - given.center
+    result[FOCAL] = np.log(other.K[0, 0] / given.K[0, 0])
+    result[CENTER] = other.K[:2, 2] - given.K[:2, 2]
+    result[K1] = other.distortion[0] - given.distortion[0]
+    return result
 
 
 def with_errors(cameras: Floats, change: Floats) -> Floats:
@@ -152,252 +204,15 @@ def residuals_of_others(cameras: Floats, sightings: JointViews, *, scale: float)
     views = len(cameras)
     states = with_errors(cameras, np.zeros((s.blocks, PARAMETERS * views)))
     seen = np.repeat(np.diff(s.start), np.diff(s.start))  # views of the joint of each sighting
-    result = np.full(views, np.nan)
+    start, result = np.full((len(s.start) - 1, 3), np.nan), np.full(views, np.nan)
     for view in range(views):
         own = s.view == view
         sigma = np.where(own, 1e4 * s.sigma, s.sigma)
-        _, residuals, *_ = _triangulate(states, s.start, s.block, s.view, s.pixels, s.velocity, sigma, scale, _FREEDOM)
+        _, residuals, *_ = triangulate(
+            states, s.start, s.block, s.view, s.pixels, s.velocity, sigma, scale, FREEDOM, start
+        )
         distance = np.linalg.norm(residuals[own & (seen > 2)], axis=1)
         distance = distance[np.isfinite(distance)]
         if len(distance):
             result[view] = np.median(distance)
     return result
-
-
-@njit(cache=True, borrows=True)
-def _project(camera, X, pixel):
-    """Write the pixel of a point (3,) and return its depth; nothing is written behind the camera."""
-    dx, dy, dz = X[0] - camera[14], X[1] - camera[15], X[2] - camera[16]
-    x = camera[5] * dx + camera[6] * dy + camera[7] * dz
-    y = camera[8] * dx + camera[9] * dy + camera[10] * dz
-    z = camera[11] * dx + camera[12] * dy + camera[13] * dz
-    if z < 0.05:
-        return z
-    x, y = x / z, y / z
-    k1, k2, p1, p2, k3 = camera[17], camera[18], camera[19], camera[20], camera[21]
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    v = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    pixel[0] = camera[0] * u + camera[1] * v + camera[2]
-    pixel[1] = camera[3] * v + camera[4]
-    return z
-
-
-@njit(cache=True, borrows=True)
-def _derivatives(camera, X, by_point, by_camera):
-    """Write the derivatives of the pixel by the point (2, 3) and by the parameters of the camera (2, 10)."""
-    dx, dy, dz = X[0] - camera[14], X[1] - camera[15], X[2] - camera[16]
-    x = camera[5] * dx + camera[6] * dy + camera[7] * dz
-    y = camera[8] * dx + camera[9] * dy + camera[10] * dz
-    z = camera[11] * dx + camera[12] * dy + camera[13] * dz
-    a, b = x / z, y / z
-    k1, k2, p1, p2, k3 = camera[17], camera[18], camera[19], camera[20], camera[21]
-    r2 = a * a + b * b
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3))
-    uu = radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a
-    uv = a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b
-    vv = radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a
-    fx, skew, fy = camera[0], camera[1], camera[3]
-    # By a and b, then by the point in the camera.
-    ja0, ja1 = fx * uu + skew * uv, fx * uv + skew * vv
-    jb0, jb1 = fy * uv, fy * vv
-    for row in range(2):
-        da, db = (ja0, ja1) if row == 0 else (jb0, jb1)
-        cx, cy, cz = da / z, db / z, -(da * a + db * b) / z
-        for c in range(3):
-            by_point[row, c] = cx * camera[5 + c] + cy * camera[8 + c] + cz * camera[11 + c]
-            by_camera[row, 3 + c] = -by_point[row, c]
-        # d(exp(w) p) = w x p
-        by_camera[row, 0] = -cy * z + cz * y
-        by_camera[row, 1] = cx * z - cz * x
-        by_camera[row, 2] = -cx * y + cy * x
-        by_camera[row, 7], by_camera[row, 8] = 1.0 - row, 1.0 * row
-    u = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
-    v = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b
-    by_camera[0, 6], by_camera[1, 6] = fx * u + skew * v, fy * v
-    by_camera[0, 9], by_camera[1, 9] = (fx * a + skew * b) * r2, fy * b * r2
-
-
-@njit(cache=True, borrows=True)
-def _solve3(A, b, x):
-    """Solve a symmetric positive definite system (3, 3); return whether it is one."""
-    a, d, f = A[0, 0], A[1, 1], A[2, 2]
-    c, e, h = A[0, 1], A[0, 2], A[1, 2]
-    c00, c01, c02 = d * f - h * h, e * h - c * f, c * h - d * e
-    det = a * c00 + c * c01 + e * c02
-    if not det > 1e-12 * (a * d * f + 1e-300):
-        return False
-    c11, c12, c22 = a * f - e * e, c * e - a * h, a * d - c * c
-    x[0] = (c00 * b[0] + c01 * b[1] + c02 * b[2]) / det
-    x[1] = (c01 * b[0] + c11 * b[1] + c12 * b[2]) / det
-    x[2] = (c02 * b[0] + c12 * b[1] + c22 * b[2]) / det
-    return True
-
-
-@njit(cache=True)
-def _triangulate(all_cameras, start, block, view, pixels, velocity, sigma, scale, nu):
-    """Return places, residuals, weights, and of each joint the weighted sum of squares and its degrees of freedom."""
-    count = len(start) - 1
-    joints, residuals = np.full((count, 3), np.nan), np.full((len(view), 2), np.nan)
-    weights, squared, freedom = np.zeros(len(view)), np.zeros(count), np.zeros(count)
-    A, b, step, X, pixel = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(2)
-    taken = np.empty(pixels.shape)
-    by_point, by_camera = np.empty((2, 3)), np.empty((2, PARAMETERS))
-    for g in range(count):
-        first, last, cameras = start[g], start[g + 1], all_cameras[block[g]]
-        for k in range(first, last):
-            clock = cameras[view[k], 22]
-            taken[k, 0], taken[k, 1] = pixels[k, 0] + clock * velocity[k, 0], pixels[k, 1] + clock * velocity[k, 1]
-        if last - first < 2 or not _linear(cameras, view[first:last], taken[first:last], sigma[first:last], A, b, X):
-            continue
-        good = True
-        for step_number in range(_STEPS):
-            A[:], b[:] = 0.0, 0.0
-            total = 0.0
-            tempered = nu * max(1.0, 16.0 / 4.0**step_number)  # wrong keypoints lose their weight by and by
-            for k in range(first, last):
-                if not _project(cameras[view[k]], X, pixel) > 0.05:
-                    weights[k] = 0.0
-                    continue
-                rx, ry = pixel[0] - taken[k, 0], pixel[1] - taken[k, 1]
-                variance = (scale * sigma[k]) ** 2
-                weights[k] = (tempered + 2.0) / (tempered + (rx * rx + ry * ry) / variance)
-                residuals[k, 0], residuals[k, 1] = rx, ry
-                total += weights[k]
-                _derivatives(cameras[view[k]], X, by_point, by_camera)
-                w = weights[k] / variance
-                for r in range(3):
-                    b[r] -= w * (by_point[0, r] * rx + by_point[1, r] * ry)
-                    for c in range(3):
-                        A[r, c] += w * (by_point[0, r] * by_point[0, c] + by_point[1, r] * by_point[1, c])
-            for r in range(3):
-                A[r, r] += 1e-9 * (A[0, 0] + A[1, 1] + A[2, 2])
-            good = _solve3(A, b, step)
-            length = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-            if not good or not length < 5.0:
-                good = False
-                break
-            X += step
-            if length < 1e-4 and step_number > 2:
-                break
-        seen = 0
-        for k in range(first, last):
-            if good and _project(cameras[view[k]], X, pixel) > 0.05:
-                rx, ry = pixel[0] - taken[k, 0], pixel[1] - taken[k, 1]
-                residuals[k, 0], residuals[k, 1] = rx, ry
-                weights[k] = (nu + 2.0) / (nu + (rx * rx + ry * ry) / (scale * sigma[k]) ** 2)
-                squared[g] += (rx * rx + ry * ry) / sigma[k] ** 2
-                seen += 1
-            else:
-                weights[k] = 0.0
-                residuals[k] = np.nan
-        if good and seen > 1:
-            joints[g] = X
-            freedom[g] = 2.0 * seen - 3.0
-    return joints, residuals, weights, squared, freedom
-
-
-@njit(cache=True)
-def _linear(cameras, view, pixels, sigma, A, b, X):
-    """Write the point nearest to the viewing rays, weighted by their angular errors at unit depth."""
-    A[:], b[:] = 0.0, 0.0
-    d, point = np.empty(3), np.empty(2)
-    for k in range(len(view)):
-        camera = cameras[view[k]]
-        v = (pixels[k, 1] - camera[4]) / camera[3]
-        u = (pixels[k, 0] - camera[2] - camera[1] * v) / camera[0]
-        point[0], point[1] = _unbent(u, v, camera)
-        if np.isnan(point[0]):
-            continue
-        norm = np.sqrt(point[0] ** 2 + point[1] ** 2 + 1.0)
-        for r in range(3):
-            d[r] = (camera[5 + r] * point[0] + camera[8 + r] * point[1] + camera[11 + r]) / norm
-        weight = (camera[0] / sigma[k]) ** 2
-        for r in range(3):
-            for c in range(3):
-                entry = weight * ((1.0 if r == c else 0.0) - d[r] * d[c])
-                A[r, c] += entry
-                b[r] += entry * camera[14 + c]
-    return _solve3(A, b, X)
-
-
-@njit(cache=True, borrows=True)
-def _unbent(u, v, camera):
-    """Return undistorted coordinates by fixed-point iteration: a start for the triangulation needs no more."""
-    x, y = u, v
-    k1, k2, p1, p2, k3 = camera[17], camera[18], camera[19], camera[20], camera[21]
-    if k1 == 0.0 and k2 == 0.0 and p1 == 0.0 and p2 == 0.0 and k3 == 0.0:
-        return x, y
-    for _ in range(10):
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        if not radial > 0.2:
-            return np.nan, np.nan
-        x, y = (
-            (u - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
-            (v - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
-        )
-    return x, y
-
-
-@njit(cache=True)
-def _accumulate(H, g, all_cameras, sightings, joints, residuals, weights, scale):
-    """Add the equations of each joint, without the joint, to those of its block."""
-    start, block, view, velocity, sigma = sightings
-    n = PARAMETERS
-    by_point, by_camera = np.empty((_MOST_VIEWS, 2, 3)), np.zeros((_MOST_VIEWS, 2, n))
-    cross, lines = np.empty((_MOST_VIEWS, n, 3)), np.empty((_MOST_VIEWS, n, 3))
-    A, b, column, unit, inverse = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
-    rows = np.empty(_MOST_VIEWS, np.int64)
-    for joint in range(len(start) - 1):
-        if np.isnan(joints[joint, 0]):
-            continue
-        into, cameras, count = block[joint], all_cameras[block[joint]], 0
-        A[:], b[:] = 0.0, 0.0
-        for k in range(start[joint], start[joint + 1]):
-            if not weights[k] > 0.0 or count == _MOST_VIEWS:
-                continue
-            points, own = by_point[count], by_camera[count]
-            _derivatives(cameras[view[k]], joints[joint], points, own)
-            own[0, 10], own[1, 10] = -velocity[k, 0], -velocity[k, 1]
-            rows[count] = k
-            count += 1
-            w = weights[k] / (scale * sigma[k]) ** 2
-            for r in range(3):
-                b[r] += w * (points[0, r] * residuals[k, 0] + points[1, r] * residuals[k, 1])
-                for c in range(3):
-                    A[r, c] += w * (points[0, r] * points[0, c] + points[1, r] * points[1, c])
-        good = count > 1
-        for c in range(3):
-            unit[:] = 0.0
-            unit[c] = 1.0
-            good = good and _solve3(A, unit, column)
-            for r in range(3):
-                inverse[r, c] = column[r]
-        if not good:
-            continue
-        for m in range(count):
-            k, points, own = rows[m], by_point[m], by_camera[m]
-            w, row = weights[k] / (scale * sigma[k]) ** 2, view[k] * n
-            for p in range(n):
-                g[into, row + p] += w * (own[0, p] * residuals[k, 0] + own[1, p] * residuals[k, 1])
-                for q in range(n):
-                    H[into, row + p, row + q] += w * (own[0, p] * own[0, q] + own[1, p] * own[1, q])
-                for c in range(3):
-                    cross[m, p, c] = w * (own[0, p] * points[0, c] + own[1, p] * points[1, c])
-                for c in range(3):
-                    lines[m, p, c] = 0.0
-                    for r in range(3):
-                        lines[m, p, c] += cross[m, p, r] * inverse[r, c]
-                    g[into, row + p] -= lines[m, p, c] * b[c]
-        for m in range(count):
-            for other in range(count):
-                row, col = view[rows[m]] * n, view[rows[other]] * n
-                for p in range(n):
-                    for q in range(n):
-                        value = 0.0
-                        for c in range(3):
-                            value += lines[m, p, c] * cross[other, q, c]
-                        H[into, row + p, col + q] -= value

@@ -13,8 +13,19 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mvpose.arrays import Bools, Floats, Integers
-from mvpose.calibration.adjustment import Adjustment, Prior, adjust
-from mvpose.calibration.bundle import CENTER, CLOCK, FOCAL, PARAMETERS, ROTATION, TRANSLATION, observations, reduce
+from mvpose.calibration.adjustment import Adjustment, adjust, shared_joints
+from mvpose.calibration.calibration_prior import Prior
+from mvpose.calibration.normal_equations import (
+    CENTER,
+    CLOCK,
+    FOCAL,
+    PARAMETERS,
+    POSE,
+    ROTATION,
+    TRANSLATION,
+    normal_equations,
+    with_errors,
+)
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.tracklet_matching import PeopleGroups, RigUncertainty, match_tracklets
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, link
@@ -24,7 +35,7 @@ from mvpose.detections import Detections
 Freedom = Literal["extrinsics", "focal", "center"]
 """What a repair may change: places and orientations; focal lengths; principal points."""
 
-_PLACES = {"extrinsics": slice(0, 6), "focal": FOCAL, "center": CENTER}
+_PLACES = {"extrinsics": POSE, "focal": FOCAL, "center": CENTER}
 _SPACING = 0.2  # seconds between the frames that are used: errors of detectors last as long
 _NARROW = RigUncertainty(np.radians(0.3), 0.02, 0.02)  # of the rig that has been adjusted once
 _MOST_TURNS = 3
@@ -175,7 +186,7 @@ def _alternate(
 
 
 def _allowed(rig: Rig, free: Sequence[Freedom], cameras: Sequence[int | str] | None, *, clocks: bool) -> Bools:
-    """Return the parameters that may change, (V, 10)."""
+    """Return the parameters that may change, (V, 11)."""
     unknown = [each for each in free if each not in get_args(Freedom)]
     if isinstance(free, str) or unknown:
         raise ValueError(f"free must be some of {', '.join(get_args(Freedom))}, got {free!r}")
@@ -247,37 +258,33 @@ def _undetermined(adjusted: Adjustment, mask: Bools) -> Bools:
     return result
 
 
-def _residuals(rig: Rig, sightings: Sightings, given: Rig, offsets: Floats) -> Floats:
-    """Return the median distance of keypoints from projected joints by view, (V,), pixels."""
-    seen = observations(given, sightings)
-    solved = reduce(rig, offsets, seen)
-    error = np.linalg.norm(solved.residuals, axis=1) * sightings.sigma[seen.row]
-    sound = seen.scale > 0
-    return np.array(
-        [
-            np.median(error[sound & (seen.view == v)]) if (sound & (seen.view == v)).any() else np.nan
-            for v in range(len(rig))
-        ]
-    )
+def _residuals(rig: Rig, sightings: Sightings, parameters: Floats) -> Floats:
+    """Return the median distance of keypoints from projected joints by view, (V,), pixels, with changed cameras."""
+    joints, _ = shared_joints(sightings)
+    error = np.linalg.norm(normal_equations(with_errors(rig.packed, parameters.ravel()), joints).residuals, axis=1)
+    of_views = [error[(joints.view == view) & np.isfinite(error)] for view in range(len(rig))]
+    return np.array([np.median(each) if len(each) else np.nan for each in of_views])
 
 
 def _result(rig: Rig, sightings: Sightings, adjusted: Adjustment, held: list[str]) -> Repair:
-    views = len(rig)
+    views, parameters = len(rig), adjusted.parameters
     covariance = adjusted.covariance.reshape(views, PARAMETERS, views, PARAMETERS)
     own = np.stack([covariance[v, :, v] for v in range(views)])
-    offsets = adjusted.parameters[:, CLOCK].ravel()
+    # From rotations about the axes of the cameras, R' = exp(w) R, to turns of the cameras about those of the world.
+    to_world = np.tile(np.eye(6), (views, 1, 1))
+    to_world[:, ROTATION, ROTATION] = [-camera.R.T for camera in rig]
     return Repair(
         rig=adjusted.rig,
-        offsets=offsets,
-        corrections=adjusted.parameters[:, :6],
-        covariance=own[:, :6, :6],
+        offsets=parameters[:, CLOCK].ravel(),
+        corrections=np.einsum("vab,vb->va", to_world, parameters[:, POSE]),
+        covariance=to_world @ own[:, POSE, POSE] @ np.swapaxes(to_world, 1, 2),
         offset_sigmas=np.sqrt(own[:, CLOCK, CLOCK].ravel()),
-        focal=np.exp(adjusted.parameters[:, FOCAL].ravel()),
-        center=adjusted.parameters[:, CENTER],
+        focal=np.exp(parameters[:, FOCAL].ravel()),
+        center=parameters[:, CENTER],
         held=tuple(held),
         refused=None,
-        residuals_before=_residuals(rig, sightings, rig, np.zeros(views)),
-        residuals_after=_residuals(adjusted.rig, sightings, rig, offsets),
+        residuals_before=_residuals(rig, sightings, np.zeros_like(parameters)),
+        residuals_after=_residuals(rig, sightings, parameters),
         people=len(np.unique(sightings.person)),
     )
 

@@ -1,5 +1,7 @@
 """Bundle adjustment: derivatives, an oracle, recovery of known errors, and what the prior decides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from moving_people import disturbed, film, walk
@@ -7,8 +9,18 @@ from people import ring
 from scipy.optimize import least_squares
 
 from mvpose import Rig
-from mvpose.calibration.adjustment import Prior, adjust
-from mvpose.calibration.bundle import FLOOR, changed, difference, observations, reduce
+from mvpose.calibration.adjustment import adjust, shared_joints
+from mvpose.calibration.calibration_prior import Prior, PriorWeights
+from mvpose.calibration.evidence import CORRELATION, LIFETIME, importance_over_time, lasting_effect, shared_effect
+from mvpose.calibration.normal_equations import (
+    CLOCK,
+    FREEDOM,
+    POSE,
+    changed,
+    difference,
+    normal_equations,
+    with_errors,
+)
 from mvpose.calibration.sightings import Sightings, gather
 from mvpose.skeleton import COCO17
 
@@ -38,87 +50,152 @@ def clouds(count=40, seed=0):
     return np.random.default_rng(seed).uniform([-1.5, -1.5, 0.1], [1.5, 1.5, 1.8], (count, 3))
 
 
+def solved(rig, change, sightings, **options):
+    return normal_equations(with_errors(rig.packed, np.asarray(change, float).ravel()), sightings, scale=1.0, **options)
+
+
 def test_changes_of_cameras_are_found_again():
     rng = np.random.default_rng(0)
     camera = ring(3, distortion=BENT)[1]
-    change = rng.normal(size=10) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.0, 0.05, 9, 9]
+    change = rng.normal(size=11) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.05, 9, 9, 0.02, 0.0]
     np.testing.assert_allclose(difference(camera, changed(camera, change)), change, atol=1e-9)
+
+
+def test_packed_cameras_change_as_cameras_do():
+    rng = np.random.default_rng(0)
+    rig = ring(3, distortion=BENT)
+    change = rng.normal(size=(3, 11)) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.05, 9, 9, 0.02, 0.03]
+    packed = with_errors(rig.packed, change.ravel())[0]
+    other = Rig([changed(camera, each) for camera, each in zip(rig, change, strict=True)])
+    np.testing.assert_allclose(packed[:, :22], other.packed, atol=1e-9)
+    np.testing.assert_array_equal(packed[:, 22], change[:, CLOCK].ravel())
 
 
 @pytest.mark.parametrize("distortion", [None, BENT])
 def test_gradients_are_the_slopes_of_the_likelihood(distortion):
-    """All ten parameters of all cameras, against central differences of the cost with every joint solved for again."""
-    rig = ring(3, distortion=distortion)
-    off = disturbed(rig, 0.3, 0.01)
-    seen = observations(rig, sightings_of_points(rig, clouds(), noise=4.0, velocity=50.0))
-    offsets = np.array([0.004, -0.01, 0.0])
-    at = reduce(off, offsets, seen)
+    """All eleven parameters of all cameras, against central differences of the cost with every joint solved again."""
+    rig = disturbed(ring(3, distortion=distortion), 0.3, 0.01)
+    joints, _ = shared_joints(sightings_of_points(ring(3, distortion=distortion), clouds(), noise=4.0, velocity=50.0))
+    at = np.zeros((3, 11))
+    at[:, CLOCK.start] = 0.004, -0.01, 0.0
+    found = solved(rig, at, joints)
     for _ in range(5):
-        at = reduce(off, offsets, seen, points=at.points)
-    steps = np.array([1e-5] * 3 + [1e-4] * 3 + [1e-4, 1e-5, 1e-2, 1e-2])
-    slopes = np.empty((3, 10))
-    for view, parameter in np.ndindex(3, 10):
+        found = solved(rig, at, joints, joints=found.joints)
+    steps = np.array([1e-5] * 3 + [1e-4] * 3 + [1e-5, 1e-2, 1e-2, 1e-4, 1e-4])
+    slopes = np.empty((3, 11))
+    for place in np.ndindex(3, 11):
         costs = []
         for sign in (1.0, -1.0):
-            change = np.zeros((3, 10))
-            change[view, parameter] = sign * steps[parameter]
-            other = Rig([changed(camera, each) for camera, each in zip(off, change, strict=True)])
-            costs.append(reduce(other, offsets + change[:, 6], seen, points=at.points).cost)
-        slopes[view, parameter] = (costs[0] - costs[1]) / (2 * steps[parameter])
-    gradient = at.gradients.sum(axis=0).reshape(3, 10)
-    scale = np.sqrt(np.diag(at.information)).reshape(3, 10)
+            change = at.copy()
+            change[place] += sign * steps[place[1]]
+            costs.append(solved(rig, change, joints, joints=found.joints).cost)
+        slopes[place] = (costs[0] - costs[1]) / (2 * steps[place[1]])
+    gradient = found.g.sum(axis=0).reshape(3, 11)
+    scale = np.sqrt(np.diag(found.H[0])).reshape(3, 11)
     np.testing.assert_allclose(gradient / scale, slopes / scale, atol=0.01)
 
 
 def test_clusters_share_the_gradient_among_them():
     rig = ring(4)
-    seen = observations(rig, sightings_of_points(rig, clouds(), noise=4.0))
-    one = reduce(rig, np.zeros(4), seen)
-    some = reduce(rig, np.zeros(4), seen, clusters=np.random.default_rng(0).integers(0, 7, len(seen)))
-    np.testing.assert_allclose(some.gradients.sum(axis=0), one.gradients.sum(axis=0), rtol=1e-9, atol=1e-6)
+    joints, _ = shared_joints(sightings_of_points(rig, clouds(), noise=4.0))
+    one = solved(rig, np.zeros((4, 11)), replace(joints, cluster=np.zeros(len(clouds()), int)))
+    cluster = np.random.default_rng(0).integers(0, 7, len(clouds()))
+    some = solved(rig, np.zeros((4, 11)), replace(joints, cluster=cluster))
+    assert len(some.g) == 7
+    np.testing.assert_allclose(some.g.sum(axis=0), one.g[0], rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(some.H, one.H)
+
+
+def test_a_joint_of_importance_two_counts_as_two_joints():
+    rig, twice = ring(3), np.append(np.arange(10), 0)
+    joints, _ = shared_joints(sightings_of_points(rig, clouds(10), noise=0.0))
+    repeated, _ = shared_joints(sightings_of_points(rig, clouds(10)[twice], noise=0.0))
+    weighted = replace(joints, importance=np.append(2.0, np.ones(9)))
+    one, other = (solved(rig, np.zeros((3, 11)), each) for each in (weighted, repeated))
+    np.testing.assert_allclose(one.H, other.H, rtol=1e-6, atol=1e-6 * other.H.max())
 
 
 def test_the_information_is_that_of_all_unknowns_with_the_joints_eliminated():
     """Against the dense Schur complement of a numerical Jacobian of cameras and joints together."""
     rig, points = ring(3), clouds(12)
-    seen = observations(rig, sightings_of_points(rig, points, noise=0.0))
-    at = reduce(rig, np.zeros(3), seen)
+    joints, _ = shared_joints(sightings_of_points(rig, points, noise=0.0))
+    at = solved(rig, np.zeros((3, 11)), joints)
 
     def residuals(unknowns):
-        cameras, joints = unknowns[:18].reshape(3, 6), unknowns[18:].reshape(-1, 3)
-        moved = [changed(c, np.append(each, np.zeros(4))) for c, each in zip(rig, cameras, strict=True)]
-        pixels = np.stack([camera.project(joints) for camera in moved])[seen.view, seen.point]
-        return ((pixels - seen.pixels) / 4.0).ravel()
+        cameras, places = unknowns[:18].reshape(3, 6), unknowns[18:].reshape(-1, 3)
+        moved = [changed(c, np.append(each, np.zeros(5))) for c, each in zip(rig, cameras, strict=True)]
+        pixels = np.stack([camera.project(places) for camera in moved])[joints.view, joints.joint]
+        return ((pixels - joints.pixels) / 4.0).ravel()
 
-    start = np.append(np.zeros(18), at.points.ravel())
+    start = np.append(np.zeros(18), at.joints.ravel())
     jacobian = np.stack(
         [(residuals(start + 1e-6 * e) - residuals(start - 1e-6 * e)) / 2e-6 for e in np.eye(len(start))], axis=1
     )
-    full = jacobian.T @ jacobian / (1 + FLOOR)  # the weight of a residual of 0
+    full = jacobian.T @ jacobian * (FREEDOM + 2) / FREEDOM  # the weight of a residual of 0
     dense = full[:18, :18] - full[:18, 18:] @ np.linalg.solve(full[18:, 18:], full[18:, :18])
-    of_poses = (10 * np.arange(3)[:, None] + np.arange(6)).ravel()
-    got = at.information[np.ix_(of_poses, of_poses)]
+    of_poses = (11 * np.arange(3)[:, None] + np.arange(6)).ravel()
+    got = at.H[0][np.ix_(of_poses, of_poses)]
     np.testing.assert_allclose(got, dense, atol=1e-4 * np.abs(dense).max())
 
 
-def test_least_squares_finds_the_same_cameras():
-    """SciPy over cameras and joints together, with the same Gaussian prior and errors small enough to be Gaussian."""
+def test_least_squares_finds_the_same_camera():
+    """SciPy over the camera and all joints together, without a prior, with residuals whose squares are the cost."""
     rig, points = ring(3), clouds(15)
     wrong = disturbed(rig, 0.4, 0.02, seed=5)
-    sightings = sightings_of_points(rig, points, noise=0.4)
-    free = np.zeros((3, 10), bool)
-    free[2, :6] = True
-    found = adjust(wrong, sightings, free=free, prior=Prior(rotation=1e3, translation=1e3))
-    sigma = 4.0
+    free = np.zeros((3, 11), bool)
+    free[2, POSE] = True
+    found = adjust(wrong, sightings_of_points(rig, points, noise=0.4), free=free, prior=Prior(1e3, 1e3))
+    seen = found.joints
 
     def residuals(unknowns):
-        cameras = [*list(wrong)[:2], changed(wrong[2], np.append(unknowns[:6], np.zeros(4)))]
-        joints = unknowns[6:].reshape(-1, 3)
-        seen = found.observations
-        return ((np.stack([c.project(joints) for c in cameras])[seen.view, seen.point] - seen.pixels) / sigma).ravel()
+        cameras = [*list(wrong)[:2], changed(wrong[2], np.append(unknowns[:6], np.zeros(5)))]
+        places = unknowns[6:].reshape(-1, 3)
+        errors = np.stack([c.project(places) for c in cameras])[seen.view, seen.joint] - seen.pixels
+        square = (errors**2).sum(axis=1, keepdims=True) / (4.0 * found.equations.scale) ** 2
+        return (errors * np.sqrt(np.log1p(square / FREEDOM) / square)).ravel()
 
-    solved = least_squares(residuals, np.append(np.zeros(6), found.points.ravel()), x_scale="jac", method="trf")
-    np.testing.assert_allclose(found.parameters[2, :6], solved.x[:6], atol=4e-4)
+    solution = least_squares(residuals, np.append(np.zeros(6), found.equations.joints.ravel()), x_scale="jac")
+    np.testing.assert_allclose(found.parameters[2, POSE], solution.x[:6], atol=1e-4)
+
+
+@pytest.mark.parametrize("n", [1, 2, 30])
+def test_effect_of_lasting_errors_is_the_variance_of_their_sum(n):
+    """Against the sum of the whole covariance matrix of errors at irregular times."""
+    times = np.sort(np.random.default_rng(n).uniform(0, 8, n))
+    covariance = CORRELATION * np.exp(-np.abs(times[:, None] - times) / LIFETIME)
+    np.fill_diagonal(covariance, 1.0)
+    assert lasting_effect(times) == pytest.approx(covariance.sum() / n)
+
+
+def test_people_seen_for_longer_count_less_in_each_frame():
+    person, times = np.repeat([4, 7], [60, 5]), np.append(np.repeat(0.2 * np.arange(30), 2), 0.2 * np.arange(5))
+    weight = importance_over_time(person, times)
+    np.testing.assert_allclose(weight[:60], 1 / lasting_effect(0.2 * np.arange(30)))
+    np.testing.assert_allclose(weight[60:], 1 / lasting_effect(0.2 * np.arange(5)))
+    assert weight[0] < weight[-1]
+
+
+def test_effect_of_shared_errors_is_that_of_repeated_joints():
+    """Seven joints of a body with one and the same error have the evidence of one."""
+    rng = np.random.default_rng(0)
+    slopes = rng.standard_normal((400, 3))
+    own = slopes * rng.standard_normal((400, 1))
+    information = slopes.T @ slopes
+    assert shared_effect(own, np.ones(400), information) == pytest.approx(1.0, abs=0.2)
+    assert shared_effect(7 * own, np.ones(400), 7 * information) == pytest.approx(7.0, rel=0.15)
+    weighted = shared_effect(0.1 * 7 * own, np.full(400, 0.1), 0.1 * 7 * information)
+    assert weighted == pytest.approx(shared_effect(7 * own, np.ones(400), 7 * information))
+
+
+def test_the_width_of_the_prior_is_that_of_the_errors():
+    """Many cameras whose errors are known exactly: the scale of their Student distribution is found."""
+    rng, prior = np.random.default_rng(0), Prior()
+    free = np.ones((2000, 11), bool)
+    errors = 3.0 * prior.sigmas() * rng.standard_normal((2000, 11)) / np.sqrt(rng.gamma(2.0, 0.5, (2000, 1)))
+    weights = PriorWeights.wide(prior, 2000)
+    for _ in range(50):
+        weights = weights.updated(prior, errors, np.zeros_like(errors), free)
+    np.testing.assert_allclose(weights.width[:2], 3.0, rtol=0.1)
 
 
 def test_gross_errors_do_not_move_the_cameras():
@@ -131,11 +208,11 @@ def test_gross_errors_do_not_move_the_cameras():
     spoilt = Sightings(
         clean.frame, clean.view, clean.person, clean.joint, pixels, clean.sigma, clean.times, COCO17, clean.velocity
     )
-    free = np.zeros((5, 10), bool)
-    free[:, :6] = True
+    free = np.zeros((5, 11), bool)
+    free[:, POSE] = True
     found = adjust(rig, spoilt, free=free)
     assert np.abs(found.parameters[:, :3]).max() < np.radians(0.05)
-    assert found.weights[np.isin(found.observations.row, bad)].mean() < 0.15
+    assert found.equations.weights[np.isin(found.rows, bad)].mean() < 0.15
 
 
 @pytest.fixture(scope="module")
@@ -147,8 +224,8 @@ def test_the_camera_that_moved_takes_the_whole_correction(filmed):
     """All cameras are free; four agree with each other and stay."""
     rig = ring(5)
     wrong = disturbed(rig, 2, 0.2, seed=4, views=[3])
-    free = np.zeros((5, 10), bool)
-    free[:, :6] = True
+    free = np.zeros((5, 11), bool)
+    free[:, POSE] = True
     found = adjust(wrong, gather(wrong, filmed, period=0.1), free=free)
     error = np.stack([difference(a, b) for a, b in zip(rig, found.rig, strict=True)])
     assert np.degrees(np.linalg.norm(error[:, :3], axis=1)).max() < 0.2
@@ -158,8 +235,8 @@ def test_the_camera_that_moved_takes_the_whole_correction(filmed):
 def test_what_is_held_stays(filmed):
     rig = ring(5)
     wrong = disturbed(rig, 1, 0.1, seed=4)
-    free = np.zeros((5, 10), bool)
-    free[3, :6] = True
+    free = np.zeros((5, 11), bool)
+    free[3, POSE] = True
     found = adjust(wrong, gather(wrong, filmed, period=0.1), free=free)
     assert not found.parameters[~free].any()
     assert not found.covariance[~free.ravel()].any()
