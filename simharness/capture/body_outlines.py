@@ -43,7 +43,7 @@ class Outline:
     @classmethod
     def of(cls, body: Body) -> Outline:
         """Choose the outermost vertices of a body: the extreme vertices of the skin of each bone in all directions."""
-        directions = _directions(_DIRECTIONS)
+        directions = even_directions(_DIRECTIONS)
         share = np.zeros((len(body.vertices), len(body.bones)), np.float32)
         np.add.at(share, (np.arange(len(body.vertices))[:, None], body.weight_bones), body.weights)
         parts = []
@@ -67,7 +67,7 @@ class Outline:
         return moved
 
 
-def _directions(count: int) -> NDArray[np.float32]:
+def even_directions(count: int) -> NDArray[np.float32]:
     """Return evenly spread unit vectors, (count, 3): a Fibonacci spiral."""
     height = 1 - (2 * np.arange(count) + 1) / count
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
@@ -147,9 +147,9 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
             b = c[8] * x + c[9] * y + c[10] * z + c[15]
             d = c[11] * x + c[12] * y + c[13] * z + c[16]
             local[i, 0], local[i, 1], local[i, 2] = a, b, d
-            imaged, u, v = _project(a, b, d, c)
+            imaged, u, v = project_vertex(a, b, d, c)
             pixel[i, 0], pixel[i, 1] = u, v
-            if imaged == _IN_FRONT and image[0] <= u <= image[2] and image[1] <= v <= image[3]:
+            if imaged == IN_FRONT and image[0] <= u <= image[2] and image[1] <= v <= image[3]:
                 imaged = _IN_IMAGE
                 _widen(box, u, v)
             else:
@@ -163,12 +163,12 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
         out[view] = box
 
 
-_BEYOND, _BEHIND, _IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond the fold of the lens; depth below ``NEAR``
+_BEYOND, _BEHIND, IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond the fold of the lens; depth below ``NEAR``
 
 
 @njit(cache=True)
-def _project(x, y, z, c):
-    """Return the state of a point in camera coordinates (``_BEYOND`` to ``_IN_FRONT``) and its pixel."""
+def project_vertex(x, y, z, c):
+    """Return the state of a point in camera coordinates (``_BEYOND`` to ``IN_FRONT``) and its pixel."""
     if z < NEAR:
         return _BEHIND, 0.0, 0.0
     x, y = x / z, y / z
@@ -176,7 +176,7 @@ def _project(x, y, z, c):
         if not is_imaged(x, y, c[17:22], c[24]):
             return _BEYOND, 0.0, 0.0
         x, y = bend(x, y, c[17:22])
-    return _IN_FRONT, c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
+    return IN_FRONT, c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
 
 
 @njit(cache=True)
@@ -195,8 +195,8 @@ def _cut(i, j, local, pixel, state, c, image, box):
     if one == _BEHIND or two == _BEHIND:
         share = (NEAR - local[i, 2]) / (local[j, 2] - local[i, 2])
         x, y = (1 - share) * local[i, 0] + share * local[j, 0], (1 - share) * local[i, 1] + share * local[j, 1]
-        imaged, new_u, new_v = _project(x, y, NEAR, c)
-        if imaged != _IN_FRONT:
+        imaged, new_u, new_v = project_vertex(x, y, NEAR, c)
+        if imaged != IN_FRONT:
             return
         if one == _BEHIND:
             u, v = new_u, new_v

@@ -1,8 +1,8 @@
 """Planning of a rig before its cameras hang: what a set of cameras will make of the people in a volume."""
 
-from simharness.planning.layer import CameraTerms, FastLayer
+from simharness.planning.layer import CameraTerms, FastLayer, Reconstruction
 from simharness.planning.prediction import Figure, Prediction
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 
-__all__ = ["CameraTerms", "FastLayer", "Figure", "Obstacle", "Prediction", "Volume"]
+__all__ = ["CameraTerms", "FastLayer", "Figure", "Obstacle", "Prediction", "Reconstruction", "Volume"]

@@ -111,7 +111,7 @@ class FastLayer:
         people: int = 4,
         spacing: float = 0.5,
         orientations: int = 8,
-        draws: int = 2,
+        draws: int = 1,
         obstacles: Sequence[Obstacle] = (),
         activities: Sequence[str] = ACTIVITIES,
         children: float = 0.0,
@@ -184,19 +184,36 @@ class FastLayer:
         Raises:
             ValueError: fewer than two cameras, cameras that all stand in one point, or an unknown variant.
         """
+        return _prediction(self.scenes, terms, self.reconstruct(terms, variant=variant))
+
+    def reconstruct(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Reconstruction:
+        """Return what the method makes of everyone in every scene; arguments as of :meth:`predict`."""
         rig = Rig([each.camera for each in terms])
-        joints, found, mixed = _by_variant(rig, terms, self.scenes, variant) if variant else _by_truth(rig, terms)
-        return _prediction(self.scenes, terms, joints, found, mixed)
+        return _by_variant(rig, terms, self.scenes, variant) if variant else _by_truth(rig, terms)
 
 
-def _prediction(
-    scenes: StandingScenes, terms: Sequence[CameraTerms], joints: Floats, paired: Floats, mixed: Floats
-) -> Prediction:
-    """Return the maps of nearest and paired joints of everyone, (S, Q, 17, 3), and of who is mixed up, (S, Q)."""
+@dataclass(frozen=True)
+class Reconstruction:
+    """Estimates of everyone in S scenes of Q people.
+
+    Attributes:
+        nearest: joints of the estimate nearest to everyone, by which PCP is scored, (S, Q, 17, 3), metres; NaN where
+            missing.
+        paired: joints of the estimate paired one to one with everyone, (S, Q, 17, 3), metres; NaN where missing.
+        mixed: whose detections are not matched rightly, (S, Q), 0 or 1; NaN where matching was not tried.
+    """
+
+    nearest: Floats
+    paired: Floats
+    mixed: Floats
+
+
+def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: Reconstruction) -> Prediction:
+    """Return the maps of a reconstruction."""
     truth = scenes.joints
-    states = part_states(coco17_to_shelf14(truth), coco17_to_shelf14(joints))
+    states = part_states(coco17_to_shelf14(truth), coco17_to_shelf14(made.nearest))
     pcp = 100.0 * (states == Part.CORRECT).mean(axis=-1)
-    distance = np.linalg.norm(paired - truth, axis=-1)
+    distance = np.linalg.norm(made.paired - truth, axis=-1)
     placed = np.isfinite(distance)
     count = placed.sum(axis=-1)
     error = np.divide(
@@ -215,14 +232,14 @@ def _prediction(
         error_mm=scenes.mean_by_place(error),
         views=scenes.mean_by_place(np.asarray(views)),
         ellipse=ellipse,
-        risk=scenes.mean_by_place(mixed),
+        risk=scenes.mean_by_place(made.mixed),
         person_pcp=np.where(scenes.present, pcp, np.nan),
         person_error_mm=np.where(scenes.present, error, np.nan),
     )
 
 
-def _by_truth(rig: Rig, terms: Sequence[CameraTerms]) -> tuple[Floats, Floats, Floats]:
-    """Return the joints of everyone, twice, (S, Q, 17, 3), by robust triangulation of each person's own detections."""
+def _by_truth(rig: Rig, terms: Sequence[CameraTerms]) -> Reconstruction:
+    """Return estimates by robust triangulation of each person's own detections."""
     scenes = terms[0].scenes
     count, people = len(scenes), scenes.people
     rows = count * people
@@ -240,7 +257,7 @@ def _by_truth(rig: Rig, terms: Sequence[CameraTerms]) -> tuple[Floats, Floats, F
         joints[: len(poses.joints)] = poses.joints
         parts.append(joints)
     everyone = np.concatenate(parts).reshape(count, people, 17, 3)
-    return everyone, everyone, np.full((count, people), np.nan)
+    return Reconstruction(everyone, everyone, np.full((count, people), np.nan))
 
 
 _RAY_FIELDS = ("view", "origins", "directions", "weights", "pixel")
@@ -272,10 +289,8 @@ def _joined(parts: Sequence[Rays]) -> Rays:
 _MOST_ROWS = 256
 
 
-def _by_variant(
-    rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, variant: str
-) -> tuple[Floats, Floats, Floats]:
-    """Return the estimates of a variant nearest to everyone and paired with everyone, and who is mixed up, (S, Q)."""
+def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, variant: str) -> Reconstruction:
+    """Return the estimates of a variant of the method."""
     pipeline = Pipeline.preset(variant)
     shape = (len(scenes), scenes.people)
     close, paired = np.full((*shape, 17, 3), np.nan), np.full((*shape, 17, 3), np.nan)
@@ -294,7 +309,7 @@ def _by_variant(
             own = labels[person == q]
             mine = person[np.isin(labels, own[own >= 0])]
             mixed[s, q] = len(own) > 1 and (len(np.unique(own)) > 1 or own[0] < 0 or (mine != q).any())
-    return close, paired, mixed
+    return Reconstruction(close, paired, mixed)
 
 
 def _detections(terms: Sequence[CameraTerms], scene: int) -> tuple[Detections, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mvpose.arrays import Floats
+from simharness.types.random_streams import stream
 
 
 @dataclass(frozen=True)
@@ -49,20 +50,29 @@ class Prediction:
     person_pcp: Floats
     person_error_mm: Floats
 
-    def summary(self) -> dict[str, Figure]:
-        """Return ``pcp`` and ``mpjpe_mm`` of the volume, with 90 % intervals."""
-        return {"pcp": _figure(self.person_pcp, top=100.0), "mpjpe_mm": _figure(self.person_error_mm)}
+    def summary(self, *, seconds: float = 10.0) -> dict[str, Figure]:
+        """Return ``pcp`` and ``mpjpe_mm`` of the volume, with the 90 % intervals of a recording of some seconds.
+
+        The interval is that of the mean over as many moments as are independent in so many seconds: people stay
+        where they are for a while, and so do the errors of the detector.
+        """
+        moments = _FIRST_MOMENTS + seconds / _MOMENT
+        return {
+            "pcp": _figure(self.person_pcp, moments),
+            "mpjpe_mm": _figure(self.person_error_mm, moments),
+        }
 
 
-def _figure(values: Floats, *, top: float = np.inf) -> Figure:
-    """Return the mean of values of people (S, Q) and the interval of recordings."""
+_FIRST_MOMENTS, _MOMENT = 1.0, 4.0  # independent moments of a short recording; seconds until the next one
+_RESAMPLES = 2000
+
+
+def _figure(values: Floats, moments: float) -> Figure:
+    """Return the mean of values of people (S, Q) and the interval of the mean of some scenes, drawn from all."""
     known = np.isfinite(values).any(axis=1)
     if not known.any():
         return Figure(np.nan, np.nan, np.nan)
     scenes = np.nanmean(values[known], axis=1)
-    mean = float(np.nanmean(values))
-    spread = 1.645 * float(scenes.std()) / np.sqrt(_INDEPENDENT)
-    return Figure(mean, max(mean - spread, 0.0), min(mean + spread, top))
-
-
-_INDEPENDENT = 8.0  # independent moments of a recording of ten seconds
+    drawn = stream(0, "planning", "interval").choice(scenes, (_RESAMPLES, max(round(moments), 1))).mean(axis=1)
+    low, high = np.quantile(drawn, [0.05, 0.95])
+    return Figure(float(np.nanmean(values)), float(low), float(high))

@@ -13,6 +13,7 @@ from functools import cache
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.detector.bias import body_axes
@@ -29,6 +30,8 @@ _BODIES, _POSES = 6, 48  # bodies of the pool, and poses of each
 _FIRST, _LAST = 0.5, 9.5  # seconds of the motion from which poses are taken
 _AREA = 6.0  # metres, half the side of the square in which the people of the pool move
 _NOWHERE = np.array([0.0, 0.0, -1e4])  # position of absent people: no ray goes there
+_LIMBS = slice(5, 17)  # of COCO-17: shoulders to ankles
+_EXTREMES = 100  # directions in which the outermost vertices of a pose are taken
 _TRIES = 40  # open scenes that a person is tried in before the rule of the least distance is dropped
 
 
@@ -42,8 +45,12 @@ class PosePool:
         radii: radii of the capsules, (K, C), metres.
         depths: largest distance of the skin in front of each COCO-17 joint, (K, 17), metres.
         body: body of each pose, (K,).
-        outlines: outermost vertices of the skin by pose, K arrays (n, 3) float32, metres.
-        edges: edges of these outlines by body, arrays (e, 2).
+        outlines: outermost vertices of the skin of all poses, one after the other, (n, 3), metres.
+        outline_of: first vertex of each pose, and the end, (K + 1,).
+        extremes: outermost of these, which suffice where the whole person is in the picture, (m, 3), metres.
+        extremes_of: first of them of each pose, and the end, (K + 1,).
+        edges: edges of the outlines of all bodies, one after the other, as vertices of a pose, (e, 2).
+        edges_of: first edge of each body, and the end.
     """
 
     landmarks: Floats
@@ -51,16 +58,20 @@ class PosePool:
     radii: Floats
     depths: Floats
     body: Integers
-    outlines: tuple[np.ndarray, ...]
-    edges: tuple[Integers, ...]
+    outlines: Floats
+    outline_of: Integers
+    extremes: Floats
+    extremes_of: Integers
+    edges: Integers
+    edges_of: Integers
 
     def __len__(self) -> int:
         return len(self.landmarks)
 
     def nearest(self, joints: Floats) -> Integers:
-        """Return the pose nearest to each of n poses (n, 17, 3) that face +x over the origin, (n,)."""
-        own = self.landmarks[:, :17].reshape(len(self), -1)
-        given = np.nan_to_num(joints.reshape(len(joints), -1))
+        """Return the pose whose limbs are nearest to those of n poses (n, 17, 3) over the origin, facing +x, (n,)."""
+        own = self.landmarks[:, _LIMBS].reshape(len(self), -1)
+        given = np.nan_to_num(joints[:, _LIMBS].reshape(len(joints), -1))
         return ((given**2).sum(axis=1)[:, None] - 2 * given @ own.T + (own**2).sum(axis=1)).argmin(axis=1)
 
 
@@ -73,7 +84,7 @@ def pose_pool(activities: tuple[str, ...] = ACTIVITIES, *, children: float = 0.0
         children: share of children.
         seed: seed of bodies and motions.
     """
-    from simharness.capture.body_outlines import Outline
+    from simharness.capture.body_outlines import Outline, even_directions
     from simharness.capture.ray_casting import RayCaster
     from simharness.scenario.sections.cameras import Cameras
     from simharness.scenario.sections.people import People
@@ -93,6 +104,7 @@ def pose_pool(activities: tuple[str, ...] = ACTIVITIES, *, children: float = 0.0
         cameras=Cameras(),
     )
     scene = build(scenario, build_rig(scenario.cameras, seed=seed, room=None))
+    ways = even_directions(_EXTREMES).T
     caster, outlines = RayCaster(scene), [Outline.of(body) for body in scene.bodies]
     landmarks, capsules, radii, depths, bodies, skins = [], [], [], [], [], []
     for state in Playback(scene).over(np.linspace(_FIRST, _LAST, _POSES)):
@@ -105,16 +117,22 @@ def pose_pool(activities: tuple[str, ...] = ACTIVITIES, *, children: float = 0.0
             radii.append(radius)
             depths.append(body.joint_radii)
             bodies.append(person)
-            skins.append(((outlines[person].at(state.bones[person]) - here) @ turn).astype(np.float32))
+            skins.append((outlines[person].at(state.bones[person]) - here) @ turn)
     return PosePool(
         np.array(landmarks),
         np.array(capsules),
         np.array(radii),
         np.array(depths),
         np.array(bodies),
-        tuple(skins),
-        tuple(outline.edges for outline in outlines),
+        *_joined(skins),
+        *_joined([skin[np.unique((skin @ ways).argmax(axis=0))] for skin in skins]),
+        *_joined([outline.edges for outline in outlines]),
     )
+
+
+def _joined(parts: Sequence[NDArray]) -> tuple[NDArray, Integers]:
+    """Return arrays as one, and the first row of each, and the end."""
+    return np.concatenate(parts), np.cumsum([0, *map(len, parts)])
 
 
 def _frame(joints: Floats) -> tuple[Floats, Floats]:
@@ -150,6 +168,7 @@ class StandingScenes:
         present: who is in each scene, (S, Q).
         landmarks: positions of all landmarks, (S, Q, L, 3), metres.
         capsules: ends of the axes of all capsules, (S, Q, C, 2, 3), metres.
+        frame: recorded frame of each scene, (S,); -1 of a scene that is drawn.
     """
 
     pool: PosePool
@@ -161,19 +180,29 @@ class StandingScenes:
     present: Bools
     landmarks: Floats
     capsules: Floats
+    frame: Integers
 
     @classmethod
     def of(
-        cls, pool: PosePool, places: Floats, place: Integers, pose: Integers, position: Floats, angle: Floats
+        cls,
+        pool: PosePool,
+        places: Floats,
+        place: Integers,
+        pose: Integers,
+        position: Floats,
+        angle: Floats,
+        *,
+        frame: Integers | None = None,
     ) -> Self:
         """Return the scenes with people at positions (S, Q, 2), NaN where absent, facing angles (S, Q), radians."""
+        frame = np.full(len(place), -1) if frame is None else frame
         present = np.isfinite(position).all(axis=-1) & np.isfinite(angle)
         turn = _turns(np.where(present, angle, 0.0))
         flat = np.concatenate([position, np.zeros((*position.shape[:2], 1))], axis=-1)
         here = np.where(present[..., None], flat, _NOWHERE)
         landmarks = np.einsum("sqij,sqlj->sqli", turn, pool.landmarks[pose]) + here[:, :, None]
         capsules = np.einsum("sqij,sqcej->sqcei", turn, pool.capsules[pose]) + here[:, :, None, None]
-        return cls(pool, places, place, pose, here, turn, present, landmarks, capsules)
+        return cls(pool, places, place, pose, here, turn, present, landmarks, capsules, frame)
 
     def __len__(self) -> int:
         return len(self.place)
@@ -287,4 +316,4 @@ def _recorded_scenes(tracks: Floats, pool: PosePool, places: Floats, *, repeats:
     local = np.einsum("sqji,sqlj->sqli", _turns(np.nan_to_num(angle)), local)
     pose = pool.nearest(local.reshape(-1, 17, 3)).reshape(present.shape)
     away = ((np.nan_to_num(position)[:, :, None] - places) ** 2).sum(axis=-1)
-    return StandingScenes.of(pool, places, away.argmin(axis=-1), pose, position, angle)
+    return StandingScenes.of(pool, places, away.argmin(axis=-1), pose, position, angle, frame=chosen)

@@ -15,7 +15,7 @@ from mvpose.arrays import Bools, Floats
 from mvpose.camera import Camera
 from mvpose.checks import as_array
 from mvpose.kernels import njit
-from simharness.capture.body_outlines import bounding_box, packed
+from simharness.capture.body_outlines import IN_FRONT, bounding_box, packed, project_vertex
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import hit_people
 from simharness.capture.rendering.renderer import NEAR
@@ -193,38 +193,88 @@ def _enter_box(start, way, box):
 
 def _boxes(camera: Camera, scenes: StandingScenes) -> Floats:
     """Return the boxes of everyone in the image, (S, Q, 4); zeros where nothing of the person is inside."""
-    pool, result = scenes.pool, np.zeros((len(scenes), scenes.people, 4))
-    table, limits = packed(camera)[None], np.empty((1, 4))
-    near = _may_be_inside(camera, scenes)
-    for s, q in np.argwhere(near).tolist():
-        pose = scenes.pose[s, q]
-        _box(
-            pool.outlines[pose],
-            scenes.turn[s, q],
-            scenes.position[s, q],
-            pool.edges[pool.body[pose]],
-            table,
-            limits,
-        )
-        low, high = limits[0, :2], limits[0, 2:]
-        if (high >= low).all():
-            result[s, q] = *low, *(high - low)
-    return result
-
-
-def _may_be_inside(camera: Camera, scenes: StandingScenes) -> Bools:
-    """Return who may have a part inside the image, (S, Q): everyone not wholly behind the camera or absent."""
-    return scenes.present & (camera.depth(scenes.joints) > 0).any(axis=-1)
+    pool, limits = scenes.pool, np.full((len(scenes), scenes.people, 4), np.nan)
+    _box_everyone(
+        scenes.pose,
+        scenes.turn,
+        scenes.position,
+        scenes.present,
+        pool.outlines,
+        pool.outline_of,
+        pool.extremes,
+        pool.extremes_of,
+        pool.edges,
+        pool.edges_of,
+        pool.body,
+        packed(camera)[None],
+        limits,
+    )
+    low, high = limits[..., :2], limits[..., 2:]
+    inside = (high >= low).all(axis=-1, keepdims=True)  # False where NaN
+    return np.where(inside, np.concatenate([low, high - low], axis=-1), 0.0)
 
 
 @njit(cache=True)
-def _box(vertices, turn, position, edges, camera, limits):
-    """Write left, top, right, bottom of the outline (n, 3) of one person who is turned and moved, (1, 4)."""
-    moved = np.empty_like(vertices)
-    for i in range(len(vertices)):
-        for k in range(3):
-            at = position[k]
-            for m in range(3):
-                at += turn[k, m] * vertices[i, m]
-            moved[i, k] = at
-    bounding_box(moved, edges, camera, 0.0, 1.0, limits)
+def _box_everyone(
+    poses, turns, positions, present, outlines, outline_of, extremes, extremes_of, edges, edges_of, bodies, camera, out
+):
+    """Write left, top, right, bottom of everyone in one image, (S, Q, 4).
+
+    Where all extreme vertices are inside the image, their bounds are the box; else outline and edges are clipped.
+
+    Args:
+        poses: poses of the pool, (S, Q).
+        turns: rotations, (S, Q, 3, 3).
+        positions: positions, (S, Q, 3).
+        present: who is in the scene, (S, Q).
+        outlines: vertices of the outlines of all poses, (n, 3).
+        outline_of: first vertex of each pose and the end, (K + 1,).
+        extremes: extreme vertices of all poses, (m, 3).
+        extremes_of: first of them of each pose and the end, (K + 1,).
+        edges: edges of the outlines of all bodies, (e, 2).
+        edges_of: first edge of each body and the end.
+        bodies: body of each pose, (K,).
+        camera: parameters of the camera, (1, 26).
+        out: output.
+    """
+    c, limits = camera[0], np.empty((1, 4))
+    for s in range(len(poses)):
+        for q in range(poses.shape[1]):
+            if not present[s, q]:
+                continue
+            pose = poses[s, q]
+            turn, at, box = turns[s, q], positions[s, q], out[s, q]
+            box[:] = np.inf, np.inf, -np.inf, -np.inf
+            inside, ahead = True, False
+            for i in range(extremes_of[pose], extremes_of[pose + 1]):
+                x, y, z = _moved(extremes[i], turn, at)
+                a = c[5] * x + c[6] * y + c[7] * z + c[14]
+                b = c[8] * x + c[9] * y + c[10] * z + c[15]
+                d = c[11] * x + c[12] * y + c[13] * z + c[16]
+                state, u, v = project_vertex(a, b, d, c)
+                ahead |= d > 0
+                if state == IN_FRONT and -0.5 <= u <= c[22] - 0.5 and -0.5 <= v <= c[23] - 0.5:
+                    box[0], box[1] = min(box[0], u), min(box[1], v)
+                    box[2], box[3] = max(box[2], u), max(box[3], v)
+                else:
+                    inside = False
+            if inside or not ahead:
+                continue
+            first, last = outline_of[pose], outline_of[pose + 1]
+            moved = np.empty((last - first, 3))
+            for i in range(first, last):
+                moved[i - first] = _moved(outlines[i], turn, at)
+            body = bodies[pose]
+            bounding_box(moved, edges[edges_of[body] : edges_of[body + 1]], camera, 0.0, 1.0, limits)
+            box[:] = limits[0]
+
+
+@njit(cache=True)
+def _moved(vertex, turn, position):
+    """Return the coordinates of a vertex (3,) turned (3, 3) and moved (3,)."""
+    x, y, z = vertex[0], vertex[1], vertex[2]
+    return (
+        turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z + position[0],
+        turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z + position[1],
+        turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z + position[2],
+    )

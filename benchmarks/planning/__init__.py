@@ -1,0 +1,1 @@
+"""Planning held against simulation, and against the subsets of the cameras of a real recording."""

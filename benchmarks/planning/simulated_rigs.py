@@ -1,0 +1,231 @@
+"""The fast layer beside the simulator, on random rigs.
+
+    python -m benchmarks.planning.simulated_rigs trials [--count 40] [--first 7000]
+    python -m benchmarks.planning.simulated_rigs maps [--count 6] [--first 7000] [--recordings 6]
+
+``trials``: the PCP that ``full`` reaches in short simulated recordings, and the share of them that the predicted 90 %
+intervals hold. ``maps``: the mean error of the joints at every place, from several recordings of one rig, beside the
+predicted one. Rigs, rooms, people, detectors and activities are drawn from the seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from mvpose import Pipeline, Rig
+from mvpose.arrays import Floats
+from simharness.interface import simulate
+from simharness.pairing.pairing import pair
+from simharness.planning import FastLayer, Prediction, Volume
+from simharness.scenario.presets import read_profile
+from simharness.scenario.sections.scenario import Scenario
+from simharness.scoring.frame import score_frame
+from simharness.scoring.pcp import Part
+from simharness.trial.stages.build_trial import true_rig
+from simharness.types.random_streams import stream
+
+SECONDS, RATE = 8.0, 2.5
+"""Duration of a recording, seconds, and its frames per second."""
+
+DETECTORS = ("typical", "topdown", "excellent", "openpose-shelf")
+ACTIVITIES = ("walk", "wave", "turn", "reach", "talk", "point")
+
+_FEWEST = 25  # people at a place, below which its mean error is too noisy to be compared
+
+
+def random_scenario(seed: int, *, walking: bool = False) -> Scenario:
+    """Return a scenario with 3 to 8 cameras on the walls of a room and 1 to 6 people.
+
+    Args:
+        seed: seed of everything.
+        walking: whether everyone walks, so that all places are visited.
+    """
+    rng = stream(seed, "benchmark of planning")
+    x, y = rng.uniform(5.0, 9.0, 2).round(1)
+    area = round(min(x, y) / 2 - 0.9, 2)
+    fits = min(6, int(2.2 * area))
+    cameras = int(rng.integers(3, 9))
+    along = rng.permutation(cameras) + rng.uniform(-0.3, 0.3, cameras)
+    size = [[800, 600], [1280, 720], [1032, 776]][rng.integers(3)]
+    positions = [[*_on_wall(share / cameras, x, y), float(rng.uniform(1.6, 2.7))] for share in along]
+    aims = [[*rng.uniform(-0.4, 0.4, 2) * area, 0.9] for _ in positions]
+    activities = ["walk"] if walking else rng.permutation(ACTIVITIES)[: rng.integers(1, 4)].tolist()
+    people = int(rng.integers(1, fits + 1))
+    detector = str(rng.choice(DETECTORS))
+    return Scenario.model_validate(
+        {
+            "name": "planning",
+            "seed": seed,
+            "duration": SECONDS,
+            "rate": RATE,
+            "room": {"size": [x, y, 3.0]},
+            "people": {"count": people, "area": area, "activities": activities},
+            "cameras": {
+                "layout": "free",
+                "positions": np.round(positions, 3).tolist(),
+                "aims": np.round(aims, 3).tolist(),
+                "fov": round(float(rng.uniform(60, 95)), 1),
+                "size": size,
+            },
+            "detector": read_profile(detector).model_dump(),
+            "rendering": {"renderer": "rays"},
+        }
+    )
+
+
+def _on_wall(share: float, x: float, y: float) -> tuple[float, float]:
+    """Return the point at a share of the way round a room, a hand's breadth from the wall."""
+    x, y = x - 0.3, y - 0.3
+    way = (share % 1.0) * 2 * (x + y)
+    for length, corner, direction in (
+        (x, (-x / 2, -y / 2), (1, 0)),
+        (y, (x / 2, -y / 2), (0, 1)),
+        (x, (x / 2, y / 2), (-1, 0)),
+        (y, (-x / 2, y / 2), (0, -1)),
+    ):
+        if way <= length:
+            return corner[0] + direction[0] * way, corner[1] + direction[1] * way
+        way -= length
+    return -x / 2, -y / 2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the method made of a simulated recording.
+
+    Attributes:
+        pcp: PCP of ``full``, percent.
+        position: place of every true person in every frame, (n, 2), metres.
+        error_mm: mean error of their joints, (n,), millimetres; NaN for people who are not found.
+    """
+
+    pcp: float
+    position: Floats
+    error_mm: Floats
+
+
+def simulated(scenario: Scenario) -> Outcome:
+    """Simulate a scenario and score ``full`` on it."""
+    recording, pipeline = simulate(scenario), Pipeline.preset("full")
+    parts, positions, errors = [], [], []
+    for detections, truth in zip(recording.detections, recording.truth, strict=True):
+        estimate = pipeline.estimate(recording.rig, detections)
+        parts.append(score_frame(truth.joints, estimate.joints).parts)
+        positions.append(truth.joints[:, 11:13, :2].mean(axis=1))
+        errors.append(1000.0 * pair(truth.joints, estimate.joints).error)
+    counted = np.concatenate(parts)
+    pcp = 100.0 * (counted == Part.CORRECT).sum() / (counted != Part.UNDEFINED).sum()
+    return Outcome(float(pcp), np.concatenate(positions), np.concatenate(errors))
+
+
+def predicted(scenario: Scenario, *, spacing: float = 0.5, draws: int = 1) -> Prediction:
+    """Return the prediction of the fast layer for ``full``."""
+    side = 2 * scenario.people.area
+    layer = FastLayer.of(
+        Volume.box(side, side),
+        detector=scenario.detector,
+        people=scenario.people.count,
+        activities=scenario.people.activities,
+        spacing=spacing,
+        draws=draws,
+        seed=scenario.seed,
+    )
+    rig: Rig = true_rig(scenario)
+    return layer.predict([layer.terms(camera) for camera in rig], variant="full")
+
+
+def possible(first: int, *, walking: bool = False) -> Iterator[Scenario]:
+    """Yield random scenarios from a seed on, without those that have no room for their people."""
+    for seed in range(first, first + 10_000):
+        scenario = random_scenario(seed, walking=walking)
+        try:
+            true_rig(scenario)
+        except ValueError:
+            continue
+        yield scenario
+
+
+def trials(count: int, first: int) -> None:
+    """Print predicted intervals beside the PCP of one recording each."""
+    inside, done, apart = 0, 0, []
+    for scenario in possible(first):
+        if done == count:
+            break
+        try:
+            real = simulated(scenario).pcp
+        except ValueError:  # the people do not fit
+            continue
+        figure = predicted(scenario).summary(seconds=SECONDS)["pcp"]
+        done, inside = done + 1, inside + (figure.low <= real <= figure.high)
+        apart.append(abs(real - figure.value))
+        print(
+            f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people: PCP "
+            f"{real:.1f}, predicted {figure.value:.1f} ({figure.low:.1f} to {figure.high:.1f})",
+            flush=True,
+        )
+    print(
+        f"{inside} of {done} inside: {100 * inside / done:.1f} % (bar 85 to 95); mean difference {np.mean(apart):.2f}"
+    )
+
+
+def maps(count: int, first: int, recordings: int) -> None:
+    """Print how well the predicted error of each place agrees with that of simulated recordings."""
+    everything: list[tuple[float, float]] = []
+    for done, scenario in enumerate(possible(first, walking=True)):
+        if done == count:
+            break
+        outcomes = []
+        for number in range(recordings):
+            again = scenario.model_copy(update={"seed": scenario.seed + 100_000 * (number + 1), "duration": 20.0})
+            try:
+                outcomes.append(simulated(again))
+            except ValueError:
+                continue
+        prediction = predicted(scenario, spacing=1.0, draws=4)
+        position = np.concatenate([each.position for each in outcomes])
+        error = np.concatenate([each.error_mm for each in outcomes])
+        known = np.isfinite(error)
+        place = ((position[known][:, None] - prediction.places) ** 2).sum(axis=-1).argmin(axis=1)
+        number_at = np.bincount(place, minlength=len(prediction.places))
+        total = np.bincount(place, error[known], minlength=len(prediction.places))
+        chosen = np.flatnonzero((number_at >= _FEWEST) & np.isfinite(prediction.error_mm))
+        real = total[chosen] / number_at[chosen]
+        expected = prediction.error_mm[chosen]
+        everything += list(zip(real.tolist(), expected.tolist(), strict=True))
+        print(
+            f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people, "
+            f"{len(chosen)} places: Spearman {spearmanr(real, expected)[0]:.2f}, median relative error "
+            f"{100 * np.median(np.abs(expected / real - 1)):.0f} %, {real.mean():.0f} mm, "
+            f"predicted {expected.mean():.0f} mm",
+            flush=True,
+        )
+    real, expected = np.array(everything).T
+    print(
+        f"all {len(real)} places: Spearman {spearmanr(real, expected)[0]:.3f} (bar .9), median relative error "
+        f"{100 * np.median(np.abs(expected / real - 1)):.1f} % (bar 20)"
+    )
+
+
+def main() -> None:
+    """Run one of the comparisons."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("what", choices=("trials", "maps"))
+    parser.add_argument("--count", type=int, default=6)
+    parser.add_argument("--first", type=int, default=7000, help="first seed")
+    parser.add_argument("--recordings", type=int, default=6, help="recordings of each rig for the maps")
+    arguments = parser.parse_args()
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    if arguments.what == "trials":
+        trials(arguments.count, arguments.first)
+    else:
+        maps(arguments.count, arguments.first, arguments.recordings)
+
+
+if __name__ == "__main__":
+    main()
