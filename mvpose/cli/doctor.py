@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.cli.exit_codes import FAULTS, exit_on_error
-from mvpose.cli.inputs import (
-    Calibration,
-    Cameras,
-    Choices,
-    DetectionPaths,
-    Fps,
-    Frames,
-    Size,
-    Skeleton,
-    Times,
-    Up,
-    read_inputs,
-)
+from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
+from mvpose.cli.option_groups import grouped
 
 if TYPE_CHECKING:
     from mvpose.calibration import Diagnosis
@@ -35,6 +24,7 @@ def add_to(app: typer.Typer) -> None:
     app.command()(doctor)
 
 
+@grouped(without=["joints"])
 def doctor(
     calibration: Calibration,
     detections: DetectionPaths,
@@ -42,13 +32,8 @@ def doctor(
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Folder for a page with drawings, doctor.html.")
     ] = None,
-    fps: Fps = None,
-    times: Times = None,
-    size: Size = None,
-    cameras: Cameras = None,
-    frames: Frames = None,
-    skeleton: Skeleton = None,
-    up: Up = None,
+    *,
+    choices: Choices,
 ) -> None:
     """Say what is wrong with a calibration, from the people in the pictures. Exit code 1 where there are faults."""
     with exit_on_error():
@@ -59,7 +44,6 @@ def doctor(
         from mvpose.calibration import diagnose
         from mvpose.cli.exit_codes import failing
 
-        choices = Choices(fps, times, cameras, frames, skeleton, size, up)
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the diagnosis"):
             diagnosis = diagnose(inputs.rig, inputs.frames, period=inputs.period)

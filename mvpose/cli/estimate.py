@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,42 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.cli.exit_codes import command_line, exit_on_error
-from mvpose.cli.inputs import (
-    Calibration,
-    Cameras,
-    Choices,
-    DetectionPaths,
-    Fps,
-    Frames,
-    Joints,
-    Size,
-    Skeleton,
-    Times,
-    Up,
-    read_inputs,
-)
+from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
+from mvpose.cli.option_groups import grouped
 
 if TYPE_CHECKING:
     from mvpose.cli.inputs import Inputs
     from mvpose.formats.pictures import PictureSource
-    from mvpose.report.picture_drawings import Pictures
-
-Method = Annotated[
-    str, typer.Option(metavar="NAME", help="Method: track, track-fast, or full and fast, without identities.")
-]
-Formats = Annotated[
-    str, typer.Option("--format", metavar="NAME,...", help="Formats beside poses.parquet and people.json.")
-]
-FilesUp = Annotated[
-    str | None,
-    typer.Option(metavar="AXIS", help="Axis that points up in the files of --format, y or z, if not the usual one."),
-]
-Together = Annotated[bool, typer.Option("--together", help="One C3D file for all people, with prefixes.")]
-Lag = Annotated[float, typer.Option(metavar="S", help="Seconds of later frames that an estimate uses; inf for all.")]
-Page = Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page of the result.")]
-Trust = Annotated[
-    bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
-]
 
 
 def add_to(app: typer.Typer) -> None:
@@ -53,45 +23,42 @@ def add_to(app: typer.Typer) -> None:
     app.command()(estimate)
 
 
-def estimate(
-    calibration: Calibration,
-    detections: DetectionPaths,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")],
-    method: Method = "track",
-    fps: Fps = None,
-    times: Times = None,
-    formats: Formats = "trc,json",
-    files_up: FilesUp = None,
-    together: Together = False,
-    lag: Lag = 0.2,
-    size: Size = None,
-    cameras: Cameras = None,
-    frames: Frames = None,
-    skeleton: Skeleton = None,
-    joints: Joints = "body",
-    up: Up = None,
-    page: Page = True,
-    trust: Trust = False,
-) -> None:
-    """Estimate the people of a recording in 3D, and write them for other programs."""
-    with exit_on_error():
-        choices = Choices(fps, times, cameras, frames, skeleton, size, up, joints)
-        wanted = Wanted(out, method, formats, files_up, together, lag, page, trust)
-        estimate_into(calibration, detections, choices, wanted)
-
-
 @dataclass(frozen=True)
 class Wanted:
-    """Options about results, as given; see the types of this module."""
+    """Options about results, as given."""
 
-    out: Path
-    method: str
-    formats: str
-    files_up: str | None
-    together: bool
-    lag: float
-    page: bool
-    trust: bool
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
+    method: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="Method: track, track-fast, or full and fast, without identities."),
+    ] = "track"
+    formats: Annotated[
+        str, typer.Option("--format", metavar="NAME,...", help="Formats beside poses.parquet and people.json.")
+    ] = "trc,json"
+    files_up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS", help="Axis that points up in the files of --format, y or z, if not the usual one."
+        ),
+    ] = None
+    together: Annotated[bool, typer.Option("--together", help="One C3D file for all people, with prefixes.")] = False
+    lag: Annotated[
+        float, typer.Option(metavar="S", help="Seconds of later frames that an estimate uses; inf for all.")
+    ] = 0.2
+    page: Annotated[bool, typer.Option("--page/--no-page", help="Write recording.html, a page of the result.")] = True
+    pictures: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="VIDEO",
+            help="Videos or folders of pictures of the cameras, or a folder that holds them, for the page. Repeatable.",
+        ),
+    ] = None
+    films: Annotated[
+        bool, typer.Option("--films/--no-films", help="Write a film of each camera's pictures with the people in it.")
+    ] = True
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
+    ] = False
 
     def check(self) -> None:
         """Check all of them.
@@ -110,17 +77,31 @@ class Wanted:
         check_method(self.method, lag=self.lag)
 
 
+@grouped()
+def estimate(calibration: Calibration, detections: DetectionPaths, *, wanted: Wanted, choices: Choices) -> None:
+    """Estimate the people of a recording in 3D, and write them for other programs."""
+    with exit_on_error():
+        estimate_into(calibration, detections, choices, wanted)
+
+
 def estimate_into(
     calibration: Path,
     detections: Sequence[Path],
     choices: Choices,
     wanted: Wanted,
     *,
-    sources: Mapping[Path, PictureSource] | None = None,
+    sources: Sequence[PictureSource] | None = None,
 ) -> None:
     """Estimate the people of a recording, write them into a folder, and print how many there are.
 
-    Options are checked before anything is read. ``sources`` are the pictures of each file of detections, for the page.
+    Options are checked before anything is read.
+
+    Args:
+        calibration: file or folder.
+        detections: files or folders.
+        choices: options about the recording.
+        wanted: options about the results.
+        sources: pictures of the cameras for the page; by default those that the options name.
 
     Raises:
         ValueError: anything wrong with a file or an option.
@@ -132,7 +113,12 @@ def estimate_into(
     wanted.check()
     from mvpose.cli.estimation import estimate_people, estimator
 
+    if sources is None and wanted.pictures:
+        from mvpose.cli.video_detection import open_videos
+
+        sources = open_videos(wanted.pictures)
     inputs = read_inputs(calibration, detections, choices)
+    views = None if sources is None else _of_cameras(inputs, sources)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     people = estimate_people(inputs, method, trust=wanted.trust)
     write_results(
@@ -143,12 +129,18 @@ def estimate_into(
         options=options_of(wanted.files_up, together=wanted.together),
         command=command_line(),
         page=wanted.page,
-        pictures=None if sources is None else _pictures(inputs, sources),
+        views=views,
+        films=wanted.films,
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
 
 
-def _pictures(inputs: Inputs, sources: Mapping[Path, PictureSource]) -> Pictures:
-    """Return the function of frame and view that reads a picture."""
-    views = [sources[path] for path in inputs.paths]
-    return lambda frame, view: views[view].picture(int(inputs.numbers[frame]))
+def _of_cameras(inputs: Inputs, sources: Sequence[PictureSource]) -> list[PictureSource]:
+    """Return the pictures of each camera, found by the names of the cameras."""
+    from mvpose.formats.views.assignment import assign
+    from mvpose.formats.views.sources import Source
+
+    by_path = {source.path: source for source in sources}
+    named = [Source(source.name, source.path) for source in sources]
+    assigned = assign([camera.name for camera in inputs.rig], named, what="pictures")
+    return [by_path[source.path] for source in assigned.sources]

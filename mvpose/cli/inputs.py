@@ -36,41 +36,6 @@ DetectionPaths = Annotated[
         metavar="DETECTIONS",
     ),
 ]
-Fps = Annotated[float | None, typer.Option(metavar="N", help="Frames per second. [dim]\\[default: 25][/]")]
-Times = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
-    ),
-]
-Cameras = Annotated[
-    str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
-]
-Frames = Annotated[str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")]
-Skeleton = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME", help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..., or a TOML file."
-    ),
-]
-Joints = Annotated[
-    str,
-    typer.Option(
-        metavar="body|all", help="Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet."
-    ),
-]
-Size = Annotated[
-    str | None,
-    typer.Option(metavar="WxH", help="Size of the pictures in pixels, for calibrations that do not state it."),
-]
-Up = Annotated[
-    str | None,
-    typer.Option(
-        metavar="AXIS", help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]"
-    ),
-]
-
 _FPS = 25.0
 
 
@@ -102,16 +67,47 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Choices:
-    """Options of commands that read a recording, as given; see the types of this module."""
+    """Options of commands that read a recording, as given."""
 
-    fps: float | None = None
-    times: Path | None = None
-    cameras: str | None = None
-    frames: str | None = None
-    skeleton: str | None = None
-    size: str | None = None
-    up: str | None = None
-    joints: str = "body"
+    fps: Annotated[float | None, typer.Option(metavar="N", help="Frames per second. [dim]\\[default: 25][/]")] = None
+    times: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Times of the pictures in seconds: a line for each frame, with one number, or one for each camera.",
+        ),
+    ] = None
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Size of the pictures in pixels, for calibrations that do not state it."),
+    ] = None
+    cameras: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Cameras of the calibration to use. [dim]\\[default: all][/]")
+    ] = None
+    frames: Annotated[
+        str | None, typer.Option(metavar="FIRST:LAST", help="Frames to use, by the numbers in the files.")
+    ] = None
+    skeleton: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Skeleton of the detections: coco17, body25, halpe26, wholebody133 ..., or a TOML file.",
+        ),
+    ] = None
+    joints: Annotated[
+        str,
+        typer.Option(
+            metavar="body|all",
+            help="Joints to estimate: the 17 of COCO, or all of the detections, with hands, face, feet.",
+        ),
+    ] = "body"
+    up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help="Axis of the calibration's world that points up: z, y, -y ... [dim]\\[default: z][/]",
+        ),
+    ] = None
 
 
 def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:

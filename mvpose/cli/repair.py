@@ -10,18 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mvpose.cli.exit_codes import exit_on_error, note
-from mvpose.cli.inputs import (
-    Calibration,
-    Cameras,
-    Choices,
-    DetectionPaths,
-    Fps,
-    Frames,
-    Size,
-    Skeleton,
-    Times,
-    read_inputs,
-)
+from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
+from mvpose.cli.option_groups import grouped
 
 if TYPE_CHECKING:
     from mvpose import Rig
@@ -35,6 +25,7 @@ def add_to(app: typer.Typer) -> None:
     app.command()(repair)
 
 
+@grouped(without=["joints", "up"])
 def repair(
     calibration: Calibration,
     detections: DetectionPaths,
@@ -46,12 +37,8 @@ def repair(
         Path | None,
         typer.Option(metavar="FILE", help="Write the times of the pictures with mended clocks, for --times."),
     ] = None,
-    fps: Fps = None,
-    times: Times = None,
-    size: Size = None,
-    cameras: Cameras = None,
-    frames: Frames = None,
-    skeleton: Skeleton = None,
+    *,
+    choices: Choices,
 ) -> None:
     """Mend a calibration by the people in the pictures, and write it in the format in which it came."""
     with exit_on_error():
@@ -64,7 +51,6 @@ def repair(
         from mvpose.calibration import repair as mend
         from mvpose.cli.exit_codes import failing
 
-        choices = Choices(fps, times, cameras, frames, skeleton, size)
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the repair"):
             result = mend(inputs.rig, inputs.frames, period=inputs.period, free=freedoms)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mvpose.cli.exit_codes import failing
 from mvpose.cli.inputs import Inputs
 from mvpose.cli.output_folder import RESULTS
+from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import atomic_folder
 from mvpose.formats.writers import Options, check_formats, write_people
 from mvpose.recording import People
 
 if TYPE_CHECKING:
-    from mvpose.report.picture_drawings import Pictures
+    from mvpose.formats.pictures import PictureSource
 
 ALWAYS = ("parquet", "json")
 """Formats that every folder of results holds."""
@@ -55,9 +56,21 @@ def write_results(
     options: Options,
     command: str,
     page: bool = True,
-    pictures: Pictures | None = None,
+    views: Sequence[PictureSource] | None = None,
+    films: bool = True,
 ) -> None:
     """Write people in some formats, what they were estimated from, and the page of the recording.
+
+    Args:
+        folder: folder of the results, which appears when it is complete.
+        people: the people.
+        inputs: what they were estimated from.
+        formats: names of formats.
+        options: what the files are to be like.
+        command: command of the user.
+        page: whether to write the page.
+        views: pictures of each camera, for the page; None: there are none.
+        films: whether the page gets a film of each camera, where there are pictures.
 
     Raises:
         OSError: the folder cannot be written; nothing is left of it.
@@ -73,14 +86,37 @@ def write_results(
         }
         (partial / RESULTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
-            from mvpose.report.recording_page import write_page
+            _write_page(partial, folder.absolute().name, people, inputs, views, films=films)
 
-            with failing("the page"):
-                write_page(
-                    partial,
-                    name=folder.absolute().name,
-                    people=people,
-                    rig=inputs.rig,
-                    frames=inputs.frames,
-                    pictures=pictures,
-                )
+
+def _write_page(
+    folder: Path,
+    name: str,
+    people: People,
+    inputs: Inputs,
+    views: Sequence[PictureSource] | None,
+    *,
+    films: bool,
+) -> None:
+    """Write the page, with pictures and films where there are any."""
+    from mvpose.report.recording_page import write_page
+    from mvpose.report.reprojection import compared_frames
+
+    def picture(frame: int, view: int) -> Any:
+        return None if views is None else views[view].picture(int(inputs.numbers[frame]))
+
+    def moving(view: int, frames: Any) -> Iterator[Any]:
+        return iter(()) if views is None else views[view].some(inputs.numbers[frames].tolist())
+
+    count = 0 if views is None or not films else len(views) * len(compared_frames(people.frames))
+    with bar("films", count) as advance, failing("the page"):
+        write_page(
+            folder,
+            name=name,
+            people=people,
+            rig=inputs.rig,
+            frames=inputs.frames,
+            pictures=None if views is None else picture,
+            moving=moving if count else None,
+            progress=advance,
+        )

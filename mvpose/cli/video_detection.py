@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
     Raises:
         ValueError: a video that cannot be read, or two of one name, whose detections would share a file.
     """
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # no lines of the decoder beside our message
     sources = [open_pictures(path) for path in of_cameras(paths)]
     names = [each.name for each in sources]
     for source in sources:

@@ -48,6 +48,24 @@ class PictureSource:
         except ValueError:
             return None
 
+    def some(self, numbers: Sequence[int]) -> Iterator[NDArray[np.uint8] | None]:
+        """Yield the pictures of ascending numbers, each read once; None where there is none that can be read."""
+        if self.path.is_dir():
+            files = _files(self.path)
+            for number in numbers:
+                yield _readable(files[number]) if number < len(files) else None
+            return
+        pictures, following = self.pictures(), 0
+        for number in numbers:
+            picture = None
+            try:
+                while following <= number:
+                    picture = next(pictures, None)
+                    following += 1
+            except ValueError:  # the rest of the video is damaged
+                picture = None
+            yield picture
+
     def pictures(self, start: int = 0) -> Iterator[NDArray[np.uint8]]:
         """Yield the pictures from a number on, (h, w, 3) uint8, red green blue.
 
@@ -116,6 +134,13 @@ def _read(file: Path) -> NDArray[np.uint8]:
     if picture is None:
         raise ValueError(f"{file}: cannot be read as a picture; it may be cut off: copy it again")
     return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _readable(file: Path) -> NDArray[np.uint8] | None:
+    try:
+        return _read(file)
+    except ValueError:
+        return None
 
 
 def _of_folder(folder: Path, start: int) -> Iterator[NDArray[np.uint8]]:

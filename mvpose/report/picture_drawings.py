@@ -57,7 +57,7 @@ def picture_element(
     if picture is not None:
         ground = (
             f'<image x="-0.5" y="-0.5" width="{width}" height="{height}" preserveAspectRatio="none" '
-            f'href="{_jpeg_uri(picture)}"/>'
+            f'href="{jpeg_uri(picture)}"/>'
         )
     kind = "view pictured" if picture is not None else "view"
     return (
@@ -131,7 +131,8 @@ def _dots(camera: Camera, points: Floats, radius: float) -> str:
     )
 
 
-def _jpeg_uri(rgb: NDArray[np.uint8]) -> str:
+def jpeg_uri(rgb: NDArray[np.uint8]) -> str:
+    """Return a picture (h, w, 3) as the data URI of a JPEG file of at most 960 pixels."""
     from PIL import Image
 
     picture = Image.fromarray(rgb)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from mvpose.report import tables
 from mvpose.report.documents import fill_template, program_version
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.expected_error import expected_error
+from mvpose.report.films import MovingPictures, write_films
 from mvpose.report.limbs import limbs_of
 from mvpose.report.measures import median_by, share_on_one_view
 from mvpose.report.palette import identity_color
@@ -44,6 +45,8 @@ def write_page(
     diagnosis: Diagnosis | None = None,
     doctor_page: str = "",
     pictures: Pictures | None = None,
+    moving: MovingPictures | None = None,
+    progress: Callable[[int], None] = lambda _: None,
     shown_frames: int = 3,
 ) -> Path:
     """Write the page of a recording, ``recording.html``, and its numbers, ``recording.json``.
@@ -57,6 +60,8 @@ def write_page(
         diagnosis: what the doctor found, where it was asked.
         doctor_page: address of the doctor's page, relative to the folder.
         pictures: function that returns the picture of a frame and view; by default people are drawn on plain ground.
+        moving: pictures for a film of each camera, in a folder beside the page; without them there is none.
+        progress: called with the number of pictures that were added to films since the last call.
         shown_frames: frames that are drawn.
 
     Returns:
@@ -69,6 +74,7 @@ def write_page(
     if not len(frames):
         raise ValueError("a page needs at least one frame, got none; read detections of at least one frame")
     recording = ExaminedRecording.of(people, rig, frames)
+    films = [] if moving is None or not len(people) else write_films(Path(folder), recording, moving, progress=progress)
     page = fill_template(
         "recording.html",
         program="mvpose",
@@ -78,6 +84,7 @@ def write_page(
         cards=_cards(recording),
         doctor=_doctor(diagnosis, doctor_page),
         detections=sum(map(len, frames)),
+        films=films,
         **_sections(recording, pictures, shown_frames),
     )
     numbers = {"name": name, **recording.numbers(), "doctor": None if diagnosis is None else diagnosis.to_json()}

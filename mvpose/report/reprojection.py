@@ -86,8 +86,7 @@ def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: 
         )
     noise = noise or Noise()
     reach = np.sqrt(-2.0 * np.log(noise.floor)) * noise.sigmas(people.skeleton)
-    step = -(-len(frames) // MOST_FRAMES) or 1
-    numbers = np.arange(0, len(frames), step)
+    numbers = compared_frames(len(frames))
     pixels, scale = _projected(rig, people, numbers)
     owners, rows = [], []
     for k, frame in enumerate(numbers.tolist()):
@@ -116,6 +115,11 @@ def reproject(rig: Rig, frames: Sequence[Detections], people: People, *, noise: 
     empty = (*(np.zeros(0, np.int64) for _ in range(4)), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
     columns = [np.concatenate(each) for each in zip((*empty, np.zeros(0, bool)), *rows, strict=True)]
     return Reprojection(numbers, tuple(owners), *columns)
+
+
+def compared_frames(count: int) -> Integers:
+    """Return the frames that are compared of a recording of ``count``: at most :data:`MOST_FRAMES`, evenly spaced."""
+    return np.arange(0, count, -(-count // MOST_FRAMES) or 1)
 
 
 def _projected(rig: Rig, people: People, numbers: Integers) -> tuple[Floats, Floats]:

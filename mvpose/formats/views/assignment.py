@@ -32,24 +32,29 @@ class Assignment:
         return f"detections of cameras, {how}: {pairs}{unused}"
 
 
-def assign(cameras: Sequence[str], sources: Sequence[Source]) -> Assignment:
+def assign(cameras: Sequence[str], sources: Sequence[Source], *, what: str = "detections") -> Assignment:
     """Assign a source to each camera.
 
     Names count as equal if they are after the removal of upper case and punctuation; or if each contains the other's
     words ("cam1" and "int_cam1_img"), or the same only number ("camera 01" and "cam1"), and no other name fits.
+
+    Args:
+        cameras: names of the cameras.
+        sources: what there is.
+        what: what the sources hold, for messages.
 
     Raises:
         ValueError: two sources that fit one camera, a camera without source, or, where no name fits, another number of
             sources than of cameras.
     """
     if not sources:
-        raise ValueError(f"no detections for the cameras {listed(cameras)}; give a folder or file for each")
+        raise ValueError(f"no {what} for the cameras {listed(cameras)}; give a folder or file for each")
     for equal in (_same_name, _same_words, _same_number):
         fitting = [[k for k, source in enumerate(sources) if equal(camera, source.name)] for camera in cameras]
         for camera, found in zip(cameras, fitting, strict=True):
             if len(found) > 1 and equal is _same_name:
                 twice = listed([str(sources[k].path) for k in found])
-                raise ValueError(f"camera {camera!r} has {len(found)} sources of detections, {twice}; give one of them")
+                raise ValueError(f"camera {camera!r} has {len(found)} sources of {what}, {twice}; give one of them")
         chosen = [found[0] for found in fitting if len(found) == 1]
         if len(chosen) == len(cameras) and len(set(chosen)) == len(chosen):
             rest = tuple(source for k, source in enumerate(sources) if k not in chosen)
@@ -59,12 +64,12 @@ def assign(cameras: Sequence[str], sources: Sequence[Source]) -> Assignment:
     if exact:
         lacking = listed([camera for camera in cameras if camera not in exact])
         raise ValueError(
-            f"no detections for the camera {lacking}: the detections are called {names}; add them, rename them as the "
+            f"no {what} for the camera {lacking}: the {what} are called {names}; add them, rename them as the "
             f"cameras of the calibration, or select cameras: --cameras {','.join(exact)}"
         )
     if len(sources) != len(cameras):
         raise ValueError(
-            f"the calibration has {len(cameras)} cameras, {listed(cameras)}, but there are detections of "
+            f"the calibration has {len(cameras)} cameras, {listed(cameras)}, but there are {what} of "
             f"{len(sources)}, {names}; name folders or files as the cameras, or select cameras: --cameras NAME,NAME"
         )
     return Assignment(tuple(sources), by_name=False)

@@ -1,0 +1,62 @@
+"""Options that several commands share, declared once as the fields of a dataclass."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import typing
+from collections.abc import Callable, Collection
+from typing import Any
+
+Command = Callable[..., None]
+
+
+def grouped(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
+    """Return a decorator that gives a command the fields of its dataclass parameters as options.
+
+    The fields are annotated as parameters of a typer command. The command itself is called with the dataclasses.
+
+    Args:
+        without: fields that are no options of this command; they keep their defaults.
+    """
+
+    def decorate(command: Command) -> Command:
+        hints = typing.get_type_hints(command, include_extras=True)
+        parameters: list[inspect.Parameter] = []
+        groups: dict[str, type[Any]] = {}
+        for parameter in inspect.signature(command).parameters.values():
+            kind = hints[parameter.name]
+            if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+                groups[parameter.name] = kind
+                parameters += [each for each in _options(kind) if each.name not in without]
+            else:
+                parameters.append(
+                    parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)  # typer passes names
+                )
+
+        def called(**values: Any) -> None:
+            for name, kind in groups.items():
+                fields = [field.name for field in dataclasses.fields(kind) if field.name not in without]
+                values[name] = kind(**{field: values.pop(field) for field in fields})
+            command(**values)
+
+        called.__name__, called.__doc__ = command.__name__, command.__doc__
+        called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        called.__annotations__ = {each.name: each.annotation for each in parameters}
+        return called
+
+    return decorate
+
+
+def _options(kind: type[Any]) -> list[inspect.Parameter]:
+    """Return the fields of a dataclass as parameters."""
+    hints = typing.get_type_hints(kind, include_extras=True)
+    return [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default,
+            annotation=hints[field.name],
+        )
+        for field in dataclasses.fields(kind)
+    ]

@@ -1,0 +1,243 @@
+"""Films of the cameras: pictures with the people in 3D and the detections drawn into them, which browsers play.
+
+WebM files with VP8, which OpenCV brings along: all browsers play them. Drawings are those of the page
+(:mod:`.picture_drawings`): broad limbs for people in 3D, thin lines with dots for detections.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Bools, Floats, Integers
+from mvpose.files.message_text import one_line
+from mvpose.report.examined_recording import ExaminedRecording
+from mvpose.report.limbs import Edges, limbs_of
+from mvpose.report.palette import UNMATCHED, identity_color
+from mvpose.report.picture_drawings import jpeg_uri
+
+if TYPE_CHECKING:
+    from mvpose.camera import Camera
+
+Rgb = NDArray[np.uint8]
+MovingPictures = Callable[[int, Integers], Iterator[Rgb | None]]
+"""Function of a view and of ascending frames that yields their pictures, (h, w, 3) uint8 RGB, or None for none."""
+
+FOLDER = "films"
+"""Folder of the films, beside the page."""
+
+_WIDEST = 768  # pixels
+_USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
+_SHIFT = 4  # bits of a pixel's fraction in OpenCV's coordinates
+_BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
+_OPACITY = 0.6  # of people in 3D
+_GROUND = (236, 238, 240)  # where a picture is missing
+_SPACE = 2**20  # bytes that must be free after a film
+_SLOWEST = 1.0  # frames per second that players can be relied on to show
+
+
+@dataclass(frozen=True)
+class Film:
+    """Film of a camera.
+
+    Attributes:
+        camera: name of the camera.
+        address: address of the file, relative to the folder of the page.
+        poster: the picture that shows most people, as a data URI.
+    """
+
+    camera: str
+    address: str
+    poster: str
+
+
+def write_films(
+    folder: Path,
+    recording: ExaminedRecording,
+    pictures: MovingPictures,
+    *,
+    progress: Callable[[int], None] = lambda _: None,
+) -> list[Film]:
+    """Write the film of each camera.
+
+    Args:
+        folder: an existing folder; the films get a folder in it.
+        recording: people, detections and cameras. Films show the frames in which they were compared, in real time.
+        pictures: the pictures.
+        progress: called with the number of pictures that were written since the last call.
+
+    Returns:
+        The film of each camera.
+
+    Raises:
+        OSError: a film cannot be written.
+    """
+    (folder / FOLDER).mkdir()
+    frames = recording.seen.frames
+    step = int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    rate = max(_SLOWEST, recording.people.rate / step)
+    films, names = [], _file_names(recording.names)
+    for view, camera in enumerate(recording.rig):
+        address = f"{FOLDER}/{names[view]}.webm"
+        scale = min(1.0, _WIDEST / camera.size[0])
+        size = tuple(max(2, 2 * round(0.5 * scale * side)) for side in camera.size)  # colour has half the resolution
+        writer, pen = _Writer(folder / address, (size[0], size[1]), rate), _Pen(recording, view, scale)
+        most, poster = -1, np.full((size[1], size[0], 3), _GROUND, np.uint8)
+        for row, picture in enumerate(pictures(view, frames)):
+            drawn = pen.drawn(row, picture, (size[0], size[1]))
+            if (shown := pen.detected(row)) > most:
+                most, poster = shown, drawn
+            writer.add(drawn)
+            progress(1)
+        writer.close()
+        films.append(Film(recording.names[view], address, jpeg_uri(poster)))
+    return films
+
+
+def _file_names(cameras: Sequence[str]) -> list[str]:
+    """Return names for files that are those of the cameras as far as files may have them; all different."""
+    plain = [re.sub(r"[^\w-]+", "_", name, flags=re.ASCII)[:60] for name in cameras]
+    return [f"{name}_{view}" if plain.count(name) > 1 or not name else name for view, name in enumerate(plain)]
+
+
+class _Writer:
+    """File of a film that is being written."""
+
+    def __init__(self, path: Path, size: tuple[int, int], rate: float) -> None:
+        self._path = path
+        with _no_messages():  # about a tag that WebM does not have
+            self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
+        if not self._writer.isOpened():
+            raise OSError(errno.EIO, "cannot be written as a WebM film by this OpenCV; --no-films leaves it out", path)
+
+    def add(self, picture: Rgb) -> None:
+        self._writer.write(np.ascontiguousarray(picture[..., ::-1]))
+
+    def close(self) -> None:
+        """Finish the file, and check that there is space left: OpenCV does not say when a disk is full."""
+        self._writer.release()
+        probe = self._path.with_suffix(".partial")
+        try:
+            probe.write_bytes(bytes(_SPACE))
+        finally:
+            probe.unlink(missing_ok=True)
+
+
+class _Pen:
+    """Drawer of the people and detections of one view into its pictures, which are ``scale`` as large."""
+
+    def __init__(self, recording: ExaminedRecording, view: int, scale: float) -> None:
+        self._recording, self._view, self._scale = recording, view, scale
+        people = recording.people
+        self._limbs = limbs_of(people.skeleton)
+        self._colors = [_rgb(identity_color(row)) for row in range(len(people))]
+        self._unit = scale * recording.rig[view].size[1] / _USUAL_HEIGHT
+
+    def drawn(self, row: int, picture: Rgb | None, size: tuple[int, int]) -> Rgb:
+        """Return a picture with the drawings of a compared frame."""
+        if picture is None:
+            canvas = np.full((size[1], size[0], 3), _GROUND, np.uint8)
+        else:
+            canvas = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        canvas = np.ascontiguousarray(canvas)
+        self._draw_people(canvas, int(self._recording.seen.frames[row]))
+        self._draw_detections(canvas, row, plain=picture is None)
+        return canvas
+
+    def detected(self, row: int) -> int:
+        """Return the number of people who are detected in this view of a compared frame."""
+        seen = self._recording.seen
+        owners = seen.owners[row][self._recording.frames[int(seen.frames[row])].view == self._view]
+        return int((owners >= 0).sum())
+
+    def _draw_people(self, canvas: Rgb, frame: int) -> None:
+        people, camera = self._recording.people, self._recording.rig[self._view]
+        layer = canvas.copy()
+        names = []
+        for person in np.flatnonzero(people.present[frame].any(axis=1)).tolist():
+            points = self._placed(camera, camera.project(people.joints[frame, person]))
+            _draw_limbs(layer, points, self._limbs, self._colors[person], max(2, round(8 * self._unit)))
+            if np.isfinite(points).any():
+                names.append((points, person))
+        cv2.addWeighted(layer, _OPACITY, canvas, 1.0 - _OPACITY, 0.0, dst=canvas)
+        for points, person in names:
+            _draw_name(canvas, points, one_line(str(people.ids[person]), 12), self._colors[person], self._unit)
+
+    def _draw_detections(self, canvas: Rgb, row: int, *, plain: bool) -> None:
+        recording, seen = self._recording, self._recording.seen
+        detections, owners = recording.frames[int(seen.frames[row])], seen.owners[row]
+        edges, line = limbs_of(detections.skeleton), (27, 29, 33) if plain else (255, 255, 255)
+        for index in np.flatnonzero(detections.view == self._view):
+            owner = int(owners[index])
+            color = UNMATCHED if owner < 0 else self._colors[owner]
+            points = self._placed(recording.rig[self._view], detections.keypoints[index])
+            _draw_limbs(canvas, points, edges, line if owner >= 0 else UNMATCHED, max(1, round(1.2 * self._unit)))
+            for point in points[_known(points)]:
+                place, radius = _fixed(point), round(2.6 * self._unit * 2**_SHIFT)
+                cv2.circle(canvas, place, radius, color, cv2.FILLED, cv2.LINE_AA, _SHIFT)
+
+    def _placed(self, camera: Camera, points: Floats) -> Floats:
+        """Return pixels of the camera (J, 2) as pixels of the film; NaN far outside of the picture."""
+        size = np.array(camera.size)
+        with np.errstate(invalid="ignore"):
+            near = (points > -_BEYOND * size) & (points < (1 + _BEYOND) * size)
+        return np.where(near.all(axis=1, keepdims=True), (points + 0.5) * self._scale - 0.5, np.nan)
+
+
+@contextlib.contextmanager
+def _no_messages() -> Iterator[None]:
+    """Leave out what native code prints on stderr."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _draw_limbs(canvas: Rgb, points: Floats, edges: Edges, color: Sequence[int], width: int) -> None:
+    known = _known(points)
+    for a, b in edges:
+        if known[a] and known[b]:
+            cv2.line(canvas, _fixed(points[a]), _fixed(points[b]), tuple(color), width, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_name(canvas: Rgb, points: Floats, name: str, color: Sequence[int], unit: float) -> None:
+    """Write the identity above a person, on a ground of its colour."""
+    font, size, weight = cv2.FONT_HERSHEY_SIMPLEX, 0.55 * unit, max(1, round(1.4 * unit))
+    (width, height), _ = cv2.getTextSize(name, font, size, weight)
+    margin = max(2, round(4 * unit))
+    x = round(float(np.nanmean(points[:, 0])) - width / 2)
+    y = round(float(np.nanmin(points[:, 1])) - 16 * unit)
+    corner, opposite = (x - margin, y - height - margin), (x + width + margin, y + margin)
+    cv2.rectangle(canvas, corner, opposite, tuple(color), cv2.FILLED, cv2.LINE_AA)
+    cv2.putText(canvas, name, (x, y), font, size, (255, 255, 255), weight, cv2.LINE_AA)
+
+
+def _known(points: Floats) -> Bools:
+    """Return which points (J, 2) are known, (J,)."""
+    return np.asarray(np.isfinite(points).all(axis=1))
+
+
+def _fixed(point: Floats) -> tuple[int, int]:
+    return round(float(point[0]) * 2**_SHIFT), round(float(point[1]) * 2**_SHIFT)
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    """Return red, green and blue, 0 to 255, of "#0077bb"."""
+    red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
+    return red, green, blue
