@@ -6,7 +6,8 @@ The negative logarithm of the posterior is minimised by the Levenberg-Marquardt 
 - rotations beyond their range of motion (:mod:`.joint_limits`) cost as the square of the excess; what is left of it in
   the end is cut off;
 - every rotation is a priori near that of rest, as far as its spread says;
-- between frames rotations and the root change as by a random walk, which fills gaps by the most even motion.
+- between frames rotations and the root change as by a random walk and at the speeds of gait, which fills gaps by the most
+  even motion.
 
 The normal equations are block tridiagonal, and are solved as a banded system.
 """
@@ -25,10 +26,11 @@ from mvpose.skeleton_fit.rotations import to_matrices, to_vectors
 
 _TAIL = 4.0  # degrees of freedom of the errors of joints
 _EXCESS = np.radians(2.0)  # standard deviation of an excess over a range of motion
-# Standard deviations of the random walks over 1 s. At 25 frames per second a step is 0.2 rad or 6 cm, far more than the
-# error of a limb's direction: where joints are seen, the walk only matters for what they determine badly.
-_TURNS = 1.0  # rad
-_ROOT = 0.3  # metres
+# Between two frames rotations and root change by a random walk and by motion at a speed that is kept meanwhile, which
+# counts at low frame rates. In 0.04 s that is 0.23 rad and 8 cm, far more than the error of a limb's direction: where
+# joints are seen, the walk only matters for what they determine badly.
+_TURNS, _TURN_SPEED = 1.0, 3.0  # rad over 1 s; rad/s, of thigh and shank in gait (D. Winter, Biomechanics, chapter 3)
+_ROOT, _SPEED = 0.3, 1.4  # metres over 1 s; m/s, comfortable gait (R. Bohannon, Age and Ageing 26, 1997)
 _LONGEST_STEP = 1.0  # rad; of one iteration
 _CONVERGED = 1e-3  # relative decrease of the cost
 _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e6
@@ -103,8 +105,9 @@ class _Search:
         self._rest = to_matrices(np.radians([each.rest for each in segments]))
         self._same = (self._free.segments[:, None] == self._free.segments).astype(float)  # (D, D)
         count = len(self._free)
-        steps = np.sqrt(np.diff(target.times))[:, None]
-        self._walks = steps * np.where(np.arange(count) < 3, _ROOT, _TURNS)
+        steps, root = np.diff(target.times)[:, None], np.arange(count) < 3
+        walk, speed = np.where(root, _ROOT, _TURNS), np.where(root, _SPEED, _TURN_SPEED)
+        self._walks = np.sqrt(walk**2 * steps + (speed * steps) ** 2)
         self._wanted = np.nan_to_num(target.joints)
 
     def evaluate(self, pose: Pose) -> _State:

@@ -177,6 +177,15 @@ class TestFit:
         assert distances(fit, pose.joints)[20:28].max() < 0.06
         assert distances(fit, pose.joints)[35:40].max() < 0.06
 
+    def test_fast_motion_in_few_frames_is_followed(self):
+        """At 10 frames a second limbs turn by half a radian and more between frames, at the speeds of walking."""
+        slow, pose = moving(40, rate=0.5)
+        people = recorded(slow, pose)
+        covariance = np.broadcast_to(0.05**2 * np.eye(3), people.covariance.shape)  # as of distant cameras
+        (fit,) = fit_bodies(People(np.arange(40) / 10.0, people.ids, people.joints, people.scores, covariance))
+        limbs = [fit.body.joints.index(f"{side}_{end}") for side in ("left", "right") for end in ("wrist", "ankle")]
+        assert distances(fit, pose.joints)[:, limbs].mean() < 0.025
+
     def test_a_wrong_joint_does_not_pull_the_body(self):
         times, pose = moving(40)
         people = recorded(times, pose)
