@@ -6,7 +6,8 @@ respect of one camera (it moved, its focal length is wrong, ...), all the time, 
 Gaussian priors the evidence of each model is a closed form (Bishop, Pattern Recognition and Machine Learning, section
 3.5), which weighs the better fit of a freer model against its freedom. All cameras are in one form, so each model
 explains the disagreements of all views at once, and a wrong camera is not blamed on the others. Models are added one by
-one as long as the evidence grows, and stays whichever person is left out.
+one as long as the evidence grows, if they are likelier as errors about everybody than about one person
+(:mod:`.fault_support`).
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from scipy.special import logsumexp
 from mvpose.arrays import Floats, Integers
 from mvpose.calibration.camera_evidence import Quadratic, errors_of, quadratic_of
 from mvpose.calibration.camera_models import ALWAYS, SINCE, Fault, candidates
-from mvpose.calibration.fault_support import LEAST_ODDS, rests_on_several
+from mvpose.calibration.fault_support import is_for_everybody
 from mvpose.calibration.normal_equations import PARAMETERS, JointViews, NormalEquations, normal_equations, with_errors
 
 _ROUNDS = 4
+_LEAST_ODDS = 0.0  # log posterior odds from which a camera has moved: more likely than not
 _LEAST_ODDS_INTRINSICS = 3.0  # of another fault: 20 to 1, because detectors imitate small ones
 _LEAST_ODDS_CHANGE = 30.0
 """Log posterior odds from which a change in time is one of the camera. What detectors do to people changes with the
@@ -102,7 +104,7 @@ def fit(cameras: Floats, sightings: JointViews) -> Fit:
         if best is None:
             break
         fault, gain = best
-        if not rests_on_several(fault.view, found, cameras, errors, sightings, equations):
+        if not is_for_everybody(fault, found, cameras, errors, sightings, equations):
             refuted.add(fault.view)
             continue
         found.append(fault)
@@ -134,7 +136,7 @@ def _next(
         quadratic: log likelihood of all errors.
         found: faults that are known already.
         views: number of cameras, V.
-        refuted: cameras whose faults rest on one person.
+        refuted: cameras whose faults are those of one person alone.
         strongest: log posterior odds of the clearest fault.
     """
     base, best, most = quadratic.evidence(found), None, -np.inf
@@ -151,7 +153,7 @@ def _next(
 def _least_odds(fault: Fault) -> float:
     if fault.course != ALWAYS:
         return _LEAST_ODDS_CHANGE
-    return LEAST_ODDS if fault.model.kind == "moved-camera" else _LEAST_ODDS_INTRINSICS
+    return _LEAST_ODDS if fault.model.kind == "moved-camera" else _LEAST_ODDS_INTRINSICS
 
 
 def _described(quadratic: Quadratic, found: list[Fault], fault: Fault, views: int) -> CameraFault:

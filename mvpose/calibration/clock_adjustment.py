@@ -15,7 +15,7 @@ the joints of a person also go together. The covariance of the offsets is that o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,7 +28,7 @@ _TURN, _SHIFT = np.radians(3.0), 0.3  # rad, m: standard deviations of the error
 _CLOCK = 1.0  # s: of an offset, before any data
 _ROUNDS = 15
 _STEP = 0.1  # s: most that an offset changes in one round; motions are not linear beyond
-_SETTLED = 1e-4  # s
+_SETTLED = 2e-4  # s
 _ROBUST = 2.0  # residual in standard deviations at which a keypoint has half its weight
 _WIDEST, _NARROWEST = 10.0, 0.1  # factors of the standard deviations, in the first round and at least
 _BLOCK = 1.0  # s: errors of a detector are correlated in time for less than this
@@ -53,6 +53,7 @@ class ClockAdjustment:
         scores: what each instant says about each offset, (K, V): gradient of half the squared error, 1/s.
         curvatures: its curvature, (K, V), 1/s²: score / curvature is how much later the clock is at that instant.
         spread: standard deviation of residuals, in that of the sightings.
+        settled: whether the rounds ended because nothing changed any more.
     """
 
     offsets: Floats
@@ -62,6 +63,7 @@ class ClockAdjustment:
     scores: Floats
     curvatures: Floats
     spread: float
+    settled: bool = True
 
 
 def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
@@ -76,13 +78,17 @@ def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
     offsets, turns, centers = np.array(start, float), np.stack([camera.R for camera in rig]), rig.centers.copy()
     correction = np.zeros(views * _PARAMETERS)
     prior = np.tile(1.0 / np.repeat([_TURN, _SHIFT, _CLOCK], [3, 3, 1]) ** 2, views)
-    scale, memory = _WIDEST, 0.0
+    scale, memory, settled = _WIDEST, 0.0, False
+    before = np.zeros(views)
     for _ in range(_ROUNDS):
         terms = _terms(tracks, instants, offsets, turns, centers, scale)
         equations = _equations(tracks, terms, instants, memory)
         step = np.linalg.solve(equations.hessian + np.diag(prior), equations.gradient - prior * correction)
-        step = step.reshape(views, _PARAMETERS)
+        step = np.asarray(step, np.float64).reshape(views, _PARAMETERS)
         step[:, 6] = np.clip(step[:, 6], -_STEP, _STEP)
+        if step[:, 6] @ before < 0.0:  # it turns back: weights that change with the step make it go too far
+            step *= 0.5
+        before = step[:, 6].copy()
         correction += step.ravel()
         offsets = offsets + step[:, 6]
         turns = Rotation.from_rotvec(step[:, :3]).as_matrix() @ turns
@@ -90,11 +96,12 @@ def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
         narrower, last = max(terms.spread, _NARROWEST), memory
         memory = equations.memory if np.abs(step[:, 6]).max() < _NEAR else 0.0
         if np.abs(step[:, 6]).max() < _SETTLED and narrower > 0.95 * scale and abs(memory - last) < 0.02:
+            settled = True
             break
         scale = min(scale, narrower)
     terms = _terms(tracks, instants, offsets, turns, centers, scale)
     equations = _equations(tracks, terms, instants, memory)
-    return _solution(equations, offsets, prior, instants, terms.spread)
+    return replace(_solution(equations, offsets, prior, instants, terms.spread), settled=settled)
 
 
 def _instants(tracks: JointTracks) -> Floats:

@@ -176,7 +176,11 @@ def estimate_clocks(
         return _unknown(names, repeated, sightings.times, tracks.period)
     adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
     steps: list[ClockStep] = []
-    while len(steps) < _MOST_STEPS and (step := find_step(adjustment, tracks.times, tracks.period)) is not None:
+    # What is left beside offsets that do not settle is of other people or of wrong cameras, not of lost pictures.
+    while len(steps) < _MOST_STEPS and adjustment.settled:
+        step = find_step(adjustment, tracks.times, tracks.period)
+        if step is None:
+            break
         steps.append(replace(step, frame=first + step.frame))
         times = tracks.times.copy()
         times[step.frame :, step.view] += step.frames * tracks.period

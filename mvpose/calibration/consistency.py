@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,8 @@ class Consistency:
 
     Values of views whose reading did not change are kept, so that a reading that differs in one camera costs little.
     """
+
+    _MOST_RAYS, _MOST_PAIRS = 64, 4096  # values that are kept; those of a view take a megabyte
 
     def __init__(self, pieces: Pieces) -> None:
         self.pieces = pieces
@@ -110,6 +113,7 @@ class Consistency:
     def _pair(self, reading: Reading, keys: list[bytes], i: int, j: int) -> Floats:
         key = (i, j, keys[i], keys[j])
         if key not in self._pairs:
+            _make_room(self._pairs, self._MOST_PAIRS)
             self._pairs[key] = best_evidence(*self._views(reading, keys, i, j), False)
         return self._pairs[key]
 
@@ -121,6 +125,7 @@ class Consistency:
     def _view_rays(self, reading: Reading, key: bytes, view: int) -> tuple[ViewRays, Floats]:
         """Return the detections of a view with normalised coordinates, and the covariance of these, (2, 2)."""
         if (view, key) not in self._rays:
+            _make_room(self._rays, self._MOST_RAYS)
             p = self.pieces
             first, last = p.start[view, 0], p.stop[view, -1]
             keypoints, sigma = p.keypoints[first:last], p.sigma[first:last]
@@ -136,6 +141,12 @@ class Consistency:
             rays = (bounds, p.count[view], p.frame[first:last], p.piece[first:last], points, errors)
             self._rays[view, key] = rays, spread
         return self._rays[view, key]
+
+
+def _make_room(kept: dict[Any, Any], most: int) -> None:
+    """Drop the oldest values of a dictionary that has as many as it may have."""
+    while len(kept) >= most:
+        del kept[next(iter(kept))]
 
 
 def _key(reading: Reading, view: int) -> bytes:

@@ -7,16 +7,16 @@ is applied, and the search goes on with it, so that several cameras may have mis
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
-from mvpose.arrays import Floats
 from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.file_mistakes import CHANGES, SWAPPED, Mistake
-from mvpose.calibration.picture_offsets import EXPLAINED, offset_pictures
+from mvpose.calibration.picture_offsets import EXPLAINED, OffsetSearch
 from mvpose.calibration.reading_changes import Size, changed
 
 _TEMPER = 0.05
@@ -26,6 +26,12 @@ that are compared), and joints of one person err together (17 joints as about fo
 _CERTAIN = 0.95  # posterior probability from which a mistake is named
 _AGREES = 0.5  # a mended camera must agree with the others at least this well, compared with the others among them
 _GAIN = 0.02  # least gain, as a share of all evidence: less is a question of millimetres, not of conventions
+_LEAST_ODDS = 3.0  # log likelihood ratio by which a mistake explains more than cameras that are off by degrees
+_OFF = (float(np.radians(1.5)), 0.10)
+"""Standard deviations of rotations (rad) and places (m) of cameras that were touched."""
+
+_PLAUSIBLE = 4.0  # mean squared move in these, up to which moved cameras are believed without a search for crops
+_LARGEST_TURN = float(np.radians(5.0))  # a crop of 6 % of a picture with a field of view of 75 degrees is such a turn
 _LEAST_AGREEMENT = 0.2  # people who are not the same agree less, by chance
 _NOTHING = 0.8  # prior probability that the files are right
 
@@ -47,25 +53,25 @@ class Verdict:
     whole: bool
 
 
-def search(consistency: Consistency, given: Reading, sizes: Sequence[Size]) -> tuple[Reading, list[Verdict], Floats]:
-    """Return the reading under which the cameras agree best, and the mistakes that lead to it.
+def search(
+    consistency: Consistency, given: Reading, offsets: OffsetSearch, corrected: Callable[[Reading], Reading]
+) -> tuple[Reading, list[Verdict]]:
+    """Return the reading under which the cameras agree best, and the mistakes that lead to it, in the order found.
 
     Args:
         consistency: evidence for readings of the detections.
         given: the files as they are.
-        sizes: width and height of the pictures of each camera, pixels.
-
-    Returns:
-        The reading, the mistakes in the order found, and how well each camera agrees under it, (V,), 0 to 1.
+        offsets: search of crops and turns.
+        corrected: returns a reading whose cameras are moved by degrees to where people have them.
     """
     reading, verdicts = given, []
-    for _ in range(len(sizes) + 1):
-        step = _best(consistency, reading, sizes)
+    for _ in range(len(offsets.sizes) + 1):
+        step = _best(consistency, reading, offsets, corrected)
         if step is None:
             break
         reading, verdict = step
         verdicts.append(verdict)
-    return reading, verdicts, consistency.agreement(reading)
+    return reading, verdicts
 
 
 def hypotheses(reading: Reading, sizes: Sequence[Size]) -> Iterator[tuple[Mistake, Reading]]:
@@ -91,19 +97,72 @@ def hypotheses(reading: Reading, sizes: Sequence[Size]) -> Iterator[tuple[Mistak
                 yield replace(SWAPPED, views=(j, i)), replace(reading, cameras=cameras)
 
 
-def _best(consistency: Consistency, reading: Reading, sizes: Sequence[Size]) -> tuple[Reading, Verdict] | None:
+def _best(
+    consistency: Consistency, reading: Reading, offsets: OffsetSearch, corrected: Callable[[Reading], Reading]
+) -> tuple[Reading, Verdict] | None:
     """Return the reading without the likeliest mistake, and the mistake; None if none is certain.
 
-    Crops and turns are searched only for cameras that agree badly and where no other mistake explains all of it.
+    What cameras that are off by degrees explain as well is no mistake in the files. Crops and turns are searched only
+    for cameras that agree badly and where nothing else explains it.
     """
-    best = _likeliest(consistency, reading, hypotheses(reading, sizes))
-    agrees = consistency.agreement(reading if best is None else best[0])
-    if best is not None and agrees.min() >= EXPLAINED * np.median(agrees) and np.median(agrees) >= EXPLAINED:
+    best = _likeliest(consistency, reading, hypotheses(reading, offsets.sizes))
+    if best is None and _explained(consistency, reading):
+        return None
+    now = _Moved.of(consistency, reading, corrected)
+    then = None if best is None else _Moved.of(consistency, best[0], corrected)
+    if then is not None and not then.explains_more_than(now):
+        best, then = None, None
+    latest = then or now
+    if latest.small and _explained(consistency, latest.reading):
         return best
-    other = _likeliest(consistency, reading, offset_pictures(consistency, reading, sizes))
-    if best is None or (other is not None and other[1].gain > best[1].gain):
-        return other
-    return best
+    other = _likeliest(consistency, reading, offsets.candidates(reading))
+    if other is None or not _Moved.of(consistency, other[0], corrected).explains_more_than(latest):
+        return best
+    return other
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A reading with its cameras moved to where people have them.
+
+    Attributes:
+        reading: the reading with moved cameras.
+        evidence: log likelihood ratio of one world to chance.
+        unlikely: half the squared sizes of all moves in standard deviations (:data:`_OFF`).
+        largest: largest turn, radians.
+    """
+
+    reading: Reading
+    evidence: float
+    unlikely: float
+    largest: float
+
+    @classmethod
+    def of(cls, consistency: Consistency, reading: Reading, corrected: Callable[[Reading], Reading]) -> _Moved:
+        """Return a reading with corrected cameras."""
+        moved = corrected(reading)
+        before, after = reading.cameras, moved.cameras
+        turns = after[:, 5:14].reshape(-1, 3, 3) @ before[:, 5:14].reshape(-1, 3, 3).swapaxes(1, 2)
+        angles = Rotation.from_matrix(turns).magnitude()
+        shifts = np.linalg.norm(after[:, 14:17] - before[:, 14:17], axis=1)
+        unlikely = 0.5 * float(((angles / _OFF[0]) ** 2 + (shifts / _OFF[1]) ** 2).sum())
+        return cls(moved, float(consistency(moved).sum()), unlikely, float(angles.max()))
+
+    @property
+    def small(self) -> bool:
+        """Whether the moves are those of cameras that were measured by eye, and smaller turns than crops look like."""
+        return self.unlikely < _PLAUSIBLE * 3.0 * len(self.reading.cameras) and self.largest < _LARGEST_TURN
+
+    def explains_more_than(self, other: _Moved) -> bool:
+        """Whether it is clearly likelier than another reading, moves of the cameras included."""
+        gain = _TEMPER * (self.evidence - other.evidence) - (self.unlikely - other.unlikely)
+        return gain > _LEAST_ODDS
+
+
+def _explained(consistency: Consistency, reading: Reading) -> bool:
+    """Whether all cameras agree about as well as the errors of keypoints allow."""
+    agrees = consistency.agreement(reading)
+    return bool(agrees.min() >= EXPLAINED * np.median(agrees) and np.median(agrees) >= EXPLAINED)
 
 
 def _likeliest(

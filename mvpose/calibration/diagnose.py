@@ -12,12 +12,13 @@ from mvpose.calibration import camera_findings, convention_findings
 from mvpose.calibration.cameras import Fit, fit
 from mvpose.calibration.clocks import estimate_clocks
 from mvpose.calibration.consistency import Consistency, Reading
-from mvpose.calibration.conventions import search
+from mvpose.calibration.conventions import Verdict, search
 from mvpose.calibration.findings import Diagnosis, Finding, camera_names
 from mvpose.calibration.joint_views import joint_views
 from mvpose.calibration.mismatches import without_mismatches
 from mvpose.calibration.normal_equations import JointViews, residuals_of_others, with_errors
 from mvpose.calibration.people_size import relative_size
+from mvpose.calibration.picture_offsets import COARSE_SPACING, OffsetSearch, blurred
 from mvpose.calibration.pieces import cut
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
@@ -51,7 +52,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     detections = np.bincount(tracklets.view, minlength=len(rig))
     findings = silent_views(detections, names)
     consistency = Consistency(cut(tracklets))
-    reading, mistakes, _ = search(consistency, Reading.as_given(rig.packed), [camera.size for camera in rig])
+    reading, mistakes = _without_mistakes(rig, tracklets, consistency)
     turned = {each.mistake.views[0] for each in mistakes if each.mistake.kind == "moved-camera"}
     findings += [convention_findings.of(each, names) for each in mistakes if each.mistake.kind != "moved-camera"]
     ratio, bones = relative_size(consistency, reading, tracklets.skeleton)
@@ -91,7 +92,7 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings += [
         camera_findings.of_turn(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)
     ]
-    clocks = estimate_clocks(mended, sightings, period=period)
+    clocks = estimate_clocks(_with_found_lenses(mended, reading, result), sightings, period=period)
     findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:
         different = any(DIFFERENT in each.text for each in missing)  # then no reading of the files is right
@@ -103,6 +104,22 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
         cameras=names,
         residuals=residuals,
     )
+
+
+def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) -> tuple[Reading, list[Verdict]]:
+    """Return the files of a rig as they should be read, and the mistakes in them."""
+
+    def corrected(reading: Reading) -> Reading:
+        mended = reread_rig(rig, reading)
+        if mended is None:
+            return reading
+        found = match_over_time(mended, reread_tracklets(tracklets, reading)).rig
+        return replace(reading, cameras=found.packed)
+
+    sizes = [camera.size for camera in rig]
+    coarse = Consistency(blurred(cut(tracklets, spacing=COARSE_SPACING), sizes))
+    offsets = OffsetSearch(consistency, coarse, sizes)
+    return search(consistency, Reading.as_given(rig.packed), offsets, corrected)
 
 
 _USELESS = ("silent-view", "other-people")
@@ -131,6 +148,19 @@ def _fitted(rig: Rig, tracklets: Tracklets) -> tuple[Sightings, JointViews, Inte
 def _corrected(reading: Reading, result: Fit) -> Reading:
     """Return the reading with the cameras as people have them, at the end of the recording."""
     return replace(reading, cameras=with_errors(reading.cameras, result.change.reshape(1, -1))[0, :, :22].copy())
+
+
+def _with_found_lenses(rig: Rig, reading: Reading, result: Fit) -> Rig:
+    """Return the rig with the intrinsics of cameras whose intrinsics were found to be wrong.
+
+    Poses are corrected along with the clocks (:mod:`.clock_adjustment`), lenses are not.
+    """
+    change = np.zeros_like(result.change)
+    for each in result.faults:
+        if each.fault.model.index[0] in range(6, 10):
+            change[each.fault.view, 6:10] = each.change[6:10]
+    cameras = with_errors(reading.cameras, change.reshape(1, -1))[0, :, :22].copy()
+    return reread_rig(rig, replace(reading, cameras=cameras)) or rig
 
 
 def _seconds(times: Floats) -> float:

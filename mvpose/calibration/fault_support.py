@@ -1,52 +1,65 @@
-"""Whether a fault of a camera is supported by everybody whom it sees, or by one person alone."""
+"""Whether a fault of a camera is one for everybody whom it sees, or an error about one person alone.
+
+A camera that is wrong is wrong for everybody. A correction that a single person asks for comes from a detection of
+another person that was matched with this one, or from an error of the detector that lasts for this person. Both
+explanations are compared by their evidence: one error for all people, or the same error for one of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.calibration.camera_evidence import Quadratic, temper_of, vector
-from mvpose.calibration.camera_models import Fault, candidates
+from mvpose.calibration.camera_models import MODELS, Fault
 from mvpose.calibration.normal_equations import JointViews, NormalEquations, normal_equations, with_errors
 
-LEAST_ODDS = 0.0
-"""Log posterior odds from which a camera has moved: more likely than not."""
+_MOST_PEOPLE = 8  # who are tried, those with the most joints in the view
 
 
-def rests_on_several(
-    view: int, found: list[Fault], cameras: Floats, errors: Floats, sightings: JointViews, now: NormalEquations
+def is_for_everybody(
+    fault: Fault,
+    found: Sequence[Fault],
+    cameras: Floats,
+    errors: Floats,
+    sightings: JointViews,
+    now: NormalEquations,
 ) -> bool:
-    """Whether a camera has a fault, whichever person is left out.
-
-    A camera that is wrong is wrong for everybody. A correction that a single person asks for comes from a detection of
-    another person that was matched with this one, or from an error of the detector that lasts for this person.
+    """Whether one error for all people is likelier than the same error for one person alone.
 
     Args:
-        view: the camera.
+        fault: the fault that is to be checked.
         found: faults that are known already.
         cameras: packed cameras as calibrated, (V, 22).
         errors: errors of all cameras in each block, (B, 11 V).
         sightings: joints seen by several views.
         now: normal equations at these errors.
     """
-    people = np.unique(sightings.person).tolist()
-    if len(people) < 2:
+    seen = np.repeat(sightings.person, np.diff(sightings.start))[sightings.view == fault.view]
+    names, counts = np.unique(seen, return_counts=True)
+    people = names[np.argsort(-counts, kind="stable")][:_MOST_PEOPLE].tolist()
+    if len(names) < 2:
         return True
+    # The blocks of time of each person follow each other, those of all others at the end.
     states, temper = with_errors(cameras, errors), temper_of(now)
-
-    def likelihood(person: int) -> tuple[Floats, Floats]:
-        own = normal_equations(states, sightings.of_person(person), scale=now.scale)
-        return own.H / temper, vector(own, errors) / temper
-
-    H, b = likelihood(people[0])
-    for person in people[1:]:
-        own = likelihood(person)
-        H, b = H + own[0], b + own[1]
-    models = candidates(len(H), view)
+    H, b = now.H / temper, vector(now, errors) / temper
+    parts = []
     for person in people:
-        own = likelihood(person)
-        rest = Quadratic(H - own[0], b - own[1], temper)
-        base = rest.evidence(found)
-        if max(rest.evidence([*found, fault]) - base + prior for fault, prior in models) < LEAST_ODDS:
-            return False
-    return True
+        own = normal_equations(states, sightings.of_person(person), scale=now.scale)
+        parts.append((own.H / temper, vector(own, errors) / temper))
+        H, b = H - parts[-1][0], b - parts[-1][1]
+    parts.append((H, b))
+    quadratic = Quadratic(np.concatenate([H for H, _ in parts]), np.concatenate([b for _, b in parts]), temper)
+
+    def of(each: Fault, whom: Bools) -> Fault:
+        return replace(each, profile=np.outer(whom, each.profile).ravel())
+
+    def evidence(whom: Bools) -> float:
+        known = [of(each, np.ones(len(parts), np.bool_)) for each in found]
+        return max(quadratic.evidence([*known, of(replace(fault, model=model), whom)]) for model in MODELS)
+
+    alone = np.eye(len(parts), dtype=np.bool_)[:-1]
+    return evidence(np.ones(len(parts), np.bool_)) > max(evidence(each) for each in alone)

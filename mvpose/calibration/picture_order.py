@@ -18,7 +18,7 @@ from mvpose.calibration.sightings import Sightings
 _LEAST = 5  # keypoints that do not move at all: fewer may be chance, where a detector rounds to whole pixels
 _CERTAIN = 5.0  # standard deviations of a step
 _BLOCK = 1.0  # s: errors are correlated in time for less than this
-_LEAST_SHARE = 0.03  # of the information about a clock on each side of a step
+_LEAST_SHARE = 0.08  # of the information about a clock on each side of a step; less is that of a few paces
 
 
 @dataclass(frozen=True)
