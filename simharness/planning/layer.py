@@ -152,25 +152,20 @@ class FastLayer:
         return self.scenes.places
 
     def terms(self, camera: Camera) -> CameraTerms:
-        """Return what one camera contributes; tens of milliseconds."""
-        views = see(camera, self.scenes, self.obstacles)
-        block = detect_in(camera, self.scenes, views, self.detector, seed=self.seed)
-        seen = seen_joints(views)
-        keypoints = self.detector.keypoints
-        usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = usual * np.where(views.visibility[:, 0] == 0, 1.0, keypoints.scatter_hidden)
-        return CameraTerms(self.camera_checked(camera), self.scenes, seen, block, np.maximum(deviation, 0.5))
-
-    @staticmethod
-    def camera_checked(camera: Camera) -> Camera:
-        """Return the camera.
+        """Return what one camera contributes; tens of milliseconds.
 
         Raises:
             ValueError: it is no camera.
         """
         if not isinstance(camera, Camera):
             raise ValueError(f"terms: expected a mvpose.Camera, got {type(camera).__name__}")
-        return camera
+        views = see(camera, self.scenes, self.obstacles)
+        block = detect_in(camera, self.scenes, views, self.detector, seed=self.seed)
+        seen = seen_joints(views)
+        keypoints = self.detector.keypoints
+        usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
+        deviation = usual * np.where(views.visibility[:, 0] == 0, 1.0, keypoints.scatter_hidden)
+        return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, 0.5))
 
     def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Prediction:
         """Return what a set of cameras makes of the people.

@@ -8,7 +8,7 @@ cameras are compared on the same people (common random numbers).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Self
 
@@ -53,17 +53,17 @@ class PosePool:
         edges_of: first edge of each body, and the end.
     """
 
-    landmarks: Floats
-    capsules: Floats
-    radii: Floats
-    depths: Floats
-    body: Integers
-    outlines: Floats
-    outline_of: Integers
-    extremes: Floats
-    extremes_of: Integers
-    edges: Integers
-    edges_of: Integers
+    landmarks: Floats = field(repr=False)
+    capsules: Floats = field(repr=False)
+    radii: Floats = field(repr=False)
+    depths: Floats = field(repr=False)
+    body: Integers = field(repr=False)
+    outlines: Floats = field(repr=False)
+    outline_of: Integers = field(repr=False)
+    extremes: Floats = field(repr=False)
+    extremes_of: Integers = field(repr=False)
+    edges: Integers = field(repr=False)
+    edges_of: Integers = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.landmarks)

@@ -1,0 +1,298 @@
+"""The fast layer: scenes, what cameras see and report of them, and what sets of cameras make of that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simharness.detector.conditions import VISIBLE
+from simharness.planning import FastLayer, Obstacle, Volume
+from simharness.planning.joint_error import covariance, expected_distance, information
+from simharness.planning.standing_people import APART, bearings_of, pose_pool, standing_scenes
+from simharness.planning.visibility import see, seen_joints
+from simharness.scenario.presets import read_profile
+from simharness.scenario.sections.detector import Correlation, Detector
+from simharness.types.views import Visibility
+from simharness.world.rigs.layouts import look_at
+
+PERFECT = Detector()
+
+
+def camera(x, y, z=1.5, *, at=(0.0, 0.0, 0.9), name="", focal=500.0, size=(800, 600)):
+    K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
+    return look_at(np.array([x, y, z]), np.array(at), K=K, size=size, name=name or f"{x} {y}")
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return pose_pool()
+
+
+@pytest.fixture(scope="module")
+def corners():
+    return [camera(5 * x, 5 * y, 2.2, name=f"{x}{y}") for x in (-1, 1) for y in (-1, 1)]
+
+
+@pytest.fixture(scope="module")
+def layer():
+    return FastLayer.of(Volume.box(4, 4), detector=read_profile("typical"), people=3, spacing=1.0)
+
+
+class TestVolume:
+    def test_a_polygon_contains_what_lies_inside_and_has_its_area(self):
+        ell = Volume([[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]])
+        assert ell.area == pytest.approx(4 + 2)
+        assert ell.contains([[0.5, 2.5], [3.5, 0.5]]).all()
+        assert not ell.contains([[2, 2], [-0.1, 1], [5, 0.5]]).any()
+        assert len(ell.places(0.5)) == 6 / 0.25
+
+    def test_places_are_symmetric_and_at_least_one(self):
+        places = Volume.box(3.3, 2.1).places(0.5)
+        assert {tuple(place) for place in places.round(9)} == {tuple(place) for place in (-places).round(9) + 0.0}
+        assert len(Volume.box(0.1, 0.1).places(0.5)) == 1
+
+    @pytest.mark.parametrize(
+        ("outline", "message"),
+        [
+            ([[0, 0], [1, 0]], "at least 3 corners"),
+            ([[0, 0], [1, 0], [2, 0]], "enclose an area"),
+            ([[0, 0], [1, np.nan], [2, 3]], "finite"),
+            ([[0, 0], [4000, 0], [0, 3000]], "within 200 m"),
+        ],
+    )
+    def test_refuses_an_outline_that_is_none(self, outline, message):
+        with pytest.raises(ValueError, match=message):
+            Volume(outline)
+
+
+class TestScenes:
+    def test_everyone_stands_at_a_place_as_often_as_asked_and_apart(self, pool):
+        volume = Volume.box(4, 3)
+        scenes = standing_scenes(volume, pool, people=3, spacing=0.5, repeats=6, seed=3)
+        assert (np.bincount(scenes.place.ravel()) >= 6).all()
+        assert len(scenes) == 8 * 6 * 6 / 3
+        hips = scenes.joints[:, :, 11:13, :2].mean(axis=2)
+        assert np.abs(hips - scenes.position[..., :2]).max() < 1e-9
+        assert volume.contains(hips).all()
+        away = np.linalg.norm(hips[:, :, None] - hips[:, None], axis=-1)[:, *np.triu_indices(3, 1)]
+        assert np.mean(away >= APART) > 0.99
+
+    def test_directions_at_a_place_are_evenly_spread(self, pool):
+        scenes = standing_scenes(Volume.box(2, 2), pool, people=1, spacing=1.0, repeats=8)
+        facing = bearings_of(scenes.joints)
+        for place in range(len(scenes.places)):
+            turned = np.sort(np.mod(facing[scenes.place == place], 2 * np.pi))
+            assert np.diff(turned).max() < 2 * np.pi / 8 + 0.05
+
+    def test_recorded_people_stand_and_face_as_recorded(self, pool):
+        scenes = standing_scenes(Volume.box(4, 4), pool, people=2, spacing=1.0, repeats=2)
+        tracks = scenes.joints.copy()
+        tracks[::2, 1] = np.nan
+        again = standing_scenes(Volume.around(tracks), pool, spacing=0.5, repeats=4)
+        for s, frame in enumerate(again.frame):
+            assert (again.present[s] == np.isfinite(tracks[frame, :, 0, 0])).all()
+            here = again.present[s]
+            assert np.allclose(again.joints[s][here], tracks[frame][here])  # the poses are those of the pool
+
+    def test_nobody_stands_in_an_obstacle(self):
+        shelf = Obstacle(center=[0.5, 0, 1], size=[1, 2, 2], yaw=0.4)
+        layer = FastLayer.of(Volume.box(4, 4), detector=PERFECT, people=2, obstacles=[shelf])
+        assert not shelf.floor.contains(layer.scenes.position[..., :2]).any()
+        with pytest.raises(ValueError, match="nobody can stand"):
+            FastLayer.of(
+                Volume.box(1, 1), detector=PERFECT, obstacles=[Obstacle(center=[0, 0, 1], size=[4.0, 4.0, 2.0])]
+            )
+
+
+class TestVisibility:
+    def test_agrees_with_points_along_every_ray(self, pool):
+        scenes = standing_scenes(Volume.box(3, 3), pool, people=4, spacing=1.0, repeats=2)
+        table = Obstacle(center=[0.3, -0.5, 0.4], size=[1.2, 0.7, 0.8], yaw=0.6)
+        view = camera(3.5, 1.0, 1.3)
+        labels = see(view, scenes, [table]).visibility[:, 0]
+        turn = np.array([[np.cos(0.6), np.sin(0.6), 0], [-np.sin(0.6), np.cos(0.6), 0], [0, 0, 1]])
+        compared = wrong = 0
+        for s in range(len(scenes)):
+            for q in range(4):
+                joints = scenes.joints[s, q, 5:]
+                along = np.linspace(0.02, 1.0, 700)[:, None, None]
+                points = view.center + along * (joints - view.center)  # (n, 12, 3)
+                in_table = (np.abs((points - table.center) @ turn.T) < table.size / 2).all(axis=-1).any(axis=0)
+                others = [k for k in range(4) if k != q]
+                in_other = self._inside(points, scenes, s, others).any(axis=0)
+                hidden = np.isin(labels[s, q, 5:], (Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER))
+                shown = np.isin(labels[s, q, 5:], (Visibility.VISIBLE, Visibility.SELF_OCCLUDED))
+                expected = in_table | in_other
+                compared += (hidden | shown).sum()
+                wrong += (hidden & ~expected).sum()
+                wrong += ((labels[s, q, 5:] == Visibility.VISIBLE) & expected).sum()
+        assert compared > 200
+        assert wrong / compared < 0.01
+
+    @staticmethod
+    def _inside(points, scenes, s, people):
+        inside = np.zeros(points.shape[:2], bool)
+        for q in people:
+            ends, radii = scenes.capsules[s, q], scenes.pool.radii[scenes.pose[s, q]]
+            for (a, b), radius in zip(ends, radii, strict=True):
+                share = np.clip(((points - a) @ (b - a)) / max((b - a) @ (b - a), 1e-12), 0, 1)[..., None]
+                inside |= np.linalg.norm(points - a - share * (b - a), axis=-1) < radius
+        return inside
+
+    def test_boxes_hold_the_whole_skin(self, pool):
+        scenes = standing_scenes(Volume.box(2, 2), pool, people=1, spacing=1.0, repeats=4)
+        view = camera(6.0, 0.0)
+        boxes = see(view, scenes).boxes[:, 0, 0]
+        for s, box in enumerate(boxes):
+            pose = scenes.pose[s, 0]
+            skin = pool.outlines[pool.outline_of[pose] : pool.outline_of[pose + 1]]
+            pixels = view.project(skin @ scenes.turn[s, 0].T + scenes.position[s, 0])
+            assert np.allclose(box[:2], pixels.min(axis=0), atol=2.0)
+            assert np.allclose(box[:2] + box[2:], pixels.max(axis=0), atol=2.0)
+
+    def test_a_wall_hides_everyone_and_a_camera_turned_away_sees_nobody(self, pool):
+        scenes = standing_scenes(Volume.box(2, 2), pool, people=2, spacing=1.0, repeats=2)
+        wall = Obstacle(center=[3, 0, 1.5], size=[0.1, 8, 3])
+        assert seen_joints(see(camera(6.0, 0.0), scenes)).mean() > 0.8
+        assert not seen_joints(see(camera(6.0, 0.0), scenes, [wall])).any()
+        assert not seen_joints(see(camera(6.0, 0.0, at=(12, 0, 1)), scenes)).any()
+
+
+class TestInformation:
+    def test_two_orthogonal_cameras_have_the_covariance_of_the_closed_form(self):
+        distance, focal, deviation = 4.0, 500.0, 2.0
+        views = [camera(distance, 0, 0.9, focal=focal), camera(0, distance, 0.9, focal=focal)]
+        total = sum(information(view, np.array([0.0, 0.0, 0.9]), np.array(deviation)) for view in views)
+        across = (distance * deviation / focal) ** 2
+        assert np.allclose(covariance(total), np.diag([across, across, across / 2]), rtol=1e-5, atol=1e-12)
+        assert expected_distance(covariance(total)) == pytest.approx(np.sqrt(2.5 * across), rel=1e-5)
+
+    def test_one_camera_leaves_the_depth_open(self):
+        total = information(camera(4, 0), np.zeros((3, 3)), np.ones(3))
+        assert np.isnan(covariance(total)).any(axis=(1, 2)).all()
+
+    def test_one_more_camera_never_lowers_information_or_views(self, layer, corners):
+        terms = [layer.terms(each) for each in corners]
+        few, many = (np.sum([each.information for each in terms[:n]], axis=0) for n in (2, 4))
+        assert (np.linalg.eigvalsh(many - few) > -1e-6 * np.abs(many).max()).all()
+        known = np.isfinite(covariance(few)).all(axis=(-1, -2))
+        assert known.mean() > 0.3
+        assert (expected_distance(covariance(many)) <= expected_distance(covariance(few)) + 1e-12)[known].all()
+        views = [layer.predict(terms[:n]).views for n in (2, 3, 4)]
+        assert (np.diff(views, axis=0) >= 0).all()
+
+
+class TestPrediction:
+    def test_a_perfect_detector_places_everyone_exactly(self, corners):
+        layer = FastLayer.of(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
+        terms = [layer.terms(each) for each in corners]
+        for variant in ("", "full"):
+            made = layer.predict(terms, variant=variant)
+            assert made.pcp.min() > 99.9
+            assert made.recall.min() == 1
+            assert made.error_mm.max() < (1e-3 if not variant else 10)
+            assert made.summary()["pcp"].value > 99.9
+
+    def test_people_whom_fewer_than_two_cameras_see_are_missed(self, corners):
+        layer = FastLayer.of(Volume.box(2, 2), detector=PERFECT, people=1, spacing=1.0)
+        away = [camera(4, k, at=(9, k, 1), name=f"away {k}") for k in range(2)]
+        made = layer.predict([layer.terms(each) for each in (corners[0], *away)])
+        assert made.recall.max() == 0
+        assert made.pcp.max() == 0
+        assert np.isnan(made.error_mm).all()
+        assert np.isnan(made.ellipse).all()
+
+    def test_the_same_seed_gives_the_same_prediction_and_another_seed_another(self, corners):
+        made = [
+            FastLayer.of(Volume.box(2, 2), detector=read_profile("typical"), people=2, spacing=1.0, seed=seed)
+            for seed in (1, 1, 2)
+        ]
+        one, again, other = (each.predict([each.terms(view) for view in corners]).error_mm for each in made)
+        assert np.array_equal(one, again)
+        assert not np.array_equal(one, other)
+
+    def test_a_symmetric_rig_has_a_symmetric_map(self):
+        corners = [camera(4 * x, 4 * y, 2.2, name=f"{x}{y}", focal=700) for x in (-1, 1) for y in (-1, 1)]
+        layer = FastLayer.of(Volume.box(5, 5), detector=PERFECT, people=1, spacing=1.0, orientations=16, draws=8)
+        views = layer.predict([layer.terms(each) for each in corners]).views.reshape(5, 5)
+        # The difference of two means of 128 draws of 0 to 4 cameras has a standard deviation of at most 0.125.
+        assert np.ptp(views) > 1.0
+        for mirrored in (views[::-1], views[:, ::-1], views.T):
+            assert np.abs(views - mirrored).max() < 4 * 0.125
+
+    def test_more_cameras_are_better_and_more_people_are_worse(self, corners):
+        def pcp(people, count):
+            layer = FastLayer.of(Volume.box(3, 3), detector=read_profile("typical"), people=people, spacing=0.75)
+            made = layer.predict([layer.terms(each) for each in corners[:count]], variant="full")
+            return made.summary()["pcp"]
+
+        assert pcp(1, 4).value > pcp(5, 4).value > pcp(5, 2).value
+        figure = pcp(5, 2)
+        assert figure.low < figure.value < figure.high
+
+    def test_fewer_than_two_cameras_are_refused(self, layer, corners):
+        with pytest.raises(ValueError, match="at least 2 cameras"):
+            layer.predict([layer.terms(corners[0])])
+        with pytest.raises(ValueError, match=r"expected a mvpose\.Camera"):
+            layer.terms("left")
+
+
+class TestSightings:
+    def test_errors_belong_to_the_camera(self, layer, corners):
+        view = corners[0]
+        one, again = (layer.terms(view).block for _ in range(2))
+        assert np.array_equal(one.keypoints, again.keypoints, equal_nan=True)
+        renamed = layer.terms(replace(view, name="another")).block
+        assert not np.array_equal(one.keypoints, renamed.keypoints, equal_nan=True)
+
+    def test_what_all_views_share_is_the_same_in_every_camera(self):
+        shared = PERFECT.model_copy(
+            update={
+                "keypoints": read_profile("typical").keypoints.model_copy(update={"quality": 0.0}),
+                "correlation": Correlation(scatter_views=1.0, gross_views=1.0, views=1.0),
+            }
+        )
+        layer = FastLayer.of(Volume.box(1, 1), detector=shared, people=1, spacing=1.0, orientations=32)
+        views = [camera(5, 0, name="one"), camera(5, 0.02, name="two")]
+        terms = [layer.terms(view) for view in views]
+        labels = [see(view, layer.scenes).visibility[:, 0] for view in views]
+        both = (labels[0] == VISIBLE) & (labels[1] == VISIBLE)
+        away = [
+            each.block.keypoints[:, 0, :1] - view.project(layer.scenes.joints)
+            for each, view in zip(terms, views, strict=True)
+        ]
+        known = both & np.isfinite(away[0]).all(axis=-1) & np.isfinite(away[1]).all(axis=-1)
+        assert known.mean() > 0.3
+        assert np.abs(away[0][known]).mean() > 0.5
+        assert np.median(np.abs(away[0][known] - away[1][known])) < 0.1 * np.abs(away[0][known]).mean()
+
+    def test_the_standard_deviation_is_that_of_the_reported_keypoints(self):
+        profile = read_profile("typical")
+        scatter_only = profile.model_copy(
+            update={
+                "keypoints": profile.keypoints.model_copy(update={"quality": 0.0, "scatter_hidden": 1.0}),
+                "boxes": PERFECT.boxes,
+                "phantoms": PERFECT.phantoms,
+            }
+        )
+        layer = FastLayer.of(Volume.box(2, 2), detector=scatter_only, people=1, spacing=1.0, orientations=64)
+        view = camera(6, 0)
+        terms = layer.terms(view)
+        visible = see(view, layer.scenes).visibility[:, 0] == VISIBLE
+        away = (terms.block.keypoints[:, 0, :1] - view.project(layer.scenes.joints)) / terms.deviation[..., None]
+        known = visible & (terms.block.error[:, 0, :1] == 0) & ~terms.block.guessed[:, 0, :1]
+        away = away[known]
+        assert np.sqrt((away[np.isfinite(away)] ** 2).mean()) == pytest.approx(1.0, abs=0.08)
+
+
+@pytest.mark.slow
+def test_agrees_with_a_simulation_of_the_same_rig():
+    """Walking people in the simulator, which knows motion, beside standing ones: PCP and error agree."""
+    from benchmarks.planning.simulated_rigs import predicted, random_scenario, simulated
+
+    scenario = random_scenario(103, walking=True)
+    scenario = scenario.model_copy(update={"duration": 16.0})
+    outcome, made = simulated(scenario), predicted(scenario)
+    figures = made.summary(seconds=16.0)
+    assert abs(figures["pcp"].value - outcome.pcp) < 4
+    assert figures["mpjpe_mm"].value == pytest.approx(np.nanmean(outcome.error_mm), rel=0.2)
