@@ -6,8 +6,8 @@ The negative logarithm of the posterior is minimised by the Levenberg-Marquardt 
 - rotations beyond their range of motion (:mod:`.joint_limits`) cost as the square of the excess; what is left of it in
   the end is cut off;
 - every rotation is a priori near that of rest, as far as its spread says;
-- between frames rotations and the root change as by a random walk and at the speeds of gait, which fills gaps by the most
-  even motion.
+- between frames rotations and the root change as by a random walk and at the speeds of gait, which fills gaps by the
+  most even motion.
 
 The normal equations are block tridiagonal, and are solved as a banded system.
 """
