@@ -151,6 +151,9 @@ def _sections(recording: ExaminedRecording, pictures: Pictures | None, shown_fra
     return {
         "plots": {key: Markup(svg) for key, svg in drawn.items()},
         "left_out": f" {hidden} more were there for a shorter time." if hidden > 0 else "",
+        "columns_left_out": f" Of {len(people)} people the {len(columns)} who are there longest."
+        if len(people) > len(columns)
+        else "",
         "drawings": _drawings(recording, pictures, shown_frames),
         "residuals": _residuals(recording),
         "rests": _rests(recording),
@@ -187,8 +190,8 @@ def _errors(recording: ExaminedRecording, columns: Sequence[int]) -> tables.Tabl
     people = recording.people
     if people.covariance is None:
         return None
-    of_people = np.array([expected_error(people, row) for row in columns])
-    return tables.error_table(of_people, recording.errors[columns], recording.groups, people, columns)
+    of_people = np.array([expected_error(people, row) for row in range(len(people))])
+    return tables.error_table(of_people, recording.errors, recording.groups, people, columns)
 
 
 def _drawings(recording: ExaminedRecording, pictures: Pictures | None, count: int) -> list[dict[str, Any]]:

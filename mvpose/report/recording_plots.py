@@ -16,7 +16,7 @@ from mvpose.report.track_plots import draw_bar, half_step, label_ends, runs_of, 
 MOST_ROWS = 24
 """People with a row of their own in plots over time: those who are there for longest."""
 
-_ROWS, _ROW = 3.4, (0.25, 0.55)  # height of all rows together, and least and greatest height of one, inches
+_ROWS, _ROW = 2.4, (0.25, 0.55)  # height of all rows together, and least and greatest height of one, inches
 _TALL = 1.16  # height over width of the plot from above
 _MOST_POINTS = 500  # of a plot over time
 _MARGIN = 0.6  # metres around cameras and people

@@ -27,7 +27,7 @@ class Cell:
 
     Attributes:
         text: the number.
-        small: second line.
+        small: second line; of a head, the word before the text, which narrow tables leave out.
         share: shade, 0 (none) to 1 (full).
         color: chip before the text; empty for none.
     """
@@ -117,7 +117,7 @@ def _rounded(value: float, most: float) -> Cell:
 
 
 def bone_table(bones: Sequence[Bone], people: People, rows: Sequence[int]) -> Table:
-    """Return lengths of bones as a table: bones as rows, people as columns."""
+    """Return lengths of bones as a table, centimetres: bones as rows, people as columns."""
     found = {(bone.name, bone.person): bone for bone in bones}
     names = list(dict.fromkeys(name for name, _ in found))
     body = []
@@ -130,10 +130,10 @@ def bone_table(bones: Sequence[Bone], people: People, rows: Sequence[int]) -> Ta
                 continue
             sides = f"\n{100 * bone.asymmetry:.1f} %" if math.isfinite(bone.asymmetry) else ""
             share = min(1.0, bone.spread / bone.length / 0.1)
-            cells.append(Cell(f"{100 * bone.length:.1f} cm", f"± {1000 * bone.spread:.0f} mm{sides}", share))
+            cells.append(Cell(f"{100 * bone.length:.1f}", f"± {100 * bone.spread:.1f}{sides}", share))
         body.append((name, tuple(cells)))
     return Table(_heads(people, rows), tuple(body))
 
 
 def _heads(people: People, rows: Sequence[int]) -> tuple[Cell, ...]:
-    return tuple(Cell(f"person {people.ids[row]}", color=identity_color(row)) for row in rows)
+    return tuple(Cell(str(people.ids[row]), small="person", color=identity_color(row)) for row in rows)

@@ -20,9 +20,10 @@ addEventListener("load", () => {
   const wide = [...document.querySelectorAll("main *")].filter((each) =>
     !each.closest("svg") && !each.closest(".scroll") && each.getBoundingClientRect().right > innerWidth + 1);
   const empty = [...document.querySelectorAll("svg")].filter((each) => each.checkVisibility() && !each.clientHeight);
+  const clipped = [...document.querySelectorAll(".scroll")].filter((each) => each.scrollWidth > each.clientWidth + 1);
   const page = document.scrollingElement;
   parent.postMessage(JSON.stringify({ width: innerWidth, overflow: page.scrollWidth - innerWidth,
-    wide: wide.map((each) => each.className), empty: empty.length,
+    wide: wide.map((each) => each.className), empty: empty.length, clipped: clipped.length,
     ink: getComputedStyle(document.body).color }), "*");
 });
 </script>"""
@@ -45,21 +46,35 @@ def pages(tmp_path_factory):
     return {"recording": path.read_text(encoding="utf-8"), "doctor": doctor}
 
 
-@pytest.mark.parametrize("name", ["recording", "doctor"])
-@pytest.mark.parametrize(("width", "dark"), [(360, True), (1280, False)])
-def test_pages_fit_the_screen(pages, tmp_path, name, width, dark):
-    (tmp_path / "frame.html").write_text(FRAME.replace("WIDTH", str(width)), encoding="utf-8")
-    (tmp_path / "page.html").write_text(pages[name].replace("<head>", "<head>" + PROBE, 1), encoding="utf-8")
+def probe(folder, page, width, *, dark=False):
+    """Return what the browser finds on a page on a screen of some width."""
+    (folder / "frame.html").write_text(FRAME.replace("WIDTH", str(width)), encoding="utf-8")
+    (folder / "page.html").write_text(page.replace("<head>", "<head>" + PROBE, 1), encoding="utf-8")
     scheme = f"--blink-settings=preferredColorScheme={0 if dark else 1}"
     options = ["--hide-scrollbars", "--no-first-run", "--window-size=1400,1000", scheme]
-    more = ["--virtual-time-budget=5000", "--dump-dom", (tmp_path / "frame.html").as_uri()]
-    output, log = run_browser(find_browser(), tmp_path, *options, *more)
+    more = ["--virtual-time-budget=5000", "--dump-dom", (folder / "frame.html").as_uri()]
+    output, log = run_browser(find_browser(), folder, *options, *more)
     found = re.search(r'data-probed="([^"]*)"', output)
     assert found, log
     probed = json.loads(found.group(1).replace("&quot;", '"').replace("&amp;", "&"))
     assert probed["width"] == width
+    return probed
+
+
+@pytest.mark.parametrize("name", ["recording", "doctor"])
+@pytest.mark.parametrize(("width", "dark"), [(360, True), (1280, False)])
+def test_pages_fit_the_screen(pages, tmp_path, name, width, dark):
+    probed = probe(tmp_path, pages[name], width, dark=dark)
     assert (probed["overflow"] <= 0, probed["wide"], probed["empty"]) == (True, [], 0)
     assert probed["ink"] == ("rgb(232, 233, 235)" if dark else "rgb(27, 29, 33)")
+
+
+@pytest.mark.parametrize(("people", "cameras", "width"), [(4, 5, 400), (8, 6, 1280)])
+def test_tables_of_a_usual_recording_fit_the_screen_without_scrolling(tmp_path, people, cameras, width):
+    rig, frames, found = recording(people, frames=10, cameras=cameras, noise=2.0)
+    page = write_page(tmp_path, name="take 1", people=found, rig=rig, frames=frames).read_text(encoding="utf-8")
+    probed = probe(tmp_path, page, width)
+    assert (probed["overflow"] <= 0, probed["clipped"]) == (True, 0)
 
 
 def test_people_are_drawn_in_their_colours(pages, tmp_path):

@@ -60,6 +60,22 @@ def test_names_are_escaped(tmp_path):
     assert next(iter(numbers["cameras"])) == "<b>&0$x$"
 
 
+def test_of_many_people_those_who_are_there_longest_have_columns_of_their_own(tmp_path):
+    rig, frames, people = recording(11, frames=4)
+    joints = people.joints.copy()
+    joints[2:, [0, 4, 7]] = np.nan  # numbers 3, 7 and 10 leave
+    sigmas = 0.01 * np.arange(1, 12)
+    covariance = np.broadcast_to((sigmas**2)[:, None, None, None] * np.eye(3), people.covariance.shape)
+    page, _ = page_of(tmp_path, rig, frames, replace(people, joints=joints, covariance=covariance))
+    (heads,) = re.findall(r'<th scope="col">joint</th>(.*?)</tr>', page.split("Error of joints")[1])
+    assert [int(number) for number in re.findall(r"</span>(\d+)</th>", heads)] == [4, 5, 6, 8, 9, 11, 12, 13]
+    (total,) = re.findall(r'<th scope="row">all joints</th>(.*?)</tr>', page)
+    errors = np.array([float(number) for number in re.findall(r">(\d+)</td>", total)])
+    kept = sigmas[[1, 2, 3, 5, 6, 8, 9, 10]]
+    np.testing.assert_allclose(errors / errors[0], kept / kept[0], rtol=0.03)  # whole millimetres
+    assert "Of 11 people the 8 who are there longest." in page
+
+
 @pytest.mark.parametrize("people", ["nobody", "no detections", "no covariance", "one frame", "a person without hips"])
 def test_any_recording_has_a_page(tmp_path, people):
     rig, frames, found = recording(2, frames=5)
