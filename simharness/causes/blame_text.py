@@ -11,10 +11,12 @@ from simharness.runtime.number_text import fixed, signed
 from simharness.scoring.catalogue import SCORES
 from simharness.statistics.intervals import Interval
 
+_DIGITS = 1  # of differences of scores
 
-def points(interval: Interval, digits: int = 1) -> str:
-    """Return a difference of scores with its interval: "2.5 (−1.4 to 6.9)"."""
-    return f"{_minus(fixed(interval.mean, digits))}{_ends(interval, digits)}"
+
+def points(number: Interval, *, interval: bool = True) -> str:
+    """Return a difference of scores, with its interval where wanted: "2.5 (−1.4 to 6.9)"."""
+    return _minus(fixed(number.mean, _DIGITS)) + (_ends(number, _DIGITS) if interval else "")
 
 
 def heading(blame: Blame) -> str:
@@ -57,9 +59,14 @@ def listing(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def gain(interval: Interval, digits: int = 1) -> str:
-    """Return a gain with its sign and interval."""
-    return f"{_minus(signed(interval.mean, digits))}{_ends(interval, digits)}"
+def gain(number: Interval, *, interval: bool = True) -> str:
+    """Return a gain with its sign, and its interval where wanted: "+2.5 (−1.4 to 6.9)"."""
+    return _minus(signed(number.mean, _DIGITS)) + (_ends(number, _DIGITS) if interval else "")
+
+
+def ends(number: Interval) -> str:
+    """Return the interval of a difference of scores: "−1.4 to 6.9"; empty where there is none."""
+    return _ends(number, _DIGITS).strip(" ()")
 
 
 def _value(blame: Blame, interval: Interval) -> str:

@@ -34,6 +34,15 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key: [cyan]people.count=6[/]. Repeatable."),
 ]
 Seed = Annotated[int | None, typer.Option(metavar="N", help="Replace the scenario's seed.")]
+BlameSeeds = Annotated[
+    int,
+    typer.Option(
+        "--blame",
+        metavar="N",
+        min=0,
+        help="Also find what cost the score and what to mend first, at N seeds; see [cyan]simharness blame[/].",
+    ),
+]
 JsonFile = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="Write all results to this file as well.", dir_okay=False),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simharness.cli.exit_codes import exit_on_error, run_errors_only
+from simharness.cli.options import BlameSeeds
 
 if TYPE_CHECKING:
     from simharness.report.study.worst_frames import WorstFrame
@@ -57,6 +58,7 @@ def report(
         str | None,
         typer.Option(metavar="ID", help="With --rerun: this trial, by its first digits, instead of the worst."),
     ] = None,
+    blame: BlameSeeds = 0,
 ) -> None:
     """Write the report of a study: scores, curves, failures, the worst frames in pictures and in 3D.
 
@@ -67,6 +69,8 @@ def report(
             raise ValueError("--trial: chooses the trial that --rerun writes; add --rerun FILE, or remove --trial")
         if rerun is not None and digest is not None:
             raise ValueError("--rerun and --digest: each is written instead of the report; give one of them")
+        if blame and (rerun is not None or digest is not None):
+            raise ValueError("--blame: is part of the report, which --rerun and --digest replace; give one of them")
         thresholds = _thresholds(threshold or [])
         from simharness.study.result_folder import read_study
         from simharness.trial.run_folder import is_run
@@ -91,6 +95,10 @@ def report(
             write_digest(results, digest, thresholds=thresholds or THRESHOLDS)
             typer.echo(f"digest: {digest}")
             return
+        if blame:
+            from simharness.cli.study import blame_results
+
+            blame_results(results, seeds=blame)
         with reporter() as bars, bars.stage("worst frames", SHOWN) as advance:
             page = write_report(results, out, thresholds=thresholds or THRESHOLDS, progress=advance)
     typer.echo(f"report: {page}")

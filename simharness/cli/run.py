@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from simharness.cli.exit_codes import exit_on_error
-from simharness.cli.options import Overrides, ScenarioFile, Seed, command_line
+from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, Seed, command_line
 
 if TYPE_CHECKING:
     from simharness.cli.score_tables import ScoreTable
@@ -35,6 +35,7 @@ def run(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
         "results/runs"
     ),
+    blame: BlameSeeds = 0,
 ) -> None:
     """Run a scenario: simulate, film, detect, estimate, score, report.
 
@@ -52,11 +53,17 @@ def run(
 
         command = command_line()
         with reporter() as bars:
-            folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command)
+            folder = run_scenario(loaded, out=out, workers=workers, reporter=bars, command=command, blame_seeds=blame)
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     console = Console()
     for table in _tables(summary):
         table.print_to(console)
+    if blame:
+        from simharness.causes.blame_file import read_blame
+        from simharness.cli.blame import print_blame
+
+        if found := read_blame(folder):
+            print_blame(found, console)
     console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False, markup=False)
 
 

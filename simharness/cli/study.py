@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from simharness.cli.exit_codes import FAILED, exit_on_error, run_errors_only
-from simharness.cli.options import Overrides, ScenarioFile, command_line
+from simharness.cli.options import BlameSeeds, Overrides, ScenarioFile, command_line
 
 if TYPE_CHECKING:
     import polars as pl
@@ -63,6 +63,7 @@ def study(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the result folder.", file_okay=False)] = Path(
         "results/studies"
     ),
+    blame: BlameSeeds = 0,
     yes: Annotated[bool, typer.Option("--yes", help="Run a study of more than 10,000 trials.")] = False,
 ) -> None:
     """Run a study: every setting of a scenario file's sweep at every seed.
@@ -99,7 +100,7 @@ def study(
                 for table in _tables(results):
                     table.print_to(Console())
             _write(_counts(info, loaded.name))
-            _report(results)
+            _report(results, blame=blame, workers=workers)
     if info["failed"]:
         raise typer.Exit(FAILED)
 
@@ -206,9 +207,11 @@ def _counts(info: dict[str, Any], what: str) -> str:
     return "\n".join(lines)
 
 
-def _report(results: Results) -> None:
+def _report(results: Results, *, blame: int, workers: int) -> None:
     if not len(results.trials):
         return
+    if blame:
+        blame_results(results, seeds=blame, workers=workers)
     from simharness.report.study.page import write_report
     from simharness.report.study.worst_frames import SHOWN
     from simharness.runtime.progress import reporter
@@ -216,6 +219,19 @@ def _report(results: Results) -> None:
     with run_errors_only(), reporter() as bars, bars.stage("report", SHOWN) as advance:
         page = write_report(results, progress=advance)
     _write(f"report: {page}")
+
+
+def blame_results(results: Results, *, seeds: int, workers: int = 1) -> None:
+    """Find what cost a study its score, write it into its folder, and print it."""
+    from simharness.causes.blame_file import write_blame
+    from simharness.cli.blame import print_blame
+    from simharness.report.study.blame_study import blame_study
+    from simharness.runtime.progress import reporter
+
+    with reporter() as bars:
+        found = blame_study(results, seeds=seeds, workers=workers, reporter=bars)
+    write_blame(found, results.folder)
+    print_blame(found, Console())
 
 
 def _write(text: str, *, err: bool = False) -> None:

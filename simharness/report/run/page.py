@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.report.palette import line_color
 from mvpose.skeleton import COCO17
+from simharness.causes.blame import Blame
 from simharness.pairing.pairing import pair
 from simharness.report.documents import fill_template
+from simharness.report.figures.blame_section import blame_section
 from simharness.report.run import plots
 from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Animation
@@ -36,6 +38,7 @@ def render(
     pictures: Sequence[Picture] = (),
     things: Sequence[Floats] = (),
     animation: Animation | None = None,
+    found: Blame | None = None,
 ) -> str:
     """Return the page of a run.
 
@@ -44,6 +47,7 @@ def render(
         pictures: pictures below the headline scores.
         things: outlines of the clutter from above, each (n, 2) metres.
         animation: film of the run.
+        found: what cost the score; None where it was not examined.
 
     Returns:
         A self-contained HTML document.
@@ -63,6 +67,8 @@ def render(
         people=_people_table(record, main),
         pictures=pictures,
         animation=animation,
+        blame=found and blame_section(found),
+        blame_hint=f"{_command(record)} --blame 10",
         plots=_plots(record, main, things),
         figures=draw_figures(record, main),
         tracking_columns=TRACKING_COLUMNS,

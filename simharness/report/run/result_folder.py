@@ -11,6 +11,8 @@ import numpy as np
 import polars as pl
 
 from mvpose.files.atomic_files import atomic_folder
+from simharness.causes.blame import blame
+from simharness.causes.blame_file import write_blame
 from simharness.report.run.film import animate, animated_frames
 from simharness.report.run.pictures import draw_pictures, outlines
 from simharness.runtime.progress import Reporter, Silence
@@ -34,6 +36,7 @@ def run(
     workers: int = 1,
     reporter: Reporter | None = None,
     command: str | None = None,
+    blame_seeds: int = 0,
 ) -> Path:
     """Run a scenario and write its results.
 
@@ -44,6 +47,8 @@ def run(
         workers: processes that share the frames; the results do not depend on how many.
         reporter: receiver of progress.
         command: the user's command, for the report.
+        blame_seeds: number of seeds at which the causes of the lost score are examined, from the scenario's on; 0: they
+            are not.
 
     Returns:
         The result folder; :func:`simharness.trial.run_folder.read_run` reads it.
@@ -66,6 +71,7 @@ def run(
     )
     stages = Stages(reporter, dict(result.seconds))
     record = _record(result, {"command": command, "workers": workers, "stages_s": stages.seconds})
+    found = blame(scenario, seeds=blame_seeds, workers=workers, reporter=reporter) if blame_seeds else None
     with stages.stage("report", 3) as advance:
         from simharness.report.run.page import render  # imported late, because matplotlib loads slowly
 
@@ -73,12 +79,14 @@ def run(
         trial, previews = result.simulation.trial, result.simulation.views.previews
         pictures = [] if scenario.rendering.renderer == "rays" else draw_pictures(trial, record, progress=advance)
         animation = animate(previews, record) if previews else None
-        page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation)
+        page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation, found=found)
         advance(1)
     folder = out / f"{scenario.name}-{fingerprint(scenario)}"
     with stages.stage("write", 1), atomic_folder(folder) as partial:
         write_run(record, partial)
         (partial / "report.html").write_text(page, encoding="utf-8")
+        if found:
+            write_blame(found, partial)
         if pictures:
             (partial / "mosaic.png").write_bytes(pictures[0].png())
         if animation:

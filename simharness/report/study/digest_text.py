@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from simharness.failures.blame import Stage
+from simharness.failures.classification import FailureKind
 from simharness.report.documents import markdown_table, provenance_sentence
 from simharness.report.study.factor_names import NAMES, axis_label
-from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS, mean_over, short
+from simharness.report.study.plots import mean_over, short
 from simharness.report.study.tables import OVER_TIME
 from simharness.runtime.number_text import fixed
 from simharness.runtime.progress import duration
@@ -135,7 +137,7 @@ def _breaking(digest: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]])
 
 def _failures(digest: Mapping[str, Any]) -> Iterator[str]:
     failures = digest["failures"]
-    kinds, stages = list(KIND_COLORS), list(BLAME_COLORS)
+    kinds, stages = [str(kind) for kind in FailureKind], [str(stage) for stage in Stage]
     if not any("method" in failed["stages"] for failed in failures.values()):
         stages.remove("method")  # only user-defined estimators can have it
     over = ", over all cases" if digest["cases"] else ""

@@ -11,10 +11,14 @@ import polars as pl
 from markupsafe import Markup
 
 from mvpose.files.atomic_files import write_atomic
+from simharness.causes.blame import Blame
+from simharness.causes.blame_file import read_blame
 from simharness.report.documents import fill_template
+from simharness.report.figures.blame_section import blame_section
 from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
 from simharness.report.study.curves import Factor, factor_breaking_points, factors_by_case, grid, panels
+from simharness.report.study.failure_section import failure_section
 from simharness.report.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
@@ -56,8 +60,9 @@ def write_report(
     check_thresholds(thresholds)
     if not out.parent.is_dir():  # checked before the long work
         raise ValueError(f"{out}: cannot be written: there is no folder {out.parent}")
+    found = read_blame(results.folder)
     shown = [picture for picture, _ in show(results, worst_frames(results), progress=progress)]
-    page = render_study(results, shown=shown, thresholds=thresholds)
+    page = render_study(results, shown=shown, thresholds=thresholds, found=found)
     try:
         write_atomic(out, page.encode())
     except OSError as error:
@@ -77,13 +82,18 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
 
 
 def render_study(
-    results: Results, *, shown: Sequence[WorstFramePictures] = (), thresholds: Mapping[str, float] = THRESHOLDS
+    results: Results,
+    *,
+    shown: Sequence[WorstFramePictures] = (),
+    thresholds: Mapping[str, float] = THRESHOLDS,
+    found: Blame | None = None,
 ) -> str:
     """Return the page of a study.
 
     Args:
         results: the study.
         shown: worst frames of the study.
+        found: what cost the score; None where it was not examined.
         thresholds: thresholds by score; the page has the breaking points of every numeric factor for each of them.
 
     Returns:
@@ -117,7 +127,9 @@ def render_study(
         heats=_heats(swept, variants, drawn, one_at_a_time=info["one_at_a_time"]),
         threshold_drawn=any(score in thresholds for score in drawn),
         breaking=_breaking(swept, variants, thresholds),
-        failures=_failures(results, variants),
+        failures=failure_section(results, variants),
+        blame=found and blame_section(found),
+        blame_hint=f"simharness report {results.folder} --blame 10",
         shown=shown,
         times=_times(results, variants),
         study_folder=results.folder,
@@ -262,35 +274,6 @@ def _breaking(
         if rows:
             tables_by_factor.append({"factor": key, "rows": rows})
     return tables_by_factor
-
-
-def _failures(results: Results, variants: Sequence[str]) -> dict[str, Any]:
-    """Return the plots of failures, and the table of kinds by stage for the first variant; empty without failures."""
-    failures = results.failures
-    if not len(failures):
-        return {}
-    frames = dict(results.frames["variant"].value_counts().iter_rows())
-    kinds = tables.failures_per_100_frames(failures, frames, variants, "kind")
-    stages = tables.failures_per_100_frames(failures, frames, variants, "stage")
-    alone = tables.failures_per_100_frames(failures.filter(pl.col("matching_alone")), frames, variants, "stage")
-    main = failures.filter(pl.col("variant") == variants[0])
-    blamed = [stage for stage in plots.BLAME_COLORS if stage in set(main["stage"])]
-    rows = []
-    for kind in plots.KIND_COLORS:
-        of_kind = main.filter(pl.col("kind") == kind)
-        if len(of_kind):
-            counts = [len(of_kind.filter(pl.col("stage") == stage)) for stage in blamed]
-            rows.append((kind.replace("_", " "), len(of_kind), counts))
-    return {
-        "kinds": Markup(plots.failure_bars("failure-kinds", amounts=kinds, colors=plots.KIND_COLORS)),
-        "stages": Markup(
-            plots.failure_bars("failure-stages", amounts=stages, colors=plots.BLAME_COLORS, hatched=alone)
-        ),
-        "blamed": blamed,
-        "user_defined": "method" in set(failures["stage"]),
-        "rows": rows,
-        "total": len(failures),
-    }
 
 
 def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:

@@ -11,27 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
-from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
+from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, legend_above, svg_plot
 from simharness.report.study.factor_names import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.intervals import Interval
-
-KIND_COLORS: Mapping[str, Color] = {
-    "missed": "#8b93a1",
-    "ghost": "#8a63c9",
-    "merged": "#d9643a",
-    "split": "#d9a514",
-    "swapped_limb": "#3b82c4",
-    "displaced_joint": "#2e9e6b",
-}
-BLAME_COLORS: Mapping[str, Color] = {
-    "detection": "#8a63c9",
-    "matching": "#d9a514",
-    "reconstruction": "#2e9e6b",
-    "method": "#3b82c4",
-}
-_SPARE = "#8b93a1"
 
 _SIZE = (4.5, 3.0)  # inches of 72 px: the width of a phone
 _WIDE_RANGE = 30.0  # from this ratio of the largest value to the smallest on, the axis is logarithmic
@@ -207,47 +191,6 @@ def mean_over(over: Mapping[str, Sequence[Any]]) -> str:
             text = f"({ends}{len(values)} values)"
         parts.append(f"{key} {text}")
     return f"mean over {' and '.join(parts)}" if parts else ""
-
-
-def failure_bars(
-    name: str,
-    *,
-    amounts: Mapping[str, Mapping[str, float]],
-    colors: Mapping[str, Color],
-    hatched: Mapping[str, Mapping[str, float]] | None = None,
-) -> str:
-    """Plot failures by class: a stacked bar for each variant.
-
-    Args:
-        name: different from the name of every other plot on the page.
-        amounts: failures per 100 frames by variant and class.
-        colors: colours of the classes; other classes are grey.
-        hatched: hatched part of each amount.
-    """
-    classes = list(dict.fromkeys([*colors, *(key for each in amounts.values() for key in each)]))
-    classes = [key for key in classes if any(each.get(key) for each in amounts.values())]
-    with svg_plot(name, size=(_SIZE[0], 1.15 + 0.4 * len(amounts))) as (axes, written):
-        rows = np.arange(len(amounts))
-        left = np.zeros(len(amounts))
-        for key in classes:
-            width = np.array([each.get(key, 0.0) for each in amounts.values()])
-            color = colors.get(key, _SPARE)
-            axes.barh(rows, width, left=left, height=0.62, color=color, label=key.replace("_", " "), lw=0)
-            if hatched:
-                part = np.array([hatched.get(variant, {}).get(key, 0.0) for variant in amounts])
-                if part.any():
-                    start = left + width - part
-                    axes.barh(rows, part, left=start, height=0.62, color="none", ec=INK, hatch="////", lw=0, alpha=0.75)
-            left += width
-        for row, end in enumerate(left.tolist()):
-            axes.annotate(f"{end:.1f}", (end, row), xytext=(4, 0), textcoords="offset points", va="center")
-        axes.set(xlabel="failures per 100 frames", yticks=rows, yticklabels=list(amounts))
-        axes.set_xlim(0, max(1e-6, left.max(initial=0.0)) * 1.14)
-        axes.set_ylim(len(amounts) - 0.5, -0.5)
-        axes.tick_params(axis="y", length=0, labelcolor=INK)
-        axes.spines["left"].set_visible(False)
-        legend_above(axes, columns=3)
-    return written[0]
 
 
 def time_distribution(times: Mapping[str, Floats]) -> str:

@@ -103,6 +103,8 @@ def all_scores(trials: pl.DataFrame, variants: Sequence[str]) -> list[tuple[Scor
     """
     rows = []
     for info in SCORES.values():
+        if info.key not in trials.columns:  # a table of an earlier version
+            continue
         means = [
             mean_interval(list(by_seed(trials.filter(pl.col("variant") == variant), info.key).values()), unit=info.unit)
             for variant in variants

@@ -10,6 +10,7 @@ from typing import Any
 
 import polars as pl
 
+from simharness.failures.classification import FailureKind
 from simharness.gate.trial_command import overrides
 from simharness.pairing.pairing import LIMIT
 from simharness.report.run.pictures import MAX_VIEWS, Picture, draw_frame
@@ -25,6 +26,8 @@ from simharness.world.scene.playback import Playback
 
 SHOWN = 4
 """Number of worst frames on a page."""
+
+_NAMED = 5  # failures of a frame that its caption names
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ class WorstFramePictures:
 def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:
     """Return the frames with the highest cost for the first variant with results, by falling cost.
 
-    There is one frame of each setting; where there are fewer settings than ``count``, one frame of each trial.
+    Only frames with a failure count: an error of 29 mm is none, even where nothing is worse. There is one frame of each
+    setting; where there are fewer settings than ``count``, one frame of each trial.
     """
     variant = next((name for name in results.info["variants"] if name in set(results.frames["variant"])), None)
     if variant is None:
@@ -76,6 +80,7 @@ def worst_frames(results: Results, *, count: int = SHOWN) -> list[WorstFrame]:
     errors = results.people.group_by("trial", "variant", "frame").agg(pl.col("error_mm").sum())
     frames = (
         results.frames.filter(pl.col("variant") == variant)
+        .join(results.failures, on=["trial", "variant", "frame"], how="semi")
         .join(errors, on=["trial", "variant", "frame"], how="left")
         .with_columns(cost=pl.col("error_mm").fill_null(0.0) + 1000 * LIMIT * (pl.col("missed") + pl.col("ghosts")))
         .sort("cost", "trial", "frame", descending=[True, False, False])
@@ -145,11 +150,39 @@ def _caption(results: Results, frame: WorstFrame, again: Replay) -> str:
         & (pl.col("frame") == frame.frame),
         named=True,
     )
-    ghosts = f"{row['ghosts']} ghost{'' if row['ghosts'] == 1 else 's'}"
-    error = "" if row["mpjpe_mm"] is None else f", mean joint error {row['mpjpe_mm']:.0f} mm"
+    error = "" if row["mpjpe_mm"] is None else f", mean joint error of those found {row['mpjpe_mm']:.0f} mm"
     cameras = len(again.trial.exposures.believed_rig)
     views = f"; {MAX_VIEWS} of {cameras} cameras" if cameras > MAX_VIEWS else ""
     return (
         f"Frame {frame.frame} of {len(again.time)}, at {again.time[frame.frame]:.1f} s, variant {frame.variant}: "
-        f"{row['found']} of {row['people']} people found, {ghosts}{error}{views}."
+        f"{row['found']} of {row['people']} people found{error}. {_failures(results, frame)}{views}."
     )
+
+
+def _failures(results: Results, frame: WorstFrame) -> str:
+    """Return the failures of a frame, the worst kinds first, as a sentence without its full stop."""
+    here = (pl.col("trial") == frame.trial) & (pl.col("variant") == frame.variant) & (pl.col("frame") == frame.frame)
+    worst = {row["person"]: row for row in results.people.filter(here).iter_rows(named=True)}
+    order = [str(kind) for kind in FailureKind]
+    rows = sorted(results.failures.filter(here).iter_rows(named=True), key=lambda row: order.index(row["kind"]))
+    parts = []
+    for row in rows[:_NAMED]:
+        if row["kind"] == FailureKind.GHOST:
+            parts.append("a ghost")
+        elif row["kind"] in (FailureKind.DISPLACED_JOINT, FailureKind.SWAPPED_LIMB) and row["person"] in worst:
+            parts.append(f"person {row['person']}: {_joint_error(row, worst[row['person']])}")
+        else:
+            parts.append(f"person {row['person']} {row['kind'].replace('_', ' ')}")
+    if len(rows) > _NAMED:
+        parts.append(f"{len(rows) - _NAMED} more")
+    text = "; ".join(parts)
+    return text[:1].upper() + text[1:]
+
+
+def _joint_error(failure: Mapping[str, Any], person: Mapping[str, Any]) -> str:
+    """Return the worst joint of a person with wrong joints, and how many are wrong."""
+    count = len(failure["joints"])
+    others = f", {count} joints wrong" if count > 1 else ""
+    if person.get("worst_mm") is None or person["worst_joint"] not in failure["joints"]:
+        return f"{failure['joints'][0].replace('_', ' ')} not estimated{others}" if count else "a wrong joint"
+    return f"{person['worst_joint'].replace('_', ' ')} off by {person['worst_mm']:.0f} mm{others}"

@@ -17,7 +17,7 @@ from simharness.study.result_folder import Results
 from simharness.types.random_streams import stream
 
 FRAMES, PEOPLE = 5, 2
-KINDS = ("missed", "ghost", "merged", "displaced_joint")
+KINDS = ("missed", "split", "merged", "displaced_joint")
 STAGES = ("detection", "matching", "reconstruction")
 
 
@@ -70,16 +70,19 @@ def make_study(
             )
             for frame in range(FRAMES):
                 key = {"trial": trial, "variant": variant, "frame": frame}
-                missed = int(rng.random() < 0.2)
+                missed, ghosts = int(rng.random() < 0.2), int(rng.random() < 0.1)
                 frames.append(
                     key
                     | {"people": PEOPLE, "estimates": PEOPLE - missed, "found": PEOPLE - missed, "missed": missed}
-                    | {"ghosts": int(rng.random() < 0.1), "pcp": 90.0, "mpjpe_mm": 20.0}
+                    | {"ghosts": ghosts, "pcp": 90.0, "mpjpe_mm": 20.0}
                     | {"time_ms": float(rng.gamma(4.0, 3.0))}
                 )
                 for person in range(PEOPLE):
                     error = None if missed and person == 0 else float(rng.uniform(10, 40))
                     people.append(key | {"person": person, "found": error is not None, "error_mm": error})
+                if ghosts:
+                    ghost = {"person": -1, "kind": "ghost", "stage": "detection", "matching_alone": False}
+                    failures.append(key | ghost | {"joints": [], "error_mm": None})
                 if missed:
                     kind, stage = KINDS[int(rng.integers(4))], STAGES[int(rng.integers(3))]
                     alone = bool(rng.random() < 0.5)

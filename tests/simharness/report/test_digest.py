@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 from mvpose.report.svg_plots import plot_sheet
 from simharness.cli import app
+from simharness.failures.blame import Stage
+from simharness.failures.classification import FailureKind
 from simharness.report.study.digest import PRINTED, curves, digest, markdown, write_digest
-from simharness.report.study.plots import BLAME_COLORS, KIND_COLORS
 from simharness.scoring.catalogue import SCORES
 from simharness.trial.provenance import PROVENANCE
 
@@ -58,8 +59,8 @@ def test_every_failure_has_a_kind_and_a_stage(study):
         alone = [each for each in failures["matching_alone"].to_list() if each is not None]
         assert failed["matching_alone"] == pytest.approx(100 * sum(alone) / len(alone), abs=0.05)
         assert 0 < failed["matching_alone"] < 100
-        assert failed["kinds"].keys() <= KIND_COLORS.keys()
-        assert failed["stages"].keys() <= BLAME_COLORS.keys()
+        assert failed["kinds"].keys() <= {*map(str, FailureKind)}
+        assert failed["stages"].keys() <= {*map(str, Stage)}
 
 
 def test_the_stage_method_is_listed_only_for_user_defined_estimators(study):
@@ -121,7 +122,7 @@ def test_the_text_explains_its_terms(study):
         explained = set(re.findall(r"\*([a-z ]+)\*:", table))
         assert cells - {"fast"} <= explained
         assert explained
-    for kind in KIND_COLORS:
+    for kind in [*map(str, FailureKind)]:
         assert SCORES[f"failures_{kind}"].about in text
 
 

@@ -11,10 +11,13 @@ import pytest
 from made_study import make_study, pcp_of
 from typer.testing import CliRunner
 
+from simharness.causes.blame import Blame, Mending, Share
+from simharness.causes.blame_file import FILE, read_blame, write_blame
 from simharness.cli import app
 from simharness.report.study.page import render_study, write_report
 from simharness.report.study.worst_frames import worst_frames
 from simharness.scoring.catalogue import SCORES
+from simharness.statistics.intervals import Interval
 
 GRID = {"cameras.count": [2, 3, 5], "detector.profile": ["poor", "good"]}
 _VOID = {"meta", "input", "img", "br"}
@@ -213,9 +216,54 @@ def test_the_worst_frames_have_the_highest_cost_and_one_of_each_setting(tmp_path
 
 
 def test_a_study_of_one_setting_shows_the_worst_of_its_trials(tmp_path):
-    frames = worst_frames(make_study(tmp_path, factors={}, seeds=6))
+    frames = worst_frames(make_study(tmp_path, factors={}, seeds=12))
     assert len({frame.trial for frame in frames}) == len(frames) == 4
     assert [frame.cost for frame in frames] == sorted((frame.cost for frame in frames), reverse=True)
+
+
+def test_a_frame_without_a_failure_is_no_worst_frame(tmp_path):
+    made = make_study(tmp_path)
+    assert worst_frames(dataclasses.replace(made, failures=made.failures.clear())) == []
+
+
+def test_failures_have_their_definition_and_the_worst_kinds_first(tmp_path):
+    results = make_study(tmp_path)
+    page = render_study(results)
+    section = page[page.index("<h2>Failures</h2>") : page.index("<h2>Time per frame</h2>")]
+    assert "A failure is one wrong person in one frame, or one ghost" in section
+    rows = re.findall(r'<th scope="row">([a-z ]+)<span class="meaning">.*?<span>([\d.]+)</span>', section)
+    assert [kind for kind, _ in rows] == ["missed", "ghost", "merged", "split", "displaced joint"]
+    full = results.failures.filter((pl.col("variant") == "full") & (pl.col("kind") == "missed"))
+    frames = len(results.frames.filter(pl.col("variant") == "full"))
+    assert float(dict(rows)["missed"]) == pytest.approx(100 * len(full) / frames, abs=0.05)
+
+
+def test_what_cost_the_score_stands_on_the_page(tmp_path):
+    results = make_study(tmp_path)
+    assert "--blame 10</pre>" in render_study(results)
+    number = Interval(4.0, 1.0, 9.0, 5)
+    found = Blame(
+        scenario="made",
+        setting="cameras.count 2",
+        variant="full",
+        score="pcp",
+        seeds=(0, 1, 2, 3, 4),
+        before=Interval(90.0, 80.0, 95.0, 5),
+        after=Interval(98.0, 97.0, 99.0, 5),
+        rest=Interval(2.0, 1.0, 3.0, 5),
+        shares=(Share("boxes", number, number, number), Share("swaps", number, number, number)),
+        mending=Mending(("boxes", "swaps"), Interval(98.0, 97.0, 99.0, 5), Interval(8.0, 2.0, 14.0, 5), 1.0),
+        absent=("clocks",),
+    )
+    write_blame(found, tmp_path)
+    assert read_blame(tmp_path) == found
+    page = render_study(results, found=found)
+    assert "Mend missed and merged boxes and inversions and swaps: PCP 98.0 % (97.0 to 99.0)" in page
+    assert "Not in this setting: clocks." in page
+    assert page.count("<circle") == 2
+    (tmp_path / FILE).write_text("{}")
+    with pytest.raises(ValueError, match="write it again with --blame"):
+        read_blame(tmp_path)
 
 
 def test_the_frames_shown_are_those_that_were_scored(ran, shown):
