@@ -22,6 +22,7 @@ _SYSTEMATIC = np.array([*[np.radians(0.1)] * 3, *[0.008] * 3, 0.003, 1.0, 1.0, 0
 """Standard deviations of what detectors add, who place joints differently from different sides (FACTS: hips are off by
 30 to 50 mm); it does not shrink with the length of a recording."""
 
+_LENSES = ("distortion-ignored", "distortion-model")
 _REPAIR = "mvpose repair CALIBRATION DETECTIONS --out NEW"
 _DRAWS = 4000
 
@@ -42,11 +43,46 @@ def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined
         finding = _finding(each, fit, rig, starts, names, depth, undetermined)
         if finding is not None:
             findings.append(finding)
+    findings = _of_all_lenses(findings, rig)
     faulty = {each.fault.view for each in fit.faults}
     for view in range(len(rig)):
         if view not in faulty:
             findings += _note(fit, view, names, depth)
     return findings
+
+
+def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
+    """Return the findings with one for all lenses in place of those of most lenses, if these are wrong alike.
+
+    Of V cameras V - 2 are named at most (:mod:`.cameras`); a mistake about distortion is one of all files.
+    """
+    lenses = [each for each in findings if each.kind in _LENSES and each.severity == "alarm" and each.view is not None]
+    changes = np.array([each.size["k1"] for each in lenses])
+    kinds = {each.kind for each in lenses}
+    if len(lenses) < max(2, len(rig) - 2) or len(kinds) > 1 or len(set(np.sign(changes))) > 1:
+        return findings
+    calibrated = np.array([rig[each.view].distortion[0] for each in lenses if each.view is not None])
+    seen = ", ".join(str(each.camera) for each in lenses)
+    k1 = float(np.median(changes))
+    if kinds == {"distortion-ignored"}:
+        text = "the pictures of all cameras are distorted, and the calibration has no distortion"
+        mend = f"calibrate the lenses; until then: for camera in rig: distortion = np.array([{k1:.3f}, 0, 0, 0, 0])"
+    elif (np.abs(calibrated + changes) < 0.35 * np.abs(calibrated)).all():
+        text = "the keypoints of all cameras are of pictures whose distortion was removed already"
+        mend = "for camera in rig: distortion = np.zeros(5)"
+    else:
+        text, mend = "the lenses of all cameras distort otherwise than calibrated", "calibrate the lenses again"
+    interval = tuple(float(np.median([each.interval["k1"][side] for each in lenses])) for side in (0, 1))
+    whole = Finding(
+        lenses[0].kind,
+        f"{text} (clearest in {seen})",
+        probability=max(each.probability for each in lenses),
+        size={"k1": k1},
+        interval={"k1": (interval[0], interval[1])},
+        cost=sum(each.cost for each in lenses),
+        mend=mend,
+    )
+    return [*(each for each in findings if each not in lenses), whole]
 
 
 def _finding(

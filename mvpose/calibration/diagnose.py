@@ -23,6 +23,7 @@ from mvpose.calibration.pieces import cut
 from mvpose.calibration.reread import reread_rig, reread_tracklets
 from mvpose.calibration.sightings import Sightings, match_over_time, sightings_of
 from mvpose.calibration.sufficiency import DIFFERENT, RECORD, travelled, unknowns
+from mvpose.calibration.tracklet_matching import PeopleGroups
 from mvpose.calibration.tracklets import Tracklets, link
 from mvpose.calibration.views import Agreement, silent_views, strangers
 from mvpose.camera import Rig
@@ -62,8 +63,10 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     if mended is None:  # the cameras of no reading stand in different places within 200 m
         mended, reading = rig, Reading.as_given(rig.packed)
     tracklets = reread_tracklets(tracklets, reading)
-    sightings, joints, rows, result = _fitted(mended, tracklets)
-    agreement = Agreement.of(consistency, reading, _corrected(reading, result))
+    matched = match_over_time(mended, tracklets)
+    sightings, joints, rows, result = _fitted(mended, tracklets, matched)
+    moved = replace(reading, cameras=matched.rig.packed)
+    agreement = Agreement.of(consistency, reading, _corrected(reading, result), moved)
     found_strangers = strangers(agreement, detections, names)
     if found_strangers:
         sightings = sightings.select(
@@ -137,9 +140,9 @@ def _doubtful(finding: Finding, different: bool) -> bool:
     return finding.severity == "alarm" and finding.kind not in _USELESS and (different or finding.kind in _SUBTLE)
 
 
-def _fitted(rig: Rig, tracklets: Tracklets) -> tuple[Sightings, JointViews, Integers, Fit]:
-    """Return the matched sightings and what they say about the cameras."""
-    matched = sightings_of(tracklets, match_over_time(rig, tracklets).person)
+def _fitted(rig: Rig, tracklets: Tracklets, groups: PeopleGroups) -> tuple[Sightings, JointViews, Integers, Fit]:
+    """Return the matched sightings, the joints among them, their rows, and the fit of the cameras."""
+    matched = sightings_of(tracklets, groups.person)
     sightings = without_mismatches(rig.packed, matched, *joint_views(matched))
     joints, rows = joint_views(sightings)
     return sightings, joints, rows, fit(rig.packed, joints)
