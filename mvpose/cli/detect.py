@@ -69,8 +69,11 @@ def detect(
 ) -> None:
     """Detect people in videos by networks in ONNX files. An interrupted run goes on where it stopped."""
     with exit_on_error():
+        from mvpose.cli.camera_pictures import open_videos
+
         _check_folder(out)
-        sources = _detect(videos, out, networks)
+        sources = open_videos(videos)
+        _detect(sources, out, networks)
     typer.echo(f"detections of {len(sources)} videos: {out}")
 
 
@@ -78,7 +81,7 @@ def detect(
 def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: Networks, choices: Choices) -> None:
     """Detect people in videos and estimate them in 3D; detections are kept in FOLDER-detections."""
     with exit_on_error():
-        from mvpose.cli.video_detection import common_rate
+        from mvpose.cli.camera_pictures import assigned, check_sizes, common_rate, open_videos
         from mvpose.formats.calibration.registry import read_calibration
         from mvpose.formats.views.plausibility import UNKNOWN_SIZE
 
@@ -86,8 +89,12 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
         detections = folder.with_name(f"{folder.name}-detections")
         wanted.check()
         _check_folder(detections)
-        read_calibration(calibration, size=UNKNOWN_SIZE)  # a wrong one is found before hours of detection
-        sources = _detect(videos, detections, networks)
+        # What does not fit is found before hours of detection.
+        rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
+        sources = assigned(rig.cameras, open_videos(videos))
+        check_sizes(rig.cameras, sources)
+        _detect(sources, detections, networks)
+        note(f"detections are kept in {detections}: another run does not detect again")
         sizes = {source.size for source in sources}
         size = choices.size or ("x".join(map(str, sizes.pop())) if len(sizes) == 1 else None)
         choices = replace(choices, fps=choices.fps or common_rate(sources), size=size)
@@ -102,13 +109,13 @@ def _check_folder(folder: Path) -> None:
     check_writable(folder, holds=MARK)
 
 
-def _detect(videos: Sequence[Path], out: Path, networks: Networks) -> list[PictureSource]:
-    """Write the detections of videos; return the videos."""
-    from mvpose.cli.video_detection import common_rate, detect_videos, networks_text, open_videos
+def _detect(sources: Sequence[PictureSource], out: Path, networks: Networks) -> None:
+    """Write the detections of videos of one rate."""
+    from mvpose.cli.camera_pictures import common_rate
+    from mvpose.cli.video_detection import detect_videos, networks_text
     from mvpose.networks.detector import PersonDetector
     from mvpose.networks.people import open_head
 
-    sources = open_videos(videos)
     common_rate(sources)
     detector, pose, least = networks.detector, networks.pose, networks.min_score
     try:
@@ -130,4 +137,3 @@ def _detect(videos: Sequence[Path], out: Path, networks: Networks) -> list[Pictu
         note(f"{detector.name} gives keypoints as well; those of {pose.name} are used")
     text = networks_text(detector, pose, least=least, kind=finder.kind)
     detect_videos(sources, out, finder, head, networks=text)
-    return sources

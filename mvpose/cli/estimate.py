@@ -14,7 +14,6 @@ from mvpose.cli.inputs import Calibration, Choices, DetectionPaths, read_inputs
 from mvpose.cli.option_groups import grouped
 
 if TYPE_CHECKING:
-    from mvpose.cli.inputs import Inputs
     from mvpose.formats.pictures import PictureSource
 
 
@@ -111,14 +110,13 @@ def estimate_into(
     from mvpose.cli.results import formats_of, options_of, write_results
 
     wanted.check()
+    from mvpose.cli.camera_pictures import assigned, open_videos
     from mvpose.cli.estimation import estimate_people, estimator
 
     if sources is None and wanted.pictures:
-        from mvpose.cli.video_detection import open_videos
-
         sources = open_videos(wanted.pictures)
     inputs = read_inputs(calibration, detections, choices)
-    views = None if sources is None else _of_cameras(inputs, sources)
+    views = None if sources is None else assigned(inputs.rig.cameras, sources)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     people = estimate_people(inputs, method, trust=wanted.trust)
     write_results(
@@ -133,14 +131,3 @@ def estimate_into(
         films=wanted.films,
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")
-
-
-def _of_cameras(inputs: Inputs, sources: Sequence[PictureSource]) -> list[PictureSource]:
-    """Return the pictures of each camera, found by the names of the cameras."""
-    from mvpose.formats.views.assignment import assign
-    from mvpose.formats.views.sources import Source
-
-    by_path = {source.path: source for source in sources}
-    named = [Source(source.name, source.path) for source in sources]
-    assigned = assign([camera.name for camera in inputs.rig], named, what="pictures")
-    return [by_path[source.path] for source in assigned.sources]

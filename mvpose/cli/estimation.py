@@ -33,7 +33,8 @@ def estimator(method: str, *, lag: float, period: float) -> Estimator:
     if method in NEED_DESCRIPTORS:
         raise ValueError(f"--method {method}: needs descriptors, which files of detections do not hold; use track")
     if method not in PRESETS:
-        raise ValueError(f"--method {method}: no such method; expected one of {', '.join(PRESETS)}")
+        known = [name for name in PRESETS if name not in NEED_DESCRIPTORS]
+        raise ValueError(f"--method {method}: no such method; expected one of {', '.join(known)}")
     if not lag >= 0.0 or math.isnan(lag):
         raise ValueError(f"--lag must be 0 s or more, or inf, got {lag}")
     return Pipeline.preset(method, lag=lag, period=period)

@@ -109,6 +109,11 @@ class Choices:
         ),
     ] = None
 
+    @property
+    def only(self) -> tuple[str, ...]:
+        """Names of the cameras to use; empty for all."""
+        return tuple(name.strip() for name in self.cameras.split(",")) if self.cameras else ()
+
 
 def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices, *, examined: bool = False) -> Inputs:
     """Read a calibration and detections, and check that they can belong together. Notes are printed on stderr.
@@ -133,10 +138,9 @@ def read_inputs(calibration: Path, detections: Sequence[Path], choices: Choices,
         raise ValueError(f"--joints must be body or all, got {choices.joints!r}")
     if choices.fps is not None and not 0.0 < choices.fps < 1e6:
         raise ValueError(f"--fps must be above 0, got {choices.fps}")
-    only = tuple(name.strip() for name in choices.cameras.split(",")) if choices.cameras else ()
     frames, size = _frames(choices.frames), _size(choices.size)
     skeleton = _skeleton(choices.skeleton) if choices.skeleton else None
-    rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=only, key="--cameras")
+    rig = read_calibration(calibration, size=plausibility.UNKNOWN_SIZE, only=choices.only, key="--cameras")
     names = [camera.name for camera in rig]
     with bar("read", len(rig)) as advance:
         recorded = read_recording(

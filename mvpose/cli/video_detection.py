@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from mvpose.cli.exit_codes import failing
 from mvpose.cli.progress import bar
 from mvpose.files.atomic_files import write_atomic
 from mvpose.files.input_files import parse_json, read_bytes
-from mvpose.formats.pictures import PictureSource, of_cameras, open_pictures
+from mvpose.formats.pictures import PictureSource
 from mvpose.networks.detector import Found, PersonDetector
 from mvpose.networks.people import detect_people
 from mvpose.networks.pose import PoseHead
@@ -26,37 +24,6 @@ MARK = ".mvpose-detections"
 
 _LARGEST = 2**32  # bytes of a network
 _DECIMALS = 3  # thousandths of a pixel
-
-
-def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
-    """Open all videos.
-
-    Raises:
-        ValueError: a video that cannot be read, or two of one name, whose detections would share a file.
-    """
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # no lines of the decoder beside our message
-    sources = [open_pictures(path) for path in of_cameras(paths)]
-    names = [each.name for each in sources]
-    for source in sources:
-        if names.count(source.name) > 1:
-            raise ValueError(f"two videos are called {source.name}; rename one: detections are named as the videos")
-    return sources
-
-
-def common_rate(sources: Sequence[PictureSource]) -> float | None:
-    """Return the frames per second of videos; None where none states it.
-
-    Raises:
-        ValueError: different rates.
-    """
-    rates = {source.name: source.fps for source in sources if math.isfinite(source.fps)}
-    if rates and max(rates.values()) > 1.001 * min(rates.values()):
-        text = ", ".join(f"{name} {rate:.6g}" for name, rate in rates.items())
-        raise ValueError(
-            f"the videos have different rates: {text} frames per second; convert them to one rate, so that "
-            "frame k of all is of one moment"
-        )
-    return next(iter(rates.values()), None)
 
 
 def detect_videos(

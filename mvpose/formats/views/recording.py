@@ -108,10 +108,9 @@ def read_recording(
     empty = [camera for camera, each in zip(cameras, pictures, strict=True) if not any(map(len, each.values()))]
     if empty:
         others = [camera for camera in cameras if camera not in empty]
-        raise ValueError(
-            f"nobody is detected in any frame of the camera {listed(empty)}; check its files, or leave it out: "
-            f"--cameras {','.join(others)}"
-        )
+        which = f"of the camera {listed(empty)}" if others else "of any camera"
+        mend = f", or leave it out: --cameras {','.join(others)}" if len(others) > 1 else ""
+        raise ValueError(f"nobody is detected in any frame {which}; check the files of detections{mend}")
     return RecordedFrames(numbers, tuple(pictures), assignment, tuple(view.kind for view in views), joints)
 
 

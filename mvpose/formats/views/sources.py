@@ -73,8 +73,13 @@ def _below(path: Path) -> list[Source]:
             return _below(path / inside)
     found = [_source(each) for each in folders if _files(each)]
     if not found:
-        has = f"the folders {listed([each.name for each in folders])} without such files" if folders else "neither"
-        raise ValueError(f"{name}: expected *.json or *.npz, or a folder with these for each camera; it has {has}")
+        has = (
+            f"has the folders {listed([each.name for each in folders])} without such files"
+            if folders
+            else "has neither"
+        )
+        has = has if any(path.iterdir()) else "is an empty folder"
+        raise ValueError(f"{name}: {has}; expected *.json or *.npz, or a folder with these for each camera: {_KINDS}")
     return found
 
 
@@ -88,8 +93,10 @@ def _is_of_one_picture(file: Path) -> bool:
         return False
     content = read_json(file, what=f"detections: {_KINDS}")
     if isinstance(content, dict):
-        return "instance_info" not in content
-    return bool(content) and isinstance(content[0], dict) and "keypoint_scores" in content[0]
+        return "people" in content or "instances" in content
+    return (
+        isinstance(content, list) and bool(content) and isinstance(content[0], dict) and "keypoint_scores" in content[0]
+    )
 
 
 def _source(path: Path) -> Source:

@@ -347,7 +347,13 @@ def _named_joints(path: Path, content: Mapping[str, Any]) -> JointNames | None:
 def _summary(content: Any) -> str:
     """Return the kind and the keys of a JSON value, for messages."""
     if isinstance(content, dict):
-        return f"an object with {listed(list(content)) or 'no keys'}"
-    if isinstance(content, list):
-        return f"a list of {_summary(content[0]) if content else 'nothing'}"
-    return f"a {type(content).__name__}"
+        return f"an object with {_keys(content)}"
+    if not isinstance(content, list):
+        return f"{shown(content)}, no object or list"
+    if content and isinstance(content[0], dict):
+        return f"a list of objects with {_keys(content[0])}"
+    return f"a list that begins with {shown(content[0])}" if content else "an empty list"
+
+
+def _keys(content: Mapping[str, Any]) -> str:
+    return f"the keys {listed(list(content))}" if content else "no keys"

@@ -177,6 +177,18 @@ class TestRun:
             f"cam{k}.json" for k in range(4)
         ]
 
+    def test_what_does_not_fit_is_found_before_the_detection(self, networks, tmp_path):
+        pose2sim.write_calibration(tmp_path / "Calib.toml", studio())  # of 1280 x 960 pixels
+        for view in range(3):
+            write_folder(tmp_path / "hall" / f"cam{view}", spots(2))
+        options = ["--detector", networks[0], "--pose", networks[1], "--out", tmp_path / "out"]
+        missing = call("run", tmp_path / "Calib.toml", tmp_path / "hall", *options)
+        ends(missing, 2, "no pictures for the camera cam3: the pictures are called cam0, cam1, cam2")
+        write_folder(tmp_path / "hall" / "cam3", spots(2))
+        small = call("run", tmp_path / "Calib.toml", tmp_path / "hall", *options)
+        ends(small, 2, "not of the calibrated size: cam0 320 x 240 instead of 1280 x 960, cam1")
+        assert not list(tmp_path.glob("out*"))
+
     def test_an_output_that_cannot_be_written_is_found_first(self, networks, tmp_path):
         (tmp_path / "out").write_text("")
         result = call("run", "none", "none", "--detector", networks[0], "--out", tmp_path / "out")

@@ -158,10 +158,10 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("content", "match"),
         [
-            ('{"skeleton": [1]}', "expected the people of one picture.*an object with skeleton"),
+            ('{"skeleton": [1]}', "expected the people of one picture.*an object with the keys skeleton"),
             ('{"people": ', "broken or truncated JSON"),
             ('{"people": [{"pose_keypoints_2d": ["a"]}]}', "has 0 joints a person|other than numbers"),
-            ("[1, 2]", "expected the people of one picture.*a list of a int"),
+            ("[1, 2]", "expected the people of one picture.*a list that begins with 1"),
         ],
     )
     def test_unknown_and_broken_json(self, lab, content, match):
