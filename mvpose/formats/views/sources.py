@@ -73,12 +73,9 @@ def _below(path: Path) -> list[Source]:
             return _below(path / inside)
     found = [_source(each) for each in folders if _files(each)]
     if not found:
-        has = (
-            f"has the folders {listed([each.name for each in folders])} without such files"
-            if folders
-            else "has neither"
-        )
-        has = has if any(path.iterdir()) else "is an empty folder"
+        has = "has neither" if any(path.iterdir()) else "is an empty folder"
+        if folders:
+            has = f"has the folders {listed([each.name for each in folders])} without such files"
         raise ValueError(f"{name}: {has}; expected *.json or *.npz, or a folder with these for each camera: {_KINDS}")
     return found
 

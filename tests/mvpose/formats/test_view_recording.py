@@ -117,7 +117,7 @@ class TestRefusals:
 
     def test_an_empty_folder(self, tmp_path):
         (tmp_path / "empty").mkdir()
-        self.refused(r"empty: expected \*\.json or \*\.npz, or a folder with these for each camera", tmp_path / "empty")
+        self.refused(r"empty: is an empty folder; expected \*\.json or \*\.npz, or a folder", tmp_path / "empty")
 
     def test_a_missing_folder_and_a_video(self, tmp_path):
         self.refused("nowhere: no such file or folder", tmp_path / "nowhere")
