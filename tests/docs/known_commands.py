@@ -91,6 +91,7 @@ MODULES = tuple(
         "benchmarks.simulator",
         "benchmarks.tracking",
         "benchmarks.planted_bugs",
+        "benchmarks.whole_body",
         "tools.page_pictures",
         "tools.reid",
     )

@@ -1,0 +1,1 @@
+"""Running time of hands, face and feet."""
