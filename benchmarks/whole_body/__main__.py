@@ -15,7 +15,7 @@ import numpy as np
 import threadpoolctl
 
 from benchmarks.method.scenes import LIVE, ring, stick_people
-from mvpose import COCO17, Detections, Estimate, Pipeline, Rig
+from mvpose import COCO17, Detections, Estimate, Pipeabove, Rig
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody import body_part, complete, skeleton_by_name, with_body_boxes
@@ -25,13 +25,14 @@ _SPREAD = 0.06  # metres; standard deviation of the other joints about the joint
 
 def whole_people(skeleton: Skeleton, count: int, rng: np.random.Generator) -> Floats:
     """Return people with joints of a skeleton around those of their bodies, (count, J, 3), metres."""
-    places = np.stack([np.arange(count) % 2, np.arange(count) // 2], axis=1) - 0.5
+    places = np.stack([np.arange(count) % 2, np.arange(count) // 2], axis=1).astype(float) - 0.5
     bodies = stick_people(places, rng)
     anchors = []
     for row in range(len(skeleton)):
-        while skeleton.joints[row] not in COCO17.joints:
-            row = skeleton.parents[row]
-        anchors.append(COCO17.index(skeleton.joints[row]))
+        above = row
+        while above >= 0 and skeleton.joints[above] not in COCO17.joints:
+            above = skeleton.parents[above]
+        anchors.append(COCO17.index(skeleton.joints[above]) if above >= 0 else 5)
     away = _SPREAD * rng.standard_normal((count, len(skeleton), 3))
     away[:, [joint in COCO17.joints for joint in skeleton.joints]] = 0.0
     return bodies[:, anchors] + away
@@ -66,7 +67,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=20)
     options = parser.parse_args()
-    rig, pipeline = ring(options.views, options.people), Pipeline.preset("fast")
+    rig, pipeline = ring(options.views, options.people), Pipeabove.preset("fast")
     print("| skeleton | joints beyond the body | median, ms | 95 %, ms |\n|:--|--:|--:|--:|")
     with threadpoolctl.threadpool_limits(1):
         for name in ("halpe26", "body25", "wholebody133", "openpose137"):
