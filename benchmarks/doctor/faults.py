@@ -103,15 +103,46 @@ def _cropped(camera: Camera) -> Camera:
     return replace(camera, K=K, size=(round(1.2 * camera.size[0]), round(1.2 * camera.size[1])))
 
 
-def _distortion_lost(recording: BenchRecording, rng: np.random.Generator) -> Case:
-    """Give the detections of a distorting lens to a calibration without distortion."""
-    bent = [
+def _distorting(recording: BenchRecording) -> list[Camera]:
+    """Return the cameras, each with a lens that distorts."""
+    return [
         camera if camera.distortion.any() else replace(camera, distortion=np.array([-0.25, 0.08, 0.0, 0.0, 0.0]))
         for camera in recording.rig
     ]
-    straight = Rig([replace(camera, distortion=np.zeros(5)) for camera in bent])
-    frames = tuple(_through(each, recording.rig, bent) for each in recording.frames)
-    return Case(straight, frames)
+
+
+def _lenses(believed: Callable[[Floats], Floats], *, one: bool = False) -> Fault:
+    """Return the fault of lenses whose terms (5,) are believed to be others, in all cameras or in one."""
+
+    def fault(recording: BenchRecording, rng: np.random.Generator) -> Case:
+        view = int(rng.integers(len(recording.rig))) if one else None
+        wrong = [view is None or v == view for v in range(len(recording.rig))]
+        bent = [b if w else c for b, c, w in zip(_distorting(recording), recording.rig, wrong, strict=True)]
+        frames = tuple(_through(each, recording.rig, bent) for each in recording.frames)
+        cameras = [
+            replace(camera, distortion=believed(camera.distortion)) if w else camera
+            for camera, w in zip(bent, wrong, strict=True)
+        ]
+        return Case(Rig(cameras), frames, view)
+
+    return fault
+
+
+def _distortion_removed(recording: BenchRecording, rng: np.random.Generator) -> Case:
+    """Give the detections of undistorted pictures to a calibration with distortion."""
+    bent = _distorting(recording)
+    straight = [replace(camera, distortion=np.zeros(5)) for camera in bent]
+    frames = tuple(_through(each, recording.rig, straight) for each in recording.frames)
+    return Case(Rig(bent), frames)
+
+
+def _cropped_pictures(recording: BenchRecording, rng: np.random.Generator) -> Case:
+    """Crop the pictures of one camera by 10 to 25 % of their width and height, off its centre."""
+    view = int(rng.integers(len(recording.rig)))
+    camera, signs = recording.rig[view], rng.choice([-1.0, 1.0], 2)
+    K = camera.K.copy()
+    K[:2, 2] += rng.uniform(0.10, 0.25, 2) * signs * np.array(camera.size)
+    return Case(with_camera(recording.rig, view, replace(camera, K=K)), recording.frames, view)
 
 
 def _through(detections: Detections, rig: Rig, bent: list[Camera]) -> Detections:
@@ -282,7 +313,7 @@ CONVENTIONS: Mapping[str, tuple[Fault, frozenset[str]]] = {
         frozenset({"axis-flipped"}),
     ),
     "files of two cameras swapped": (_swapped_files, frozenset({"cameras-swapped"})),
-    "distortion ignored": (_distortion_lost, frozenset({"distortion-ignored", "distortion-model"})),
+    "distortion ignored": (_lenses(lambda terms: np.zeros(5)), frozenset({"distortion-ignored", "distortion-model"})),
 }  # fmt: skip
 """Ten wrong files, with the kinds of findings that name them."""
 
@@ -295,6 +326,12 @@ OTHERS: Mapping[str, tuple[Fault, frozenset[str]]] = {
     "one camera drifts by 3 degrees": (_drifting, frozenset({"drifting-camera", "moved-camera"})),
     "focal length 5 % off": (_one(_focal), frozenset({"focal-length"})),
     "principal point 30 px off": (_one(_center), frozenset({"principal-point"})),
+    "pictures of one camera cropped": (_cropped_pictures, frozenset({"image-cropped"})),
+    "distortion of one camera ignored": (
+        _lenses(lambda terms: np.zeros(5), one=True), frozenset({"distortion-ignored", "distortion-model"})
+    ),
+    "distortion of the other sign": (_lenses(lambda terms: -terms), frozenset({"distortion-model"})),
+    "distortion removed already": (_distortion_removed, frozenset({"distortion-model"})),
     "pictures 120 ms late": (_late(3), frozenset({"clock-offset"})),
     "two pictures lost": (_dropped, frozenset({"dropped-pictures"})),
     "a tenth of pictures repeated": (_repeated, frozenset({"repeated-pictures"})),
