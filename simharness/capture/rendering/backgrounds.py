@@ -27,7 +27,7 @@ class LitBackground:
         view: what the shadow maps cover.
         rgb: picture without the shadows of anything that moves, (h, w, 3) uint8.
         shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
-            :func:`~simharness.capture.rendering.shading_kernels.shadow_places`.
+            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`.
         shadow_depth: inverse depth of each pixel from the light, (h, w) float32.
     """
 

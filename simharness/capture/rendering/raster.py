@@ -21,7 +21,8 @@ from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
-from simharness.capture.rendering.shading_kernels import shade, shadow_places
+from simharness.capture.rendering.shading_kernels import shade
+from simharness.capture.rendering.shadow_kernels import shadow_places
 from simharness.capture.rendering.shadow_maps import NO_SHADOW, SHADOW_SIZE, ShadowMap
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh

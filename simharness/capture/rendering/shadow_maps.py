@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise
-from simharness.capture.rendering.shading_kernels import BIAS, nearest_blocks
+from simharness.capture.rendering.shading_kernels import BIAS
+from simharness.capture.rendering.shadow_kernels import nearest_blocks
 from simharness.types.lighting import facing
 
 Floats = NDArray[np.float32]
