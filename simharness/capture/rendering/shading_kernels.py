@@ -91,7 +91,8 @@ def shade(
         still_blocks: highest inverse depth in every block of it, see :func:`.shadow_kernels.nearest_blocks`.
         shadow: shadow map of the other meshes, (s, s) float32.
         blocks: highest inverse depth in every block of it.
-        shadow_place: place in the shadow maps of what each pixel shows of still meshes, see :func:`.shadow_kernels.shadow_places`.
+        shadow_place: place in the shadow maps of what each pixel shows of still meshes, see
+            :func:`.shadow_kernels.shadow_places`.
         shadow_depth: its inverse depth from the light.
         first_face: first face of the meshes that are not still. Only pixels that show them are coloured, and those of
             still meshes on which their shadows may fall.
