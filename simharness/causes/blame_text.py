@@ -35,7 +35,7 @@ def conclusion(blame: Blame) -> str:
     part = f"{100 * mending.restored:.0f} % of what mending everything would gain"
     what = listing([cause.title for cause in mending.about])
     if mending.restored < RESTORED:
-        return f"No few causes restore it: with {what} mended it is {after}, {part}."
+        return f"The largest causes together are not enough: with {what} mended it is {after}, {part}."
     return f"Mend {what}: {after}, {part}."
 
 

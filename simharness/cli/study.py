@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     import polars as pl
 
     from simharness.cli.score_tables import ScoreTable
+    from simharness.report.study.losses import Loss
     from simharness.study.result_folder import Results
 
 INTERRUPTED = 130
 _LISTED = 10  # failed trials that are listed
+_SHORT_KEY = 16  # letters of a factor that stay on one line
 _IDENTITIES = ("hota", "idf1", "id_switches", "switches_per_minute")
 
 
@@ -145,17 +147,80 @@ def _part(shard: str | None) -> tuple[int, int] | None:
 
 
 def _tables(results: Results) -> list[ScoreTable]:
-    """Return mean scores with intervals over seeds, and those of identities of the variants that have any."""
+    """Return the answer of a study: what its factors cost, or where it has none the mean scores.
+
+    Variants that track people have another table.
+    """
     import polars as pl
 
+    from simharness.report.study.curves import factors_by_case
     from simharness.report.study.tables import tracks_people
     from simharness.scoring.catalogue import HEADLINE
 
+    tracked = results.trials.filter(pl.col("hota").is_not_null().any().over("variant"))
+    if any(factors_by_case(results).values()):
+        tables = [_losses(results, "pcp")]
+        if tracks_people(results.trials):
+            tables.append(_losses(results, "hota"))
+        return tables
     tables = [_table(results, results.info["name"], results.trials, HEADLINE)]
     if tracks_people(results.trials):
-        tracked = results.trials.filter(pl.col("hota").is_not_null().any().over("variant"))
         tables.append(_table(results, "identities, within 0.5 m", tracked, _IDENTITIES))
     return tables
+
+
+def _losses(results: Results, score: str) -> ScoreTable:
+    """Return what every factor costs: the score at its best and worst value, and where five points are lost."""
+    from simharness.cli.score_tables import ScoreTable
+    from simharness.report.study.curves import factors_by_case
+    from simharness.report.study.losses import LOST, losses
+    from simharness.report.study.plots import short
+    from simharness.runtime.number_text import fixed
+    from simharness.scoring.catalogue import SCORES
+
+    info = SCORES[score]
+    by_case = factors_by_case(results)
+    cases = [case for case in by_case if case]
+    rows = []
+    for case, swept in by_case.items():
+        for factor in swept:
+            for loss in losses(factor, results.info["variants"], score):
+                ends = (
+                    f"{fixed(at.mean, info.digits)} at {short(where)}"
+                    for at, where in ((loss.at_best, loss.best), (loss.at_worst, loss.worst))
+                )
+                key = factor.key if len(factor.key) <= _SHORT_KEY else factor.key.replace(".", ".\n")
+                rows.append((*((case,) if cases else ()), key, loss.variant, *ends, _lost_at(loss, factor.values)))
+    labels = (*(("case",) if cases else ()), "factor", "variant")
+    headings = ("best", "worst", f"{LOST:g} points are lost\n(95 % interval)")
+    title = f"{results.info['name']}: {info.title}, {info.unit}, along each factor"
+    return ScoreTable(title, labels, headings, _without_repeats(rows, len(labels) - 1))
+
+
+def _lost_at(loss: Loss, values: Sequence[Any]) -> str:
+    """Return where points are lost, with its interval."""
+    from simharness.report.study.losses import short
+
+    point = loss.point
+    if point is None:
+        return "–"
+    low, high = (None if end is None else short(end) for end in (point.low, point.high))
+    if point.value is None:
+        nowhere = f"not from {short(values[0])} to {short(values[-1])}"
+        near = low if loss.rising else high
+        return f"{nowhere}\n({'from' if loss.rising else 'up to'} {near})" if near else nowhere
+    where = f"{'above' if loss.rising else 'below'} {short(point.value)}"
+    return f"{where} ({low or f'≤{short(values[0])}'} to {high or f'≥{short(values[-1])}'})"
+
+
+def _without_repeats(rows: Sequence[Sequence[str]], labels: int) -> list[list[str]]:
+    """Return rows whose first labels are empty where they repeat those of the row above."""
+    result, above = [], [""] * labels
+    for row in rows:
+        same = [list(row[: k + 1]) == above[: k + 1] for k in range(labels)]
+        result.append([*("" if repeated else label for label, repeated in zip(row, same, strict=False)), *row[labels:]])
+        above = list(row[:labels])
+    return result
 
 
 def _table(results: Results, title: str, trials: pl.DataFrame, scores: Sequence[str]) -> ScoreTable:

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import polars as pl
 import pytest
+from made_study import make_study
 from rich.console import Console
 
 from simharness.cli import run, study
@@ -68,7 +69,7 @@ def test_a_study_has_identities_where_variants_have_them():
     tracked = {"hota": 60.0, "idf1": 70.0, "id_switches": 3.0, "switches_per_minute": 0.456}
     lines = [{**row, "variant": "full", **nothing}, {**row, "variant": "track", **tracked}]
     lines += [{**each, "seed": 1, "hota": each["hota"] and 70.0} for each in lines]
-    info = {"name": "clocks", "factors": ["faults.clock_offset"]}
+    info = {"name": "clocks", "factors": ["faults.clock_offset"], "one_at_a_time": False}
     head, identities = study._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines)))
     assert [row[:2] for row in head.rows] == [("0.067", "full"), ("0.067", "track")]
     ((offset, variant, hota, _, switches, rate),) = identities.rows
@@ -76,3 +77,20 @@ def test_a_study_has_identities_where_variants_have_them():
     assert hota.split("\n")[0] == "65.0"
     (only,) = study._tables(SimpleNamespace(info=info, trials=pl.DataFrame(lines[:1])))
     assert only.rows[0][1] == "full"
+
+
+def test_a_study_with_a_factor_says_where_points_are_lost(tmp_path):
+    """PCP is linear in the synthetic study, 5 points a camera: they are lost one camera below the best."""
+    results = make_study(tmp_path, factors={"cameras.count": [2, 3, 5]}, cases=("crowd", "empty"))
+    (table,) = study._tables(results)
+    assert table.rows[0] == ["crowd", "cameras.count", "full", "85.4 at 5", "70.4 at 2", "below 4 (4 to 4)"]
+    assert [row[:3] for row in table.rows[1:3]] == [["", "", "fast"], ["empty", "cameras.count", "full"]]
+    text = printed(table, 80)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "continued" not in text
+
+
+def test_a_factor_that_costs_little_is_said_to(tmp_path):
+    results = make_study(tmp_path, factors={"people.count": [1, 2]}, slope=-1.0)
+    (table,) = study._tables(results)
+    assert table.rows[0] == ["people.count", "full", "59.4 at 1", "58.4 at 2", "not from 1 to 2"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import polars as pl
@@ -148,6 +148,25 @@ class FactorBreakingPoint:
     swept: tuple[float, float]
 
 
+def breaking_along(
+    values: Floats, table: Floats, threshold: float, *, better: Literal["higher", "lower"], rising: bool
+) -> tuple[bool, BreakingPoint]:
+    """Return ``rising``, and the value of a factor at which the mean of scores (n, k) passes a threshold.
+
+    Args:
+        values: values of the factor, (k,), ascending.
+        table: scores by seed and value, (n, k).
+        threshold: worst good value of the mean.
+        better: direction of better scores.
+        rising: whether the score gets worse as the factor grows; else as it shrinks.
+    """
+    if rising:
+        return rising, breaking_point(values, table, threshold, better=better)
+    mirrored = breaking_point(-values[::-1], table[:, ::-1], threshold, better=better)
+    flipped = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
+    return rising, BreakingPoint(flipped[0], flipped[1], flipped[2], mirrored.why)
+
+
 def factor_breaking_points(
     factor: Factor, variants: Sequence[str], score: str, threshold: float
 ) -> list[FactorBreakingPoint]:
@@ -163,14 +182,9 @@ def factor_breaking_points(
         if not np.isfinite(table).any():
             continue
         ends = [column[np.isfinite(column)].mean() for column in table.T if np.isfinite(column).any()]
-        rising = ends[-1] == ends[0] or (ends[-1] < ends[0]) == (better == "higher")
+        falls = ends[-1] == ends[0] or (ends[-1] < ends[0]) == (better == "higher")
         values = np.array(factor.values, float)
-        if rising:
-            point = breaking_point(values, table, threshold, better=better)
-        else:
-            mirrored = breaking_point(-values[::-1], table[:, ::-1], threshold, better=better)
-            flipped = [None if end is None else 0.0 - end for end in (mirrored.value, mirrored.high, mirrored.low)]
-            point = BreakingPoint(flipped[0], flipped[1], flipped[2], mirrored.why)
+        rising, point = breaking_along(values, table, threshold, better=better, rising=bool(falls))
         swept = (float(values[0]), float(values[-1]))
         points.append(FactorBreakingPoint(factor.key, variant, score, threshold, rising, point, swept))
     return points

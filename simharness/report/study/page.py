@@ -17,8 +17,16 @@ from simharness.report.documents import fill_template
 from simharness.report.figures.blame_section import blame_section
 from simharness.report.run.plots import stage_times
 from simharness.report.study import plots, tables
-from simharness.report.study.curves import Factor, factor_breaking_points, factors_by_case, grid, panels
+from simharness.report.study.curves import (
+    Factor,
+    FactorBreakingPoint,
+    factor_breaking_points,
+    factors_by_case,
+    grid,
+    panels,
+)
 from simharness.report.study.failure_section import failure_section
+from simharness.report.study.losses import LOST, Loss, finding, losses
 from simharness.report.study.worst_frames import WorstFramePictures, show, worst_frames
 from simharness.runtime.progress import duration
 from simharness.scenario.sections.cameras import Cameras
@@ -194,6 +202,7 @@ def _curves(
             "along": factor.along,
             "over": plots.mean_over(factor.over),
             "plots": {},
+            "findings": {score: finding(factor, variants, score) for score in drawn},
             "numbers": {},
         }
         for case, factor in by_case.items()
@@ -260,6 +269,10 @@ def _breaking(
     for key, by_case in panels(swept).items():
         rows = []
         for case, factor in by_case.items():
+            lost = {each.variant: each for each in losses(factor, variants, "pcp")} if factor.numeric else {}
+            if lost:
+                cells = [tables.breaking_cell(_point_of(factor, lost.get(variant))) for variant in variants]
+                rows.append({"case": case, "broken": f"{LOST:g} points of PCP lost", "cells": cells})
             for score, threshold in thresholds.items() if factor.numeric else ():
                 info = SCORES[score]
                 points = {each.variant: each for each in factor_breaking_points(factor, variants, score, threshold)}
@@ -274,6 +287,14 @@ def _breaking(
         if rows:
             tables_by_factor.append({"factor": key, "rows": rows})
     return tables_by_factor
+
+
+def _point_of(factor: Factor, loss: Loss | None) -> FactorBreakingPoint | None:
+    """Return where points are lost as a breaking point of the table."""
+    if loss is None or loss.point is None:
+        return None
+    swept = (float(factor.values[0]), float(factor.values[-1]))
+    return FactorBreakingPoint(factor.key, loss.variant, "pcp", -LOST, loss.rising, loss.point, swept)
 
 
 def _times(results: Results, variants: Sequence[str]) -> dict[str, Any]:

@@ -11,13 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
-from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, legend_above, svg_plot
+from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
 from simharness.report.study.factor_names import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
 from simharness.statistics.intervals import Interval
 
 _SIZE = (4.5, 3.0)  # inches of 72 px: the width of a phone
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+_BARS_FROM = 3  # lines from which on intervals are bars: areas of three are one grey area
+_APART = 0.012  # distance of variants at one value, as a share of the axis
+_NAME_HEIGHT = 0.075  # of the name of a line, as a share of the axis
 _WIDE_RANGE = 30.0  # from this ratio of the largest value to the smallest on, the axis is logarithmic
 _MAX_LISTED = 6  # values of a key in a note on a mean
 _LINE, _LINE_HEIGHT = 62, 0.15  # letters in a line below an axis, and its height in inches
@@ -57,31 +61,92 @@ def curve(
     height = _SIZE[1] + _LINE_HEIGHT * (len(below) - 1 + 1.5 * bool(title))
     with svg_plot(name, size=(_SIZE[0], height)) as (axes, written):
         places = np.array(values, float) if numeric else np.arange(len(values), dtype=float)
-        apart = 0.0 if numeric else min(0.16, 0.6 / max(1, len(lines)))
-        for index, ((variant, intervals), color) in enumerate(
-            zip(lines.items(), VARIANT_COLORS * len(lines), strict=False)
-        ):
-            mean, low, high = (np.array([getattr(each, end) for each in intervals]) for end in ("mean", "low", "high"))
-            at = places + apart * (index - (len(lines) - 1) / 2)
-            under = 0.7 * (len(lines) - 1 - index)  # points: lines that coincide stay visible
-            if numeric:
-                axes.fill_between(at, low, high, color=color, alpha=0.16, lw=0, zorder=2)
-                axes.plot(
-                    at, mean, "o-", color=color, lw=1.5 + under, ms=3.4 + under, label=variant, zorder=4, clip_on=False
-                )
-            else:
-                axes.vlines(at, low, high, color=color, lw=1.6, alpha=0.55, zorder=3)
-                axes.plot(at, mean, "o", color=color, ms=4.6, label=variant, zorder=4, clip_on=False)
+        _ticks(axes, values, places, numeric)
         _limits(axes, [*lines.values(), *beside], score, threshold)
         if threshold is not None:
             axes.axhline(threshold, color=FAINT, lw=0.9, ls=(0, (4, 3)), zorder=1)
+        ends = []
+        for index, (variant, intervals) in enumerate(lines.items()):
+            color, dashes = VARIANT_COLORS[index % len(VARIANT_COLORS)], _DASHES[index % len(_DASHES)]
+            mean, low, high = (np.array([getattr(each, end) for each in intervals]) for end in ("mean", "low", "high"))
+            at = _beside_each_other(axes, places, index, len(lines), numeric)
+            if numeric and len(lines) < _BARS_FROM:
+                axes.fill_between(at, low, high, color=color, alpha=0.16, lw=0, zorder=2)
+            else:
+                axes.vlines(at, low, high, color=color, lw=1.4, alpha=0.5, zorder=3)
+            axes.plot(
+                at, mean, "o", ls=dashes if numeric else "none", color=color, lw=1.7, ms=4.0, zorder=4, clip_on=False
+            )
+            known = np.flatnonzero(np.isfinite(mean))
+            if len(known):
+                ends.append((variant, color, float(at[known[-1]]), float(mean[known[-1]])))
+        if len(lines) > 1:
+            _label_lines(axes, ends)
         axes.set(xlabel="\n".join(below), ylabel=f"{score.title}, {score.unit}" if score.unit else score.title)
         if title:
             axes.figure.suptitle(title, fontsize=10, fontweight="bold")
-        _ticks(axes, values, places, numeric)
         axes.grid(axis="y")
-        legend_above(axes, columns=min(4, len(lines)))
     return written[0]
+
+
+def _beside_each_other(axes: Axes, places: Floats, index: int, count: int, numeric: bool) -> Floats:
+    """Return the places of one of several variants: a little apart, so that variants that coincide stay visible."""
+    if not numeric:
+        return places + min(0.16, 0.6 / max(1, count)) * (index - (count - 1) / 2)
+    apart = _APART * (index - (count - 1) / 2)
+    if axes.get_xscale() == "log":
+        return places * (places.max() / places.min()) ** apart
+    return places + apart * (np.ptp(places) or 1.0)
+
+
+def _label_lines(axes: Axes, ends: Sequence[tuple[str, Color, float, float]]) -> None:
+    """Write the name of each line behind its end, with a thin line to it; names do not overlap.
+
+    Args:
+        axes: plot with its final limits.
+        ends: name, colour, and last point of each line.
+    """
+    low, high = axes.get_ylim()
+    heights = np.array([(y - low) / (high - low) for *_, y in ends])
+    for (name, color, x, y), height in zip(ends, spread_apart(heights, _NAME_HEIGHT), strict=True):
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(1.045, height),
+            textcoords="axes fraction",
+            va="center",
+            fontsize=8.5,
+            color=color,
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": color, "lw": 0.7, "alpha": 0.7, "shrinkA": 1, "shrinkB": 3},
+        )
+
+
+def spread_apart(places: Floats, least: float) -> Floats:
+    """Return places, (n,) from 0 to 1, at least ``least`` apart, in the same order and near where they were.
+
+    Groups that are too near to each other are spread evenly about their middle, and moved inside.
+    """
+    order = np.argsort(places, kind="stable")
+    groups = [[float(places[k])] for k in order]  # wanted places of the labels that touch
+    while True:
+        spans = [_span_of(group, least) for group in groups]
+        touching = next((k for k in range(len(spans) - 1) if spans[k][1] + least > spans[k + 1][0] + 1e-9), None)
+        if touching is None:
+            break
+        groups[touching : touching + 2] = [groups[touching] + groups[touching + 1]]
+    result = np.empty(len(places))
+    result[order] = [
+        start + least * k for (start, _), group in zip(spans, groups, strict=True) for k in range(len(group))
+    ]
+    return result
+
+
+def _span_of(group: Sequence[float], least: float) -> tuple[float, float]:
+    """Return the first and the last place of labels that touch each other, about their middle and within 0 to 1."""
+    length = least * (len(group) - 1)
+    start = min(max(float(np.mean(group)) - length / 2, 0.0), max(1.0 - length, 0.0))
+    return start, start + length
 
 
 def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
