@@ -2,6 +2,7 @@
 
 Metres, y up (the specification demands it); people face z of the file in the zero pose. Every person is a tree of
 nodes below ``person_ID``, with a mesh of its bones in its own colour, and is scaled to nothing while it is not there.
+All move in one animation, because programs that show glTF files play one animation at a time.
 The lengths and rotations are those of a fitted body (:mod:`mvpose.skeleton_fit`).
 Source: Khronos Group, glTF 2.0 Specification, 2021.
 """
@@ -42,12 +43,13 @@ class _File:
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._tree: dict[str, list[Any]] = {
-            key: [] for key in ("nodes", "meshes", "materials", "animations", "accessors", "bufferViews")
+            key: [] for key in ("nodes", "meshes", "materials", "accessors", "bufferViews")
         }
+        self._animation: dict[str, list[Any]] = {"samplers": [], "channels": []}
         self._roots: list[int] = []
 
     def add_person(self, person: Hierarchy, times: Floats) -> None:
-        """Add the nodes, the meshes and the animation of a person."""
+        """Add the nodes, the meshes and the motion of a person."""
         tree, name = self._tree, f"person_{person.identity}"
         color = _COLORS[len(self._roots) % len(_COLORS)]
         tree["materials"].append({"pbrMetallicRoughness": {"baseColorFactor": [*color, 1.0], "metallicFactor": 0.0}})
@@ -76,8 +78,7 @@ class _File:
         for node in fixed:
             self._tree["nodes"][top + 1 + node]["rotation"] = quaternions[0, node].tolist()
         clock = self._accessor(times[:, None], "SCALAR", limits=True)
-        samplers: list[dict[str, Any]] = []
-        channels: list[dict[str, Any]] = []
+        samplers, channels = self._animation["samplers"], self._animation["channels"]
 
         def add(node: int, path: str, values: Floats, kind: str, interpolation: str = "LINEAR") -> None:
             channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
@@ -87,8 +88,6 @@ class _File:
         add(top + 1, "translation", person.root, "VEC3")
         for node in moving:
             add(top + 1 + node, "rotation", quaternions[:, node], "VEC4")
-        name = f"person_{person.identity}"
-        self._tree["animations"].append({"name": name, "samplers": samplers, "channels": channels})
 
     def _bones(self, ends: Floats) -> int | None:
         """Add a mesh of an octahedron from the origin to each end (k, 3), and return its index; None for no length."""
@@ -132,6 +131,8 @@ class _File:
         tree: dict[str, Any] = {"asset": {"version": "2.0", "generator": "mvpose"}, "scene": 0}
         tree["scenes"] = [{"nodes": self._roots} if self._roots else {}]
         tree |= {key: values for key, values in self._tree.items() if values}  # empty lists are not allowed
+        if self._animation["channels"]:
+            tree["animations"] = [{"name": "recording", **self._animation}]
         chunks = b""
         if self._buffer:
             tree["buffers"] = [{"byteLength": len(self._buffer)}]

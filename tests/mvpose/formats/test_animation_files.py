@@ -214,6 +214,18 @@ class TestGltf:
         assert tree["nodes"][0]["name"] == "person_7"
         np.testing.assert_array_equal(scale[:, 0], (np.arange(40) >= 5) & (np.arange(40) < 35))
 
+    def test_all_people_move_in_one_animation(self, people):
+        both = People(people.times, np.array([7, 9]), np.repeat(people.joints, 2, axis=1), np.ones((40, 2, 17)))
+        ((_, content),) = FORMATS["gltf"].write(Export(both, Options()))
+        tree, _ = read_glb(content)
+        (animation,) = tree["animations"]
+        moved = [channel["target"]["node"] for channel in animation["channels"]]
+        roots = tree["scenes"][0]["nodes"]
+        assert [tree["nodes"][root]["name"] for root in roots] == ["person_7", "person_9"]
+        assert set(roots) <= set(moved)
+        assert len(moved) == 2 * sum(node < roots[1] for node in moved)
+        assert {channel["sampler"] for channel in animation["channels"]} == set(range(len(animation["samplers"])))
+
     def test_quaternions_take_the_shorter_way(self, export):
         ((_, content),) = FORMATS["gltf"].write(export)
         tree, buffer = read_glb(content)
