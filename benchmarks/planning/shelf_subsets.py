@@ -2,10 +2,12 @@
 
     python -m benchmarks.planning.shelf_subsets FOLDER [--detector openpose-shelf] [--detector typical]
 
-FOLDER holds the files of Shelf that ``scenarios/recordings/shelf.toml`` names. The prediction knows the calibration,
-where four people walk (the true paths, smoothed by nothing), and a detector profile; it sees no detection. Nothing is
-fitted to the subsets. PCP is that of ``full``, with missing joints of the head filled from the others, mean over the
-three scored actors.
+FOLDER holds the files of Shelf that ``scenarios/recordings/shelf.toml`` names. The prediction knows the calibration, a
+detector profile, and where four people walk: the true paths of those who are annotated (1.7 of 4 people in a frame), or
+the paths of everybody as they are tracked. The recording is scored against a truth that has errors, measured by
+``simharness fit-detector`` against the consensus of three views and more, and so is the prediction. Nothing is fitted
+to the subsets. PCP is that of ``full``, with missing joints of the head filled from the others, mean over the three
+scored actors.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from mvpose import COCO17, SHELF14, Camera
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import coco17_to_shelf14
 from simharness.planning import FastLayer, Volume
 from simharness.reality.annotated_recording import AnnotatedRecording
-from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS
+from simharness.reality.annotation import AnnotationModel
+from simharness.reality.detector_fit.fit import fit
+from simharness.reality.people_tracks import LIMB_JOINTS, SHELF14_OF_LIMBS, track_people
 from simharness.reality.recording_file import read_recording
 from simharness.reality.validation.head_joints import fill_face
 from simharness.reality.validation.passes import Cameras, annotated, run_passes
@@ -34,6 +38,7 @@ from simharness.scoring.pcp import Part, part_states
 Subset = tuple[int, ...]
 
 _ANKLE = 0.09  # metres: height of the ankle of a standing person, in shoes
+_LIMBS_14 = slice(12)  # limb joints of SHELF14; the head follows
 _STANDING = 0.25  # quantile of the heights of the lower ankle
 
 
@@ -91,41 +96,85 @@ def real_pcp(recording: AnnotatedRecording, *, variant: str = "full") -> dict[Su
     }
 
 
-def walked(recording: AnnotatedRecording) -> tuple[list[Camera], Floats]:
-    """Return the cameras and the true paths over a floor at z = 0, COCO-17, (F, A, 17, 3); NaN where not annotated."""
+@dataclass(frozen=True)
+class WalkingPeople:
+    """Where people walk in a recording, over a floor at z = 0.
+
+    Attributes:
+        cameras: the cameras, over the same floor.
+        joints: COCO-17, (F, A, 17, 3), metres.
+        scored: who is annotated in which frames, and therefore scored, (F, A).
+    """
+
+    cameras: tuple[Camera, ...]
+    joints: Floats
+    scored: Bools
+
+
+def annotated_people(recording: AnnotatedRecording) -> WalkingPeople:
+    """Return the true paths; people who are not annotated stay where the truth knows them next.
+
+    This knows nothing but the truth, which is silent on people whom some camera does not show whole.
+    """
     truth = recording.truth
     joints = np.full((*truth.shape[:2], len(COCO17), 3), np.nan)
     joints[:, :, LIMB_JOINTS] = truth[:, :, SHELF14_OF_LIMBS]
-    ankles = [SHELF14.index(name) for name in ("right_ankle", "left_ankle")]
-    floor = float(np.nanquantile(truth[:, :, ankles, 2].min(axis=-1), _STANDING)) - _ANKLE
-    joints[..., 2] -= floor
-    return [replace(camera, t=camera.t + camera.R[:, 2] * floor) for camera in recording.rig], joints
-
-
-def everyone_stays(joints: Floats) -> Floats:
-    """Return paths (F, A, 17, 3) on which those who are not annotated stay where they are next: four people work."""
-    rows, result = np.arange(len(joints)), joints.copy()
+    known = np.asarray(np.isfinite(joints[:, :, LIMB_JOINTS]).all(axis=(2, 3)))
+    rows, filled = np.arange(len(joints)), joints.copy()
     for actor in range(joints.shape[1]):
-        known = np.isfinite(joints[:, actor, 5:17]).all(axis=(1, 2))
-        result[:, actor] = joints[np.flatnonzero(known)[np.abs(rows[:, None] - rows[known]).argmin(axis=1)], actor]
-    return result
+        frames = np.flatnonzero(known[:, actor])
+        filled[:, actor] = joints[frames[np.abs(rows[:, None] - frames).argmin(axis=1)], actor]
+    return _over_the_floor(recording, filled, known)
+
+
+def tracked_people(recording: AnnotatedRecording) -> WalkingPeople:
+    """Return the paths of everybody, annotated or not, as the method tracks them with all cameras.
+
+    They come from the detections, but say only who is where: what a planner knows who has seen the people work.
+    """
+    tracked = track_people(recording)
+    known = np.asarray(np.isfinite(recording.truth[:, :, :_LIMBS_14]).all(axis=(2, 3)))
+    people = [int(np.flatnonzero(tracked.actor == actor)[0]) for actor in range(recording.people)]
+    return _over_the_floor(recording, tracked.joints[:, people], known)
+
+
+def _over_the_floor(recording: AnnotatedRecording, joints: Floats, scored: Bools) -> WalkingPeople:
+    """Return people and cameras with the floor at z = 0, an ankle's height under the ankles of standing people."""
+    ankles = [SHELF14.index(name) for name in ("right_ankle", "left_ankle")]
+    floor = float(np.nanquantile(recording.truth[:, :, ankles, 2].min(axis=-1), _STANDING)) - _ANKLE
+    cameras = tuple(replace(camera, t=camera.t + camera.R[:, 2] * floor) for camera in recording.rig)
+    return WalkingPeople(cameras, joints - [0.0, 0.0, floor], scored)
 
 
 def predicted_pcp(
-    recording: AnnotatedRecording, *, detector: str, seed: int = 0, subsets: Sequence[Subset] = (), repeats: int = 16
+    people: WalkingPeople,
+    actors: Sequence[int],
+    *,
+    detector: str,
+    annotation: AnnotationModel | None = None,
+    seed: int = 0,
+    repeats: int = 24,
 ) -> dict[Subset, float]:
-    """Return the PCP of ``full`` that the fast layer predicts for every subset."""
-    cameras, joints = walked(recording)
-    layer = FastLayer.of(
-        Volume.around(everyone_stays(joints)), detector=read_profile(detector), orientations=repeats, seed=seed
-    )
-    terms = [layer.terms(camera) for camera in cameras]
-    scenes, result = layer.scenes, {}
+    """Return the PCP of ``full`` that the fast layer predicts for every subset, mean over actors.
+
+    Args:
+        people: where people walk.
+        actors: indices of the actors whose PCP is averaged.
+        detector: profile.
+        annotation: errors of the truth by which the recording is scored; None: an exact truth.
+        seed: seed of all draws.
+        repeats: number of people at each place.
+    """
+    layer = FastLayer.of(Volume.around(people.joints), detector=read_profile(detector), orientations=repeats, seed=seed)
+    scenes, terms, result = layer.scenes, [layer.terms(camera) for camera in people.cameras], {}
     truth = coco17_to_shelf14(scenes.joints)
-    for views in subsets or camera_subsets(len(cameras)):
+    if annotation is not None:  # the scenes are further apart than the errors of a truth last
+        truth = annotation.annotate(scenes.joints, 10.0 * np.arange(len(scenes)), seed=seed)
+    scored = people.scored[scenes.frame] & scenes.present
+    for views in camera_subsets(len(people.cameras)):
         made = layer.reconstruct([terms[view] for view in views], variant="full")
-        states = part_states(truth, coco17_to_shelf14(fill_face(made.nearest)))
-        result[views] = float(100.0 * (states == Part.CORRECT)[:, list(recording.scored)].mean())
+        correct = part_states(truth, coco17_to_shelf14(fill_face(made.nearest))) == Part.CORRECT
+        result[views] = float(np.mean([100.0 * correct[:, actor][scored[:, actor]].mean() for actor in actors]))
     return result
 
 
@@ -133,12 +182,17 @@ def main() -> None:
     """Print the comparison."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--exact-truth", action="store_true", help="score the prediction against an exact truth")
     parser.add_argument("--detector", action="append", help="profile; default: openpose-shelf and typical")
     arguments = parser.parse_args()
     recording = read_recording("shelf", arguments.folder)
     real = real_pcp(recording)
-    for detector in arguments.detector or ("openpose-shelf", "typical"):
-        print(f"\ndetector {detector}\n{SubsetFigures(real, predicted_pcp(recording, detector=detector))}")
+    annotation = None if arguments.exact_truth else fit(recording).annotation.annotation
+    for name, paths in (("annotated", annotated_people), ("tracked", tracked_people)):
+        people = paths(recording)
+        for detector in arguments.detector or ("openpose-shelf", "typical"):
+            predicted = predicted_pcp(people, recording.scored, detector=detector, annotation=annotation)
+            print(f"\n{name} people, detector {detector}\n{SubsetFigures(real, predicted)}", flush=True)
 
 
 if __name__ == "__main__":
