@@ -195,7 +195,8 @@ class Reconstruction:
         nearest: joints of the estimate nearest to everyone, by which PCP is scored, (S, Q, 17, 3), metres; NaN where
             missing.
         paired: joints of the estimate paired one to one with everyone, (S, Q, 17, 3), metres; NaN where missing.
-        mixed: whose detections are not matched rightly, (S, Q), 0 or 1; NaN where matching was not tried.
+        mixed: who is matched with a detection of somebody else, or twice, (S, Q), 0 or 1; NaN where matching was not
+            tried.
     """
 
     nearest: Floats
@@ -301,9 +302,8 @@ def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, 
             paired[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
         labels = estimate.matching.labels_of(len(detections))
         for q in range(scenes.people):
-            own = labels[person == q]
-            mine = person[np.isin(labels, own[own >= 0])]
-            mixed[s, q] = len(own) > 1 and (len(np.unique(own)) > 1 or own[0] < 0 or (mine != q).any())
+            own = np.unique(labels[(person == q) & (labels >= 0)])
+            mixed[s, q] = len(own) > 1 or (person[np.isin(labels, own)] != q).any()
     return Reconstruction(close, paired, mixed)
 
 
