@@ -23,6 +23,7 @@ from scipy.stats import spearmanr
 from mvpose import COCO17, SHELF14, Camera
 from mvpose.arrays import Bools, Floats
 from mvpose.skeleton import coco17_to_shelf14
+from simharness.detector.bias import world_offsets
 from simharness.planning import FastLayer, Volume
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.annotation import AnnotationModel
@@ -38,6 +39,7 @@ from simharness.scoring.pcp import Part, part_states
 Subset = tuple[int, ...]
 
 _ANKLE = 0.09  # metres: height of the ankle of a standing person, in shoes
+_FACE = slice(5)  # of COCO-17
 _LIMBS_14 = slice(12)  # limb joints of SHELF14; the head follows
 _STANDING = 0.25  # quantile of the heights of the lower ankle
 
@@ -133,7 +135,7 @@ def tracked_people(recording: AnnotatedRecording) -> WalkingPeople:
     They come from the detections, but say only who is where: what a planner knows who has seen the people work.
     """
     tracked = track_people(recording)
-    known = np.asarray(np.isfinite(recording.truth[:, :, :_LIMBS_14]).all(axis=(2, 3)))
+    known = np.asarray(np.isfinite(recording.truth[:, :, _LIMBS_14]).all(axis=(2, 3)))
     people = [int(np.flatnonzero(tracked.actor == actor)[0]) for actor in range(recording.people)]
     return _over_the_floor(recording, tracked.joints[:, people], known)
 
@@ -153,7 +155,7 @@ def predicted_pcp(
     detector: str,
     annotation: AnnotationModel | None = None,
     seed: int = 0,
-    repeats: int = 24,
+    repeats: int = 32,
 ) -> dict[Subset, float]:
     """Return the PCP of ``full`` that the fast layer predicts for every subset, mean over actors.
 
@@ -168,8 +170,10 @@ def predicted_pcp(
     layer = FastLayer.of(Volume.around(people.joints), detector=read_profile(detector), orientations=repeats, seed=seed)
     scenes, terms, result = layer.scenes, [layer.terms(camera) for camera in people.cameras], {}
     truth = coco17_to_shelf14(scenes.joints)
-    if annotation is not None:  # the scenes are further apart than the errors of a truth last
-        truth = annotation.annotate(scenes.joints, 10.0 * np.arange(len(scenes)), seed=seed)
+    if annotation is not None:
+        shown = scenes.joints.copy()  # annotated heads are fitted to the detected face, as in twins
+        shown[:, :, _FACE] += world_offsets(shown, layer.detector.bias)[:, :, _FACE]
+        truth = annotation.annotate(shown, 10.0 * np.arange(len(scenes)), seed=seed)  # errors last less than 10 s
     scored = people.scored[scenes.frame] & scenes.present
     for views in camera_subsets(len(people.cameras)):
         made = layer.reconstruct([terms[view] for view in views], variant="full")
