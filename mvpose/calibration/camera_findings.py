@@ -13,14 +13,14 @@ from mvpose.calibration.findings import Finding, Severity
 from mvpose.camera import Camera, Rig
 
 _DEGREES, _METRES = 0.5, 0.04
-"""Corrections from which a camera has moved: twice those that people ask for of careful, published calibrations (0.16
+"""Corrections from which a camera has moved: twice those that are estimated for careful, published calibrations (0.16
 to 0.28 degrees and 1 to 2.5 cm on Shelf)."""
 
 _PERCENT, _CENTER, _EDGE = 2.0, 10.0, 6.0  # of the focal length; px; px at the outermost tenth of the people
 
 _SYSTEMATIC = np.array([*[np.radians(0.1)] * 3, *[0.008] * 3, 0.003, 1.0, 1.0, 0.01, 0.002])
-"""Standard deviations of what detectors add, who place joints differently from different sides (FACTS: hips are off by
-30 to 50 mm); it does not shrink with the length of a recording."""
+"""Standard deviations of the bias of detectors, which place joints differently from different sides (FACTS: hips are
+off by 30 to 50 mm); it does not shrink with the length of a recording."""
 
 _LENSES = ("distortion-ignored", "distortion-model")
 _REPAIR = "mvpose repair CALIBRATION DETECTIONS --out NEW"
@@ -31,7 +31,7 @@ def of(fit: Fit, rig: Rig, starts: Floats, names: Sequence[str], *, undetermined
     """Return the findings about single cameras.
 
     Args:
-        fit: what was found.
+        fit: estimated errors of the cameras.
         rig: the cameras that it is about.
         starts: time of the start of each block, (B,), seconds from the start of the recording.
         names: names of the cameras.
@@ -71,7 +71,7 @@ def _of_all_lenses(findings: list[Finding], rig: Rig) -> list[Finding]:
         text = "the keypoints of all cameras are of pictures whose distortion was removed already"
         mend = "for camera in rig: distortion = np.zeros(5)"
     else:
-        text, mend = "the lenses of all cameras distort otherwise than calibrated", "calibrate the lenses again"
+        text, mend = "the lenses of all cameras have another distortion than calibrated", "calibrate the lenses again"
     interval = tuple(float(np.median([each.interval["k1"][side] for each in lenses])) for side in (0, 1))
     whole = Finding(
         lenses[0].kind,
@@ -96,7 +96,7 @@ def _finding(
         size, interval = _pose_size(change, draws)
         alarm = size["degrees"] >= _DEGREES or size["metres"] >= _METRES
         cost = np.radians(size["degrees"]) * depth[view] + size["metres"]
-        text = f"{name} stands or looks elsewhere than calibrated, by {size['degrees']:.1f} degrees and "
+        text = f"{name} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
         text += f"{100 * size['metres']:.0f} cm"
         if found.fault.course == "growing":
             kind, text = "drifting-camera", text + " at the end, growing from the start"
@@ -125,7 +125,7 @@ def _finding(
         corner = abs(change[9]) * _outer_radius(fit, camera) ** 3 * camera.K[0, 0]
         size, interval = {"k1": float(change[9])}, {"k1": _range(draws[:, 9])}
         alarm, cost = corner >= _EDGE, 0.3 * corner / camera.K[0, 0] * depth[view]
-        text = f"the lens of {name} distorts otherwise than calibrated, by {corner:.0f} px near the edge"
+        text = f"the lens of {name} has another distortion than calibrated: {corner:.0f} px off near the edge"
         kind = "distortion-model" if camera.distortion.any() else kind
         mend = f"distortion = rig[{view}].distortion + np.array([{change[9]:.3f}, 0, 0, 0, 0])"
     else:  # offsets of clocks are findings of mvpose.calibration.clocks
@@ -153,7 +153,7 @@ def of_turn(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Seq
 
     Args:
         rig: the cameras as calibrated.
-        cameras: packed cameras as people have them, (V, 22).
+        cameras: packed cameras with their corrections, (V, 22).
         covariance: covariance of the parameters of this camera, (11, 11).
         view: the camera.
         names: names of the cameras.
@@ -163,14 +163,14 @@ def of_turn(rig: Rig, cameras: Floats, covariance: Floats, view: int, names: Seq
     change[:3] = Rotation.from_matrix(turn).as_rotvec()
     change[3:6] = cameras[view, 14:17] - rig[view].center
     size, interval = _pose_size(change, _draws(change, covariance))
-    text = f"{names[view]} stands or looks elsewhere than calibrated, by {size['degrees']:.1f} degrees and "
+    text = f"{names[view]} is not in its calibrated pose: it is off by {size['degrees']:.1f} degrees and "
     text += f"{100 * size['metres']:.0f} cm"
     cost = (np.radians(size["degrees"]) * 3.0 + size["metres"]) / len(rig)
     return Finding("moved-camera", text, "alarm", 0.99, names[view], view, size, interval, cost, _REPAIR)
 
 
 def _note(fit: Fit, view: int, names: Sequence[str], depth: Floats) -> list[Finding]:
-    """Return a note if people ask for a correction that good calibrations need as well."""
+    """Return a note if the estimated correction is significant but as small as that of good calibrations."""
     change, covariance = fit.change[view], fit.covariance[view]
     deviation = np.abs(change[:6]) / np.sqrt(np.diagonal(covariance)[:6])
     if deviation.max() < 3.0:
@@ -178,8 +178,8 @@ def _note(fit: Fit, view: int, names: Sequence[str], depth: Floats) -> list[Find
     size, interval = _pose_size(change, _draws(change, covariance))
     if size["degrees"] < 0.1 and size["metres"] < 0.01:
         return []
-    text = f"people ask for a correction of {names[view]} by {size['degrees']:.2f} degrees and "
-    text += f"{100 * size['metres']:.1f} cm, as they do of good calibrations"
+    text = f"the estimated correction of {names[view]} is {size['degrees']:.2f} degrees and "
+    text += f"{100 * size['metres']:.1f} cm, as small as for good calibrations"
     cost = (np.radians(size["degrees"]) * depth[view] + size["metres"]) / len(names)
     return [Finding("moved-camera", text, "note", 0.5, names[view], view, size, interval, cost, _REPAIR)]
 

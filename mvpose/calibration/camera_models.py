@@ -1,4 +1,4 @@
-"""Models of what may be wrong with a camera: which parameters are off, how far, and from when on."""
+"""Models of faults of a camera: which parameters are off, by how much, and since when."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from mvpose.calibration.normal_equations import PARAMETERS
 HEALTHY = np.array([*[np.radians(0.15)] * 3, *[0.012] * 3, 0.005, 2.0, 2.0, 0.02, 0.002])
 """Standard deviations of the errors of a good calibration: rotation (rad, about each axis), centre (m, along each
 axis), log focal length, principal point (px), k1, clock (s). Careful calibrations have 0.2 degrees, 8 mm and 0.3 to
-1.3 % of the focal length (FACTS: caliscope); published ones differ from what people in the pictures ask for by 0.16 to
-0.28 degrees and 1 to 2.5 cm, which includes what detectors do to joints seen from different sides."""
+1.3 % of the focal length (FACTS: caliscope); the corrections that are estimated for published ones are
+0.16 to 0.28 degrees and 1 to 2.5 cm, which includes the bias of detectors for joints seen from different sides."""
 
 ALWAYS, SINCE, GROWING = "always", "since", "growing"
 _COURSES = {ALWAYS: 0.6, SINCE: 0.25, GROWING: 0.15}  # prior of the course over time of a pose that is wrong
@@ -52,7 +52,7 @@ MODELS = (
     Model("clock-offset", 0.01, (10,), (0.02,)),
     Model("clock-offset", 0.01, (10,), (0.20,)),
 )
-"""Models of faults. Offsets of clocks are among them so that they are not taken for something else."""
+"""Models of faults. Offsets of clocks are among them so that they are not attributed to other parameters."""
 
 _NOTHING = 1.0 - sum(each.prior for each in MODELS)
 

@@ -4,12 +4,12 @@ Unknown are the offset of every clock, a small correction of every camera (else 
 one of time) and the place of every joint at every time. Joints are eliminated, and equations of the cameras remain (the
 Schur complement of bundle adjustment: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000).
 
-Errors of a detector are correlated in time, for a second and more. As residuals follow their past, what the past
-foretells is taken out of them and of the equations (generalised least squares of a first-order autoregression: Cochrane
-and Orcutt, Journal of the American Statistical Association 1949): what is left tells most by how limbs swing. Errors of
-the joints of a person also go together. The covariance of the offsets is that of sums over a person and a second
-(cluster-robust, with the correction "CR3" for few clusters: Cameron and Miller,
-"A Practitioner's Guide to Cluster-Robust Inference", Journal of Human Resources 2015).
+Errors of a detector are correlated in time, for a second and more. Residuals are correlated with those before, so the
+predictable part is removed from them and from the equations (generalised least squares of a first-order autoregression:
+Cochrane and Orcutt, Journal of the American Statistical Association 1949); the rest depends mostly on the swing of
+limbs. Errors of the joints of a person are correlated, too. The covariance of the offsets is that of sums over a person
+and a second (cluster-robust, with the correction "CR3" for few clusters: Cameron and Miller, "A Practitioner's Guide to
+Cluster-Robust Inference", Journal of Human Resources 2015).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ClockAdjustment:
             is the covariance.
         motion: share of the motion in each view that is not noise of the keypoints, (V,), 0 to 1.
         times: instants, (K,), seconds.
-        scores: what each instant says about each offset, (K, V): gradient of half the squared error, 1/s.
+        scores: information of each instant about each offset, (K, V): gradient of half the squared error, 1/s.
         curvatures: its curvature, (K, V), 1/s²: score / curvature is how much later the clock is at that instant.
         spread: standard deviation of residuals, in that of the sightings.
         settled: whether the rounds ended because nothing changed any more.
@@ -86,7 +86,7 @@ def adjust(rig: Rig, tracks: JointTracks, start: Floats) -> ClockAdjustment:
         step = np.linalg.solve(equations.hessian + np.diag(prior), equations.gradient - prior * correction)
         step = np.asarray(step, np.float64).reshape(views, _PARAMETERS)
         step[:, 6] = np.clip(step[:, 6], -_STEP, _STEP)
-        if step[:, 6] @ before < 0.0:  # it turns back: weights that change with the step make it go too far
+        if step[:, 6] @ before < 0.0:  # steps overshoot, because weights change with them
             step *= 0.5
         before = step[:, 6].copy()
         correction += step.ravel()
@@ -212,7 +212,7 @@ def _equations(tracks: JointTracks, terms: _Terms, instants: Floats, memory: flo
 
 
 def _whitened(series: Floats, both: Bools, memory: float) -> Floats:
-    """Return a series (K, V, ...) minus what its past foretells, where a view sees both (K - 1, V)."""
+    """Return a series (K, V, ...) minus its prediction from the value before, where a view sees both (K - 1, V)."""
     known = both.reshape(*both.shape, *[1] * (series.ndim - 2))
     result = series.copy()
     result[1:] -= np.where(known, memory * series[:-1], 0.0)

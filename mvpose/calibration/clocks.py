@@ -1,4 +1,4 @@
-"""Clocks of the cameras, from people who move: how much later each camera takes its pictures than their times say.
+"""Clocks of the cameras, from people who move: how much later than their time stamps each camera takes its pictures.
 
 Views of a moving joint agree on its place only where their pictures are of one time. Offsets of all cameras that make
 them agree are found in three steps: whole frames at which the rays of views meet (:mod:`.clock_search`), least squares
@@ -92,7 +92,7 @@ class Clocks(Sealed):
             if not self.determined[view]:
                 yield Finding(
                     "clock-offset",
-                    f"the clock of {name} cannot be compared with the others: nobody moves enough in what it shares",
+                    f"the clock of {name} is not determined: people move too little where other cameras see them, too",
                     severity="unknown",
                     probability=0.5,
                     camera=name,
@@ -108,7 +108,7 @@ class Clocks(Sealed):
             alarm = max(low, -high) > harmful
             yield Finding(
                 "clock-offset",
-                f"{name} takes its pictures {abs(ms):.1f} ms {'later' if ms > 0 else 'earlier'} than their times say",
+                f"{name} takes its pictures {abs(ms):.1f} ms {'later' if ms > 0 else 'earlier'} than their time stamps",
                 severity="alarm" if alarm else "note",
                 probability=float(probability),
                 camera=name,
@@ -176,7 +176,7 @@ def estimate_clocks(
         return _unknown(names, repeated, sightings.times, tracks.period)
     adjustment = adjust(rig, tracks, coarse_offsets(rig, tracks, largest=largest))
     steps: list[ClockStep] = []
-    # What is left beside offsets that do not settle is of other people or of wrong cameras, not of lost pictures.
+    # Residuals of offsets that do not settle come from other people or wrong cameras, not from lost pictures.
     while len(steps) < _MOST_STEPS and adjustment.settled:
         step = find_step(adjustment, tracks.times, tracks.period)
         if step is None:
@@ -260,8 +260,8 @@ def _unknown(names: tuple[str, ...], repeated: Bools, times: Floats, period: flo
     views = len(names)
     interval = np.tile([-np.inf, np.inf], (views, 1))
     covariance = np.where(np.eye(views) > 0, np.inf, 0.0)
-    nobody = np.zeros(views, np.bool_)
-    return Clocks(np.zeros(views), interval, covariance, nobody, (), (), repeated, times, names, period)
+    determined = np.zeros(views, np.bool_)
+    return Clocks(np.zeros(views), interval, covariance, determined, (), (), repeated, times, names, period)
 
 
 def _half_widths(deviations: Floats, covariance: Floats, against: Floats) -> Floats:

@@ -1,10 +1,10 @@
-"""How well cameras agree on who stands where: likelihood of the tracklets of two views, without any reconstruction.
+"""Agreement of pairs of views about the people in them: likelihood of their tracklets, without any reconstruction.
 
 Two keypoints show one joint only if their viewing rays meet in front of both cameras. The distance of the rays in units
 of the keypoints' errors (Sampson distance: Hartley & Zisserman, Multiple View Geometry, section 11.4.3) does not depend
 on the scale of the rig, so it compares readings of a calibration that differ in their units. Its distribution for one
-joint is compared with that for places drawn independently from the two pictures: what is left is the evidence that the
-cameras are as the reading has them.
+joint is compared with that for places drawn independently from the two pictures: the logarithm of their ratio is the
+evidence for a reading.
 
 Tracklets are matched as a whole over seconds. Single poses of different people often fit by chance, those of two
 people who move rarely do.

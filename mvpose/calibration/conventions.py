@@ -25,7 +25,7 @@ that are compared), and joints of one person err together (17 joints as about fo
 
 _CERTAIN = 0.95  # posterior probability from which a mistake is named
 _AGREES = 0.5  # a mended camera must agree with the others at least this well, compared with the others among them
-_GAIN = 0.02  # least gain, as a share of all evidence: less is a question of millimetres, not of conventions
+_GAIN = 0.02  # least gain, as a share of all evidence: less is a matter of small errors, not of conventions
 _LEAST_ODDS = 3.0  # log likelihood ratio by which a mistake explains more than cameras that are off by degrees
 _OFF = (float(np.radians(1.5)), 0.10)
 """Standard deviations of rotations (rad) and places (m) of cameras that were touched."""
@@ -62,7 +62,7 @@ def search(
         consistency: evidence for readings of the detections.
         given: the files as they are.
         offsets: search of crops and turns.
-        corrected: returns a reading whose cameras are moved by degrees to where people have them.
+        corrected: returns the reading with the poses of its cameras corrected by matching people over seconds.
     """
     reading, verdicts = given, []
     for _ in range(len(offsets.sizes) + 1):
@@ -102,8 +102,8 @@ def _best(
 ) -> tuple[Reading, Verdict] | None:
     """Return the reading without the likeliest mistake, and the mistake; None if none is certain.
 
-    What cameras that are off by degrees explain as well is no mistake in the files. Crops and turns are searched only
-    for cameras that agree badly and where nothing else explains it.
+    A mistake is named only if it explains clearly more than corrections of the poses do. Crops and turns are searched
+    only for cameras that agree badly, and where nothing else explains it.
     """
     best = _likeliest(consistency, reading, hypotheses(reading, offsets.sizes))
     if best is None and _explained(consistency, reading):
@@ -123,10 +123,10 @@ def _best(
 
 @dataclass(frozen=True)
 class _Moved:
-    """A reading with its cameras moved to where people have them.
+    """A reading with corrected poses of its cameras.
 
     Attributes:
-        reading: the reading with moved cameras.
+        reading: the reading with corrected cameras.
         evidence: log likelihood ratio of one world to chance.
         unlikely: half the squared sizes of all moves in standard deviations (:data:`_OFF`).
         largest: largest turn, radians.
@@ -150,7 +150,7 @@ class _Moved:
 
     @property
     def small(self) -> bool:
-        """Whether the moves are those of cameras that were measured by eye, and smaller turns than crops look like."""
+        """Whether the corrections are plausible for cameras that were measured by eye, and smaller than for a crop."""
         return self.unlikely < _PLAUSIBLE * 3.0 * len(self.reading.cameras) and self.largest < _LARGEST_TURN
 
     def explains_more_than(self, other: _Moved) -> bool:

@@ -33,9 +33,9 @@ from mvpose.detections import Detections
 def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) -> Diagnosis:
     """Return what is wrong with a rig.
 
-    First the conventions of its files are checked by what the views agree about without any reconstruction
-    (:mod:`.conventions`), then each camera against the people whom the others see (:mod:`.cameras`), under the files
-    as they would have to be read.
+    First the conventions of its files are checked by the distances of viewing rays, without any reconstruction
+    (:mod:`.conventions`). Then the errors of each camera are estimated against the other cameras (:mod:`.cameras`),
+    with mistakes in the files corrected.
 
     Args:
         rig: the cameras as calibrated.
@@ -48,8 +48,8 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     names = camera_names(rig)
     tracklets = link(rig, frames, period=period)
     if not len(tracklets.frame):
-        nobody = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
-        return Diagnosis.of([nobody], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
+        empty = Finding("cannot-tell", "cannot tell: there are no detections", "unknown", 1.0, mend=RECORD)
+        return Diagnosis.of([empty], evidence=[], cameras=names, residuals=np.full(len(rig), np.nan))
     detections = np.bincount(tracklets.view, minlength=len(rig))
     findings = silent_views(detections, names)
     consistency = Consistency(cut(tracklets))
@@ -127,11 +127,11 @@ def _without_mistakes(rig: Rig, tracklets: Tracklets, consistency: Consistency) 
 
 _USELESS = ("silent-view", "other-people")
 _SUBTLE = ("distortion-ignored", "distortion-model", "image-cropped", "clock-offset", "dropped-pictures")
-"""Kinds that small errors of poses imitate."""
+"""Kinds that look like small errors of poses."""
 
 
 def _doubtful(finding: Finding, different: bool) -> bool:
-    """Whether a recording that does not determine the calibration leaves a finding open.
+    """Whether a finding is unknown because the recording does not determine the calibration.
 
     Args:
         finding: the finding.
@@ -149,7 +149,7 @@ def _fitted(rig: Rig, tracklets: Tracklets, groups: PeopleGroups) -> tuple[Sight
 
 
 def _corrected(reading: Reading, result: Fit) -> Reading:
-    """Return the reading with the cameras as people have them, at the end of the recording."""
+    """Return the reading with the estimated corrections of the cameras, at the end of the recording."""
     return replace(reading, cameras=with_errors(reading.cameras, result.change.reshape(1, -1))[0, :, :22].copy())
 
 
@@ -208,7 +208,7 @@ def _evidence(
     if np.isfinite(ratio):
         lines.append(f"people are {ratio:.2f} times as large as adults ({bones} bones)")
     lines.append(
-        "median distance from the people whom the other cameras see: "
+        "median distance of keypoints from the people as seen by the other cameras: "
         + ", ".join(f"{name} {value:.1f} px" for name, value in zip(names, residuals, strict=True))
     )
     lines.append(
@@ -219,7 +219,7 @@ def _evidence(
         turn, shift = np.degrees(np.linalg.norm(change[:3])), 100 * np.linalg.norm(change[3:6])
         sigma = np.sqrt(np.diagonal(covariance))
         lines.append(
-            f"{name}: people ask for {turn:.2f} degrees and {shift:.1f} cm "
+            f"{name}: estimated correction {turn:.2f} degrees and {shift:.1f} cm "
             f"(standard deviations {np.degrees(sigma[:3].max()):.2f} degrees and {100 * sigma[3:6].max():.1f} cm)"
         )
     return lines

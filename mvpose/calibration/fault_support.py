@@ -1,6 +1,6 @@
 """Whether a fault of a camera is one for everybody whom it sees, or an error about one person alone.
 
-A camera that is wrong is wrong for everybody. A correction that a single person asks for comes from a detection of
+A camera that is wrong is wrong for everybody. A correction that only one person supports comes from a detection of
 another person that was matched with this one, or from an error of the detector that lasts for this person. Both
 explanations are compared by their evidence: one error for all people, or the same error for one of them.
 """
@@ -54,12 +54,12 @@ def is_for_everybody(
     parts.append((H, b))
     quadratic = Quadratic(np.concatenate([H for H, _ in parts]), np.concatenate([b for _, b in parts]), temper)
 
-    def of(each: Fault, whom: Bools) -> Fault:
-        return replace(each, profile=np.outer(whom, each.profile).ravel())
+    def of(each: Fault, people_of: Bools) -> Fault:
+        return replace(each, profile=np.outer(people_of, each.profile).ravel())
 
-    def evidence(whom: Bools) -> float:
+    def evidence(people_of: Bools) -> float:
         known = [of(each, np.ones(len(parts), np.bool_)) for each in found]
-        return max(quadratic.evidence([*known, of(replace(fault, model=model), whom)]) for model in MODELS)
+        return max(quadratic.evidence([*known, of(replace(fault, model=model), people_of)]) for model in MODELS)
 
     alone = np.eye(len(parts), dtype=np.bool_)[:-1]
     return evidence(np.ones(len(parts), np.bool_)) > max(evidence(each) for each in alone)

@@ -35,8 +35,8 @@ class Mistake:
         mend: lines of Python that mend it; ``{camera}`` is the expression of the camera.
         views: the cameras that it concerns; empty before it is applied.
         size: size of the mistake, names with units.
-        of_all: whether the views can tell it from no mistake if all cameras have it: scale and axes of the world do not
-            change what they agree about.
+        of_all: whether it changes the agreement of the views if all cameras have it; another scale and other axes of
+            the world do not.
     """
 
     kind: str
@@ -62,7 +62,7 @@ CROPPED = Mistake(
     "K[:2, 2] -= offset  # of the cropped picture's first pixel in the uncropped one",
 )
 TURNED = Mistake(
-    "moved-camera", 0.05, "{who} looks elsewhere than calibrated", "mvpose repair CALIBRATION DETECTIONS --out NEW"
+    "moved-camera", 0.05, "{who} is turned against its calibration", "mvpose repair CALIBRATION DETECTIONS --out NEW"
 )
 
 

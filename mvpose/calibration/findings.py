@@ -36,19 +36,19 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "distortion-ignored": "the pictures are distorted, and the calibration has no distortion",
         "distortion-model": "the distortion is of another model, sign or order of terms, or was removed already",
         # cameras (cameras.py)
-        "moved-camera": "a camera stands or looks elsewhere than its calibration has it",
+        "moved-camera": "a camera is not in its calibrated pose",
         "drifting-camera": "a camera moves away from its calibration during the recording",
         "focal-length": "the focal length of a camera is wrong",
         "principal-point": "the principal point of a camera is wrong",
         # clocks (clocks.py)
-        "clock-offset": "the pictures of a camera are taken earlier or later than their times say",
+        "clock-offset": "the pictures of a camera are taken earlier or later than their time stamps",
         "dropped-pictures": "pictures of a camera are missing",
         "repeated-pictures": "a camera delivers the same picture again",
         # views (views.py)
         "mirrored-view": "the pictures of a camera are mirrored",
-        "left-right-exchanged": "the detector names left and right joints of a view the wrong way round",
+        "left-right-exchanged": "the names of left and right joints of a view are exchanged",
         "other-people": "a camera sees other people than the rest",
-        "silent-view": "a camera contributes nothing, because there are no or nearly no detections in its pictures",
+        "silent-view": "a camera has no or nearly no detections",
         # what the recording does not determine
         "cannot-tell": "the recording does not determine whether the calibration is right",
     }
@@ -72,8 +72,8 @@ class Finding:
         view: index of the camera; None for the whole rig.
         size: size of the fault, by names that end in the unit: ``{"degrees": 1.1, "metres": 0.05, "since_s": 4.0}``.
         interval: lowest and highest value of 90 % of the probability, for names of ``size``.
-        cost: expected loss if nothing is mended: metres that joints are off because of the fault, times its
-            probability. Findings are in its order.
+        cost: expected loss without a mend: error of joints because of the fault, metres, times its probability.
+            Findings are ordered by it.
         mend: command or lines of Python that mend it, or what to record or to check.
 
     Raises:

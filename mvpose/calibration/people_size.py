@@ -1,4 +1,4 @@
-"""Size of the people under a calibration, against that of adults: the only sight of a wrong unit of the whole rig."""
+"""Size of people relative to adults: the only evidence of a wrong unit of the whole rig."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from mvpose.calibration.file_mistakes import CROPPED, TURNED, Mistake
 from mvpose.calibration.pieces import Pieces
 from mvpose.calibration.reading_changes import Change, Size, changed, shifted_picture, turned_by_picture
 
-_LEAST_OFFSET = 0.06  # of the size of the picture: nobody crops less, and smaller turns are found by the cameras' fit
+_LEAST_OFFSET = 0.06  # of the size of the picture: smaller crops are rare, smaller turns are found by the camera fit
 _SUSPECT = 0.6  # a camera that agrees less than this share of the median is searched for crops and turns
 EXPLAINED = 0.7
 """Agreement, of all cameras and of the worst one over the median, from which no crop and no turn is searched."""

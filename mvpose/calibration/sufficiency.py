@@ -16,10 +16,10 @@ _SECONDS = 3.0  # of people whom several views see; errors of a detector last fo
 _TRAVELLED = 1.0  # metres, all people together
 _JOINTS = 200  # joints in frames seen by two views or more
 _AGREES = 0.7
-"""Mean agreement of pairs of views, with all faults corrected, below which no calibration explains what they see: 0.88
+"""Mean agreement of pairs of views, with all faults corrected, below which no calibration explains the detections: 0.88
 to 0.93 in simulated recordings with errors of calibration of up to 2 degrees, at most 0.61 where every view is of
 another time (``benchmarks.doctor``)."""
-_TURN, _SHIFT = np.radians(0.6), 0.06  # standard deviations of the pose of a camera that people determine
+_TURN, _SHIFT = np.radians(0.6), 0.06  # rad, m: largest standard deviations of a pose that is determined
 
 RECORD = (
     "record at least 10 s at 10 pictures a second or more, in which one to four people walk through all of the space "
@@ -29,7 +29,7 @@ RECORD = (
 
 
 DIFFERENT = "the cameras do not see the same people at the same time and place"
-"""What no calibration mends."""
+"""Reason of a finding where no calibration explains the detections."""
 
 
 def travelled(places: Floats) -> float:
@@ -70,11 +70,11 @@ def unknowns(
     pairs = [agreement.pairs[i, j] for i in used for j in used if i < j and np.isfinite(agreement.pairs[i, j])]
     if views == 2 or len(used) <= 2:
         which = "the rig has two cameras" if views == 2 else "only two cameras see the same people"
-        return [_cannot(f"{which}: their errors and the places of people cannot be told apart", "add a third camera")]
+        return [_cannot(f"{which}, and errors of two cameras look like other places of people", "add a third camera")]
     if not pairs or np.mean(pairs) < _AGREES:
         return [
             _cannot(
-                f"{DIFFERENT}, or more is wrong than can be told apart",
+                f"no calibration explains the detections: {DIFFERENT}, or several cameras are far off",
                 f"check that the pictures are of one time, and {RECORD}",
             )
         ]
@@ -88,7 +88,7 @@ def unknowns(
         if turn > _TURN or shift > _SHIFT:
             findings.append(
                 _cannot(
-                    f"too little of what the other cameras see is seen by {names[view]}: its pose is known to "
+                    f"{names[view]} shares too few people with the other cameras: its pose is determined to "
                     f"{np.degrees(turn):.1f} degrees and {100 * shift:.0f} cm only",
                     RECORD,
                     camera=names[view],

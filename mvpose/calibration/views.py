@@ -1,4 +1,4 @@
-"""Views that contribute nothing: no detections in them, or of other people than the rest sees.
+"""Views that contribute nothing: without detections, or with detections of other people than the other views have.
 
 Pictures that are mirrored and exchanged names of left and right are among the conventions (:mod:`.conventions`).
 """
@@ -15,7 +15,7 @@ from mvpose.calibration.consistency import Consistency, Reading
 from mvpose.calibration.findings import Finding
 
 _SILENT = 0.02  # share of the median number of detections of a view below which it contributes nothing
-_FEW = 0.20  # share of the median number of detections below which what a view sees may be nothing but mistakes
+_FEW = 0.20  # share of the median number of detections below which all of them may be false
 _STRANGER = 0.68
 """Mean agreement with the other views, over theirs, below which a view sees other people: 0.4 to 0.62 for the same room
 at another time, 0.85 and more for cameras that see the same people (simulated rigs, seeds 9100 to 9106)."""
@@ -83,7 +83,7 @@ def silent_views(detections: Integers, names: Sequence[str]) -> list[Finding]:
 
 
 def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) -> list[Finding]:
-    """Return views that agree with no other one, where the others agree with each other.
+    """Return findings about views that agree with no other view, where the others agree with each other.
 
     Args:
         agreement: agreement before or after errors of the cameras were corrected.
@@ -118,8 +118,8 @@ def strangers(agreement: Agreement, detections: Integers, names: Sequence[str]) 
         findings.append(
             Finding(
                 "other-people",
-                f"{names[view]} sees nobody whom the other cameras see where its calibration has them: it sees other "
-                "people, its pictures are of another time or place, or its calibration is wrong altogether",
+                f"the people in the pictures of {names[view]} are not those of the other cameras: other people are in "
+                "them, they are of another time or place, or the calibration of this camera is entirely wrong",
                 probability=0.95,
                 camera=names[view],
                 view=view,
