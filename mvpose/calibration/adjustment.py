@@ -115,7 +115,8 @@ def adjust(
             if converged:
                 break
     information, _ = _information(equations, joints, loose)
-    covariance = _covariance(information, weights, loose)
+    variances = np.diag(_covariance(information, weights, loose)).reshape(shape)
+    covariance = _covariance(information, weights.widened(variances, free), loose)
     adjusted = Rig([changed(camera, each) for camera, each in zip(rig, parameters, strict=True)])
     return Adjustment(adjusted, parameters, covariance, information, joints, rows, equations, converged)
 

@@ -12,16 +12,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from mvpose.arrays import Bools, Floats
 from mvpose.calibration.normal_equations import CENTER, CLOCK, FOCAL, K1, PARAMETERS, POSE, ROTATION, TRANSLATION
 
-GROUPS = (POSE, CLOCK, FOCAL, CENTER, K1)
-"""Parameters of a camera that are off together."""
-
-_SHARED = (POSE, CLOCK)  # groups whose width is estimated
+_TOGETHER = (POSE, CLOCK, FOCAL, CENTER, K1)  # parameters of a camera that are off together
+_ESTIMATED = (ROTATION, TRANSLATION, CLOCK)  # groups of parameters whose width is estimated
 _FREEDOM = 4.0  # of the Student distribution of each camera's errors
-_BELIEF = 6.0  # numbers that the expected width of the distribution is worth: those of one camera's pose
+_BELIEF = 1.0  # numbers that the expected width is worth: rigs range from boards to measuring tapes
 _WIDE = 10.0  # width in the first step: 2 degrees, 0.2 m
 
 
@@ -61,7 +60,7 @@ class PriorWeights:
     """Gaussian that stands for the prior near a solution.
 
     Attributes:
-        width: of the errors of each group of parameters, relative to the prior, (5,).
+        width: of the errors, relative to the prior, (11,).
         information: of each parameter, (V, 11).
     """
 
@@ -71,11 +70,10 @@ class PriorWeights:
     @classmethod
     def wide(cls, prior: Prior, views: int) -> PriorWeights:
         """Return the start: all cameras may be far off, so that none is taken to be right."""
-        width = np.array([_WIDE if group in _SHARED else 1.0 for group in GROUPS])
-        scale = np.empty(PARAMETERS)
-        for number, group in enumerate(GROUPS):
-            scale[group] = width[number] * prior.sigmas()[group]
-        return cls(width, np.tile(scale**-2, (views, 1)))
+        width = np.ones(PARAMETERS)
+        for group in _ESTIMATED:
+            width[group] = _WIDE
+        return cls(width, np.tile((width * prior.sigmas()) ** -2, (views, 1)))
 
     def cost(self, parameters: Floats) -> float:
         """Return half the squared standardised parameters, (V, 11)."""
@@ -94,12 +92,31 @@ class PriorWeights:
             variances: their variances, (V, 11).
             free: which of them may change, (V, 11).
         """
-        width, information = self.width.copy(), np.empty_like(parameters)
         square = (parameters**2 + variances) * free / prior.sigmas() ** 2
-        for number, group in enumerate(GROUPS):
-            count, total = free[:, group].sum(axis=1), square[:, group].sum(axis=1)
-            precision = (_FREEDOM + count) / (_FREEDOM + total / width[number] ** 2)
-            if group in _SHARED:
-                width[number] = np.sqrt((_BELIEF + precision @ total) / (_BELIEF + count.sum()))
-            information[:, group] = (precision / width[number] ** 2)[:, None]
-        return PriorWeights(width, information / prior.sigmas() ** 2)
+        precision, width = np.empty_like(parameters), self.width.copy()
+        for group in _TOGETHER:
+            total = (square[:, group] / self.width[group] ** 2).sum(axis=1)
+            precision[:, group] = ((_FREEDOM + free[:, group].sum(axis=1)) / (_FREEDOM + total))[:, None]
+        for group in _ESTIMATED:
+            total = (precision * square)[:, group].sum()
+            width[group] = np.sqrt((_BELIEF + total) / (_BELIEF + free[:, group].sum()))
+        return PriorWeights(width, precision / (width * prior.sigmas()) ** 2)
+
+    def widened(self, variances: Floats, free: Bools) -> PriorWeights:
+        """Return the weights for intervals: the widths are estimates from few cameras.
+
+        A normal variable whose variance was estimated from n numbers has a Student distribution with n degrees of
+        freedom. The prior gets the standard deviation of the normal distribution with the same 90 % interval. Numbers
+        that the data determine count, each by its share ``1 - variance / prior variance`` (MacKay, "Bayesian
+        Interpolation", 1992).
+
+        Args:
+            variances: of the errors, given the weights, (V, 11).
+            free: which parameters may change, (V, 11).
+        """
+        determined = np.clip(1.0 - variances * self.information, 0.0, 1.0) * free
+        information = self.information.copy()
+        for group in _ESTIMATED:
+            count = _BELIEF + determined[:, group].sum()
+            information[:, group] *= (ndtri(0.95) / stdtrit(count, 0.95)) ** 2
+        return PriorWeights(self.width, information)

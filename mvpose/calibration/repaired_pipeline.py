@@ -1,6 +1,4 @@
-"""Estimation with the doctor in front: the rig and the clocks are repaired from the whole recording, then people are
-estimated.
-"""
+"""Estimation after repair: the rig and the clocks are corrected from the whole recording, then people are estimated."""
 
 from __future__ import annotations
 
@@ -36,19 +34,11 @@ class RepairedPipeline:
     period: float = 0.04
 
     def estimate(self, rig: Rig, detections: Detections) -> Estimate:
-        """Estimate the people of one frame alone, without any repair: one frame does not tell what is wrong."""
+        """Estimate the people of one frame alone, without repair: one frame does not determine the calibration."""
         return self.estimator.estimate(rig, detections)
 
     def track(self, rig: Rig, frames: Iterable[Detections]) -> Iterator[Estimate]:
-        """Yield the estimate of every frame of a recording, in order; every call starts without a past.
-
-        Args:
-            rig: calibrated cameras.
-            frames: detections of each frame, in the order of time.
-
-        Raises:
-            ValueError: as of the estimator.
-        """
+        """Repair the rig and the clocks, then yield the estimates (:meth:`mvpose.pipeline.SequenceEstimator.track`)."""
         given = list(frames)
         if not given:
             return

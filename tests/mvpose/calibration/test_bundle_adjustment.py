@@ -188,14 +188,33 @@ def test_effect_of_shared_errors_is_that_of_repeated_joints():
 
 
 def test_the_width_of_the_prior_is_that_of_the_errors():
-    """Many cameras whose errors are known exactly: the scale of their Student distribution is found."""
+    """Many cameras whose errors are known exactly: the scales of their Student distribution are found."""
     rng, prior = np.random.default_rng(0), Prior()
-    free = np.ones((2000, 11), bool)
-    errors = 3.0 * prior.sigmas() * rng.standard_normal((2000, 11)) / np.sqrt(rng.gamma(2.0, 0.5, (2000, 1)))
+    free, true = np.ones((2000, 11), bool), np.array([3.0] * 3 + [0.5] * 3 + [1.0] * 5)
+    errors = true * prior.sigmas() * rng.standard_normal((2000, 11)) / np.sqrt(rng.gamma(2.0, 0.5, (2000, 1)))
     weights = PriorWeights.wide(prior, 2000)
     for _ in range(50):
         weights = weights.updated(prior, errors, np.zeros_like(errors), free)
-    np.testing.assert_allclose(weights.width[:2], 3.0, rtol=0.1)
+    np.testing.assert_allclose(weights.width, true, rtol=0.1)
+
+
+def test_intervals_with_an_estimated_width_hold_what_they_promise():
+    """Five errors of unknown width, known exactly, and a sixth that the data leave open: 90 % of its interval."""
+    rng, prior = np.random.default_rng(0), Prior()
+    free = np.zeros((6, 11), bool)
+    free[:, CLOCK] = True
+    inside = []
+    for _ in range(600):
+        errors = np.zeros((6, 11))
+        errors[:, CLOCK] = 0.01 * rng.standard_normal((6, 1))
+        known, weights = errors * (np.arange(6) < 5)[:, None], PriorWeights.wide(prior, 6)
+        for _ in range(20):
+            variances = np.zeros((6, 11))
+            variances[5] = 1.0 / weights.information[5]
+            weights = weights.updated(prior, known, variances, free)
+        sigma = weights.widened(variances, free).information[5, CLOCK] ** -0.5
+        inside.append(abs(errors[5, CLOCK]) < 1.645 * sigma)
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.04)
 
 
 def test_gross_errors_do_not_move_the_cameras():
