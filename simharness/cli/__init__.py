@@ -6,7 +6,19 @@ traceback), 130 interrupted. Commands import heavy modules only when they run.
 
 from __future__ import annotations
 
-from simharness.cli import blame, check, evaluate, export, fit_detector, report, run, scenarios, study, validate
+from simharness.cli import (
+    blame,
+    check,
+    evaluate,
+    export,
+    fit_detector,
+    rehearse,
+    report,
+    run,
+    scenarios,
+    study,
+    validate,
+)
 from simharness.cli.app import app
 
 __all__ = ["app", "main"]
@@ -21,6 +33,7 @@ study.add_to(app)
 app.add_typer(evaluate.app, name="evaluate")
 fit_detector.add_to(app)
 validate.add_to(app)
+rehearse.add_to(app)
 
 
 def main() -> None:

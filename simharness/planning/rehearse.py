@@ -57,7 +57,7 @@ class Effort:
     """
 
     scenes: int = 16
-    crowd_scenes: int = 4
+    crowd_scenes: int = 6
     crowds: tuple[int, ...] = (1, 2, 6, 8, 10)
     most: int = 10
     workers: int = 1

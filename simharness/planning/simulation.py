@@ -183,7 +183,8 @@ def interval_of(results: Sequence[SceneResult], condition: Condition, score: str
         score: name of a field of :class:`Scores`.
     """
     values = [getattr(each.scores[condition], score) for each in results]
-    return mean_interval(values, unit="mm" if score.endswith("_mm") else "%")
+    # A mixed group is one of hundreds, no event of a whole scene: its bounds are those of a length.
+    return mean_interval(values, unit="%" if score in ("pcp", "recall") else "mm")
 
 
 def loss_of(results: Sequence[SceneResult], condition: Condition, base: Condition, score: str = "pcp") -> Interval:

@@ -1,0 +1,167 @@
+"""``simharness rehearse``: what a rig will give in a room, before its cameras hang."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import exit_on_error, write_json
+from simharness.cli.options import command_line
+
+if TYPE_CHECKING:
+    from simharness.planning.visibility import Obstacle
+    from simharness.planning.volume import Volume
+
+_MOST_PEOPLE = 40
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(rehearse)
+
+
+def rehearse(
+    calibration: Annotated[
+        Path,
+        typer.Argument(
+            help="A calibration of any format, a rig file (TOML), or the name of a shipped rig: [cyan]ring5[/].",
+            metavar="CALIBRATION",
+        ),
+    ],
+    room: Annotated[
+        str,
+        typer.Option(
+            metavar="XxY[xZ]",
+            help="Size of the room around the origin, metres, as [cyan]8x6x3[/]. Cameras have to be in it.",
+        ),
+    ] = "",
+    volume: Annotated[
+        str,
+        typer.Option(
+            metavar="XxY[@X,Y]",
+            help="Where people are, metres: [cyan]4x3[/] around the origin, [cyan]4x3@1,0.5[/] around a point, or "
+            "corners [cyan]0,0 4,0 4,3[/]. [dim]\\[default: what three cameras see][/]",
+        ),
+    ] = "",
+    people: Annotated[int, typer.Option(metavar="N", min=1, max=_MOST_PEOPLE, help="People in the volume.")] = 4,
+    detector: Annotated[
+        str, typer.Option(metavar="PROFILE", help="A detector profile: a shipped name or a TOML file.")
+    ] = "typical",
+    obstacle: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,W,D,H",
+            help="A box that hides people: its middle on the floor, width along x, depth along y, height. Repeatable.",
+        ),
+    ] = None,
+    target: Annotated[
+        str, typer.Option(metavar="PCP,MM", help="What a place must reach: PCP and joint error.")
+    ] = "95,40",
+    size: Annotated[
+        str,
+        typer.Option(metavar="WxH", help="Size of the pictures, pixels, where the calibration does not state it."),
+    ] = "",
+    subsets: Annotated[bool, typer.Option("--subsets", help="Score all sets of two cameras and more.")] = False,
+    scenes: Annotated[int, typer.Option(metavar="N", min=2, max=1000, help="Simulated scenes.")] = 16,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of everything.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of rehearsal.html and rehearsal.json. [dim]\\[default: results/rehearsal/NAME][/]",
+            file_okay=False,
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Processes; the results stay the same. [dim]\\[default: all cores][/]"),
+    ] = None,
+) -> None:
+    """Rehearse a rig before its cameras hang: where it is good, what each camera is worth, what one more would bring.
+
+    A fast layer draws maps of the floor and compares cameras; scenes of the
+    simulator show what the method makes of people who walk there.
+    """
+    with exit_on_error():
+        start = perf_counter()
+        from simharness.cli.rehearse_values import (
+            obstacle_of,
+            picture_size,
+            room_of,
+            target_of,
+            volume_of,
+        )
+        from simharness.planning.rehearse import Effort
+        from simharness.planning.rehearse import rehearse as rehearse_rig
+        from simharness.planning.rig_file import read_rig
+        from simharness.report.planning.rehearsal_page import render_rehearsal
+        from simharness.runtime.progress import reporter
+        from simharness.scenario.presets import read_profile
+        from simharness.trial.provenance import provenance
+
+        where: Volume | None = volume_of(volume) if volume else None
+        walls: Volume | None = room_of(room) if room else None
+        boxes: list[Obstacle] = [obstacle_of(each) for each in obstacle or ()]
+        wanted = target_of(target)
+        rig = read_rig(
+            calibration,
+            size=picture_size(size) if size else None,
+            room=None if walls is None else (*(2 * walls.outline.max(axis=0)).tolist(), walls.height),
+        )
+        profile = read_profile(detector)
+        name = calibration.stem or calibration.resolve().name
+        place = out or Path("results/rehearsal") / name
+        _prepare(place)
+        with reporter() as bars:
+            rehearsal = rehearse_rig(
+                rig,
+                detector=profile,
+                volume=where,
+                people=people,
+                room=walls,
+                obstacles=boxes,
+                target=wanted,
+                subsets=subsets,
+                seed=seed,
+                effort=Effort(scenes=scenes, workers=workers or os.cpu_count() or 1),
+                name=name,
+                reporter=bars,
+            )
+        made = provenance(
+            command=command_line(),
+            seeds=range(seed, seed + scenes),
+            variants=("full",),
+            seconds=perf_counter() - start,
+        )
+        _write(render_rehearsal(rehearsal, provenance=made), place / "rehearsal.html")
+        write_json({**made, **rehearsal.to_json()}, place / "rehearsal.json")
+    console = Console()
+    for sentence in rehearsal.sentences:
+        console.print(sentence, highlight=False, markup=False)
+    console.print(f"report: {place / 'rehearsal.html'}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _prepare(folder: Path) -> None:
+    """Create the folder of the results before minutes of work.
+
+    Raises:
+        ValueError: it cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"--out {folder}: cannot be created: {error.strerror}") from None
+
+
+def _write(page: str, path: Path) -> None:
+    from mvpose.files.atomic_files import write_atomic
+
+    try:
+        write_atomic(path, page.encode())
+    except OSError as error:
+        raise ValueError(f"--out {path.parent}: {path.name} cannot be written: {error.strerror}") from None
