@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TypeVar
@@ -25,7 +25,15 @@ from simharness.planning.rehearsal import (
 )
 from simharness.planning.rig_checks import check_rig
 from simharness.planning.sentences import sentences
-from simharness.planning.simulation import Condition, SceneResult, SceneSettings, interval_of, loss_of, simulate_scenes
+from simharness.planning.simulation import (
+    Condition,
+    SceneBatch,
+    SceneResult,
+    SceneSettings,
+    interval_of,
+    loss_of,
+    simulate_scenes,
+)
 from simharness.planning.tolerance import fault_conditions, tolerances
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
@@ -178,7 +186,7 @@ class _Rehearsing:
         layer_seconds = perf_counter() - start
         compared = self._compare()
         base = compared.sets[self.whole]
-        scenes = self._simulate(compared)
+        scenes, simulated = self._simulate(compared)
         good = (prediction.pcp >= question.target.pcp) & (prediction.error_mm <= question.target.error_mm)
         mixed = interval_of(scenes, Condition(self.whole), "mixed")
         rehearsal = Rehearsal(
@@ -199,7 +207,7 @@ class _Rehearsing:
                 for cameras, each in compared.sets.items()
             },
             extra=self._extra(scenes, compared, base),
-            crowds=self._crowds(scenes, compared),
+            crowds=self._crowds(simulated, compared),
             tolerances=tolerances(scenes, self.whole),
             scenes=tuple(scenes),
             mixed=mixed,
@@ -290,19 +298,28 @@ class _Rehearsing:
     def _without(self, camera: int) -> tuple[int, ...]:
         return tuple(k for k in self.whole if k != camera)
 
-    def _simulate(self, compared: _Compared) -> list[SceneResult]:
-        """Simulate the scenes of the rig; the additional camera is one more camera of them."""
+    def _simulate(self, compared: _Compared) -> tuple[list[SceneResult], dict[int, list[SceneResult]]]:
+        """Return the scenes of the rig, and those of it with other numbers of people, without numbers that do not fit.
+
+        The additional camera is one more camera of the scenes.
+        """
         sets = dict.fromkeys([*compared.sets, *(self._without(k) for k in self.whole)])
         conditions = [Condition(each) for each in sets] + fault_conditions(self.whole)
-        rig = self.question.rig
+        rig, people = self.question.rig, self.question.people
         if compared.extra is not None:
             rig = Rig([*rig, compared.extra[0]])
             conditions.append(Condition((*self.whole, len(self.whole))))
-        return self._scenes("simulate", rig, self.question.people, conditions, self.effort.scenes)
+        batches = {people: self._batch(rig, people, conditions, self.effort.scenes)}
+        for number in sorted(self.effort.crowds, reverse=True):
+            if number != people and number <= self.effort.most:
+                alone = [Condition(self.whole)]
+                batches[number] = self._batch(self.question.rig, number, alone, self.effort.crowd_scenes)
+        with self.reporter.stage("simulate", sum(len(each.seeds) for each in batches.values())) as advance:
+            results = simulate_scenes(list(batches.values()), workers=self.effort.workers, progress=advance)
+        by_number = {number: scenes for number, scenes in zip(batches, results, strict=True) if scenes}
+        return by_number[people], by_number
 
-    def _scenes(
-        self, stage: str, rig: Rig, people: int, conditions: Sequence[Condition], count: int
-    ) -> list[SceneResult]:
+    def _batch(self, rig: Rig, people: int, conditions: Sequence[Condition], count: int) -> SceneBatch:
         question = self.question
         settings = SceneSettings(
             rig,
@@ -313,9 +330,7 @@ class _Rehearsing:
             obstacles=question.obstacles,
             whole=self.whole,
         )
-        seeds = range(question.seed, question.seed + count)
-        with self.reporter.stage(stage, count) as advance:
-            return simulate_scenes(settings, conditions, seeds=seeds, workers=self.effort.workers, progress=advance)
+        return SceneBatch(settings, tuple(conditions), tuple(range(question.seed, question.seed + count)))
 
     def _estimated(self, scenes: Sequence[SceneResult], cameras: tuple[int, ...], prediction: Prediction) -> Estimated:
         summary, condition = prediction.summary(), Condition(cameras)
@@ -355,18 +370,8 @@ class _Rehearsing:
             float(prediction.summary()["pcp"].value - base.summary()["pcp"].value),
         )
 
-    def _crowds(self, scenes: Sequence[SceneResult], compared: _Compared) -> tuple[Crowd, ...]:
-        """Return the figures by number of people; those who do not fit into the volume are not simulated."""
-        simulated = {self.question.people: list(scenes)}
-        for number in self.effort.crowds:
-            if number == self.question.people or number > self.effort.most:
-                continue
-            try:
-                simulated[number] = self._scenes(
-                    f"{number} people", self.question.rig, number, [Condition(self.whole)], self.effort.crowd_scenes
-                )
-            except ValueError:
-                continue
+    def _crowds(self, simulated: Mapping[int, Sequence[SceneResult]], compared: _Compared) -> tuple[Crowd, ...]:
+        """Return the figures by number of people."""
         crowds = []
         for number, prediction in compared.crowds.items():
             summary, of = prediction.summary(), simulated.get(number)

@@ -25,7 +25,7 @@ from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.reality.annotated_recording import AnnotatedRecording
 from simharness.reality.validation.frame_scores import RULES, HeadRule, score_frames
-from simharness.runtime.frame_pool import map_frames
+from simharness.runtime.frame_pool import map_jobs
 from simharness.scenario.sections.cameras import Faults
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.room import Clutter
@@ -141,37 +141,55 @@ class SceneSettings:
     whole: tuple[int, ...] = ()
 
 
-def simulate_scenes(
-    settings: SceneSettings,
-    conditions: Sequence[Condition],
-    *,
-    seeds: Sequence[int],
-    workers: int = 1,
-    progress: Callable[[int], None] = lambda scenes: None,
-) -> list[SceneResult]:
-    """Simulate a scene at each seed, and score the method under every condition.
+@dataclass(frozen=True)
+class SceneBatch:
+    """Scenes of the same settings.
 
-    Args:
+    Attributes:
         settings: what the scenes have in common.
         conditions: subsets of cameras and faults; the same scene and the same draws for all.
         seeds: seeds of the scenes.
-        workers: number of processes; the results do not depend on it.
+    """
+
+    settings: SceneSettings
+    conditions: tuple[Condition, ...]
+    seeds: tuple[int, ...]
+
+
+def simulate_scenes(
+    batches: Sequence[SceneBatch],
+    *,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda scenes: None,
+) -> list[list[SceneResult]]:
+    """Simulate the scenes of batches, and score the method under every condition.
+
+    Args:
+        batches: the scenes; long ones should come first.
+        workers: number of processes, which share all scenes; the results do not depend on it.
         progress: called with the number of finished scenes.
 
     Returns:
-        Results in the order of the seeds, without those at which the scene cannot be built.
+        Results of each batch in the order of its seeds. Scenes that cannot be built are left out, and a batch without
+        the half of its scenes is empty.
 
     Raises:
-        ValueError: the scene cannot be built at half of the seeds or more, because people or clutter do not fit.
+        ValueError: the first batch is empty, because people or clutter do not fit.
         RunError: any other error.
     """
-    scenes = _Scenes(settings, tuple(conditions), tuple(seeds))
-    chunks = map_frames(scenes, range(len(seeds)), workers=workers, progress=progress)
-    results = [each for chunk in chunks for each in chunk]
-    failed = [each for each in results if isinstance(each, str)]
-    if 2 * len(failed) >= len(results):
-        raise ValueError(failed[0])
-    return [each for each in results if not isinstance(each, str)]
+    jobs = [(batch, seed) for batch in batches for seed in batch.seeds]
+    ranges = [(range(k, k + 1),) for k in range(len(jobs))]
+    done = map_jobs(_Scenes(tuple(jobs)), ranges, workers=workers, progress=progress)
+    results, start = [], 0
+    for number, batch in enumerate(batches):
+        made = done[start : start + len(batch.seeds)]
+        start += len(batch.seeds)
+        failed = [each for each in made if isinstance(each, str)]
+        if 2 * len(failed) >= len(made) and number == 0:
+            raise ValueError(failed[0])
+        kept = [each for each in made if not isinstance(each, str)]
+        results.append(kept if 2 * len(failed) < len(made) else [])
+    return results
 
 
 def interval_of(results: Sequence[SceneResult], condition: Condition, score: str) -> Interval:
@@ -195,15 +213,14 @@ def loss_of(results: Sequence[SceneResult], condition: Condition, base: Conditio
 
 @dataclass(frozen=True)
 class _Scenes:
-    """Scenes by index of the seed; a frame function of :func:`simharness.runtime.frame_pool.map_frames`."""
+    """Scenes by index; a function of :func:`simharness.runtime.frame_pool.map_jobs`."""
 
-    settings: SceneSettings
-    conditions: tuple[Condition, ...]
-    seeds: tuple[int, ...]
+    jobs: tuple[tuple[SceneBatch, int], ...]
 
-    def __call__(self, frames: range, /) -> list[SceneResult | str]:
-        """Return the results of these scenes; for one that cannot be built, the reason."""
-        return [_run(self.settings, self.conditions, self.seeds[index]) for index in frames]
+    def __call__(self, frames: range, /) -> SceneResult | str:
+        """Return the result of the scene, or the reason why it cannot be built."""
+        batch, seed = self.jobs[frames.start]
+        return _run(batch.settings, batch.conditions, seed)
 
 
 def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) -> SceneResult | str:

@@ -9,7 +9,7 @@ import pytest
 
 from mvpose import Rig
 from simharness.planning.rig_file import read_rig
-from simharness.planning.simulation import Condition, SceneSettings, loss_of, simulate_scenes
+from simharness.planning.simulation import Condition, SceneBatch, SceneSettings, loss_of, simulate_scenes
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
@@ -26,10 +26,15 @@ def settings(**changes):
     return SceneSettings(**content | changes)
 
 
+def simulated(conditions, *, seed=3, **changes):
+    (results,) = simulate_scenes([SceneBatch(settings(**changes), tuple(conditions), (seed,))])
+    return results[0]
+
+
 @pytest.fixture(scope="module")
 def scene():
     conditions = [Condition(WHOLE), Condition((0, 1)), Condition((3,)), WORSE, LATE]
-    return simulate_scenes(settings(), conditions, seeds=[3])[0]
+    return simulated(conditions)
 
 
 def test_people_are_in_the_volume_and_use_its_length(scene):
@@ -58,7 +63,7 @@ def test_the_world_may_be_moved_with_its_rig_and_volume(scene):
     turn, shift = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([7.0, -3.0, 0.0])
     rig = Rig([replace(each, R=each.R @ turn.T, t=each.t - each.R @ turn.T @ shift) for each in read_rig("ring5")])
     volume = Volume(Volume.box(4.0, 2.0).outline @ turn[:2, :2].T + shift[:2])
-    moved = simulate_scenes(settings(rig=rig, volume=volume), [Condition(WHOLE)], seeds=[3])[0]
+    moved = simulated([Condition(WHOLE)], rig=rig, volume=volume)
     assert moved.inside.mean() > 0.95
     assert moved.scores[Condition(WHOLE)].pcp > 95
 
@@ -69,10 +74,18 @@ def test_an_obstacle_before_two_cameras_costs_what_their_failure_does():
         x, y, _ = 0.9 * camera.center
         walls.append(Obstacle(np.array([x, y, 1.5]), np.array([0.1, 3.0, 3.0]), float(np.arctan2(y, x))))
     failed = Condition((2, 3, 4))
-    hidden = simulate_scenes(settings(obstacles=tuple(walls)), [Condition(WHOLE), failed], seeds=[3])[0]
+    hidden = simulated([Condition(WHOLE), failed], obstacles=tuple(walls))
     assert hidden.scores[Condition(WHOLE)].mpjpe_mm == pytest.approx(hidden.scores[failed].mpjpe_mm, abs=8)
 
 
 def test_people_who_do_not_fit_are_named():
     with pytest.raises(ValueError, match="30 people do not fit"):
-        simulate_scenes(settings(people=30, volume=Volume.box(1.5, 1.5)), [Condition(WHOLE)], seeds=[0])
+        simulated([Condition(WHOLE)], people=30, volume=Volume.box(1.5, 1.5))
+
+
+def test_a_crowd_that_does_not_fit_is_left_out_beside_people_who_do():
+    small = SceneBatch(settings(), (Condition(WHOLE),), (3,))
+    crowd = SceneBatch(settings(people=100), (Condition(WHOLE),), (0, 1))
+    fit, none = simulate_scenes([small, crowd])
+    assert len(fit) == 1
+    assert none == []
