@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from simharness.planning.volume import Volume
 
 _MOST_PEOPLE = 40
+_CROWD = 6  # scenes of other numbers of people
 
 
 def add_to(app: typer.Typer) -> None:
@@ -128,7 +129,7 @@ def rehearse(
                 target=wanted,
                 subsets=subsets,
                 seed=seed,
-                effort=Effort(scenes=scenes, workers=workers or os.cpu_count() or 1),
+                effort=Effort(scenes=scenes, crowd_scenes=min(_CROWD, scenes), workers=workers or os.cpu_count() or 1),
                 name=name,
                 reporter=bars,
             )

@@ -26,7 +26,7 @@ def volume_of(text: str) -> Volume:
         if min(width, depth) <= 0:
             raise ValueError(f"--volume {text}: expected sides above 0 m, got {width:g} by {depth:g}")
         return Volume.box(width, depth, center=(center[0], center[1]))
-    corners = np.array([_numbers("--volume", each, ",", (2,)) for each in text.split()])
+    corners = np.array([_numbers("--volume", each, ",", (2,)) for each in text.split() if "," in text])
     if len(corners) < 3:
         raise ValueError(
             f"--volume {text}: expected a size, 4x3, or three corners or more, 0,0 4,0 4,3, got {len(corners)}: the "

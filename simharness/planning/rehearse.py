@@ -61,6 +61,7 @@ class Effort:
         crowd_scenes: scenes of each other number of people.
         crowds: other numbers of people that are simulated; the fast layer has all from 1 to ``most``.
         most: largest number of people.
+        around: places on the walls where one more camera is tried, each at two heights; 0: none.
         workers: processes; the results do not depend on it.
     """
 
@@ -68,6 +69,7 @@ class Effort:
     crowd_scenes: int = 6
     crowds: tuple[int, ...] = (1, 2, 6, 8, 10)
     most: int = 10
+    around: int = 16
     workers: int = 1
 
 
@@ -261,7 +263,7 @@ class _Rehearsing:
         """Return what the fast layer says of other sets of cameras and numbers of people."""
         question, rig = self.question, self.question.rig
         sets = self._sets()
-        candidates = candidate_cameras(rig, question.volume, room=question.room)
+        candidates = candidate_cameras(rig, question.volume, room=question.room, around=self.effort.around)
         numbers = range(1, self.effort.most + 1)
         with self.reporter.stage("compare", len(sets) + len(candidates) + len(numbers)) as advance:
             layer = self._layer(people=question.people, coarse=True)

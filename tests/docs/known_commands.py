@@ -70,6 +70,11 @@ IN_PARTS = {
     "simharness merge part1 part2 part3 --into results/studies/store": "",
     "simharness study my-lab.toml": f"{LAB} --seeds 2",
 }
+REHEARSE = (  # run by tests/simharness/planning
+    "simharness rehearse",
+    "simharness rehearse ring5 --volume 6x6 --people 4",
+    "simharness rehearse my-rig.toml --room 8x6x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets",
+)
 MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
@@ -103,6 +108,7 @@ KNOWN = {
     *ALONE,
     *USER_FILES.values(),
     *NAMES,
+    *REHEARSE,
     *CHECKS,
     CHECK_OF_TRACKING,
     *SHELF,

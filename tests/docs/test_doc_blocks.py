@@ -17,7 +17,7 @@ from simharness.scenario.sections.detector import Detector
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 13, "toml": 8, "yaml": 1}
+    assert languages == {"python": 14, "toml": 8, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
@@ -59,6 +59,12 @@ def test_the_example_of_getting_started(shorter):
     assert trial.results.keys() == {"full", "fast"}
     assert 50 < trial.results["full"].scores["pcp"] <= 100
     assert {"kind", "stage"} <= set(trial.results["full"].failures.columns)
+
+
+@pytest.mark.slow
+def test_the_example_of_a_rehearsal():
+    rehearsal = run_block("rehearse(read_rig(")["rehearsal"]
+    assert rehearsal.whole.pcp.mean > 90
 
 
 def test_the_foreign_program_is_the_one_that_is_tested():

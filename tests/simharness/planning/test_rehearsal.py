@@ -1,0 +1,116 @@
+"""A whole rehearsal of a small rig: consistent figures, plain sentences, JSON, and its page."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import simharness.planning.rehearse
+from simharness.cli import app
+from simharness.planning.rehearsal import HEIGHTS
+from simharness.planning.rehearse import Effort, rehearse
+from simharness.planning.rig_file import read_rig
+from simharness.planning.sentences import good_rectangle, sentences
+from simharness.planning.volume import Volume
+from simharness.report.planning.floor_maps import outline_of
+from simharness.report.planning.rehearsal_page import render_rehearsal
+from simharness.scenario.presets import read_profile
+from simharness.trial.provenance import provenance
+
+pytestmark = pytest.mark.slow
+
+TINY = Effort(scenes=2, crowd_scenes=1, crowds=(1,), most=2, around=3)
+VOLUME = Volume.box(2.0, 2.0)
+
+
+def a_rehearsal(rig, **changes):
+    content = dict(detector=read_profile("typical"), volume=VOLUME, people=2, effort=TINY)
+    return rehearse(rig, **content | changes)
+
+
+@pytest.fixture(scope="module")
+def rehearsal():
+    return a_rehearsal(read_rig("corners4"), name="corners")
+
+
+def test_figures_of_one_rehearsal_agree(rehearsal):
+    names = tuple(camera.name for camera in rehearsal.rig)
+    assert set(rehearsal.cameras) == set(names)
+    assert rehearsal.subsets[names].pcp == rehearsal.whole.pcp
+    for name, each in rehearsal.cameras.items():
+        rest = rehearsal.subsets[tuple(other for other in names if other != name)]
+        assert each.worth.mean == pytest.approx(rehearsal.whole.pcp.mean - rest.pcp.mean)
+    assert {crowd.people for crowd in rehearsal.crowds if crowd.pcp is not None} == {1, 2}
+    assert rehearsal.extra.gain.mean == pytest.approx(rehearsal.extra.rig.pcp.mean - rehearsal.whole.pcp.mean)
+
+
+def test_four_cameras_in_the_corners_are_good_in_the_middle(rehearsal):
+    assert rehearsal.whole.pcp.mean > 95
+    assert rehearsal.good_share > 0.7
+    assert abs(rehearsal.whole.layer_pcp - rehearsal.whole.pcp.mean) < 6
+    assert "4 cameras are enough for 2 people" in rehearsal.sentences[0]
+
+
+def test_the_json_is_plain_and_has_the_contract(rehearsal):
+    content = json.loads(json.dumps(rehearsal.to_json(), allow_nan=False))
+    assert {"pcp", "mpjpe_mm", "map", "cameras", "subsets"} <= content.keys()
+    assert content["pcp"]["low"] <= content["pcp"]["mean"] <= content["pcp"]["high"]
+    assert len(content["map"]["pcp"]) == len(content["map"]["places"])
+    assert content["cameras"]["cam0"]["worth"]["mean"] == round(rehearsal.cameras["cam0"].worth.mean, 4)
+
+
+def test_sentences_say_where_a_rig_is_not_enough(rehearsal):
+    nowhere = replace(rehearsal, good=np.zeros_like(rehearsal.good))
+    assert "not enough" in sentences(nowhere)[0]
+    half = replace(rehearsal, good=rehearsal.prediction.places[:, 0] > 0)
+    assert "within 1.0 by 2.0 m; 50 % of the volume" in sentences(half)[0]
+
+
+def test_the_largest_rectangle_of_good_places():
+    places = Volume.box(3.0, 2.0).places(0.5)
+    low, high = good_rectangle(places, (places[:, 0] < 0.5) | (places[:, 1] > 0.6))
+    assert np.allclose([*low, *high], [-1.5, -1.0, 0.5, 1.0])
+    assert good_rectangle(places, np.zeros(len(places), bool)) is None
+
+
+def test_the_line_around_good_places_has_their_perimeter():
+    places = Volume.box(3.0, 2.0).places(0.5)
+    chosen = (np.abs(places[:, 0]) < 1.0) & (np.abs(places[:, 1]) < 0.5)
+    length = sum(np.linalg.norm(end - start) for start, end in outline_of(places, chosen))
+    assert length == pytest.approx(2 * (2.0 + 1.0))
+
+
+def test_the_page_has_every_sentence_and_marks_every_figure(rehearsal):
+    page = render_rehearsal(rehearsal, provenance=provenance(command="", seeds=[0, 1], variants=["full"], seconds=1.0))
+    for sentence in rehearsal.sentences:
+        assert sentence in page.replace("&#39;", "'")
+    titles = re.findall(r'<figure class="panel"><h3>(.*?)</h3>', page)
+    assert len(titles) > 10
+    unmarked = [title for title in titles if "source" not in title]
+    assert unmarked == [f"{height:g} m" for height in HEIGHTS]  # under one title, which is marked
+    assert page.count('class="source fast-layer"') >= 6
+    assert page.count('class="source simulation"') >= 8
+
+
+def test_the_command_writes_page_and_json(rehearsal, tmp_path, monkeypatch):
+    asked = {}
+
+    def remembered(rig, **options):
+        asked.update(options, rig=rig)
+        return rehearsal
+
+    monkeypatch.setattr(simharness.planning.rehearse, "rehearse", remembered)
+    options = "--room 8x8x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets --scenes 2"
+    result = CliRunner().invoke(app, ["rehearse", "corners4", *options.split(), "--out", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert asked["people"] == 6
+    assert asked["subsets"]
+    assert asked["volume"].area == pytest.approx(12.0)
+    assert len(asked["obstacles"]) == 1
+    assert json.loads((tmp_path / "rehearsal.json").read_text())["name"] == "corners"
+    assert "<h1>corners</h1>" in (tmp_path / "rehearsal.html").read_text()
