@@ -54,6 +54,9 @@ class Networks:
     threads: Annotated[int, typer.Option(metavar="N", help="Threads of the networks.", min=1)] = 1
 
 
+_LEFT = "detections that are complete are kept, and another run goes on from there"
+
+
 def add_to(app: typer.Typer) -> None:
     """Add the commands."""
     app.command()(detect)
@@ -68,7 +71,7 @@ def detect(
     networks: Networks,
 ) -> None:
     """Detect people in videos by networks in ONNX files. An interrupted run goes on where it stopped."""
-    with exit_on_error():
+    with exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import open_videos
 
         _check_folder(out)
@@ -80,7 +83,7 @@ def detect(
 @grouped(without=["times", "skeleton", "pictures"])
 def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: Networks, choices: Choices) -> None:
     """Detect people in videos and estimate them in 3D; detections are kept in FOLDER-detections."""
-    with exit_on_error():
+    with exit_on_error(left=_LEFT):
         from mvpose.cli.camera_pictures import assigned, check_sizes, common_rate, open_videos
         from mvpose.formats.calibration.registry import read_calibration
         from mvpose.formats.views.plausibility import UNKNOWN_SIZE

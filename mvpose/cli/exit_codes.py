@@ -21,11 +21,14 @@ _DEBUG = "MVPOSE_TRACEBACK"  # environment variable: print the traceback of a fa
 
 
 @contextlib.contextmanager
-def exit_on_error() -> Iterator[None]:
+def exit_on_error(*, left: str = "nothing was written") -> Iterator[None]:
     """Exit with one line on stderr and an exit code on an error.
 
     A ValueError is bad input; a failure of code that works on input that was found good is a RunError, whose message
     says what failed.
+
+    Args:
+        left: what a failure leaves on disk, for the message.
     """
     try:
         yield
@@ -35,10 +38,10 @@ def exit_on_error() -> Iterator[None]:
         _end(f"error: {one_line(str(error))}", BAD_INPUT)
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        _end(f"failed: {one_line(f'{place}{error.strerror or error}')}; nothing was written", FAILED)
+        _end(f"failed: {one_line(f'{place}{error.strerror or error}')}; {left}", FAILED)
     except Exception as error:
         kind = "" if isinstance(error, RunError) else f"{type(error).__name__}: "
-        _end(f"failed: {one_line(kind + str(error))}; nothing was written", FAILED)
+        _end(f"failed: {one_line(kind + str(error))}; {left}", FAILED)
 
 
 class RunError(RuntimeError):
