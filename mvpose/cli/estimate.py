@@ -55,6 +55,10 @@ class Wanted:
     films: Annotated[
         bool, typer.Option("--films/--no-films", help="Write a film of each camera's pictures with the people in it.")
     ] = True
+    doctor: Annotated[
+        bool,
+        typer.Option("--doctor/--no-doctor", help="Examine the calibration by some frames."),
+    ] = True
     trust: Annotated[
         bool, typer.Option("--trust", help="Write people even if calibration and detections contradict each other.")
     ] = False
@@ -112,6 +116,7 @@ def estimate_into(
     wanted.check()
     from mvpose.cli.camera_pictures import assigned, open_videos
     from mvpose.cli.estimation import estimate_people, estimator
+    from mvpose.cli.examination import examine
 
     if sources is None and wanted.pictures:
         sources = open_videos(wanted.pictures)
@@ -119,6 +124,7 @@ def estimate_into(
     views = None if sources is None else assigned(inputs.rig.cameras, sources)
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     people = estimate_people(inputs, method, trust=wanted.trust)
+    diagnosis = examine(inputs) if wanted.doctor else None
     write_results(
         wanted.out,
         people,
@@ -129,5 +135,6 @@ def estimate_into(
         page=wanted.page,
         views=views,
         films=wanted.films,
+        diagnosis=diagnosis,
     )
     typer.echo(f"{len(people)} people in {people.frames} frames: {wanted.out}")

@@ -16,6 +16,7 @@ from mvpose.formats.writers import Options, check_formats, write_people
 from mvpose.recording import People
 
 if TYPE_CHECKING:
+    from mvpose.calibration.findings import Diagnosis
     from mvpose.formats.pictures import PictureSource
 
 ALWAYS = ("parquet", "json")
@@ -58,6 +59,7 @@ def write_results(
     page: bool = True,
     views: Sequence[PictureSource] | None = None,
     films: bool = True,
+    diagnosis: Diagnosis | None = None,
 ) -> None:
     """Write people in some formats, what they were estimated from, and the page of the recording.
 
@@ -71,6 +73,7 @@ def write_results(
         page: whether to write the page.
         views: pictures of each camera, for the page; None: there are none.
         films: whether the page gets a film of each camera, where there are pictures.
+        diagnosis: what the doctor found, for the page.
 
     Raises:
         OSError: the folder cannot be written; nothing is left of it.
@@ -86,7 +89,7 @@ def write_results(
         }
         (partial / RESULTS).write_text(json.dumps(about) + "\n", encoding="utf-8")
         if page:
-            _write_page(partial, folder.absolute().name, people, inputs, views, films=films)
+            _write_page(partial, folder.absolute().name, people, inputs, views, films=films, diagnosis=diagnosis)
 
 
 def _write_page(
@@ -97,6 +100,7 @@ def _write_page(
     views: Sequence[PictureSource] | None,
     *,
     films: bool,
+    diagnosis: Diagnosis | None,
 ) -> None:
     """Write the page, with pictures and films where there are any."""
     from mvpose.report.recording_page import write_page
@@ -116,6 +120,7 @@ def _write_page(
             people=people,
             rig=inputs.rig,
             frames=inputs.frames,
+            diagnosis=diagnosis,
             pictures=None if views is None else picture,
             moving=moving if count else None,
             progress=advance,
