@@ -56,7 +56,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", nargs="+", choices=EXPERIMENTS, help="experiments; by default all")
     parser.add_argument("--seeds", type=int, metavar="N", help="draws of each case, instead of those of the benchmark")
     parser.add_argument("--workers", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="write tables here: doctor.json, confusion.html")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="write tables here: doctor.json, doctor.md, confusion.html"
+    )
     return parser
 
 

@@ -92,14 +92,17 @@ def measure(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result:
 
 
 def _diagnosed(case: faults.Case, recording: BenchRecording) -> tuple[Diagnosis, Result]:
-    start = time.perf_counter()
+    start, processor = time.perf_counter(), time.process_time()
     diagnosis = diagnose(case.rig, case.frames, period=recording.period)
-    seconds = time.perf_counter() - start
+    seconds, processor = time.perf_counter() - start, time.process_time() - processor
     findings = [
         {"kind": each.kind, "view": each.view, "severity": each.severity, "size": dict(each.size)}
         for each in diagnosis.findings
     ]
-    return diagnosis, {"verdict": diagnosis.verdict, "findings": findings, "view": case.view, "seconds": seconds}
+    return diagnosis, {
+        "verdict": diagnosis.verdict, "findings": findings, "view": case.view, "seconds": seconds,
+        "processor_seconds": processor,
+    }  # fmt: skip
 
 
 def _alarms(result: Result) -> list[tuple[str, int | None]]:
@@ -240,9 +243,9 @@ def _refusals(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
         frames = faults.scattered(recording)
     disturbed = faults.move_all(replace(recording, rig=rig), 1.0, 0.05, key.rng).rig
     fixed = _repair(disturbed, frames, recording)
-    diagnosis = diagnose(disturbed, frames, period=recording.period)
+    _, result = _diagnosed(faults.Case(disturbed, frames), recording)
     unchanged = all(np.allclose(a.R, b.R) and np.allclose(a.t, b.t) for a, b in zip(fixed.rig, disturbed, strict=True))
-    return {"refused": fixed.refused, "unchanged": unchanged, "verdict": diagnosis.verdict}
+    return {**result, "refused": fixed.refused, "unchanged": unchanged}
 
 
 _EXPERIMENTS = {

@@ -63,7 +63,7 @@ def move_one(recording: BenchRecording, view: int, degrees: float, metres: float
 def move_all(recording: BenchRecording, degrees: float, metres: float, rng: np.random.Generator) -> Case:
     """Turn and shift every camera by normal errors of these standard deviations along each axis.
 
-    What all have in common is taken out: a turn or a shift of the whole rig changes no picture, so nobody can mend it.
+    What all have in common is taken out: a turn or a shift of the whole rig changes no picture, so no picture shows it.
     """
     cameras = [
         moved(camera, np.radians(degrees) * rng.standard_normal(3), metres * rng.standard_normal(3))

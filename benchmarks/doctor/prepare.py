@@ -39,7 +39,7 @@ def recordings(shelf: Path | None, *, some: int | None = None) -> Iterator[Bench
     for k in range(min(CLOCKS, some or CLOCKS)):
         seed = _FIRST_SEED + 100 + k
         offsets = np.random.default_rng(seed).uniform(-OFFSET, OFFSET, 5)
-        offsets -= offsets.mean()  # nobody can see the common part
+        offsets -= offsets.mean()  # the common part is in no picture
         for name, each in (("clock", offsets), ("sync", np.zeros(5))):
             yield simulated(f"{name}{k:02d}", seed, 'people.activities=["walk"]', offsets=each)
     for k in range(min(STILL, some or STILL)):
@@ -66,7 +66,7 @@ def simulated(name: str, seed: int, *overrides: str, offsets: Floats | None = No
         name: name of the recording.
         seed: seed.
         *overrides: changed keys of the scenario.
-        offsets: offset of the clock of each camera, (V,), seconds, which the method is not told.
+        offsets: offset of the clock of each camera, (V,), seconds, unknown to the method.
     """
     scenario = load(
         "quickstart",

@@ -32,7 +32,7 @@ class BenchRecording:
         name: name of the recording.
         rig: true calibration; of a real recording, the published one.
         frames: detections, F.
-        truth: joints on SHELF14, (F, P, 14, 3), metres; NaN where nobody knows them.
+        truth: joints on SHELF14, (F, P, 14, 3), metres; NaN where unknown.
         offsets: true time minus given time of each camera's pictures, (V,), seconds.
         period: time between frames, seconds.
     """

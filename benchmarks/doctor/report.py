@@ -15,7 +15,10 @@ import numpy as np
 from mvpose.calibration.findings import KINDS
 
 Results = Mapping[str, Mapping[str, Any]]
-_NOTHING = "nothing"
+_NOTHING, _UNSURE = "nothing", "cannot tell"
+_ONE_MOVED = "one camera 1 degree and 5 cm off"
+_DIAGNOSED = ("clean", "moved", "conventions", "faults", "refusals")
+"""Experiments in which a recording is diagnosed."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Row:
         what: what is measured.
         bar: what is asked for.
         measured: what was measured, as text.
-        met: whether the bar is met; None where it cannot be told.
+        met: whether the bar is met; None without a bar.
         trials: number of trials.
     """
 
@@ -48,29 +51,51 @@ def rows_of(results: Results) -> list[Row]:
         _share("   and no other alarm", by["moved"], "alone", None),
         _share("untouched Shelf and clean rigs: false alarms", by["clean"], "false_alarm", 2.0, most=True),
         *_repaired_rows(by["repaired"]),
-        _share("conventions named", by["conventions"], "named", 98.0),
-        _share("   of the right camera", by["conventions"], "camera", None),
+        *_convention_rows(by["conventions"]),
         _share("other faults named", by["faults"], "named", None),
         *_rigs_rows(by["rigs-off"]),
         *_clock_rows(by["clocks"]),
         _coverage_row(by["coverage"]),
         *_refusal_rows(by["refusals"]),
+        *_time_rows(by),
     ]
     return [row for row in rows if row is not None]
 
 
 def confusion_of(results: Results) -> dict[str, Counter[str]]:
-    """Return for each fault how many recordings have an alarm of each kind; "nothing" counts those without any."""
+    """Return for each fault how many recordings have an alarm of each kind.
+
+    Recordings without any alarm are counted as "nothing", or as "cannot tell" where that is the verdict.
+    """
     matrix: dict[str, Counter[str]] = {}
     for key, result in results.items():
-        experiment, _, case, _ = key.split("/")
-        if experiment not in ("clean", "conventions", "faults"):
+        experiment, recording, case, _ = key.split("/")
+        if experiment not in _DIAGNOSED or "findings" not in result:
             continue
         kinds = {each["kind"] for each in result["findings"] if each["severity"] == "alarm"}
-        row = matrix.setdefault(case or "no fault", Counter())
-        row.update(kinds or {_NOTHING})
+        name = f"{recording}, {_ONE_MOVED}" if experiment == "moved" else case or "no fault"
+        row = matrix.setdefault(name, Counter())
+        row.update(kinds or {_UNSURE if result["verdict"] == _UNSURE else _NOTHING})
         row["recordings"] += 1
     return matrix
+
+
+def misses_of(results: Results) -> list[str]:
+    """Return one line for each trial that is not as it should be, with the alarms that it had."""
+    lines = []
+    for key, result in results.items():
+        experiment = key.split("/")[0]
+        if experiment not in _DIAGNOSED or "findings" not in result:
+            continue
+        right = {
+            "clean": lambda each: not each["false_alarm"],
+            "refusals": lambda each: each["unchanged"] and each["verdict"] == _UNSURE,
+        }.get(experiment, lambda each: each["named"] and each.get("camera", True))
+        if not right(result):
+            alarms = [f"{each['kind']} {each['view']}" for each in result["findings"] if each["severity"] == "alarm"]
+            at_fault = "" if result["view"] is None else f", camera {result['view']}"
+            lines.append(f"{key}{at_fault}: {', '.join(alarms) or result['verdict']}")
+    return lines
 
 
 def print_report(results: Results) -> None:
@@ -87,12 +112,17 @@ def print_report(results: Results) -> None:
 
 
 def write_report(results: Results, folder: Path) -> None:
-    """Write ``doctor.json`` (bars and confusion matrix) and ``confusion.html`` into a folder."""
+    """Write bars, confusion matrix and misses into a folder: ``doctor.json``, ``doctor.md``, ``confusion.html``."""
     folder.mkdir(parents=True, exist_ok=True)
-    matrix = confusion_of(results)
-    summary = {"bars": [asdict(row) for row in rows_of(results)], "confusion": {k: dict(v) for k, v in matrix.items()}}
+    rows, matrix, misses = rows_of(results), confusion_of(results), misses_of(results)
+    summary = {
+        "bars": [asdict(row) for row in rows],
+        "confusion": {fault: dict(counts) for fault, counts in matrix.items()},
+        "misses": misses,
+    }
     (folder / "doctor.json").write_text(json.dumps(summary, indent=1) + "\n")
-    (folder / "confusion.html").write_text(_page(rows_of(results), matrix))
+    (folder / "doctor.md").write_text(_markdown(rows, matrix, misses))
+    (folder / "confusion.html").write_text(_page(rows, matrix))
 
 
 def _share(
@@ -104,6 +134,32 @@ def _share(
     met = None if bar is None else share <= bar if most else share >= bar
     text = "" if bar is None else f"{'<=' if most else '>='} {bar:g} %"
     return Row(what, text, f"{share:.1f} %", met, len(results))
+
+
+def _convention_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
+    rows: list[Row | None] = []
+    for where, inside in (("Shelf", True), ("simulated rigs", False)):
+        some = [each for each in results if (each["recording"] == "shelf") == inside]
+        rows += [
+            _share(f"conventions named, {where}", some, "named", 98.0),
+            _share("   of the right camera", some, "camera", None),
+        ]
+    return rows
+
+
+def _time_rows(by: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[Row | None]:
+    """Return the processor time of a diagnosis; the first one of a process also compiles or loads kernels."""
+    rows: list[Row | None] = []
+    for what, names in (
+        ("a diagnosis, nothing wrong", ("clean",)),
+        ("a diagnosis, a fault", ("moved", "conventions", "faults")),
+        ("a diagnosis, nothing fits", ("refusals",)),
+    ):
+        times = [each["processor_seconds"] for name in names for each in by[name] if "processor_seconds" in each]
+        if times:
+            text = f"median {np.median(times):.1f} s, 95 % {np.percentile(times, 95):.1f} s"
+            rows.append(Row(f"processor time of {what}", "", text, None, len(times)))
+    return rows
 
 
 def _worst(results: Sequence[Mapping[str, Any]], key: str) -> float:
@@ -214,9 +270,32 @@ def _refusal_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
     return rows
 
 
+def _markdown(rows: Sequence[Row], matrix: Mapping[str, Counter[str]], misses: Sequence[str]) -> str:
+    """Return the tables and the misses as Markdown."""
+    marks = {True: "yes", False: "**no**", None: ""}
+    kinds = _kinds(matrix)
+    lines = [
+        "# The doctor", "", "| what | bar | measured | met | trials |", "|---|---|---|---|---|",
+        *(f"| {row.what.strip()} | {row.bar} | {row.measured} | {marks[row.met]} | {row.trials} |" for row in rows),
+        "", "## Faults (rows) and alarms (columns), recordings with an alarm of each kind", "",
+        f"| fault | recordings | {' | '.join(kinds)} |", "|---" * (len(kinds) + 2) + "|",
+        *(
+            f"| {fault} | {counts['recordings']} | {' | '.join(str(counts[kind] or '') for kind in kinds)} |"
+            for fault, counts in matrix.items()
+        ),
+        "", "## Misses", "", *(f"- {each}" for each in misses or ["none"]), "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _kinds(matrix: Mapping[str, Counter[str]]) -> list[str]:
+    """Return the kinds of alarms that occur."""
+    return [kind for kind in (*KINDS, _NOTHING, _UNSURE) if any(kind in counts for counts in matrix.values())]
+
+
 def _page(rows: Sequence[Row], matrix: Mapping[str, Counter[str]]) -> str:
     """Return both tables as a page without scripts; the darker a cell, the more recordings."""
-    kinds = [kind for kind in (*KINDS, _NOTHING) if any(kind in counts for counts in matrix.values())]
+    kinds = _kinds(matrix)
     bars = "".join(
         f"<tr><td>{html.escape(row.what)}<td>{html.escape(row.bar)}<td>{html.escape(row.measured)}"
         f"<td>{ {True: '✓', False: '✗', None: ''}[row.met] }<td>{row.trials}"

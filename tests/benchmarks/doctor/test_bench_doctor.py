@@ -9,7 +9,7 @@ from benchmarks.doctor import faults, runner
 from benchmarks.doctor.experiments import TrialKey, trials, true_corrections
 from benchmarks.doctor.measures import aligned, camera_errors
 from benchmarks.doctor.recordings import BenchRecording, Recordings, write
-from benchmarks.doctor.report import confusion_of, rows_of
+from benchmarks.doctor.report import confusion_of, misses_of, rows_of, write_report
 from benchmarks.method.scenes import ring, stick_people
 from mvpose import Detections, Rig
 from mvpose.calibration.findings import KINDS
@@ -97,23 +97,34 @@ def test_trials_cover_every_fault_and_differ(recording):
     }
 
 
-def test_tables_count_alarms_by_fault():
+def test_tables_count_alarms_by_fault_and_list_what_was_missed(tmp_path):
     alarm = {"kind": "moved-camera", "view": 1, "severity": "alarm"}
     note = {"kind": "clock-offset", "view": 1, "severity": "note"}
+    base = {"view": None, "verdict": "fine"}
+    unsure = {**base, "verdict": "cannot tell", "unchanged": True, "refused": "two cameras"}
     results = {
-        "clean/rig00//0": {"findings": [note], "false_alarm": False},
-        "clean/rig01//0": {"findings": [alarm], "false_alarm": True},
-        "faults/rig00/x/0": {"findings": [alarm, note], "named": True},
+        "clean/rig00//0": {**base, "findings": [note], "false_alarm": False},
+        "clean/rig01//0": {**base, "findings": [alarm], "false_alarm": True},
+        "faults/rig00/x/0": {**base, "findings": [alarm, note], "named": True, "camera": True},
+        "faults/rig01/x/0": {**base, "findings": [alarm], "named": True, "camera": False, "view": 2},
+        "refusals/rig00/two cameras/0": {**unsure, "findings": [note]},
+        "refusals/rig01/two cameras/0": {**unsure, "findings": [alarm], "verdict": "faults"},
     }
     assert confusion_of(results) == {
         "no fault": {"nothing": 1, "moved-camera": 1, "recordings": 2},
-        "x": {"moved-camera": 1, "recordings": 1},
+        "x": {"moved-camera": 2, "recordings": 2},
+        "two cameras": {"cannot tell": 1, "moved-camera": 1, "recordings": 2},
     }
     (row,) = (row for row in rows_of(results) if "false alarms" in row.what)
     assert (row.measured, row.met) == ("50.0 %", False)
+    missed = [line.split(":")[0] for line in misses_of(results)]
+    assert missed == ["clean/rig01//0", "faults/rig01/x/0, camera 2", "refusals/rig01/two cameras/0"]
+    write_report(results, tmp_path)
+    assert all(line in (tmp_path / "doctor.md").read_text() for line in misses_of(results))
+    assert json.loads((tmp_path / "doctor.json").read_text())["misses"] == misses_of(results)
 
 
-def testtrue_corrections_turn_the_believed_rig_into_the_true_one(recording):
+def test_true_corrections_turn_the_believed_rig_into_the_true_one(recording):
     believed = faults.move_all(recording, 1.0, 0.05, np.random.default_rng(2)).rig
     turns, shifts = true_corrections(believed, recording.rig)
     for camera, turn, shift, true in zip(believed, turns, shifts, recording.rig, strict=True):
