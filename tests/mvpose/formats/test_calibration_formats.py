@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pair_of_cameras import RIG
 from scipy.spatial.transform import Rotation
 
 from mvpose import Camera, Rig
@@ -104,19 +105,6 @@ def test_easymocap_round_trip(rig):
             assert_same(easymocap.read_calibration(Path(folder) / name, size=(7, 8)), rig)
 
 
-RIG = Rig(
-    [
-        Camera(
-            K=np.array([[500.0 + k, 0, 320], [0, 510, 240], [0, 0, 1]]),
-            R=Rotation.from_euler("xyz", [-1.6, 0.2 + k, 0.1]).as_matrix(),
-            t=np.array([0.1, 0.2, 4.0 + k]),
-            distortion=np.array([-0.1, 0.02, 0.001, -0.002, 0.0]),
-            size=(640, 480),
-            name=f"c{k}",
-        )
-        for k in range(2)
-    ]
-)
 POINTS = np.random.default_rng(0).uniform(-0.5, 0.5, (20, 3))
 EXPECTED = RIG.project(POINTS)
 

@@ -13,13 +13,12 @@ import numpy as np
 from fakes import made_up
 from made_study import make_study
 from onnx_graphs import Graph
-from scipy.spatial.transform import Rotation
+from pair_of_cameras import RIG
 from test_mocap_asf import AMC, ASF
 from test_mocap_bvh import BVH
 from test_store import make_record
 from test_track_formats import cells, tracks, write_c3d, write_mat, write_trc
 
-from mvpose import Camera, Rig
 from mvpose.formats.calibration import easymocap, opencv, panoptic, pose2sim, voxelpose
 from mvpose.formats.calibration.registry import read_calibration
 from mvpose.formats.detection_files import DetectionFiles
@@ -64,21 +63,6 @@ class ReaderCase:
     file: str
     make: Callable[[Path], object]
     read: Callable[[Path], object]
-
-
-RIG = Rig(
-    [
-        Camera(
-            K=np.array([[500.0 + k, 0, 320], [0, 510, 240], [0, 0, 1]]),
-            R=Rotation.from_euler("xyz", [-1.6, 0.2 + k, 0.1]).as_matrix(),
-            t=np.array([0.1, 0.2, 4.0 + k]),
-            distortion=np.array([-0.1, 0.02, 0.001, -0.002, 0.0]),
-            size=(640, 480),
-            name=f"c{k}",
-        )
-        for k in range(2)
-    ]
-)
 
 
 def calibration(file, write):
