@@ -73,7 +73,7 @@ def blame(
 
 def print_blame(blame: Blame, console: Console) -> None:
     """Print what cost a scenario its score: a row for each cause, and what to mend first."""
-    from simharness.causes.blame_text import conclusion, heading, points
+    from simharness.causes.blame_text import conclusion, heading, points, surest
     from simharness.cli.score_tables import ScoreTable
 
     rows = [(each.about.title, points(each.share), points(each.alone)) for each in blame.shares]
@@ -83,4 +83,4 @@ def print_blame(blame: Blame, console: Console) -> None:
     ScoreTable(title, ("cause",), ("share of the\nloss, points", "gain if mended\nalone, points"), rows).print_to(
         console
     )
-    console.print(conclusion(blame), highlight=False, markup=False)
+    console.print(f"{conclusion(blame)} {surest(blame)}".strip(), highlight=False, markup=False)

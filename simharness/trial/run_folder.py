@@ -33,7 +33,7 @@ A result folder holds, for T frames, V cameras, P people, J joints and n detecti
 `timings.parquet`
     ``variant``, ``frame``, ``stage``, ``seconds``: a separate file, because all files above are the same bytes in two
     runs.
-`film.webp`, `mosaic.png`, `report.html`
+`film.mp4`, `mosaic.png`, `report.html`
     pictures of all cameras, a typical frame with all people drawn into it, and the report.
 `summary.json`
     the headline scores, the duration of each stage of the run, the command.

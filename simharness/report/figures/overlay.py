@@ -7,6 +7,7 @@ width and position, and a translucent skeleton is evenly translucent where its l
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Self
@@ -25,6 +26,40 @@ _FINER = 4  # mask pixels for each pixel of the picture, in each direction
 _SUBPIXEL_BITS = 4  # of cv2's fixed-point coordinates
 _RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
 _USUAL_HEIGHT = 600.0  # picture height in pixels at which widths and sizes apply unscaled
+
+
+_FACE_JOINTS = tuple(range(5))  # nose, eyes, ears of COCO-17
+
+
+@dataclass(frozen=True)
+class BoxTag:
+    """Tag of a box.
+
+    Attributes:
+        text: text of the tag.
+        box: x, y, width, height of the box, pixels.
+        color: colour of the tag.
+    """
+
+    text: str
+    box: tuple[float, ...]
+    color: Color
+
+
+def plain_face(joints: ArrayLike, *, least: float) -> NDArray[np.float64]:
+    """Return a person's joints, (J, 2) pixels that begin with those of COCO-17, with a plain face where it is small.
+
+    The five dots of a face that spans less than ``least`` pixels run into one patch. Of such a face only the joint
+    nearest to the middle stays.
+    """
+    joints = np.array(joints, float)
+    face = joints[: len(_FACE_JOINTS)]
+    known = np.flatnonzero(np.isfinite(face).all(axis=1))
+    if len(known) < 2 or float(np.ptp(face[known], axis=0).max()) >= least:
+        return joints
+    middle = known[np.linalg.norm(face[known] - face[known].mean(axis=0), axis=1).argmin()]
+    face[[joint for joint in known.tolist() if joint != middle]] = np.nan
+    return joints
 
 
 class Overlay:
@@ -94,12 +129,48 @@ class Overlay:
         """Draw text on a coloured patch with its lower left corner at ``at``, moved to lie within the picture."""
         glyphs = text_mask(text, size * self.scale)
         pad_x, pad_y = round(4 * self.scale), round(2 * self.scale)
-        height, width = glyphs.shape[0] + 2 * pad_y, glyphs.shape[1] + 2 * pad_x
-        left = int(np.clip(round(at[0]), 0, max(0, self.rgb.shape[1] - width)))
-        top = int(np.clip(round(at[1]) - height, 0, max(0, self.rgb.shape[0] - height)))
+        height, width = self._tag_size(text, size)
+        top, left = self._tag_place(at, height, width)
         self._paint((top, left, np.ones((height, width), np.float32)), color, 0.9)
         self._paint((top + pad_y, left + pad_x, glyphs), readable_on(color), 1.0)
         return self
+
+    def tags(self, tags: Sequence[BoxTag], *, size: float = 15.0) -> Self:
+        """Draw tags at the corners of their boxes, each at the corner where it hides least of the tags before it.
+
+        Corners are tried in the order: above the upper left, above the upper right, below the lower left, below the
+        lower right, and inside of the upper left. Boxes with NaN have no tag.
+        """
+        taken: list[tuple[int, int, int, int]] = []
+        for tag in sorted(tags, key=lambda tag: tag.box[0]):
+            if not np.isfinite(tag.box).all():
+                continue
+            x, y, w, h = tag.box
+            height, width = self._tag_size(tag.text, size)
+            corners = [
+                (x, y),
+                (x + w - width, y),
+                (x, y + h + height),
+                (x + w - width, y + h + height),
+                (x, y + height),
+            ]
+            places = [self._tag_place(corner, height, width) for corner in corners]
+            rectangles = [(top, left, top + height, left + width) for top, left in places]
+            hidden = [sum(_shared_area(rectangle, other) for other in taken) for rectangle in rectangles]
+            best = int(np.argmin(hidden))  # the first of several that hide nothing
+            taken.append(rectangles[best])
+            self.tag(tag.text, at=corners[best], color=tag.color, size=size)
+        return self
+
+    def _tag_size(self, text: str, size: float) -> tuple[int, int]:
+        """Return height and width of a tag, pixels."""
+        glyphs = text_mask(text, size * self.scale)
+        return glyphs.shape[0] + 2 * round(2 * self.scale), glyphs.shape[1] + 2 * round(4 * self.scale)
+
+    def _tag_place(self, at: tuple[float, float], height: int, width: int) -> tuple[int, int]:
+        """Return top and left of a tag with its lower left corner at a pixel, moved to lie within the picture."""
+        left = int(np.clip(round(at[0]), 0, max(0, self.rgb.shape[1] - width)))
+        return int(np.clip(round(at[1]) - height, 0, max(0, self.rgb.shape[0] - height))), left
 
     def text(self, text: str, *, at: tuple[float, float], size: float = 15.0, color: Color = INK) -> Self:
         """Draw a line of text with its upper left corner at ``at``."""
@@ -154,6 +225,12 @@ class Overlay:
 def _fixed(points: NDArray) -> NDArray[np.int32]:
     """Convert points to cv2's fixed-point coordinates; distant points are clipped to their range."""
     return np.round(np.clip(points, -1e6, 1e6) * 2**_SUBPIXEL_BITS).astype(np.int32)
+
+
+def _shared_area(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> int:
+    """Return the area that two rectangles (top, left, bottom, right) share."""
+    rows, columns = (min(one[k + 2], other[k + 2]) - max(one[k], other[k]) for k in (0, 1))
+    return max(rows, 0) * max(columns, 0)
 
 
 def readable_on(color: Color) -> Color:

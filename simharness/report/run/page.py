@@ -19,7 +19,7 @@ from simharness.report.documents import fill_template
 from simharness.report.figures.blame_section import blame_section
 from simharness.report.run import plots
 from simharness.report.run.figures import draw_figures
-from simharness.report.run.film import Animation
+from simharness.report.run.film import Film
 from simharness.report.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
 from simharness.report.run.pictures import Picture
 from simharness.report.run.standard_figures import person_errors
@@ -37,7 +37,7 @@ def render(
     *,
     pictures: Sequence[Picture] = (),
     things: Sequence[Floats] = (),
-    animation: Animation | None = None,
+    film: Film | None = None,
     found: Blame | None = None,
 ) -> str:
     """Return the page of a run.
@@ -46,7 +46,7 @@ def render(
         record: the run.
         pictures: pictures below the headline scores.
         things: outlines of the clutter from above, each (n, 2) metres.
-        animation: film of the run.
+        film: film of the run.
         found: what cost the score; None where it was not examined.
 
     Returns:
@@ -66,7 +66,8 @@ def render(
         parts=_parts_table(summary["variants"]),
         people=_people_table(record, main),
         pictures=pictures,
-        animation=animation,
+        film=film,
+        poster=film and Picture("", "", film.poster).uri,
         blame=found and blame_section(found),
         blame_hint=f"{_command(record)} --blame 10",
         plots=_plots(record, main, things),

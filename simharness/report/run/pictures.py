@@ -17,7 +17,7 @@ from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.capture.picture import PictureSource
 from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic
-from simharness.report.figures.overlay import Overlay
+from simharness.report.figures.overlay import BoxTag, Overlay, plain_face
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record
 from simharness.trial.stages.build_trial import Trial
@@ -32,6 +32,7 @@ Rgb = NDArray[np.uint8]
 
 MAX_VIEWS = 8  # with the legend, three rows of three tiles
 MAX_NAMED = 6  # people in the legend
+_FACE = 30.0  # pixels of a picture 600 pixels high: dots of the joints of a smaller face would run into one another
 _MAX_WIDTH = 2400  # pixels of a picture on the page
 _JPEG_QUALITY = 88
 
@@ -144,7 +145,7 @@ def draw_frame(
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
     titles = [rig[view].name for view in views]
     if explained:
-        tiles.append(legend(_legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
+        tiles.append(legend(legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
         titles.append("")
     return mosaic(tiles, titles)
 
@@ -186,11 +187,15 @@ def annotate(
             _draw_estimate(overlay, camera, joints, person_color(int(person)))
     if show_truth:
         for pixels in truth.pixels[view]:
-            overlay.skeleton(pixels, color=TRUTH, width=1.3, dots=1.8, outline=0.9)
+            overlay.skeleton(
+                plain_face(pixels, least=_FACE * overlay.scale), color=TRUTH, width=1.3, dots=1.8, outline=0.9
+            )
     if detections is not None:
-        for index in np.flatnonzero(detections.view == view):
-            person = int(assigned[index])
-            _draw_detection(overlay, detections, int(index), assigned=person, true=int(truth.person[index]))
+        tags = [
+            _draw_detection(overlay, detections, index, assigned=int(assigned[index]), true=int(truth.person[index]))
+            for index in np.flatnonzero(detections.view == view).tolist()
+        ]
+        overlay.tags([tag for tag in tags if tag.text])
     return overlay.rgb
 
 
@@ -198,17 +203,20 @@ def _draw_estimate(overlay: Overlay, camera: Camera, joints: NDArray[np.float64]
     overlay.skeleton(project_to_image(camera, joints), color=color, edges=COCO17_BODY, width=7, dots=0, opacity=0.55)
 
 
-def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, assigned: int, true: int) -> None:
-    """Draw box and joints, and a tag with the assigned person, and with the true one where they differ."""
+def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, assigned: int, true: int) -> BoxTag:
+    """Draw box and joints; return the tag with the assigned person, and with the true one where they differ."""
     color = person_color(assigned)
     label = "" if assigned < 0 else f"{assigned}"
     if assigned not in (-1, true):
         label += " (no person)" if true < 0 else f" (is {true})"
-    overlay.box(detections.boxes[index], color=color, label=label)
-    overlay.skeleton(detections.keypoints[index], color=color, edges=(), dots=2.6, outline=0.9)
+    overlay.box(detections.boxes[index], color=color)
+    keypoints = plain_face(detections.keypoints[index], least=_FACE * overlay.scale)
+    overlay.skeleton(keypoints, color=color, edges=(), dots=2.6, outline=0.9)
+    return BoxTag(label, tuple(detections.boxes[index].tolist()), color)
 
 
-def _legend_entries(scenario: Scenario) -> list[tuple[Mark, Color, str]]:
+def legend_entries(scenario: Scenario) -> list[tuple[Mark, Color, str]]:
+    """Return mark, colour and meaning of everything that is drawn into pictures."""
     named: Sequence[tuple[Mark, Color, str]] = [
         ("limbs", person_color(person), f"estimate of person {person} ({role})")
         for person, role in enumerate(roles(scenario)[:MAX_NAMED])

@@ -13,7 +13,7 @@ import polars as pl
 from mvpose.files.atomic_files import atomic_folder
 from simharness.causes.blame import blame
 from simharness.causes.blame_file import write_blame
-from simharness.report.run.film import animate, animated_frames
+from simharness.report.run.film import filmed_frames, make_film
 from simharness.report.run.pictures import draw_pictures, outlines
 from simharness.runtime.progress import Reporter, Silence
 from simharness.runtime.stages import Stages
@@ -65,7 +65,7 @@ def run(
         scenario,
         until="score",
         workers=workers,
-        previews=animated_frames(scenario.frames) if shown else (),
+        previews=filmed_frames(scenario.frames) if shown else (),
         compile_ahead=True,
         reporter=reporter,
     )
@@ -78,8 +78,10 @@ def run(
         assert result.simulation is not None
         trial, previews = result.simulation.trial, result.simulation.views.previews
         pictures = [] if scenario.rendering.renderer == "rays" else draw_pictures(trial, record, progress=advance)
-        animation = animate(previews, record) if previews else None
-        page = render(record, pictures=pictures, things=outlines(trial.scene), animation=animation, found=found)
+        main = next(iter(record.estimates))
+        film = make_film(previews, record, trial.exposures, variant=main) if previews else None
+        shown_pictures = pictures[1:] if film else pictures  # the film shows typical frames already
+        page = render(record, pictures=shown_pictures, things=outlines(trial.scene), film=film, found=found)
         advance(1)
     folder = out / f"{scenario.name}-{fingerprint(scenario)}"
     with stages.stage("write", 1), atomic_folder(folder) as partial:
@@ -89,8 +91,8 @@ def run(
             write_blame(found, partial)
         if pictures:
             (partial / "mosaic.png").write_bytes(pictures[0].png())
-        if animation:
-            (partial / "film.webp").write_bytes(animation.webp)
+        if film:
+            (partial / "film.mp4").write_bytes(film.mp4)
     return folder
 
 

@@ -7,7 +7,7 @@ from mvpose.report.limbs import COCO17_LIMBS
 from mvpose.report.palette import INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color
 from mvpose.skeleton import COCO17
 from simharness.report.figures.mosaic import legend, mosaic
-from simharness.report.figures.overlay import Overlay, readable_on, text_mask
+from simharness.report.figures.overlay import BoxTag, Overlay, plain_face, readable_on, text_mask
 
 BLACK = np.zeros((600, 800, 3), np.uint8)
 WHITE = (255, 255, 255)
@@ -189,3 +189,37 @@ def test_a_legend_fits_its_picture(size):
     assert (border == np.array(PAPER)).all()
     assert (picture == np.array(person_color(1))).all(-1).sum() == 0  # translucent: mixed with the paper
     assert (np.abs(picture.astype(int) - UNMATCHED).max(-1) < 8).any()
+
+
+def patches(rgb, colors):
+    """Return which pixels have each colour."""
+    return [np.abs(rgb.astype(int) - color).max(axis=-1) < 30 for color in colors]
+
+
+def test_tags_of_people_who_stand_side_by_side_do_not_hide_each_other():
+    colors = [(250, 0, 0), (0, 250, 0), (0, 0, 250)]
+    boxes = [(300.0 + 4 * k, 200.0, 90.0, 250.0) for k in range(3)]
+    alone = [patches(Overlay(BLACK).tags([BoxTag("7", boxes[0], color)]).rgb, [color])[0].sum() for color in colors]
+    tags = [BoxTag("7", box, color) for box, color in zip(boxes, colors, strict=True)]
+    together = [patch.sum() for patch in patches(Overlay(BLACK).tags(tags).rgb, colors)]
+    assert together == alone
+    drawn_over = Overlay(BLACK)
+    for tag in tags:
+        drawn_over.tag(tag.text, at=tag.box[:2], color=tag.color)
+    assert patches(drawn_over.rgb, colors)[0].sum() < alone[0]  # as they were before
+
+
+def test_tags_stay_within_the_picture():
+    corner = Overlay(BLACK).tags([BoxTag("person 12", (760.0, -5.0, 80.0, 700.0), (250, 0, 0))]).rgb
+    inside = Overlay(BLACK).tags([BoxTag("person 12", (300.0, 200.0, 80.0, 300.0), (250, 0, 0))]).rgb
+    assert patches(corner, [(250, 0, 0)])[0].sum() == patches(inside, [(250, 0, 0)])[0].sum()
+    assert not Overlay(BLACK).tags([BoxTag("1", (np.nan,) * 4, (250, 0, 0))]).rgb.any()
+
+
+def test_a_small_face_has_one_dot_and_a_large_one_all():
+    joints = np.full((17, 2), 300.0)
+    joints[:5] = [(100, 100), (103, 97), (97, 97), (108, 99), (92, 99)]
+    assert np.isfinite(plain_face(joints, least=30)).all(axis=1)[:5].tolist() == [True, False, False, False, False]
+    assert np.isfinite(plain_face(joints, least=16)).all()
+    np.testing.assert_array_equal(plain_face(joints, least=30)[5:], joints[5:])
+    assert np.isfinite(joints).all()  # the given joints stay

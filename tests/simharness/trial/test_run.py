@@ -23,7 +23,7 @@ from simharness.trial.stages import simulation
 from simharness.trial.stages.build_trial import build_trial
 
 SAME_BYTES = ("detections.npz", "truth.npz", "estimates.npz", "scores.parquet", "rig.npz", "scenario.toml")
-FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.webp", "report.html"}
+FILES = {*SAME_BYTES, "timings.parquet", "summary.json", "mosaic.png", "film.mp4", "report.html"}
 
 
 def tiny(**sections) -> Scenario:
@@ -195,5 +195,5 @@ class TestScoring:
 
 def test_without_colour_there_is_no_film_and_the_same_detections(tmp_path, done):
     folder = run(tiny(rendering=Rendering(color=False)), out=tmp_path)
-    assert {path.name for path in folder.iterdir()} == FILES - {"film.webp"}
+    assert {path.name for path in folder.iterdir()} == FILES - {"film.mp4"}
     assert (folder / "detections.npz").read_bytes() == (done / "detections.npz").read_bytes()
