@@ -155,7 +155,7 @@ def predicted_pcp(
     detector: str,
     annotation: AnnotationModel | None = None,
     seed: int = 0,
-    repeats: int = 32,
+    repeats: int = 96,
 ) -> dict[Subset, float]:
     """Return the PCP of ``full`` that the fast layer predicts for every subset, mean over actors.
 
@@ -173,7 +173,9 @@ def predicted_pcp(
     if annotation is not None:
         shown = scenes.joints.copy()  # annotated heads are fitted to the detected face, as in twins
         shown[:, :, _FACE] += world_offsets(shown, layer.detector.bias)[:, :, _FACE]
-        truth = annotation.annotate(shown, 10.0 * np.arange(len(scenes)), seed=seed)  # errors last less than 10 s
+        truth = annotation.annotate(
+            shown, np.arange(0.0, 10.0 * len(scenes), 10.0), seed=seed
+        )  # errors last less than 10 s
     scored = people.scored[scenes.frame] & scenes.present
     for views in camera_subsets(len(people.cameras)):
         made = layer.reconstruct([terms[view] for view in views], variant="full")

@@ -1,7 +1,9 @@
 """Planning of a rig before its cameras hang: what a set of cameras will make of the people in a volume."""
 
-from simharness.planning.layer import CameraTerms, FastLayer, Reconstruction
+from simharness.planning.camera_terms import CameraTerms
+from simharness.planning.layer import FastLayer
 from simharness.planning.prediction import Figure, Prediction
+from simharness.planning.reconstruction import Reconstruction
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 

@@ -10,78 +10,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from mvpose import COCO17, Detections, Pipeline, Rig
-from mvpose.arrays import Bools, Floats
+from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from mvpose.rays import Rays, viewing_rays
-from mvpose.reconstruction import Triangulation
 from mvpose.skeleton import coco17_to_shelf14
-from simharness.detector.conditions import oks_units
-from simharness.detector.detection_block import DetectionBlock
-from simharness.pairing.pairing import LIMIT, pair
-from simharness.planning.joint_error import covariance, information
+from simharness.detector.conditions import VISIBLE, oks_units
+from simharness.planning.camera_terms import CameraTerms
+from simharness.planning.joint_error import covariance
 from simharness.planning.prediction import Prediction
+from simharness.planning.reconstruction import Reconstruction, reconstruct
 from simharness.planning.sightings import detect_in
 from simharness.planning.standing_people import ACTIVITIES, StandingScenes, pose_pool, standing_scenes
 from simharness.planning.visibility import Obstacle, see, seen_joints
 from simharness.planning.volume import Volume
 from simharness.scenario.sections.detector import Detector
-from simharness.scoring.pcp import Part, nearest, part_states
+from simharness.scoring.pcp import Part, part_states
 
-_TRUNK = (5, 6, 11, 12)  # shoulders and hips
-_SCENES_AT_ONCE = 64  # whose people are triangulated in one call
-
-
-@dataclass(frozen=True)
-class CameraTerms:
-    """What one camera contributes in all S scenes of Q people.
-
-    Attributes:
-        camera: the camera.
-        scenes: the scenes.
-        seen: which joints it sees, whether or not the detector reports them, (S, Q, 17).
-        block: what the detector reports, (S, 1, slots); person q in slot q.
-        deviation: standard deviation of good keypoints, pixels, (S, Q, 17).
-        whole: probability that it sees a person at each place whole, (P,): all limb joints inside the picture and
-            none hidden by others or by objects.
-    """
-
-    camera: Camera
-    scenes: StandingScenes = field(repr=False)
-    seen: Bools = field(repr=False)
-    block: DetectionBlock = field(repr=False)
-    deviation: Floats = field(repr=False)
-
-    @cached_property
-    def sees_whole(self) -> Bools:
-        """Whom the camera sees whole, (S, Q)."""
-        return np.asarray(self.seen[:, :, _LIMBS].all(axis=-1))
-
-    @cached_property
-    def whole(self) -> Floats:
-        """Probability that the camera sees a person at each place whole, (P,); see the class."""
-        return self.scenes.mean_by_place(self.sees_whole.astype(float))
-
-    @cached_property
-    def reported(self) -> Bools:
-        """Which joints of which people the detector reports, (S, Q, 17)."""
-        people = self.scenes.people
-        return self.block.present[:, 0, :people, None] & (self.block.scores[:, 0, :people] > 0)
-
-    @cached_property
-    def information(self) -> Floats:
-        """Information of the reported joints of the trunk, (S, Q, 4, 3, 3), 1/m²; zeros where not reported."""
-        joints = self.scenes.joints[:, :, _TRUNK]
-        deviation = np.where(self.reported, self.deviation, np.nan)[:, :, _TRUNK]
-        return information(self.camera, joints, deviation)
-
-
-_LIMBS = np.arange(5, 17)  # shoulders to ankles
+_LEAST_DEVIATION = 0.5  # pixels: no keypoint is more exact than the grid from which it is read
 
 
 @dataclass(frozen=True)
@@ -164,8 +111,8 @@ class FastLayer:
         seen = seen_joints(views)
         keypoints = self.detector.keypoints
         usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
-        deviation = usual * np.where(views.visibility[:, 0] == 0, 1.0, keypoints.scatter_hidden)
-        return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, 0.5))
+        deviation = usual * np.where(views.visibility[:, 0] == VISIBLE, 1.0, keypoints.scatter_hidden)
+        return CameraTerms(camera, self.scenes, seen, block, np.maximum(deviation, _LEAST_DEVIATION))
 
     def predict(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Prediction:
         """Return what a set of cameras makes of the people.
@@ -177,31 +124,14 @@ class FastLayer:
                 too good where people are mistaken for each other: few cameras, many people).
 
         Raises:
-            ValueError: fewer than two cameras, cameras that all stand in one point, or an unknown variant.
+            ValueError: fewer than two cameras, cameras that all stand in one point, terms of another layer, or an
+                unknown variant.
         """
-        return _prediction(self.scenes, terms, self.reconstruct(terms, variant=variant))
+        return _prediction(self.scenes, terms, reconstruct(terms, variant=variant))
 
     def reconstruct(self, terms: Sequence[CameraTerms], *, variant: str = "") -> Reconstruction:
         """Return what the method makes of everyone in every scene; arguments as of :meth:`predict`."""
-        rig = Rig([each.camera for each in terms])
-        return _by_variant(rig, terms, self.scenes, variant) if variant else _by_truth(rig, terms)
-
-
-@dataclass(frozen=True)
-class Reconstruction:
-    """Estimates of everyone in S scenes of Q people.
-
-    Attributes:
-        nearest: joints of the estimate nearest to everyone, by which PCP is scored, (S, Q, 17, 3), metres; NaN where
-            missing.
-        paired: joints of the estimate paired one to one with everyone, (S, Q, 17, 3), metres; NaN where missing.
-        mixed: who is matched with a detection of somebody else, or twice, (S, Q), 0 or 1; NaN where matching was not
-            tried.
-    """
-
-    nearest: Floats
-    paired: Floats
-    mixed: Floats
+        return reconstruct(terms, variant=variant)
 
 
 def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: Reconstruction) -> Prediction:
@@ -232,91 +162,3 @@ def _prediction(scenes: StandingScenes, terms: Sequence[CameraTerms], made: Reco
         person_pcp=np.where(scenes.present, pcp, np.nan),
         person_error_mm=np.where(scenes.present, error, np.nan),
     )
-
-
-def _by_truth(rig: Rig, terms: Sequence[CameraTerms]) -> Reconstruction:
-    """Return estimates by robust triangulation of each person's own detections."""
-    scenes = terms[0].scenes
-    count, people = len(scenes), scenes.people
-    rows = count * people
-    method, parts = Triangulation(), []
-    rays = [_rays_of_people(rig, view, each) for view, each in enumerate(terms)]
-    here = [each.block.present[:, 0, :people] for each in terms]
-    for start in range(0, count, _SCENES_AT_ONCE):
-        chosen = slice(start, min(start + _SCENES_AT_ONCE, count))
-        many = (chosen.stop - start) * people
-        labels = [np.where(each[chosen].ravel(), np.arange(many), -1) for each in here]
-        own = slice(start * people, chosen.stop * people)
-        together = _joined([each.select(np.arange(rows)[own]) for each in rays])
-        poses = method(together, np.concatenate(labels), COCO17)
-        joints = np.full((many, 17, 3), np.nan)
-        joints[: len(poses.joints)] = poses.joints
-        parts.append(joints)
-    everyone = np.concatenate(parts).reshape(count, people, 17, 3)
-    return Reconstruction(everyone, everyone, np.full((count, people), np.nan))
-
-
-_RAY_FIELDS = ("view", "origins", "directions", "weights", "pixel")
-
-
-def _rays_of_people(rig: Rig, view: int, terms: CameraTerms) -> Rays:
-    """Return the rays of all people of all scenes in one camera, S Q rows."""
-    people, block = terms.scenes.people, terms.block
-    rows = len(terms.scenes) * people
-    keypoints = block.keypoints[:, 0, :people].reshape(rows, 17, 2)
-    scores = block.scores[:, 0, :people].reshape(rows, 17)
-    parts = []
-    for start in range(0, rows, _MOST_ROWS):
-        chosen = slice(start, start + _MOST_ROWS)
-        size = len(scores[chosen])
-        detections = Detections(
-            np.full(size, view), keypoints[chosen], scores[chosen], np.ones((size, 4)), np.ones(size), COCO17
-        )
-        parts.append(viewing_rays(rig, detections))
-    return _joined(parts)
-
-
-def _joined(parts: Sequence[Rays]) -> Rays:
-    """Return the rays of all parts as one."""
-    fields: dict[str, Any] = {key: np.concatenate([getattr(each, key) for each in parts]) for key in _RAY_FIELDS}
-    return Rays(**fields)
-
-
-_MOST_ROWS = 256
-
-
-def _by_variant(rig: Rig, terms: Sequence[CameraTerms], scenes: StandingScenes, variant: str) -> Reconstruction:
-    """Return the estimates of a variant of the method."""
-    pipeline = Pipeline.preset(variant)
-    shape = (len(scenes), scenes.people)
-    close, paired = np.full((*shape, 17, 3), np.nan), np.full((*shape, 17, 3), np.nan)
-    mixed = np.zeros(shape)
-    for s in range(len(scenes)):
-        detections, person = _detections(terms, s)
-        estimate = pipeline.estimate(rig, detections)
-        truth = np.where(scenes.present[s][:, None, None], scenes.joints[s], np.nan)
-        if len(estimate.joints):
-            partner = nearest(coco17_to_shelf14(truth), coco17_to_shelf14(estimate.joints))
-            close[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
-            partner = pair(truth, estimate.joints, limit=LIMIT).estimate
-            paired[s] = np.where((partner >= 0)[:, None, None], estimate.joints[partner], np.nan)
-        labels = estimate.matching.labels_of(len(detections))
-        for q in range(scenes.people):
-            own = np.unique(labels[(person == q) & (labels >= 0)])
-            mixed[s, q] = len(own) > 1 or (person[np.isin(labels, own)] != q).any()
-    return Reconstruction(close, paired, mixed)
-
-
-def _detections(terms: Sequence[CameraTerms], scene: int) -> tuple[Detections, np.ndarray]:
-    """Return the detections of one scene in all cameras, ordered as detectors report them, and whom each shows."""
-    columns: dict[str, list[np.ndarray]] = {key: [] for key in ("keypoints", "scores", "boxes", "box_scores", "person")}
-    view = []
-    for v, each in enumerate(terms):
-        block = each.block
-        slots = np.flatnonzero(block.present[scene, 0])
-        slots = slots[np.argsort(-block.box_scores[scene, 0, slots], kind="stable")]
-        for key, values in columns.items():
-            values.append(getattr(block, key)[scene, 0, slots])
-        view.append(np.full(len(slots), v))
-    keypoints, scores, boxes, box_scores, person = (np.concatenate(each) for each in columns.values())
-    return Detections(np.concatenate(view), keypoints, scores, boxes, box_scores, COCO17), person

@@ -35,8 +35,8 @@ class Prediction:
         error_mm: expected error of the joints of people who are found, millimetres, (P,).
         views: mean number of cameras that see a person whole, (P,).
         ellipse: covariance of a joint of the trunk on the floor, (P, 2, 2), square metres.
-        risk: probability of a wrong match, (P,): a detection of somebody else is matched to a person, or the person's own
-            to two people; NaN where matching was not tried.
+        risk: probability of a wrong match, (P,): a person is matched with a detection of somebody else, or is two people
+            in the end; NaN where matching was not tried.
         person_pcp: percentage of correct parts of everyone in every scene, (S, Q); NaN for absent people.
         person_error_mm: mean error of the joints of everyone, (S, Q), millimetres; NaN for people not found.
     """
@@ -66,7 +66,7 @@ class Prediction:
 
 _FIRST_MOMENTS, _MOMENT = 1.0, 1.0
 """Independent moments of a short recording, and seconds until the next one. Fitted on 32 simulated recordings of 8 s,
-seeds 1000 to 1017 and 1300 to 1313 of ``benchmarks.planning.simulated_rigs``: the narrowest intervals that hold 90 %."""
+seeds 1000 to 1017 and 1300 to 1313 of ``benchmarks.planning.simulated_rigs``, of which the intervals then hold 90 %."""
 
 _RESAMPLES = 2000
 
