@@ -35,7 +35,7 @@ class Prediction:
         error_mm: expected error of the joints of people who are found, millimetres, (P,).
         views: mean number of cameras that see a person whole, (P,).
         ellipse: covariance of a joint of the trunk on the floor, (P, 2, 2), square metres.
-        risk: probability of a wrong match, (P,): a person is matched with a detection of somebody else, or is two people
+        risk: probability of a wrong match, (P,): a person has a detection of somebody else, or is two people
             in the end; NaN where matching was not tried.
         person_pcp: percentage of correct parts of everyone in every scene, (S, Q); NaN for absent people.
         person_error_mm: mean error of the joints of everyone, (S, Q), millimetres; NaN for people not found.
