@@ -95,8 +95,8 @@ def test_a_changed_score_is_computed_without_simulation(run, stages, code, monke
     assert calls(stages)["capture_trial"] == 3
     assert (before.info["kept"], before.info["run"]) == (0, 3)
 
-    def halved(recording, estimates):
-        result = assess(recording, estimates)
+    def halved(*arguments, **options):
+        result = assess(*arguments, **options)
         return replace(result, scores={**result.scores, "pcp": result.scores["pcp"] / 2})
 
     assess = assessment.assess

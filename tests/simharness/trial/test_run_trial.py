@@ -99,7 +99,7 @@ def test_people_that_do_not_fit_are_a_value_error():
 
 
 def test_an_error_of_a_later_stage_is_a_run_error_with_the_stage_in_front(monkeypatch):
-    def broken(*_args):
+    def broken(*_args, **_options):
         raise ValueError("wrong turn")
 
     monkeypatch.setattr(module, "assess", broken)
