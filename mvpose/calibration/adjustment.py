@@ -46,7 +46,6 @@ class Adjustment:
         rig: adjusted cameras.
         parameters: changes of the believed cameras, (V, 11); see :mod:`mvpose.calibration.normal_equations`.
         covariance: of the parameters, (11 V, 11 V); 0 for those that were held.
-        information: of the data alone, per independent sighting, (11 V, 11 V).
         joints: the sightings used.
         rows: row of each of them in the sightings that were given, (k,).
         equations: normal equations at the solution.
@@ -56,7 +55,6 @@ class Adjustment:
     rig: Rig
     parameters: Floats
     covariance: Floats
-    information: Floats
     joints: JointViews
     rows: Integers
     equations: NormalEquations
@@ -118,7 +116,7 @@ def adjust(
     variances = np.diag(_covariance(information, weights, loose)).reshape(shape)
     covariance = _covariance(information, weights.widened(variances, free), loose)
     adjusted = Rig([changed(camera, each) for camera, each in zip(rig, parameters, strict=True)])
-    return Adjustment(adjusted, parameters, covariance, information, joints, rows, equations, converged)
+    return Adjustment(adjusted, parameters, covariance, joints, rows, equations, converged)
 
 
 def shared_joints(sightings: Sightings) -> tuple[JointViews, Integers]:
