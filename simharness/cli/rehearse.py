@@ -60,6 +60,14 @@ def rehearse(
             help="A box that hides people: its middle on the floor, width along x, depth along y, height. Repeatable.",
         ),
     ] = None,
+    clutter: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=N",
+            help="Objects that the simulator places around the people, in the simulation alone: [cyan]boxes=6[/], "
+            "[cyan]shelves=1[/] and other kinds of a scenario. Repeatable.",
+        ),
+    ] = None,
     target: Annotated[
         str, typer.Option(metavar="PCP,MM", help="What a place must reach: PCP and joint error.")
     ] = "95,40",
@@ -91,6 +99,7 @@ def rehearse(
     with exit_on_error():
         start = perf_counter()
         from simharness.cli.rehearse_values import (
+            clutter_of,
             obstacle_of,
             picture_size,
             room_of,
@@ -108,7 +117,7 @@ def rehearse(
         where: Volume | None = volume_of(volume) if volume else None
         walls: Volume | None = room_of(room) if room else None
         boxes: list[Obstacle] = [obstacle_of(each) for each in obstacle or ()]
-        wanted = target_of(target)
+        wanted, objects = target_of(target), clutter_of(clutter or ())
         rig = read_rig(
             calibration,
             size=picture_size(size) if size else None,
@@ -126,6 +135,7 @@ def rehearse(
                 people=people,
                 room=walls,
                 obstacles=boxes,
+                clutter=objects,
                 target=wanted,
                 subsets=subsets,
                 seed=seed,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from simharness.planning.rehearsal import Target
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
+from simharness.scenario.sections.room import Clutter
 
 _ROOM_HEIGHT = 3.0  # metres, unless another is given
 
@@ -67,6 +69,22 @@ def obstacle_of(text: str) -> Obstacle:
     if min(width, depth, height) <= 0:
         raise ValueError(f"--obstacle {text}: expected width, depth and height above 0 m")
     return Obstacle(np.array([x, y, height / 2]), np.array([width, depth, height]))
+
+
+def clutter_of(texts: Sequence[str]) -> Clutter:
+    """Return the numbers of objects: "boxes=6", "shelves=1".
+
+    Raises:
+        ValueError: not of this form, or no such kind of objects.
+    """
+    kinds = [name for name in Clutter.model_fields if name != "coverage"]
+    numbers = {}
+    for text in texts:
+        kind, _, number = text.partition("=")
+        if kind not in kinds or not number.isdecimal():
+            raise ValueError(f"--clutter {text}: expected a kind and a number, boxes=6; kinds are {', '.join(kinds)}")
+        numbers[kind] = int(number)
+    return Clutter(**numbers)
 
 
 def target_of(text: str) -> Target:

@@ -117,7 +117,7 @@ class SceneSettings:
         volume: where people are.
         people: number of people in the volume.
         detector: profile of the detector.
-        clutter: objects that the simulator places around the people.
+        clutter: objects that the simulator places around the people, who then use the square around the volume.
         obstacles: boxes at known places of the world.
         activities: activities of the people, in turn.
         frames: frames of a take; a scene has four takes, or one with clutter.
@@ -226,13 +226,16 @@ class _Scenes:
 def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) -> SceneResult | str:
     """Simulate one scene and score it under all conditions; return the reason where it cannot be built."""
     frame = SceneFrame.around(settings.volume.outline)
+    takes = _TAKES
+    if _has_objects(settings.clutter):  # it stands where the people of the scene are not, so they cannot be moved
+        takes, settings = 1, replace(settings, frames=_TAKES * settings.frames)
+        frame = replace(frame, half=np.full(2, frame.half.max()))
     rig = frame.rig(settings.rig)
     scenario = _scenario(settings, frame, seed)
     try:
         built = _build(scenario, rig)
     except ValueError as error:
         return str(error)
-    takes = 1 if _has_objects(settings.clutter) else _TAKES
     parts = [
         _take(settings, frame, _in_volume(built, settings, frame, take), conditions, seed * _TAKES + take)
         for take in range(takes)
@@ -409,7 +412,7 @@ def _moved(root: Floats, turn: Rotation, stretch: Floats) -> Floats:
 
 
 def _has_objects(clutter: Clutter) -> bool:
-    """Return whether there are objects, which stand where the people of the scene are not."""
+    """Return whether there are objects."""
     return any(clutter.model_dump().values())
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from headless_browser import find_browser, run_browser
 from typer.testing import CliRunner
 
 import simharness.planning.rehearse
@@ -114,3 +115,36 @@ def test_the_command_writes_page_and_json(rehearsal, tmp_path, monkeypatch):
     assert len(asked["obstacles"]) == 1
     assert json.loads((tmp_path / "rehearsal.json").read_text())["name"] == "corners"
     assert "<h1>corners</h1>" in (tmp_path / "rehearsal.html").read_text()
+
+
+PROBE = """<script>
+addEventListener("load", () => {
+  const main = [...document.querySelectorAll("main *")];
+  const wide = main.filter((each) => !each.closest("svg") && !each.closest(".scroll")
+    && each.getBoundingClientRect().right > innerWidth + 1);
+  const canvas = document.querySelector(".rig-3d canvas"), first = canvas.toDataURL();
+  canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
+  const turns = canvas.toDataURL() !== first;
+  canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+  parent.postMessage(JSON.stringify({ wide: wide.map((each) => each.className), turns,
+    turnsBack: canvas.toDataURL() === first, width: innerWidth }), "*");
+});
+</script>"""
+FRAME = """<!doctype html><html><script>
+addEventListener("message", (event) => { document.documentElement.dataset.probed = event.data; });
+</script><iframe src="page.html" style="border: 0; width: WIDTHpx; height: 900px"></iframe></html>"""
+
+
+@pytest.mark.parametrize(("width", "dark"), [(400, False), (1280, True)])
+def test_the_page_fits_the_screen_and_its_rig_turns(rehearsal, tmp_path, width, dark):
+    made = provenance(command="simharness rehearse corners4", seeds=[0, 1], variants=["full"], seconds=1.0)
+    page = render_rehearsal(rehearsal, provenance=made).replace("<head>", "<head>" + PROBE, 1)
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    (tmp_path / "frame.html").write_text(FRAME.replace("WIDTH", str(width)), encoding="utf-8")
+    options = ["--window-size=1400,1000", f"--blink-settings=preferredColorScheme={0 if dark else 1}"]
+    more = ["--virtual-time-budget=5000", "--dump-dom", (tmp_path / "frame.html").as_uri()]
+    output, log = run_browser(find_browser(), tmp_path, *options, *more)
+    found = re.search(r'data-probed="([^"]*)"', output)
+    assert found, log
+    probed = json.loads(found.group(1).replace("&quot;", '"'))
+    assert probed == {"wide": [], "turns": True, "turnsBack": True, "width": width}

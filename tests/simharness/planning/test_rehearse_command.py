@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from mvpose import Rig
 from simharness.cli import app
-from simharness.cli.rehearse_values import obstacle_of, room_of, target_of, volume_of
+from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, target_of, volume_of
 from simharness.planning.rehearse import rehearse
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
@@ -37,6 +37,7 @@ def test_nothing_visible_is_one_message():
         (volume_of, "axb", "expected 2 numbers"),
         (room_of, "8", "expected 2 or 3 numbers"),
         (obstacle_of, "1,2,3", "expected 5 numbers"),
+        (lambda text: clutter_of([text]), "chair=2", "kinds are boxes, shelves"),
         (target_of, "101,40", "at most 100"),
     ],
 )
@@ -49,6 +50,7 @@ def test_options_that_can():
     assert np.allclose(volume_of("4x2@1,0.5").outline.mean(axis=0), [1.0, 0.5])
     assert volume_of("0,0 4,0 4,3 0,0").area == pytest.approx(6.0)
     assert room_of("8x6").height == 3.0
+    assert clutter_of(["boxes=3", "chairs=1"]).boxes == 3
     assert np.allclose(obstacle_of("1,2,0.5,0.4,1.8").center, [1.0, 2.0, 0.9])
 
 
