@@ -46,7 +46,7 @@ def mosaic(
         )
     height, width = max(picture.shape[0] for picture in images), max(picture.shape[1] for picture in images)
     gap = max(2, height // 60) if gap is None else gap
-    columns = math.ceil(math.sqrt(len(images))) if columns is None else columns
+    columns = _columns(len(images)) if columns is None else columns
     rows = math.ceil(len(images) / columns)
     scale = height / 600
     band = text_mask("", _TITLE * scale).shape[0] + round(8 * scale)
@@ -61,6 +61,16 @@ def mosaic(
         paper.rgb[down : down + fitted.shape[0], right : right + fitted.shape[1]] = fitted
         paper.text(title, at=(left + 2 * scale, top), size=_TITLE)
     return paper.rgb
+
+
+def rooms_in_grid(count: int) -> int:
+    """Return the number of tiles, empty ones included, of a mosaic of ``count`` pictures: 6 of 5."""
+    columns = _columns(count)
+    return columns * math.ceil(count / columns)
+
+
+def _columns(count: int) -> int:
+    return math.ceil(math.sqrt(count))
 
 
 def _fitted(picture: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:

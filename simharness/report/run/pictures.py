@@ -16,7 +16,7 @@ from mvpose.report.limbs import COCO17_BODY
 from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.capture.picture import PictureSource
 from simharness.pairing.pairing import LIMIT, pair
-from simharness.report.figures.mosaic import Mark, legend, mosaic
+from simharness.report.figures.mosaic import Mark, legend, mosaic, rooms_in_grid
 from simharness.report.figures.overlay import BoxTag, Overlay, plain_face
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record
@@ -123,7 +123,7 @@ def draw_frame(
     truth: Truth,
     detections: Detections,
     estimate: Estimate,
-    explained: bool = True,
+    explained: bool | None = True,
 ) -> Rgb:
     """Draw up to ``MAX_VIEWS`` views of a frame as a mosaic, with :func:`annotate`.
 
@@ -134,7 +134,7 @@ def draw_frame(
         truth: truth of the frame.
         detections: detections of the frame.
         estimate: estimate of the frame.
-        explained: add a legend as the last tile.
+        explained: whether a legend is the last tile; None: where the last row of tiles has room for it.
     """
     rig = trial.exposures.believed_rig
     views = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_VIEWS)).astype(int))
@@ -144,7 +144,7 @@ def draw_frame(
         camera = trial.exposures.camera(frame, view)
         tiles.append(annotate(rgb, camera, view, truth=truth, detections=detections, estimate=estimate))
     titles = [rig[view].name for view in views]
-    if explained:
+    if explained or (explained is None and rooms_in_grid(len(tiles)) > len(tiles)):
         tiles.append(legend(legend_entries(trial.scenario), size=rig[0].size, title="Legend"))
         titles.append("")
     return mosaic(tiles, titles)

@@ -12,9 +12,11 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike
 
+from mvpose import Camera
 from mvpose.arrays import Floats
 from mvpose.report.limbs import COCO17_LIMBS
 from mvpose.report.palette import css, person_color
+from simharness.report.study.body_parts import CAPSULES, HEAD, NECK, TRUNK, body_parts
 from simharness.report.study.replay import Replay
 from simharness.report.study.room_view import RoomView, camera_pyramid
 
@@ -24,10 +26,9 @@ MAX_FRAMES = 60
 _YAW, _PITCH = math.radians(-58), math.radians(24)  # first viewing direction
 _MIDDLE = 0.45  # share of the height at which the middle of the people is: nearer people need more room
 _DISTANCE = 3.0  # from the eye to the middle of the people, in radii
-_LIMB = 55.0  # millimetres, width of an estimated limb
 _BOX_EDGES = ((0, 1), (0, 2), (0, 4), (3, 1), (3, 2), (3, 7), (5, 1), (5, 4), (5, 7), (6, 2), (6, 4), (6, 7))
 _STILL_SIZE = (640, 400)  # of the still drawing
-_STILL_LIMB = 5.0  # width of an estimated limb in the still drawing
+_RIM = 0.72  # width of the light middle of a limb, as a share of the whole
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,10 @@ def skeleton_view_3d(replay: Replay, frame: int) -> SkeletonView3D:
         "yaw": round(_YAW, 4),
         "pitch": round(_PITCH, 4),
         "far": _DISTANCE,
-        "limb": _LIMB,
+        "capsules": CAPSULES,
+        "trunk": TRUNK,
+        "head": HEAD,
+        "neck": NECK,
         "middle": _MIDDLE,
     }
     return SkeletonView3D(data, _still(replay, frame))
@@ -129,13 +133,38 @@ def _still(replay: Replay, frame: int) -> Markup:
         _path([line for apex, *base in view.cameras for line in _pyramid_lines(apex, base)], "var(--faint)", 1.0),
     ]
     owners = replay.owners(frame).tolist()
-    for owner, joints in zip(owners, view.estimates, strict=True):
-        paths.append(_path(_limbs(joints), css(person_color(owner)), _STILL_LIMB, ' stroke-opacity="0.6"'))
+    truth, estimates = replay.truth[frame].joints, replay.estimates[frame].joints
+    bodies = [(joints, css(person_color(owner))) for owner, joints in zip(owners, estimates, strict=True)]
+    bodies += [(joints, "") for person, joints in enumerate(truth) if person not in owners]
+    paths += _bodies(view.eye, bodies)
     for person, joints in enumerate(view.truth):
         paths.append(_path(_limbs(joints), "currentColor", 1.5, "" if person in owners else ' stroke-dasharray="4 3"'))
     width, height = _STILL_SIZE
-    label = "People in 3D: truth as thin lines, estimates as thick ones, cameras as pyramids."
+    label = "People in 3D: estimates as bodies, truth as thin lines, cameras as pyramids."
     return Markup(f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{label}">{"".join(paths)}</svg>')
+
+
+def _bodies(eye: Camera, bodies: Sequence[tuple[Floats, str]]) -> list[str]:
+    """Return bodies as SVG, the nearest parts last: joints (J, 3) and a colour each, "" for a person who was missed."""
+    parts = [(points, radius, color) for joints, color in bodies for points, radius in body_parts(joints)]
+    depths = [float(eye.depth(points).mean()) for points, _, _ in parts]
+    drawn = []
+    for index in np.argsort(depths)[::-1].tolist():
+        points, radius, color = parts[index]
+        corners = " ".join(f"{x:.1f} {y:.1f}" for x, y in eye.project(points))
+        closed = "Z" if len(points) > 2 else f"L{corners}" if len(points) == 1 else ""  # a line of no length is a dot
+        width = 2 * radius * float(eye.K[0, 0]) / depths[index]
+        shape = f'd="M{corners}{closed}" stroke-linecap="round" stroke-linejoin="round"'
+        rim, middle = (_shade(color, -0.28), color) if color else ("var(--faint)", "var(--line)")
+        for tone, share in ((rim, 1.0), (middle, _RIM)):
+            drawn.append(f'<path {shape} fill="{tone}" stroke="{tone}" stroke-width="{share * width:.1f}"/>')
+    return drawn
+
+
+def _shade(color: str, change: float) -> str:
+    """Return a colour "#rrggbb" that is darker by a share."""
+    parts = (round((1 + change) * int(color[at : at + 2], 16)) for at in (1, 3, 5))
+    return "#" + "".join(f"{part:02x}" for part in parts)
 
 
 def _outline(corners: Floats) -> list[Floats]:

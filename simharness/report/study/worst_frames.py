@@ -124,7 +124,7 @@ def show(
             truth=again.truth[frame.frame],
             detections=again.detections[frame.frame],
             estimate=again.estimates[frame.frame],
-            explained=False,
+            explained=None,
         )
         setting = ", ".join(f"{key} {value}" for key, value in frame.setting.items())
         picture = Picture(f"{number}. {setting}", _caption(results, frame, again), rgb)

@@ -15,9 +15,25 @@ function showView(place) {
   function aim() {
     const [sy, cy, sp, cp] = [Math.sin(yaw), Math.cos(yaw), Math.sin(pitch), Math.cos(pitch)];
     axes = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
-    const across = width / 2 / (1.2 * data.radius);
-    const upright = height / 2 / (1.1 * data.radius * Math.sin(Math.abs(data.pitch)) + 1100);
-    scale = zoom * data.far * data.radius * Math.min(across, upright);
+    scale = zoom * wholeScale();
+  }
+
+  // The scale at which all cameras and people are whole, from all sides at the first pitch.
+  function wholeScale() {
+    const points = [...data.cameras.flat(), ...data.truth[data.start].flat().filter(Boolean)];
+    const [sp, cp] = [Math.sin(data.pitch), Math.cos(data.pitch)];
+    let least = Infinity;
+    for (let turned = 0; turned < 2 * Math.PI; turned += Math.PI / 12) {
+      const [sy, cy] = [Math.sin(turned), Math.cos(turned)];
+      for (const point of points) {
+        const [x, y, z] = point.map((value, axis) => value - data.center[axis]);
+        const ahead = cy * x + sy * y, away = data.far * data.radius - (cp * ahead + sp * z);
+        const right = Math.abs(cy * y - sy * x) / away, up = (cp * z - sp * ahead) / away;
+        const room = up > 0 ? data.middle * height : (1 - data.middle) * height;
+        least = Math.min(least, (width / 2 - 8) / Math.max(right, 1e-9), (room - 8) / Math.max(Math.abs(up), 1e-9));
+      }
+    }
+    return least;
   }
 
   // Project a point of the world to the canvas: x, y, pixels per millimetre at its depth, nearness; null behind the eye.
@@ -29,15 +45,47 @@ function showView(place) {
     return [width / 2 + scale / away * right, data.middle * height - scale / away * up, scale / away, near];
   }
 
-  function line(from, to, color, thick, millimetres) {
+  function line(from, to, color, thick) {
     const a = projected(from), b = projected(to);
     if (!a || !b) return;
     pen.strokeStyle = color;
-    pen.lineWidth = millimetres ? Math.max(2, millimetres * (a[2] + b[2]) / 2) : thick;
+    pen.lineWidth = thick;
     pen.beginPath();
     pen.moveTo(a[0], a[1]);
     pen.lineTo(b[0], b[1]);
     pen.stroke();
+  }
+
+  // Parts of a body with their nearness: capsules around limbs and neck, the trunk, and a ball for the head.
+  function parts(joints, color) {
+    const found = [], mean = (points) => [0, 1, 2].map((axis) => points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+    const add = (points, radius) => {
+      const places = points.map(projected);
+      if (places.every(Boolean)) found.push({ places, radius, color, near: mean(places.map((place) => [place[3], 0, 0]))[0] });
+    };
+    for (const [a, b, radius] of data.capsules) if (joints[a] && joints[b]) add([joints[a], joints[b]], radius);
+    const trunk = data.trunk[0].map((joint) => joints[joint]), face = data.head[0].map((joint) => joints[joint]).filter(Boolean);
+    if (trunk.every(Boolean)) add(trunk, data.trunk[1]);
+    if (face.length) {
+      add([mean(face)], data.head[1]);
+      if (trunk[0] && trunk[1]) add([mean(trunk.slice(0, 2)), mean(face)], data.neck);
+    }
+    return found;
+  }
+
+  // Draw a part in three tones, as a round body in light from the eye.
+  function body({ places, radius, color }) {
+    const thick = 2 * radius * places.reduce((sum, place) => sum + place[2], 0) / places.length;
+    pen.lineJoin = "round";
+    for (const [share, tone] of [[1, color[0]], [0.74, color[1]], [0.3, color[2]]]) {
+      pen.strokeStyle = pen.fillStyle = tone;
+      pen.lineWidth = Math.max(1, share * thick);
+      pen.beginPath();
+      pen.moveTo(places[0][0], places[0][1]);
+      for (const place of places.length > 1 ? places.slice(1) : places) pen.lineTo(place[0], place[1]);
+      if (places.length > 2) { pen.closePath(); pen.fill(); }
+      pen.stroke();
+    }
   }
 
   function limbs(joints) {
@@ -50,7 +98,7 @@ function showView(place) {
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.lineCap = "round";
-    const [ink, faint, rule, card] = ["--ink", "--faint", "--line", "--card"].map((name) => style.getPropertyValue(name).trim());
+    const [ink, faint, rule] = ["--ink", "--faint", "--line"].map((name) => style.getPropertyValue(name).trim());
     aim();
     for (const axis of [0, 1]) {
       const half = data.room[axis] / 2, side = data.room[1 - axis] / 2, steps = [-half, half];
@@ -65,15 +113,16 @@ function showView(place) {
     for (const [apex, ...base] of data.cameras) {
       base.forEach((corner, k) => { line(apex, corner, faint, 1); line(corner, base[(k + 1) % 4], faint, 1); });
     }
-    const thick = [], found = new Set();
+    const solid = [], found = new Set();
     for (const [owner, ...joints] of data.estimates[frame]) {
       found.add(owner);
-      const color = mixed(owner < 0 ? data.ghost : data.colors[owner], card, 0.35);
-      for (const ends of limbs(joints)) thick.push([...ends, color]);
+      const color = owner < 0 ? data.ghost : data.colors[owner];
+      solid.push(...parts(joints, [mixed(color, "#000000", 0.3), color, mixed(color, "#ffffff", 0.25)]));
     }
-    const nearness = ([a, b]) => (projected(a)?.[3] ?? 0) + (projected(b)?.[3] ?? 0);
-    thick.sort((one, other) => nearness(one) - nearness(other));
-    for (const [a, b, color] of thick) line(a, b, color, 0, data.limb);
+    data.truth[frame].forEach((joints, person) => {
+      if (!found.has(person)) solid.push(...parts(joints, [faint, rule, rule])); // a pale body: nobody was estimated here
+    });
+    solid.sort((one, other) => one.near - other.near).forEach(body);
     data.truth[frame].forEach((joints, person) => {
       pen.setLineDash(found.has(person) ? [] : [4, 3]);
       for (const [a, b] of limbs(joints)) line(a, b, ink, 1.5);
