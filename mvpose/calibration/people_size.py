@@ -6,8 +6,7 @@ import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.calibration.consistency import Consistency, Reading
-from mvpose.reconstruction.bone_graph import bone_graph
-from mvpose.reconstruction.bone_length_prior import published_bones
+from mvpose.calibration.rig_size import published_limbs
 from mvpose.skeleton import Skeleton
 
 _FEWEST = 30  # bones in frames; fewer show nothing
@@ -20,18 +19,10 @@ def relative_size(consistency: Consistency, reading: Reading, skeleton: Skeleton
     Bones are those between joints triangulated by pairs of views from matched tracklets. Adults differ by 6 % of their
     stature (:mod:`mvpose.reconstruction.bone_length_prior`).
     """
-    graph, published = bone_graph(skeleton), published_bones(skeleton)
-    bones = [
-        (int(parent), int(child), length)
-        for parent, child, length, vague in zip(
-            graph.parents, graph.children, published.length, published.definition, strict=True
-        )
-        if parent >= 0 and length > 0.2 and vague < 0.05
-    ]
+    parents, children, length = published_limbs(skeleton)
     ratios = []
     for joints in _triangulated(consistency, reading):
-        for parent, child, length in bones:
-            ratios.append(np.linalg.norm(joints[:, parent] - joints[:, child], axis=-1) / length)
+        ratios.append((np.linalg.norm(joints[:, parents] - joints[:, children], axis=-1) / length).ravel())
     found = np.concatenate(ratios) if ratios else np.zeros(0)
     found = found[np.isfinite(found)]
     return (float(np.median(found)), len(found)) if len(found) >= _FEWEST else (np.nan, len(found))

@@ -5,7 +5,8 @@ two cameras: a shift, a rotation, and an offset of the clock (seven numbers for 
 of tracklets over many frames and joints are a linear regression on 14 unknowns with a prior, the uncertainty of the
 rig: tracklets of one person fit it up to the errors of keypoints, those of different people do not, however far the
 cameras are off, as soon as people move or differ in pose. The score of a pair is the logarithm of its marginal
-likelihood, against that of two different people.
+likelihood, against that of two different people. Where detections carry descriptors, appearance counts as well
+(:mod:`mvpose.calibration.tracklet_looks`).
 
 People are the groups of tracklets with the greatest sum of scores (correlation clustering, as in
 :mod:`mvpose.matching.clustering`), with no two tracklets of one view at one time. The pairs in groups then say how the
@@ -21,6 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mvpose.arrays import Bools, Floats, Integers
+from mvpose.calibration.tracklet_looks import evidence_of_looks
 from mvpose.calibration.tracklets import Tracklets, chosen_frames, frame_times
 from mvpose.camera import Camera, Rig
 from mvpose.kernels import njit
@@ -103,6 +105,7 @@ def match_tracklets(rig: Rig, tracklets: Tracklets, uncertainty: RigUncertainty)
     clocks = np.zeros(views)
     if not len(pairs):
         return PeopleGroups(groups, 0.0, rig)
+    looks = evidence_of_looks(tracklets, apart)[pairs[:, 0], pairs[:, 1]]
     starts = np.searchsorted(tracklets.tracklet[rows], np.arange(count + 1))
     adjusted = rig
     for weight in _TEMPERING:
@@ -111,6 +114,7 @@ def match_tracklets(rig: Rig, tracklets: Tracklets, uncertainty: RigUncertainty)
         gains, left, right = _score_pairs(
             pairs, starts, tracklets.frame[rows], tracklets.view[rows], adjusted.centers, *sights, covariance
         )
+        gains = np.where(gains != 0.0, gains + looks, 0.0)  # looks alone do not join
         matrix = np.where(apart, -np.inf, 0.0)
         matrix[pairs[:, 0], pairs[:, 1]] = matrix[pairs[:, 1], pairs[:, 0]] = gains
         before, groups = groups, join_by_gains(matrix)

@@ -16,7 +16,7 @@ from mvpose.cli.option_groups import grouped
 if TYPE_CHECKING:
     from mvpose import Rig
     from mvpose.calibration import Repair
-    from mvpose.calibration.repair import Freedom
+    from mvpose.calibration.repair import Freedom, Size
     from mvpose.cli.inputs import Inputs
 
 
@@ -37,6 +37,10 @@ def repair(
         Path | None,
         typer.Option(metavar="FILE", help="Write the times of the pictures with mended clocks, for --times."),
     ] = None,
+    rig_size: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="What decides the size of the rig: calibration, or people by bone lengths."),
+    ] = "calibration",
     *,
     choices: Choices,
 ) -> None:
@@ -47,13 +51,13 @@ def repair(
         check_new(out)
         if new_times is not None:
             check_new(new_times, option="--new-times")
-        freedoms = _freedoms(free)
+        freedoms, decides = _freedoms(free), _size(rig_size)
         from mvpose.calibration import repair as mend
         from mvpose.cli.exit_codes import failing
 
         inputs = read_inputs(calibration, detections, choices, examined=True)
         with failing("the repair"):
-            result = mend(inputs.rig, inputs.frames, period=inputs.period, free=freedoms)
+            result = mend(inputs.rig, inputs.frames, period=inputs.period, free=freedoms, size=decides)
         if result.refused:
             raise ValueError(f"nothing was repaired: {result.refused}")
         for reason in result.held:
@@ -72,6 +76,13 @@ def _freedoms(given: str) -> tuple[Freedom, ...]:
         if name not in known:
             raise ValueError(f"--free {name}: expected some of {', '.join(known)}")
     return tuple(known[name] for name in names)
+
+
+def _size(given: str) -> Size:
+    known: dict[str, Size] = {"calibration": "calibration", "people": "people"}
+    if given not in known:
+        raise ValueError(f"--rig-size {given}: expected calibration or people")
+    return known[given]
 
 
 def write_new(original: Path, path: Path, rig: Rig) -> None:

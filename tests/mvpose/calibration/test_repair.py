@@ -9,9 +9,10 @@ from moving_people import disturbed, film, walk
 from people import ring
 from scipy.spatial.transform import Rotation
 
-from mvpose import Detections, Rig
+from mvpose import COCO17, Detections, Rig
 from mvpose.calibration import repair
 from mvpose.calibration.normal_equations import FOCAL, changed, difference
+from mvpose.calibration.rig_size import published_limbs, resized
 
 RIG = ring(5)
 PERIOD = 0.1
@@ -144,3 +145,24 @@ def test_the_order_of_cameras_does_not_matter(frames):
 def test_bad_arguments_are_refused(frames, arguments, text):
     with pytest.raises(ValueError, match=text):
         repair(RIG, frames, period=PERIOD, **arguments)
+
+
+def test_the_size_of_people_decides_that_of_the_rig_where_asked(frames):
+    """A rig 30 % too large: the lengths of limbs give its size, and nothing else changes."""
+    large = resized(RIG, 1.3)
+    by_rig = repair(large, frames, period=PERIOD)
+    by_people = repair(large, frames, period=PERIOD, size="people")
+    size = np.mean([published_size(each) for each in JOINTS[0]])  # of the people, relative to the published adult
+    arms = [np.linalg.norm(each.rig.centers - each.rig.centers.mean(axis=0)) for each in (by_rig, by_people)]
+    true = np.linalg.norm(RIG.centers - RIG.centers.mean(axis=0)) / size
+    assert by_rig.scale == 1.0
+    assert arms[0] == pytest.approx(1.3 * size * true, rel=0.01)
+    assert arms[1] == pytest.approx(true, rel=0.02)
+    assert (by_people.covariance[:, 3:, 3:].trace(axis1=1, axis2=2) > 0.01).all()
+    with pytest.raises(ValueError, match="size must be one of calibration, people, got 'mine'"):
+        repair(RIG, frames, period=PERIOD, size="mine")
+
+
+def published_size(joints):
+    parents, children, length = published_limbs(COCO17)
+    return np.median(np.linalg.norm(joints[parents] - joints[children], axis=-1) / length)

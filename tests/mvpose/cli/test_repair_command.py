@@ -24,7 +24,8 @@ def call(tmp_path, monkeypatch):
     moved = [replace(camera, t=camera.t - 0.02 * camera.R[:, 2]) if k == 1 else camera for k, camera in enumerate(rig)]
 
     def run(*arguments, refused=None):
-        def repair(given, frames, *, period, free):
+        def repair(given, frames, *, period, free, size):
+            assert size == ("people" if "--rig-size" in arguments else "calibration")
             corrections, clocks = np.zeros((4, 6)), np.array([0.0, 0.01, 0.0, 0.0])
             corrections[1, 5] = 0.02
             return Repair(
@@ -45,7 +46,8 @@ def test_the_new_calibration_has_the_format_of_the_old(call, write, file):
     (folder / "old").mkdir()
     write.write_calibration(folder / "old" if write is easymocap else folder / "old" / file, rig)
     out, times = folder / "new" / file, folder / "times.csv"
-    result = run(folder / "old" / file, folder / "openpose", "--out", out, "--fps", 25, "--new-times", times)
+    options = "--out", out, "--fps", 25, "--new-times", times, "--rig-size", "people"
+    result = run(folder / "old" / file, folder / "openpose", *options)
     assert result.exit_code == 0, result.output
     assert "cam1: turned by 0.00 degrees, moved by 2.0 cm, clock +10 ms (standard deviation 2)" in result.stdout
     assert "note: not changed: the clock of cam0: it is the reference" in result.stderr
@@ -77,3 +79,6 @@ def test_a_refused_repair_writes_nothing(call):
     wrong = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--free", "colour")
     assert wrong.exit_code == 2
     assert "--free colour: expected some of extrinsics, focal, center" in wrong.stderr
+    wrong = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--rig-size", "me")
+    assert wrong.exit_code == 2
+    assert "--rig-size me: expected calibration or people" in wrong.stderr
