@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_people import film, walk
+from moving_people import disturbed, film, walk
 from people import look_at
 from scipy.spatial.transform import Rotation
 
-from mvpose import Rig
+from mvpose import Detections, Rig
 from mvpose.calibration.diagnose import diagnose
 
 _FRAMES, _PERIOD = 60, 0.1
@@ -94,7 +94,7 @@ def test_people_who_stand_still_do_not_determine_a_calibration():
     assert "stood still" in diagnosis.findings[0].text
 
 
-def test_two_cameras_cannot_be_told_apart(recording):
+def test_errors_of_two_cameras_are_not_determined(recording):
     rig, frames = recording
     pair = [each.select(each.view < 2) for each in frames]
     diagnosis, found = alarms(Rig([rig[0], rig[1]]), pair)
@@ -134,3 +134,33 @@ def test_a_camera_that_was_turned_far_is_no_crop_and_a_crop_is_no_turned_camera(
     K = camera.K + [[0.0, 0.0, 200.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     _, found = alarms(with_camera(rig, 2, K=K), frames)
     assert ("image-cropped", 2) in found
+
+
+def test_cameras_that_are_all_off_have_moved_and_have_no_other_mistake(recording):
+    rig, frames = recording
+    _, found = alarms(disturbed(rig, 2.0, 0.2, seed=5), frames)
+    assert len(found) >= len(rig) - 2
+    assert {kind for kind, _ in found} == {"moved-camera"}
+
+
+def test_distortion_that_no_camera_of_the_calibration_has_is_one_finding():
+    right = Rig([replace(each, distortion=np.array([-0.25, 0.08, 0.0, 0.0, 0.0])) for each in uneven(4)])
+    frames, _ = film(right, walk(3, frames=_FRAMES, period=_PERIOD, radius=2.0), noise=3.0)
+    diagnosis, found = alarms(uneven(4), frames)
+    assert found == [("distortion-ignored", None)]
+    assert -0.35 < diagnosis.alarms[0].size["k1"] < -0.15
+    assert alarms(right, frames)[1] == []
+
+
+def test_a_view_of_another_time_sees_other_people(recording):
+    rig, frames = recording
+    late = [*frames[_FRAMES // 2 :], *frames[: _FRAMES // 2]][::-1]
+    mixed = [_with_view(each, other, 1) for each, other in zip(frames, late, strict=True)]
+    _, found = alarms(rig, mixed)
+    assert found == [("other-people", 1)]
+
+
+def _with_view(frame, other, view):
+    rest, taken = frame.select(frame.view != view), other.select(other.view == view)
+    columns = [np.concatenate([getattr(rest, key), getattr(taken, key)]) for key in ("view", "keypoints", "scores")]
+    return Detections.from_keypoints(*columns)
