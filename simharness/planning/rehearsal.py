@@ -82,7 +82,7 @@ class CameraWorth:
 
     @property
     def redundant(self) -> bool:
-        """Whether the rig does as well without it: less than half a point of PCP and a twentieth of the error."""
+        """Whether its failure costs less than half a point of PCP, and surely less than one."""
         return self.without is not None and self.worth.high < 1.0 and self.worth.mean < 0.5
 
 

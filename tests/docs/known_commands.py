@@ -101,6 +101,7 @@ MODULES = tuple(
         "tools.reid",
     )
 )
+REHEARSED_SHELF = "python -m benchmarks.planning.shelf_rehearsal FOLDER"  # five minutes, and the data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
@@ -119,6 +120,7 @@ KNOWN = {
     *IN_PARTS,
     *MAKE,
     *MODULES,
+    REHEARSED_SHELF,
     ON_SHELF,
     *BAKE,
     CI,
