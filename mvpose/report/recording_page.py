@@ -130,7 +130,10 @@ def _with_unit(value: float, digits: int, unit: str) -> str:
 def _doctor(diagnosis: Diagnosis | None, page: str) -> dict[str, Any] | None:
     if diagnosis is None:
         return None
-    lines = [sentence_of(finding) for finding in diagnosis.alarms[1:]] or list(diagnosis.evidence[:4])
+    lines = [sentence_of(finding) for finding in diagnosis.alarms[1:]]
+    if diagnosis.verdict == "cannot tell":
+        lines += [sentence_of(finding) for finding in diagnosis.findings if finding.severity == "unknown"]
+    lines = lines or list(diagnosis.evidence[:4])
     return {"verdict": diagnosis.verdict, "sentence": sentence(diagnosis), "lines": lines, "link": page}
 
 

@@ -129,3 +129,11 @@ def test_without_frames_there_is_no_page(tmp_path):
     rig, _, people = recording(1)
     with pytest.raises(ValueError, match="at least one frame"):
         write_page(tmp_path, name="x", people=people, rig=rig, frames=[])
+
+
+def test_a_verdict_that_is_open_says_why(tmp_path):
+    short = Finding("cannot-tell", "cannot tell: people were seen for 2 s only", "unknown", 1.0, mend="record more")
+    diagnosis = Diagnosis.of([short], evidence=["90 joints"], cameras=["a"], residuals=np.array([4.0]))
+    page, _ = page_of(tmp_path, *recording(1), diagnosis=diagnosis)
+    assert "does not determine whether the cameras are right" in page
+    assert "<li>Cannot tell: people were seen for 2 s only.</li>" in page
