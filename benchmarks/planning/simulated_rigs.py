@@ -166,12 +166,10 @@ def trials(count: int, first: int) -> None:
         apart.append(abs(real - figure.value))
         print(
             f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people: PCP "
-            f"{real:.1f}, predicted {figure.value:.1f} ({figure.low:.1f} to {figure.high:.1f})",
+            f"{real:.1f}, predicted {figure.value:.1f} ({figure.low:.1f} to {figure.high:.1f}); so far {inside} of "
+            f"{done} inside, {100 * inside / done:.1f} % (bar 85 to 95), mean difference {np.mean(apart):.2f}",
             flush=True,
         )
-    print(
-        f"{inside} of {done} inside: {100 * inside / done:.1f} % (bar 85 to 95); mean difference {np.mean(apart):.2f}"
-    )
 
 
 def maps(count: int, first: int, recordings: int) -> None:
@@ -205,11 +203,12 @@ def maps(count: int, first: int, recordings: int) -> None:
             f"predicted {expected.mean():.0f} mm",
             flush=True,
         )
-    real, expected = np.array(everything).T
-    print(
-        f"all {len(real)} places: Spearman {spearmanr(real, expected)[0]:.3f} (bar .9), median relative error "
-        f"{100 * np.median(np.abs(expected / real - 1)):.1f} % (bar 20)"
-    )
+        real, expected = np.array(everything).T
+        print(
+            f"  so far {len(real)} places: Spearman {spearmanr(real, expected)[0]:.3f} (bar .9), median relative error "
+            f"{100 * np.median(np.abs(expected / real - 1)):.1f} % (bar 20)",
+            flush=True,
+        )
 
 
 def main() -> None:
