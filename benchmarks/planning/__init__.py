@@ -1,1 +1,1 @@
-"""Planning held against simulation, and against the subsets of the cameras of a real recording."""
+"""Planning held against simulation, against subsets of the cameras of a real recording, and beside other plans."""

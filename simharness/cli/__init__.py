@@ -12,6 +12,7 @@ from simharness.cli import (
     evaluate,
     export,
     fit_detector,
+    plan,
     rehearse,
     report,
     run,
@@ -34,6 +35,7 @@ app.add_typer(evaluate.app, name="evaluate")
 fit_detector.add_to(app)
 validate.add_to(app)
 rehearse.add_to(app)
+plan.add_to(app)
 
 
 def main() -> None:

@@ -105,7 +105,8 @@ def section_at(location: Sequence[str | int], root: type[BaseModel] = ScenarioFi
     """Return the section at a location; the whole file for an empty one; None for values and unknown keys."""
     section: type[BaseModel] | None = root
     for part in location:
-        section = None if section is None else _nested(section.model_fields.get(str(part)))
+        if section is not None and not isinstance(part, int):  # an index stays in the section of a list of tables
+            section = _nested(section.model_fields.get(part))
     return section
 
 
@@ -194,6 +195,8 @@ def _type_at(location: Sequence[str | int], root: type[BaseModel]) -> tuple[Any,
     names: tuple[str, ...] = ()
     default: Any = None
     for part in location:
+        if section is not None and isinstance(part, int):  # an element of a list of tables
+            continue
         if section is not None:
             field = section.model_fields.get(str(part))
             if field is None:
@@ -246,8 +249,9 @@ def _written(location: tuple[str | int, ...], origins: Mapping[Any, str]) -> str
 
 def _unknown(location: Sequence[str | int], root: type[BaseModel]) -> str:
     """Return the message about a key that does not exist."""
-    *parents, wrong = map(str, location)
-    section = section_at(parents, root) or root
+    wrong = str(location[-1])
+    section = section_at(location[:-1], root) or root
+    parents = [part for part in location[:-1] if isinstance(part, str)]  # without indices in lists of tables
     valid = sorted(section.model_fields)
     candidates = [".".join([*parents, key]) for key in difflib.get_close_matches(wrong, valid, n=1)]
     # A key of another section, most often one written above its [section] or below the wrong one.
@@ -273,12 +277,16 @@ def _field(location: Sequence[str | int], root: type[BaseModel]) -> FieldInfo | 
     for part in location:
         if section is None:
             break
-        field = section.model_fields.get(str(part))
+        if isinstance(part, int):  # an element of a list of tables
+            continue
+        field = section.model_fields.get(part)
         section = _nested(field)
     return field
 
 
 def _nested(field: FieldInfo | None) -> type[BaseModel] | None:
-    """Return the section that a field holds; None where it holds a value."""
+    """Return the section that a field holds, or a list of which it holds; None where it holds a value."""
     kind: Any = None if field is None else _plain(field.annotation)
+    if typing.get_origin(kind) is tuple and len(typing.get_args(kind)) == 2 and typing.get_args(kind)[1] is Ellipsis:
+        kind = _plain(typing.get_args(kind)[0])
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None

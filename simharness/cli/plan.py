@@ -1,0 +1,126 @@
+"""``simharness plan``: where to hang the cameras of a room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from simharness.cli.exit_codes import exit_on_error
+from simharness.cli.options import command_line
+
+if TYPE_CHECKING:
+    from simharness.planning.plan_result import Plan
+
+INTERRUPTED = 130
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(plan)
+
+
+def plan(
+    room: Annotated[
+        Path,
+        typer.Argument(help="A room file (TOML), or the name of a shipped room: [cyan]lab[/].", metavar="ROOM"),
+    ],
+    cameras: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Number of cameras, those that hang already included; instead of the file's."),
+    ] = None,
+    lens: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="A lens of the file to choose from. Repeatable.")
+    ] = None,
+    people: Annotated[int | None, typer.Option(metavar="N", help="Number of people, instead of the file's.")] = None,
+    detector: Annotated[
+        str | None, typer.Option(metavar="PROFILE", help="Detector profile, instead of the file's.")
+    ] = None,
+    objective: Annotated[
+        str | None, typer.Option(metavar="KIND", help="[cyan]share[/], [cyan]mean[/] or [cyan]worst[/].")
+    ] = None,
+    failing: Annotated[
+        int | None, typer.Option(metavar="K", help="Number of cameras that may fail, instead of the file's.")
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option(metavar="SUM", help="Largest cost of the lenses, instead of the file's.")
+    ] = None,
+    scenes: Annotated[
+        int, typer.Option(metavar="N", min=0, max=1000, help="Simulated scenes that confirm the plan; 0: none.")
+    ] = 8,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of all draws.")] = 0,
+    workers: Annotated[
+        int, typer.Option(metavar="N", min=1, max=1024, help="Processes of the simulation; the results stay the same.")
+    ] = 1,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Only draw the room and the places for cameras: preview.html.")
+    ] = False,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Parent of the folder NAME.", file_okay=False)] = Path(
+        "results/plans"
+    ),
+) -> None:
+    """Plan where the cameras of a room should hang.
+
+    The folder holds planned.toml (a rig for scenarios, and for rehearse),
+    plan.html for people and plan.json for programs.
+    An interrupted plan goes on where it stopped.
+    """
+    with exit_on_error():
+        from simharness.planning.room_file import read_room
+        from simharness.runtime.progress import reporter
+
+        changes = {
+            ("people", "count"): people,
+            ("detector",): detector,
+            ("objective", "kind"): objective,
+            ("objective", "failing"): failing,
+            ("cameras", "budget"): budget,
+        }
+        loaded = read_room(room, changes={key: value for key, value in changes.items() if value is not None})
+        folder = out / (Path(loaded.file).stem or loaded.name)
+        if preview:
+            from simharness.report.planning.plan_page import write_preview
+
+            page = write_preview(loaded, folder)
+            typer.echo(f"preview: {page}")
+            return
+        from simharness.planning.plan import plan as plan_rig
+        from simharness.report.planning.plan_page import write_plan
+
+        try:
+            with reporter() as bars:
+                planned = plan_rig(
+                    loaded, cameras, lenses=lens or (), simulate=scenes, seed=seed, workers=workers, folder=folder,
+                    reporter=bars,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            typer.echo("interrupted; the same command goes on where this one stopped", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        page = write_plan(planned, folder, command=command_line())
+    _show(planned)
+    typer.echo(f"rig: {folder / 'planned.toml'}")
+    typer.echo(f"report: {page}")
+
+
+def _show(planned: Plan) -> None:
+    """Print the sentences and the cameras of a plan."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from simharness.planning.plan_result import sentences
+
+    console = Console()
+    for sentence in sentences(planned):
+        console.print(sentence, highlight=False, markup=False)
+    table = Table(box=SIMPLE_HEAD, show_edge=False)
+    for title in ("camera", "place", "x", "y", "z", "lens", "sure", "worth"):
+        table.add_column(title, justify="left" if title in ("camera", "place", "lens") else "right")
+    for camera, built in zip(planned.cameras, planned.rig, strict=True):
+        sure = "" if camera.candidate is None else f"{100 * camera.sure:.0f} %"
+        table.add_row(
+            camera.name, camera.mount, *(f"{value:.2f}" for value in built.center), camera.lens, sure,
+            f"{camera.worth:.1f}",
+        )  # fmt: skip
+    console.print(table)

@@ -1,0 +1,428 @@
+"""Plan of a rig: the best places for N cameras in a room, judged by the fast layer and confirmed by simulation.
+
+1. Candidates: cameras on a grid of places that look at points of the volume (:mod:`.candidates`).
+2. Search: greedy starts and exchanges (:mod:`.search`), with a value that costs tenths of a millisecond
+   (:mod:`.rig_value`); then small movements of the cameras of the best sets.
+3. Judgement: the fast layer runs the method on the best sets, on scenes that the search has not seen.
+4. Confirmation: the best of them are simulated on the same scenes, beside the rigs that people hang without a plan.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mvpose import Rig
+from mvpose.arrays import Floats
+from simharness.planning.candidates import Candidate, candidates_in
+from simharness.planning.layer import FastLayer
+from simharness.planning.ledger import Ledger
+from simharness.planning.limits import Limits
+from simharness.planning.plan_result import Alternative, CurvePoint, Figures, Plan, PlannedCamera
+from simharness.planning.prediction import Prediction
+from simharness.planning.rig_comparison import rig_of, simulate_rigs
+from simharness.planning.rig_value import RigValue
+from simharness.planning.room import Room
+from simharness.planning.room_file import read_room
+from simharness.planning.search import Found, exchange_search, refine
+from simharness.planning.simulation import interval_of
+from simharness.planning.usual_rigs import corner_rig, ring_rig
+from simharness.planning.value_fit import VARIANT, fit_value, layer_of
+from simharness.runtime.code_digest import digest_of_folders
+from simharness.runtime.progress import Reporter, Silence
+
+_MOST_CANDIDATES = 1200
+_STARTS = 6  # of the search for the requested number of cameras
+_CURVE_STARTS = 2  # of the searches for other numbers
+_CURVE = (-2, -1, 0, 1, 2)
+_REFINED = 2  # sets that are refined, judged and simulated
+_SCENES = 8  # simulated scenes
+_JUDGED_PLACES, _JUDGED_REPEATS = 60, 8
+_NEAR_BEST = 1.0  # points of the objective within which a set is as good as the best
+_SAME_PLACE, _SAME_TURN = 1.0, 30.0  # metres and degrees within which two cameras are alike
+_PREVIEW_SHARE = 1e-3  # of seen joints: less is nothing
+
+
+def plan(
+    room: Room | Path | str,
+    cameras: int | None = None,
+    *,
+    lenses: Sequence[str] = (),
+    simulate: int = _SCENES,
+    starts: int = _STARTS,
+    curve: Sequence[int] = _CURVE,
+    most: int = _MOST_CANDIDATES,
+    seed: int = 0,
+    workers: int = 1,
+    folder: Path | None = None,
+    reporter: Reporter | None = None,
+) -> Plan:
+    """Plan where cameras should hang.
+
+    Args:
+        room: a room, or its file.
+        cameras: number of cameras, those that hang already included; by default that of the room file, or as many as
+            its budget buys.
+        lenses: names of the lenses to choose from; all by default.
+        simulate: number of simulated scenes that confirm the plan; 0: none.
+        starts: number of greedy starts of the search.
+        curve: numbers of cameras beyond the requested one for which the curve is computed.
+        most: largest number of candidates from which the search chooses.
+        seed: seed of all draws.
+        workers: number of processes for the simulation.
+        folder: folder in which finished steps are kept, so that an interrupted plan goes on; None: nowhere.
+        reporter: receiver of progress.
+
+    Raises:
+        ValueError: an impossible room or number of cameras, no place to hang, or nobody visible; the message names the
+            keys.
+    """
+    room = read_room(room) if isinstance(room, str | Path) else room
+    room = room.with_lenses(tuple(lenses)) if lenses else room
+    count = _count(room, cameras)
+    work = _Work(room, count, simulate, starts, tuple(curve), most, seed, workers, folder, reporter or Silence())
+    return work.plan()
+
+
+def _count(room: Room, cameras: int | None) -> int | None:
+    """Return the number of cameras of a plan; None: as many as the budget buys.
+
+    Raises:
+        ValueError: fewer than two, or fewer than hang already.
+    """
+    keys, where = room.keys.cameras, room.file or room.name
+    count, key = (cameras, "--cameras") if cameras is not None else (keys.count, "cameras.count")
+    if count is None:
+        if keys.budget is None:
+            raise ValueError(f"{where}: the number of cameras is missing: give --cameras N, or cameras.count or budget")
+        return None
+    if count < 2:
+        raise ValueError(f"{where}: {key} = {count}: one camera gives no positions in space; expected at least 2")
+    if count <= len(room.fixed):
+        raise ValueError(
+            f"{where}: {key} = {count}: {len(room.fixed)} cameras hang already ([[fixed]]); expected a larger number"
+        )
+    return count
+
+
+class _Work:
+    """Steps of a plan; the result of each is kept in the ledger."""
+
+    def __init__(
+        self,
+        room: Room,
+        count: int | None,
+        simulate: int,
+        starts: int,
+        curve: tuple[int, ...],
+        most: int,
+        seed: int,
+        workers: int,
+        folder: Path | None,
+        reporter: Reporter,
+    ) -> None:
+        self.room, self.count, self.seed, self.workers = room, count, seed, workers
+        self.scenes, self.starts, self.offsets, self.reporter = simulate, starts, curve, reporter
+        self.candidates = candidates_in(room, most=most)
+        self.limits = Limits.of(room, self.candidates, count)
+        path = None if folder is None else folder / "search.json"
+        self.ledger = Ledger(path, _identity(room, seed, most))
+        self.seconds: dict[str, float] = {}
+        self._terms: list[Floats] = []
+
+    def plan(self) -> Plan:
+        """Return the plan."""
+        with self._timed("search"):
+            sets = self._search(self.limits, self.starts, "search")
+            near = [each for each in sets if each.value >= sets[0].value - _NEAR_BEST]
+            refined = self._refined(sets)
+        with self._timed("curve"):
+            curve = self._curve(sets[0])
+        with self._timed("judge"):
+            judged = self._judged(refined)
+            usual = self._usual(len(refined[0].candidates))
+        with self._timed("simulate"):
+            alternatives, best = self._confirmed(judged, usual)
+        names = [camera.name for camera in alternatives[0].rig]
+        prediction, worth = self._worth(best)
+        return Plan(
+            room=self.room,
+            rig=alternatives[0].rig,
+            cameras=self._cameras(names, best, near, worth),
+            alternatives=alternatives,
+            prediction=prediction,
+            curve=curve,
+            near_best=len(near),
+            candidates=len(self.candidates),
+            simulated_scenes=self.scenes,
+            seed=self.seed,
+            seconds=self.seconds,
+        )
+
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - start
+
+    @cached_property
+    def value(self) -> RigValue:
+        """Value of sets of cameras."""
+        return fit_value(self.room, self.candidates, seed=self.seed)
+
+    @cached_property
+    def fixed_terms(self) -> list[Floats]:
+        """Contributions of the cameras that hang already."""
+        return [self.value.terms_of(camera) for camera in self.room.fixed]
+
+    @property
+    def terms(self) -> list[Floats]:
+        """Contributions of the candidates, computed when a step first needs them.
+
+        Raises:
+            ValueError: no candidate sees anybody.
+        """
+        if not self._terms:
+            value = self.value
+            with self.reporter.stage("cameras", len(self.candidates)) as advance:
+                for each in self.candidates:
+                    self._terms.append(value.terms(each))
+                    advance(1)
+            seen = max(float(each[..., 4].mean()) for each in self._terms)
+            if seen < _PREVIEW_SHARE:
+                raise ValueError(
+                    f"{self.room.file or self.room.name}: no camera at any place sees anybody in the volume: obstacles "
+                    "hide it, or it is out of view; change obstacles, places, volume, or lenses"
+                )
+        return self._terms
+
+    def _search(self, limits: Limits, starts: int, title: str) -> list[Found]:
+        names = [f"start {limits.count} {k}" for k in range(starts)]
+        terms = self.terms if any(name not in self.ledger for name in names) else []
+        with self.reporter.stage(title, starts) as advance:
+            found = exchange_search(
+                self.value if terms else _Unused(), terms, limits, starts=starts, seed=self.seed,
+                fixed=self.fixed_terms if terms else (), ledger=self.ledger, advance=advance,
+            )  # fmt: skip
+        if not found:
+            raise ValueError(
+                f"{self.room.file or self.room.name}: no camera can be placed: cameras.spacing, budget and the numbers "
+                "of each kind leave no candidate; change them"
+            )
+        wanted = limits.count
+        if wanted is not None and len(found[0][0]) < wanted:
+            raise ValueError(
+                f"{self.room.file or self.room.name}: only {len(found[0][0])} of {wanted} cameras find a place "
+                f"{self.room.keys.cameras.spacing:g} m from each other: lower cameras.spacing, or give more places"
+            )
+        return [Found(tuple(self.candidates[k] for k in chosen), value) for chosen, value in found]
+
+    def _refined(self, sets: Sequence[Found]) -> list[Found]:
+        best = sets[:_REFINED]
+        results = []
+        with self.reporter.stage("refine", len(best)) as advance:
+            for k, each in enumerate(best):
+                key = f"refined {self.count} {self.starts} {k}"
+
+                def work(each: Found = each, key: str = key) -> Any:
+                    fixed = self.fixed_terms
+                    found = refine(self.value, self.room, each, seed=self.seed, key=key, fixed=fixed)
+                    return [[dataclasses.astuple(camera) for camera in found.candidates], found.value]
+
+                cameras, value = self.ledger.result(key, work)
+                chosen = tuple(Candidate(c[0], c[1], (c[2][0], c[2][1], c[2][2]), c[3], c[4]) for c in cameras)
+                results.append(Found(_around(self.room, chosen), value))
+                advance(1)
+        return results
+
+    def _curve(self, best: Found) -> tuple[CurvePoint, ...]:
+        fixed, now = len(self.room.fixed), len(best.candidates)
+        points = []
+        for offset in sorted(set(self.offsets)):
+            free = now + offset
+            if free < max(1, 2 - fixed) or free > len(self.candidates):
+                continue
+            name = f"curve {free}"
+            if name not in self.ledger and offset:
+                try:
+                    limits = Limits.of(self.room, self.candidates, free + fixed)
+                    sets = self._search(limits, _CURVE_STARTS, f"{free + fixed} cameras")
+                except ValueError:
+                    continue  # the limits of the room do not allow so many
+            elif offset == 0:
+                sets = [best]
+            else:
+                sets = []
+            figures, cost = self.ledger.result(name, lambda sets=sets: self._curve_point(sets[0]))
+            points.append(CurvePoint(free + fixed, _figures(figures), cost))
+        return tuple(points)
+
+    def _curve_point(self, found: Found) -> tuple[Any, float]:
+        cost = sum(self.room.lenses[each.lens].cost for each in found.candidates)
+        return dataclasses.astuple(self._figures(self._predicted(self._rig(found.candidates)))), cost
+
+    @cached_property
+    def layer(self) -> FastLayer:
+        """Fast layer on scenes that the search has not seen."""
+        return layer_of(self.room, places=_JUDGED_PLACES, repeats=_JUDGED_REPEATS, seed=self.seed + 1)
+
+    def _predicted(self, rig: Rig) -> Prediction:
+        return self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
+
+    def _figures(self, prediction: Prediction) -> Figures:
+        figures, target = prediction.summary(), self.room.keys.target
+        within = (prediction.pcp >= target.pcp) & (prediction.error_mm <= target.error)
+        known = np.isfinite(prediction.pcp)
+        pcp, error = figures["pcp"], figures["mpjpe_mm"]
+        return Figures(
+            (float(pcp.value), float(pcp.low), float(pcp.high)),
+            (float(error.value), float(error.low), float(error.high)),
+            100.0 * float(within[known].mean()),
+            float(prediction.pcp[known].min()),
+        )
+
+    def _judged(self, refined: Sequence[Found]) -> list[tuple[Found, Figures]]:
+        """Return the refined sets with their figures by the fast layer, best first."""
+        results = []
+        for k, each in enumerate(refined):
+            figures = self.ledger.result(
+                f"judged {self.count} {self.starts} {k}",
+                lambda each=each: dataclasses.astuple(self._figures(self._predicted(self._rig(each.candidates)))),
+            )
+            results.append((each, _figures(figures)))
+        return sorted(results, key=lambda pair: -self._objective(pair[1]))
+
+    def _objective(self, figures: Figures) -> float:
+        """Return the objective of the room by figures; ties are broken by the mean PCP."""
+        kind = self.room.keys.objective.kind
+        main = {"mean": 0.0, "share": figures.share, "worst": figures.worst}[kind]
+        return main + (1.0 if kind == "mean" else 1e-3) * figures.pcp[0]
+
+    def _usual(self, free: int) -> list[tuple[str, Rig, Figures]]:
+        """Return the rigs that people hang without a plan, with their figures by the fast layer."""
+        results = []
+        for title, make in (("corners", corner_rig), ("ring", ring_rig)):
+            try:
+                rig = self._rig(make(self.room, free))
+            except ValueError:
+                continue
+            figures = self.ledger.result(
+                f"{title} {free}", lambda rig=rig: dataclasses.astuple(self._figures(self._predicted(rig)))
+            )
+            results.append((title, rig, _figures(figures)))
+        return results
+
+    def _confirmed(
+        self, judged: Sequence[tuple[Found, Figures]], usual: Sequence[tuple[str, Rig, Figures]]
+    ) -> tuple[tuple[Alternative, ...], Found]:
+        """Return the compared rigs, the plan first, and the set of the plan."""
+        titles = ("plan", "second", "third", *(f"{k}th" for k in range(4, 4 + len(judged))))
+        rigs = [self._rig(found.candidates) for found, _ in judged] + [rig for _, rig, _ in usual]
+        predicted = [figures for _, figures in judged] + [figures for _, _, figures in usual]
+        simulated: list[Figures | None] = [None] * len(rigs)
+        order = list(range(len(judged)))
+        if self.scenes:
+            simulated = list(self._simulated(rigs))
+            # The simulation chooses among the best few, by its mean PCP.
+            order.sort(key=lambda k: -(simulated[k] or predicted[k]).pcp[0])
+        names = list(titles[: len(judged)]) + [title for title, _, _ in usual]
+        order += range(len(judged), len(rigs))
+        alternatives = tuple(Alternative(names[n], rigs[k], predicted[k], simulated[k]) for n, k in enumerate(order))
+        return alternatives, judged[order[0]][0]
+
+    def _simulated(self, rigs: Sequence[Rig]) -> list[Figures]:
+        key = hashlib.blake2b(
+            b"".join(each.K.tobytes() + each.R.tobytes() + each.t.tobytes() for rig in rigs for each in rig),
+            digest_size=8,
+        ).hexdigest()
+
+        def work() -> Any:
+            results, conditions = simulate_rigs(
+                self.room, rigs, seeds=range(self.scenes), seed=self.seed, workers=self.workers, reporter=self.reporter
+            )
+            return [
+                [_triple(interval_of(results, each, score)) for score in ("pcp", "mpjpe_mm")] for each in conditions
+            ]
+
+        found = self.ledger.result(f"simulated {self.scenes} {key}", work)
+        return [Figures(tuple(pcp), tuple(error)) for pcp, error in found]
+
+    def _worth(self, best: Found) -> tuple[Prediction, list[float]]:
+        """Return the maps of the plan, and the loss of PCP without each of its cameras."""
+        terms = [self.layer.terms(camera) for camera in self._rig(best.candidates)]
+        whole = self.layer.predict(terms, variant=VARIANT)
+        pcp = float(np.nanmean(whole.person_pcp))
+        if len(terms) < 3:
+            return whole, [pcp] * len(terms)
+        return whole, [
+            pcp - float(np.nanmean(self.layer.predict([*terms[:k], *terms[k + 1 :]], variant=VARIANT).person_pcp))
+            for k in range(len(terms))
+        ]
+
+    def _cameras(
+        self, names: Sequence[str], best: Found, near: Sequence[Found], worth: Sequence[float]
+    ) -> tuple[PlannedCamera, ...]:
+        fixed = len(self.room.fixed)
+        cameras = [
+            PlannedCamera(name, None, "fixed", "", float("nan"), worth[k]) for k, name in enumerate(names[:fixed])
+        ]
+        for k, each in enumerate(best.candidates):
+            sure = float(np.mean([any(_alike(each, other) for other in found.candidates) for found in near]))
+            mount = self.room.mounts[each.mount].name
+            lens = self.room.lenses[each.lens]
+            title = f"{lens.name}, turned" if lens.turned else lens.name
+            cameras.append(PlannedCamera(names[fixed + k], each, mount, title, sure, worth[fixed + k]))
+        return tuple(cameras)
+
+    def _rig(self, candidates: Sequence[Candidate]) -> Rig:
+        return rig_of(self.room, candidates)
+
+
+class _Unused:
+    """Value of a search all of whose steps are kept already."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AssertionError(f"{name}: every step is in the ledger")
+
+
+def _around(room: Room, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return candidates in the order of their bearings from the middle of the volume, counter-clockwise."""
+    x, y = room.volume.mean(axis=0).tolist()
+    return tuple(sorted(candidates, key=lambda each: math.atan2(each.place[1] - y, each.place[0] - x) % (2 * math.pi)))
+
+
+def _alike(one: Candidate, other: Candidate) -> bool:
+    """Return whether two cameras hang at about the same place and look the same way."""
+    away = float(np.linalg.norm(np.subtract(one.place, other.place)))
+    return away <= _SAME_PLACE and float(one.direction @ other.direction) >= np.cos(np.radians(_SAME_TURN))
+
+
+def _identity(room: Room, seed: int, most: int) -> str:
+    """Return a text that changes with everything on which finished steps depend."""
+    import mvpose
+    import simharness
+
+    ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
+    code = [digest_of_folders(ours, ("planning", "world", "capture", "detector")), digest_of_folders(its, ("",))]
+    lenses = [(lens.name, lens.turned) for lens in room.lenses]
+    values = [room.keys.model_dump(mode="json"), room.detector.model_dump(mode="json"), lenses, seed, most, code]
+    return hashlib.blake2b(json.dumps(values, sort_keys=True).encode(), digest_size=16).hexdigest()
+
+
+def _figures(values: Sequence[Any]) -> Figures:
+    pcp, error, share, worst = values
+    return Figures((pcp[0], pcp[1], pcp[2]), (error[0], error[1], error[2]), share, worst)
+
+
+def _triple(interval: Any) -> tuple[float, float, float]:
+    return float(interval.mean), float(interval.low), float(interval.high)

@@ -1,0 +1,233 @@
+"""Plan: where the cameras of a room should hang, what that reaches, and how sure it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mvpose import Rig
+from simharness.planning.candidates import Candidate
+from simharness.planning.prediction import Prediction
+from simharness.planning.room import Room
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Figures of a rig in the volume.
+
+    Attributes:
+        pcp: percentage of correct parts, with its interval (90 % by the fast layer, 95 % by simulation).
+        error_mm: mean error of joints, millimetres, with its interval.
+        share: share of the places of the volume within the target, percent; NaN where it was not computed.
+        worst: least PCP of a place, percent; NaN where it was not computed.
+    """
+
+    pcp: tuple[float, float, float]
+    error_mm: tuple[float, float, float]
+    share: float = math.nan
+    worst: float = math.nan
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the figures as JSON values; null where unknown."""
+        return {
+            "pcp": _interval(self.pcp),
+            "mpjpe_mm": _interval(self.error_mm),
+            "share_within_target": _number(self.share),
+            "worst_pcp": _number(self.worst),
+        }
+
+
+@dataclass(frozen=True)
+class PlannedCamera:
+    """Camera of a plan.
+
+    Attributes:
+        name: its name.
+        candidate: where it hangs; None of a camera that hangs already.
+        mount: name of its mount, "wall 2"; "fixed" of a camera that hangs already.
+        lens: name of its lens.
+        sure: share of the near-best rigs that have a camera like it, 0 to 1; NaN of a camera that hangs already.
+        worth: loss of predicted PCP without it, points.
+    """
+
+    name: str
+    candidate: Candidate | None
+    mount: str
+    lens: str
+    sure: float
+    worth: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Rig that was compared.
+
+    Attributes:
+        title: name for people: "plan", "second best", "corners", "ring".
+        rig: the rig.
+        predicted: its figures by the fast layer.
+        simulated: its figures by simulation; None where it was not simulated.
+    """
+
+    title: str
+    rig: Rig = field(repr=False)
+    predicted: Figures
+    simulated: Figures | None = None
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """What the best found rig of a number of cameras gives, by the fast layer, with the cost of its lenses."""
+
+    cameras: int
+    figures: Figures
+    cost: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Planned rig.
+
+    Attributes:
+        room: the room.
+        rig: the planned cameras, those that hang already first.
+        cameras: each camera of the rig.
+        alternatives: the plan first, then other rigs.
+        prediction: maps of the plan by the fast layer.
+        curve: what fewer and more cameras would give.
+        near_best: number of near-best rigs by which ``sure`` is counted.
+        candidates: number of cameras from which the search chose.
+        simulated_scenes: number of simulated scenes; 0: none.
+        seed: seed of the plan.
+        seconds: duration by stage, of this run.
+    """
+
+    room: Room = field(repr=False)
+    rig: Rig = field(repr=False)
+    cameras: tuple[PlannedCamera, ...]
+    alternatives: tuple[Alternative, ...]
+    prediction: Prediction = field(repr=False)
+    curve: tuple[CurvePoint, ...]
+    near_best: int
+    candidates: int
+    simulated_scenes: int
+    seed: int
+    seconds: dict[str, float] = field(default_factory=dict, compare=False)
+
+    @property
+    def best(self) -> Alternative:
+        """The plan itself."""
+        return self.alternatives[0]
+
+    @property
+    def figures(self) -> Figures:
+        """Figures of the plan: simulated ones where there are any."""
+        return self.best.simulated or self.best.predicted
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the plan as JSON values."""
+        simulated = self.best.simulated
+        return {
+            "room": self.room.name,
+            "seed": self.seed,
+            "cameras": {each.name: self._camera(k, each) for k, each in enumerate(self.cameras)},
+            "predicted": self.best.predicted.to_json(),
+            "simulated": None if simulated is None else simulated.to_json(),
+            "simulated_scenes": self.simulated_scenes,
+            "alternatives": [
+                {
+                    "title": each.title,
+                    "predicted": each.predicted.to_json(),
+                    "simulated": None if each.simulated is None else each.simulated.to_json(),
+                }
+                for each in self.alternatives
+            ],
+            "curve": [{"cameras": p.cameras, "cost": p.cost, **p.figures.to_json()} for p in self.curve],
+            "map": {
+                "places": self.prediction.places.round(3).tolist(),
+                "pcp": _numbers(self.prediction.pcp.tolist()),
+                "error_mm": _numbers(self.prediction.error_mm.tolist()),
+                "views": _numbers(self.prediction.views.tolist()),
+            },
+            "near_best": self.near_best,
+            "candidates": self.candidates,
+        }
+
+    def _camera(self, index: int, camera: PlannedCamera) -> dict[str, Any]:
+        built = self.rig[index]
+        return {
+            "position": built.center.round(3).tolist(),
+            "direction": built.R[2].round(4).tolist(),
+            "mount": camera.mount,
+            "lens": camera.lens,
+            "sure": _number(camera.sure),
+            "worth": _number(camera.worth),
+        }
+
+
+def sentences(plan: Plan) -> list[str]:
+    """Return what the plan says in plain sentences, the most important first."""
+    room, figures, target = plan.room, plan.figures, plan.room.keys.target
+    area = f"{_extent(room)}"
+    people = "1 person" if room.keys.people.count == 1 else f"{room.keys.people.count} people"
+    how = f"in {plan.simulated_scenes} simulated scenes" if plan.best.simulated is not None else "by the fast layer"
+    lines = [
+        f"{len(plan.rig)} cameras give {figures.pcp[0]:.1f} PCP and {figures.error_mm[0]:.0f} mm for {people} "
+        f"within {area}, {how}."
+    ]
+    share = plan.best.predicted.share
+    if math.isfinite(share):
+        lines.append(
+            f"{share:.0f} % of the volume is within the target of {target.pcp:g} PCP and {target.error:g} mm; its "
+            f"worst place has {plan.best.predicted.worst:.0f} PCP."
+        )
+    enough = [p for p in plan.curve if p.figures.share >= 99.5]
+    now = len(plan.rig)
+    if enough and enough[0].cameras < now:
+        lines.append(f"{enough[0].cameras} cameras would be enough for this target everywhere in the volume.")
+    elif enough and enough[0].cameras > now:
+        lines.append(f"{enough[0].cameras} cameras would bring the whole volume within the target.")
+    more = next((p for p in plan.curve if p.cameras == now + 1), None)
+    same = next((p for p in plan.curve if p.cameras == now), None)
+    if more is not None and same is not None:
+        gain = more.figures.pcp[0] - same.figures.pcp[0]
+        lines.append(
+            f"One more camera would add {max(gain, 0.0):.1f} PCP."
+            if gain >= 0.05
+            else "One more camera would add nothing."
+        )
+    placed = [each for each in plan.cameras if each.candidate is not None]
+    sure = [each.name for each in placed if each.sure >= 0.8]
+    free = [each.name for each in placed if each.sure < 0.4]
+    if plan.near_best > 1 and sure:
+        lines.append(
+            f"{_names(sure)} {'hangs' if len(sure) == 1 else 'hang'} at about the same place in nearly every good rig."
+        )
+    if plan.near_best > 1 and free:
+        lines.append(
+            f"{_names(free)} may also hang elsewhere: other good rigs do without {'it' if len(free) == 1 else 'them'}."
+        )
+    return lines
+
+
+def _names(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _extent(room: Room) -> str:
+    x, y = (room.volume.max(axis=0) - room.volume.min(axis=0)).tolist()
+    return f"{x:.1f} by {y:.1f} m"
+
+
+def _interval(values: tuple[float, float, float]) -> dict[str, float | None]:
+    return {"value": _number(values[0]), "low": _number(values[1]), "high": _number(values[2])}
+
+
+def _number(value: float) -> float | None:
+    return round(float(value), 4) if math.isfinite(value) else None
+
+
+def _numbers(values: Sequence[float]) -> list[float | None]:
+    return [_number(value) for value in values]

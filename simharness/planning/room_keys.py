@@ -1,0 +1,212 @@
+"""Keys of a room file (TOML): the room, what stands in it, where cameras may hang, and what the rig has to reach.
+
+Metres; angles in degrees; the frame of the file is that of the planned rig: z is up and the floor is at z = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+
+from simharness.scenario.sections.cameras import Pixels, Term
+from simharness.scenario.sections.section import (
+    MOST_CAMERAS,
+    Coordinate,
+    Count,
+    Elements,
+    Length,
+    Percent,
+    Point,
+    Section,
+    Spread,
+)
+
+Name = Annotated[str, Field(min_length=1, max_length=60)]
+Corner = Annotated[tuple[Coordinate, Coordinate], Elements(("x", "y"))]
+Outline = Annotated[tuple[Corner, ...], Field(max_length=100)]
+Heights = Annotated[tuple[Length, Length], Elements(("lowest", "highest"))]
+Range = Annotated[
+    tuple[Annotated[int, Field(ge=0, le=MOST_CAMERAS)], Annotated[int, Field(ge=0, le=MOST_CAMERAS)]],
+    Elements(("least", "most")),
+]
+Millimetres = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+
+class ShapeKeys(Section):
+    """[room]: the floor and the height."""
+
+    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] | None = Field(
+        None, description="a box around the origin: x, y, z in metres"
+    )
+    outline: Outline = Field((), description="instead of size: corners of the floor in order, metres")
+    height: Length = Field(3.0, description="height of a room that is given by its outline, metres")
+
+
+class VolumeKeys(Section):
+    """[volume]: where people will be. By default the floor, 0.5 m from the walls."""
+
+    size: Annotated[tuple[Length, Length], Elements(("x", "y"))] | None = Field(
+        None, description="a rectangle around center: x, y in metres"
+    )
+    center: Corner = Field((0.0, 0.0), description="centre of the rectangle, metres")
+    outline: Outline = Field((), description="instead of size: corners in order, metres")
+    height: Annotated[float, Field(ge=0.5, le=5.0)] = Field(2.0, description="height that people reach, metres")
+
+
+class WallPlaces(Section):
+    """[places.walls]: cameras on the walls."""
+
+    heights: Heights = Field((1.0, 2.8), description="lowest and highest camera, metres")
+    clearance: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
+        0.15, description="distance of a camera from its wall, metres"
+    )
+    walls: tuple[Annotated[int, Field(ge=0, lt=100)], ...] = Field(
+        (),
+        max_length=100,
+        description="walls that may be used: wall 0 begins at the first corner of the outline; of a box they are the "
+        "walls at -y, +x, +y and -x; empty: all",
+    )
+
+
+class CeilingPlaces(Section):
+    """[places.ceiling]: cameras under the ceiling, or on a truss below it."""
+
+    drop: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
+        0.2, description="distance of a camera below the ceiling, metres"
+    )
+    outline: Outline = Field((), description="part of the ceiling: corners in order, metres; empty: all")
+
+
+class TripodPlaces(Section):
+    """[[places.tripods]]: an area where tripods may stand."""
+
+    outline: Outline = Field((), description="corners of the area in order, metres; empty: the whole floor")
+    heights: Heights = Field((1.2, 2.2), description="lowest and highest camera, metres")
+
+
+class PlacesKeys(Section):
+    """[places]: where cameras may hang. With no key of it: on all walls."""
+
+    walls: WallPlaces | None = None
+    ceiling: CeilingPlaces | None = None
+    tripods: tuple[TripodPlaces, ...] = Field((), max_length=20, description="areas for tripods")
+
+
+class ObstacleKeys(Section):
+    """[[obstacles]]: a box that hides people and where no camera is."""
+
+    name: str = Field("", max_length=60, description="name in pictures and messages")
+    center: Corner = Field(description="centre on the floor, metres")
+    size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(description="x, y, z in metres")
+    base: Spread = Field(0.0, description="height of its lower side above the floor, metres")
+    yaw: float = Field(0.0, ge=-360.0, le=360.0, description="rotation about the vertical, degrees")
+
+
+class DoorKeys(Section):
+    """[[doors]]: a door in a wall, where no camera hangs and before which no tripod stands."""
+
+    start: Corner = Field(description="one side of the door, metres")
+    end: Corner = Field(description="the other side, metres")
+
+
+class LensKeys(Section):
+    """[[lenses]]: a camera with its lens, by its field of view or by focal length and sensor."""
+
+    name: Name = "camera"
+    size: Annotated[tuple[Pixels, Pixels], Elements(("width", "height"))] = Field(
+        (1920, 1080), description="width, height in pixels"
+    )
+    fov: Annotated[float, Field(gt=1.0, lt=170.0)] | None = Field(
+        None, description="horizontal field of view, degrees; 75 where no focal length is given"
+    )
+    focal: Annotated[float, Field(gt=0.1, le=1000.0)] | None = Field(
+        None, description="instead of fov: focal length, millimetres"
+    )
+    sensor: Annotated[float, Field(gt=0.5, le=100.0)] | None = Field(
+        None, description="with focal: width of the sensor, millimetres"
+    )
+    distortion: Annotated[tuple[Term, Term, Term, Term, Term], Elements(("k1", "k2", "p1", "p2", "k3"))] = Field(
+        (0.0, 0.0, 0.0, 0.0, 0.0), description="lens distortion in OpenCV's order: k1, k2, p1, p2, k3"
+    )
+    turned: bool = Field(False, description="may also hang turned by 90 degrees, with pictures in portrait format")
+    cost: Annotated[float, Field(ge=0.0, le=1e6)] = Field(1.0, description="cost, in any unit, for cameras.budget")
+
+
+class CameraKeys(Section):
+    """[cameras]: how many, of which kind, and how far from other things."""
+
+    count: Annotated[int, Field(ge=0, le=MOST_CAMERAS)] | None = Field(
+        None, description="number of cameras, fixed ones included; --cameras replaces it"
+    )
+    wall: Range = Field((0, MOST_CAMERAS), description="least and largest number on walls")
+    ceiling: Range = Field((0, MOST_CAMERAS), description="least and largest number under the ceiling")
+    tripod: Range = Field((0, MOST_CAMERAS), description="least and largest number on tripods")
+    budget: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
+        None, description="largest sum of the costs of the lenses; without count: as many cameras as it buys"
+    )
+    spacing: Spread = Field(0.5, description="smallest distance between two cameras, metres")
+    from_people: Spread = Field(
+        0.3, description="smallest distance on the floor from the volume, of cameras that people could touch, metres"
+    )
+    from_walls: Annotated[float, Field(ge=0.0, le=5.0)] = Field(
+        0.1, description="smallest distance from the other walls and from obstacles, metres"
+    )
+
+
+class FixedKeys(Section):
+    """[[fixed]]: a camera that hangs already; the plan adds the others."""
+
+    name: str = Field("", max_length=60, description="name of the camera")
+    position: Point = Field(description="position, metres")
+    aim: Point = Field(description="point at which it looks, metres")
+    lens: str = Field("", description="name of its lens; empty: the first one")
+
+
+class PeopleKeys(Section):
+    """[people]: the people whom the cameras have to see."""
+
+    count: Annotated[int, Field(ge=1, le=20)] = Field(4, description="number of people in the volume at a time")
+
+
+class TargetKeys(Section):
+    """[target]: what a place has to reach to count."""
+
+    pcp: Percent = Field(95.0, description="least PCP, percent")
+    error: Millimetres = Field(40.0, description="largest expected error of joints, millimetres")
+
+
+class ObjectiveKeys(Section):
+    """[objective]: what the search maximises."""
+
+    kind: Literal["share", "mean", "worst"] = Field(
+        "share",
+        description="share: share of the volume within the target; mean: mean PCP of its places; worst: least PCP of "
+        "any place",
+    )
+    failing: Count = Field(
+        0, description="number of cameras that may fail: the value counts after the worst such failure"
+    )
+
+
+class RoomKeys(Section):
+    """Keys of a room file."""
+
+    model_config = ConfigDict(title="a room")
+
+    name: str = Field("", max_length=60, description="name of the room; by default that of the file")
+    description: str = Field("", max_length=500, description="one line for lists")
+    room: ShapeKeys = ShapeKeys()
+    volume: VolumeKeys = VolumeKeys()
+    places: PlacesKeys = PlacesKeys()
+    obstacles: tuple[ObstacleKeys, ...] = Field((), max_length=200, description="boxes that stand in the room")
+    doors: tuple[DoorKeys, ...] = Field((), max_length=50, description="doors")
+    lenses: tuple[LensKeys, ...] = Field(
+        (LensKeys(),), min_length=1, max_length=20, description="cameras and lenses to choose from"
+    )
+    cameras: CameraKeys = CameraKeys()
+    fixed: tuple[FixedKeys, ...] = Field((), max_length=MOST_CAMERAS, description="cameras that hang already")
+    people: PeopleKeys = PeopleKeys()
+    detector: str = Field("typical", description="detector profile: a name in scenarios/detectors, or a TOML file")
+    target: TargetKeys = TargetKeys()
+    objective: ObjectiveKeys = ObjectiveKeys()
