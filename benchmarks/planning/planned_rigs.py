@@ -7,6 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ledger = Ledger(options.out, f"scenes {options.scenes} starts {options.starts} of {options.candidates}")
     rows = []
     for seed in range(options.first, options.first + options.rooms):
-        row = ledger.result(str(seed), lambda seed=seed: _compare(seed, options, program))
+        row = ledger.result(str(seed), partial(_compare, seed, options, program))
         rows.append(row)
         print(_line(row), flush=True)
     print(summary(rows))

@@ -16,7 +16,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -252,7 +252,7 @@ class _Work:
             free = now + offset
             if free < max(1, 2 - fixed) or free > len(self.candidates):
                 continue
-            name = f"curve {free}"
+            name = f"curve {self.count} {self.starts} {free}"
             if name not in self.ledger and offset:
                 try:
                     limits = Limits.of(self.room, self.candidates, free + fixed)
@@ -263,21 +263,23 @@ class _Work:
                 sets = [best]
             else:
                 sets = []
-            figures, cost = self.ledger.result(name, lambda sets=sets: self._curve_point(sets[0]))
+            figures, cost = self.ledger.result(name, partial(self._curve_point, sets[0] if sets else best))
             points.append(CurvePoint(free + fixed, _figures(figures), cost))
         return tuple(points)
 
     def _curve_point(self, found: Found) -> tuple[Any, float]:
         cost = sum(self.room.lenses[each.lens].cost for each in found.candidates)
-        return dataclasses.astuple(self._figures(self._predicted(self._rig(found.candidates)))), cost
+        return self._figures_of(self._rig(found.candidates)), cost
 
     @cached_property
     def layer(self) -> FastLayer:
         """Fast layer on scenes that the search has not seen."""
         return layer_of(self.room, places=_JUDGED_PLACES, repeats=_JUDGED_REPEATS, seed=self.seed + 1)
 
-    def _predicted(self, rig: Rig) -> Prediction:
-        return self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
+    def _figures_of(self, rig: Rig) -> tuple[Any, ...]:
+        """Return the figures of a rig by the fast layer, as values for the ledger."""
+        prediction = self.layer.predict([self.layer.terms(camera) for camera in rig], variant=VARIANT)
+        return dataclasses.astuple(self._figures(prediction))
 
     def _figures(self, prediction: Prediction) -> Figures:
         figures, target = prediction.summary(), self.room.keys.target
@@ -297,7 +299,7 @@ class _Work:
         for k, each in enumerate(refined):
             figures = self.ledger.result(
                 f"judged {self.count} {self.starts} {k}",
-                lambda each=each: dataclasses.astuple(self._figures(self._predicted(self._rig(each.candidates)))),
+                partial(self._figures_of, self._rig(each.candidates)),
             )
             results.append((each, _figures(figures)))
         return sorted(results, key=lambda pair: -self._objective(pair[1]))
@@ -316,9 +318,7 @@ class _Work:
                 rig = self._rig(make(self.room, free))
             except ValueError:
                 continue
-            figures = self.ledger.result(
-                f"{title} {free}", lambda rig=rig: dataclasses.astuple(self._figures(self._predicted(rig)))
-            )
+            figures = self.ledger.result(f"{title} {free}", partial(self._figures_of, rig))
             results.append((title, rig, _figures(figures)))
         return results
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from mvpose import Camera, Rig
 from simharness.planning.candidates import Candidate
 from simharness.planning.room import Room
-from simharness.planning.simulation import Condition, SceneResult, SceneSettings, simulate_scenes
+from simharness.planning.simulation import Condition, SceneBatch, SceneResult, SceneSettings, simulate_scenes
 from simharness.planning.value_fit import VARIANT, obstacles_of
 from simharness.planning.volume import Volume
 from simharness.runtime.progress import Reporter, Silence
@@ -59,7 +59,8 @@ def simulate_rigs(
         variant=VARIANT,
         whole=conditions[0].cameras,
     )
-    drawn = [int(stream(seed, "plan", "scene", number).integers(2**31)) for number in seeds]
+    drawn = tuple(int(stream(seed, "plan", "scene", number).integers(2**31)) for number in seeds)
     with (reporter or Silence()).stage("simulate", len(drawn)) as advance:
-        results = simulate_scenes(settings, conditions, seeds=drawn, workers=workers, progress=advance)
+        batch = SceneBatch(settings, tuple(conditions), drawn)
+        (results,) = simulate_scenes([batch], workers=workers, progress=advance)
     return results, conditions

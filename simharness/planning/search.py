@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -22,7 +23,6 @@ from simharness.planning.candidates import Candidate, far_enough, moved
 from simharness.planning.ledger import Ledger
 from simharness.planning.limits import Limits
 from simharness.planning.room import Room
-from simharness.runtime.progress import Advance
 from simharness.types.random_streams import stream
 
 Terms = TypeVar("Terms")
@@ -89,7 +89,7 @@ def exchange_search(
     found: dict[tuple[int, ...], float] = {}
     for start in range(starts):
         name = f"start {limits.count} {start}"
-        chosen, value = ledger.result(name, lambda start=start: _start(values, terms, limits, start, seed, fixed))  # type: ignore[misc]
+        chosen, value = ledger.result(name, partial(_start, values, terms, limits, start, seed, fixed))
         if chosen:
             found[tuple(chosen)] = value
         advance(1)
@@ -105,7 +105,7 @@ def _start(
         pool = np.flatnonzero(allowed)
         if start:
             pool = rng.permutation(pool)[: max(1, int(np.ceil(_SHARE * len(pool))))]
-        gains = values.values_with([*fixed, *(terms[k] for k in chosen)], [terms[k] for k in pool])
+        gains = values.values_with([*fixed, *(terms[k] for k in chosen)], [terms[int(k)] for k in pool])
         chosen.append(int(pool[int(np.argmax(gains))]))
     return _exchanged(values, terms, limits, chosen, rng, fixed)
 
@@ -183,12 +183,3 @@ def refine(
                         break
                     cameras[slot], terms[slot], best = changed, trial, value
     return Found(tuple(cameras), float(best))
-
-
-def advance_of(advance: Advance) -> Callable[[int], None]:
-    """Return a report of steps alone."""
-
-    def report(steps: int) -> None:
-        advance(steps)
-
-    return report

@@ -61,7 +61,9 @@ class SightingOdds:
         keypoints = self.detector.keypoints
         usual = np.array(keypoints.scatter.by_joint()) * oks_units(views.boxes[:, 0])
         deviation = np.maximum(usual * np.where(state == 0, 1.0, keypoints.scatter_hidden), _LEAST)
-        return self.right[joints, state, bins], self.false[joints, state, bins], deviation
+        pictured = views.boxes[:, 0, :, 2:].min(axis=-1, keepdims=True) > 0  # nobody else is ever reported
+        right, false = (np.where(pictured, odds[joints, state, bins], 0.0) for odds in (self.right, self.false))
+        return right, false, deviation
 
 
 def _bins(views: Views) -> np.ndarray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Floats, Integers
 from simharness.planning.candidates import Candidate
 from simharness.planning.layer import FastLayer
 from simharness.planning.rig_value import Correction, RigValue
@@ -76,7 +76,7 @@ def fit_value(room: Room, candidates: Sequence[Candidate], *, seed: int = 0) -> 
 
 
 def _compared(
-    room: Room, layer: FastLayer, value: RigValue, candidates: Sequence[Candidate], chosen: Sequence[int] | Floats
+    room: Room, layer: FastLayer, value: RigValue, candidates: Sequence[Candidate], chosen: Integers
 ) -> tuple[float, float, float, float]:
     """Return the percentage of wrong parts and the error by the value, and by the method, of one rig."""
     cameras = [candidates[int(k)] for k in chosen]

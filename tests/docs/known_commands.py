@@ -75,6 +75,13 @@ REHEARSE = (  # run by tests/simharness/planning
     "simharness rehearse ring5 --volume 6x6 --people 4",
     "simharness rehearse my-rig.toml --room 8x6x3 --volume 4x3@1,0.5 --people 6 --obstacle 1.5,0,0.4,2,1.8 --subsets",
 )
+PLAN = (  # run by tests/simharness/planning
+    "simharness plan",
+    "simharness plan lab --cameras 5",
+    "simharness plan lab --preview",
+    "simharness plan my-room.toml --cameras 6 --lens wide --failing 1 --workers 2",
+    "simharness rehearse results/plans/lab/planned.toml --people 4",
+)
 MAKE = ("make demo", "make test", "make docs", "make lint", "make lint docs", "make results")
 CI = ".ci/run"
 PYTEST = ('pytest -m "not slow"', "pytest tests/simharness/detector")
@@ -110,6 +117,7 @@ KNOWN = {
     *USER_FILES.values(),
     *NAMES,
     *REHEARSE,
+    *PLAN,
     *CHECKS,
     CHECK_OF_TRACKING,
     *SHELF,

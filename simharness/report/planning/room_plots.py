@@ -121,4 +121,4 @@ def room_from_side(name: str, room: Room, *, cameras: Sequence[Camera] = (), pla
 
 def _rectangle(left: float, right: float, bottom: float, top: float, **style: object) -> Polygon:
     corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
-    return Polygon(corners, closed=True, **style)  # type: ignore[arg-type]
+    return Polygon(corners, closed=True, **style)
