@@ -29,11 +29,13 @@ class SightingOdds:
         right, false: probability that a joint is reported rightly, or falsely, by joint, visibility and bin of the
             visible share of the person, (17, V, B).
         detector: the detector.
+        sightings: number of right reports that were counted.
     """
 
     right: Floats
     false: Floats
     detector: Detector
+    sightings: int = 0
 
     @classmethod
     def measure(cls, layer: FastLayer, cameras: Sequence[Camera]) -> SightingOdds:
@@ -53,7 +55,7 @@ class SightingOdds:
                 right = terms.reported & (away * metres <= np.maximum(_FALSE, 3.0 * terms.deviation * metres))
             for count, chosen in zip(counts, (right, terms.reported & ~right, here), strict=True):
                 np.add.at(count, cells, chosen[here])
-        return cls(_shrunk(counts[0], counts[2]), _shrunk(counts[1], counts[2]), layer.detector)
+        return cls(_shrunk(counts[0], counts[2]), _shrunk(counts[1], counts[2]), layer.detector, int(counts[0].sum()))
 
     def of(self, views: Views, camera: Camera) -> tuple[Floats, Floats, Floats]:
         """Return the odds of right and of false reports, and the deviation of right ones, pixels, all (S, Q, 17)."""

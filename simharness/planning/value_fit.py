@@ -64,13 +64,15 @@ def fit_value(room: Room, candidates: Sequence[Candidate], *, seed: int = 0) -> 
         seed: seed of the scenes and of the rigs.
 
     Raises:
-        ValueError: no candidate sees anybody.
+        ValueError: nobody can stand in the volume.
     """
     layer = layer_of(room, seed=seed)
     rng = stream(seed, "plan", "value")
     shown = [candidates[k] for k in rng.permutation(len(candidates))[:_CAMERAS]]
     odds = SightingOdds.measure(layer, [each.camera(room, name=f"odds{k}") for k, each in enumerate(shown)])
     plain = RigValue(room, layer, odds)
+    if not odds.sightings:
+        return plain
     figures = [_compared(room, layer, plain, candidates, rng.permutation(len(candidates))[:size]) for size in _SIZES]
     return RigValue(room, layer, odds, correction=_correction(np.array(figures)))
 
