@@ -55,8 +55,7 @@ def importance_by_place(
 ) -> tuple[Floats, Integers]:
     """Return weights with which all sightings of one joint of a person in one place count as one.
 
-    A detector repeats its errors with somebody who stays where he is, however long. So a correction of cameras that
-    needs longer evidence than this needs people in more places.
+    A detector repeats its errors on a person who does not move, for any length of time.
 
     Args:
         person: person of each joint, (G,).

@@ -1,7 +1,7 @@
 """Standard deviation of keypoints in pixels, by joint, size of the person and score.
 
 The error model is that of :class:`mvpose.reconstruction.likelihood.Noise`, in pixels instead of metres: an adult has an
-area of (0.70 m)², so the size of a person in the picture says how many pixels a metre at the person has.
+area of (0.70 m)², so the size of a person in the picture gives the pixels per metre at the person.
 """
 
 from __future__ import annotations

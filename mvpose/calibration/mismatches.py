@@ -1,4 +1,4 @@
-"""People who were taken for somebody else in one view: what is seen of them there fits much worse than of the others.
+"""Wrong matches: a person whose keypoints in one view are those of another person, and fit much worse than the rest.
 
 A camera that moved misplaces all people alike. One wrong tracklet among right ones would be taken for a camera that
 moved, because it misplaces its person in all frames.
@@ -18,7 +18,7 @@ _FEWEST = 20  # sightings of a person in a view
 
 
 def without_mismatches(cameras: Floats, sightings: Sightings, joints: JointViews, rows: Integers) -> Sightings:
-    """Return the sightings without those of people who were taken for somebody else in a view.
+    """Return the sightings without those of a person in a view who was matched wrongly there.
 
     Args:
         cameras: packed cameras, (V, 22).

@@ -50,8 +50,8 @@ _LEAST_SHARED = 20  # sightings of a camera that other cameras share
 _CAN_TELL = (float(np.radians(0.75)), 0.06)  # standard deviations beyond which a pose is not determined: rad, m
 _LEAST_EFFECT = 5.0  # design effect of errors that joints and people share, measured on 12 simulated recordings
 _TOO_FEW_PLACES = (
-    "cannot tell: people were in too few places to tell a turned camera from a moved one; record somebody who walks "
-    "through the whole scene for ten seconds"
+    "cannot tell: people were in too few places to distinguish a turned camera from a moved one; record a person who "
+    "walks through the whole scene for ten seconds"
 )
 _TOO_FEW_SHARED = (
     "cannot tell: hardly anybody is seen by two cameras at one time; record people in the middle of the scene, or "
@@ -269,7 +269,7 @@ def _connected(rig: Rig, sightings: Sightings, allowed: Bools) -> tuple[Bools, l
 def _undetermined(rig: Rig, sightings: Sightings, adjusted: Adjustment, mask: Bools) -> Bools:
     """Return the cameras whose pose the data do not determine even with all other cameras fixed, (V,).
 
-    Sightings in one place count as one here: the detector may repeat its errors there for as long as somebody stays.
+    Sightings in one place count as one here: the detector may repeat its errors on a person who does not move.
     """
     joints, found = adjusted.joints, adjusted.equations
     first = adjusted.rows[joints.start[:-1]]

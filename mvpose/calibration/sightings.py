@@ -34,8 +34,8 @@ class Sightings(Sealed):
     Attributes:
         frame: frame of each sighting, (k,).
         view: view, (k,).
-        person: person, 0, 1, ..., (k,): the same number for one person in all views and frames. Somebody who was
-            seen by one view alone, or who could not be matched to other views, has a number of his own.
+        person: person, 0, 1, ..., (k,): the same number for one person in all views and frames. A person
+            seen by one view alone, or not matched to other views, has a separate number.
         joint: index of the joint in ``skeleton``, (k,).
         pixels: keypoint as detected, with the distortion of the lens, (k, 2).
         sigma: standard deviation of the keypoint, pixels, (k,).

@@ -9,9 +9,9 @@ likelihood, against that of two different people. Where detections carry descrip
 (:mod:`mvpose.calibration.tracklet_looks`).
 
 People are the groups of tracklets with the greatest sum of scores (correlation clustering, as in
-:mod:`mvpose.matching.clustering`), with no two tracklets of one view at one time. The pairs in groups then say how the
-cameras are off; the uncertainty of the rig shrinks, and the pairs are scored again. Their evidence counts little at
-first, so that early mistakes can be corrected.
+:mod:`mvpose.matching.clustering`), with no two tracklets of one view at one time. The pairs in groups then give the
+errors of the cameras; the uncertainty of the rig shrinks, and the pairs are scored again. Their evidence counts little
+at first, so that early mistakes can be corrected.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _INDEPENDENT = 0.2  # share of the keypoints whose errors are independent: error
 _WRONG = 0.1  # share of the keypoints of the right person that are grossly wrong
 _ELSEWHERE = 2.5  # metres: the lines of sight of two different people pass each other at any distance within it
 _LEAST_GAIN = 0.5  # of the logarithm of the likelihood, for each keypoint: how much likelier one person must be
-_LEAST_SINE = 0.05  # lines of sight closer to parallel say nothing
+_LEAST_SINE = 0.05  # lines of sight closer to parallel are no evidence
 _NEAREST = 0.5  # metres: a nearer body does not fit in the picture
 _LEAST_SAMPLES = 12  # joints in frames that two tracklets must share
 _TEMPERING = (0.1, 0.3, 1.0, 1.0, 1.0, 1.0)  # weight of the evidence about the rig in each round
@@ -177,11 +177,11 @@ def _lines_of_sight(rig: Rig, tracklets: Tracklets, rows: Integers, clocks: Floa
     directions, change = np.zeros((*pixels.shape[:2], 3)), np.zeros((*pixels.shape[:2], 3))
     angle = np.full(pixels.shape[:2], np.inf)
     for number, camera in enumerate(rig):
-        mine = view == number
-        directions[mine] = camera.rays(pixels[mine])
+        own = view == number
+        directions[own] = camera.rays(pixels[own])
         # The clock is later by dt: the joint was at this pixel dt later, so that it is seen where it was before.
-        change[mine] = (camera.rays(pixels[mine] - velocity[mine] * _STEP) - directions[mine]) / _STEP
-        angle[mine] = tracklets.sigma[rows][mine] / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
+        change[own] = (camera.rays(pixels[own] - velocity[own] * _STEP) - directions[own]) / _STEP
+        angle[own] = tracklets.sigma[rows][own] / np.sqrt(camera.K[0, 0] * camera.K[1, 1])
     bad = ~(np.isfinite(directions).all(axis=-1) & np.isfinite(change).all(axis=-1) & np.isfinite(angle))
     angle[bad] = np.inf
     return directions, change, angle
