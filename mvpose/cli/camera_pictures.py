@@ -14,6 +14,8 @@ from mvpose.formats.views.assignment import assign
 from mvpose.formats.views.plausibility import UNKNOWN_SIZE
 from mvpose.formats.views.sources import Source
 
+_ABOUT, _ABOUT_SHARE = 3, 0.02  # pictures, and share of them, by which headers of videos are often wrong
+
 
 def open_videos(paths: Sequence[Path]) -> list[PictureSource]:
     """Open all videos.
@@ -73,6 +75,21 @@ def check_sizes(cameras: Sequence[Camera], pictures: Sequence[PictureSource]) ->
         raise ValueError(
             f"pictures are not of the calibrated size: {listed(wrong)} pixels; convert them to that size, or scale the "
             "intrinsics of the calibration to theirs"
+        )
+
+
+def check_lengths(pictures: Sequence[PictureSource]) -> None:
+    """Check that there are about as many pictures of all cameras; headers of videos may be wrong by some.
+
+    Raises:
+        ValueError: different numbers of pictures.
+    """
+    counts = [source.count for source in pictures]
+    if max(counts) - min(counts) > max(_ABOUT, _ABOUT_SHARE * max(counts)):
+        text = listed([f"{source.name} {source.count}" for source in pictures])
+        raise ValueError(
+            f"the cameras have different numbers of pictures: {text}; cut them to the same time, or, if all begin "
+            f"at the same moment, take the frames that all have: --frames 0:{min(counts) - 1}"
         )
 
 

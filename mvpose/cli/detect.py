@@ -84,7 +84,7 @@ def detect(
 def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: Networks, choices: Choices) -> None:
     """Detect people in videos and estimate them in 3D; detections are kept in FOLDER-detections."""
     with exit_on_error(left=_LEFT):
-        from mvpose.cli.camera_pictures import assigned, check_sizes, common_rate, open_videos
+        from mvpose.cli.camera_pictures import assigned, check_lengths, check_sizes, common_rate, open_videos
         from mvpose.formats.calibration.registry import read_calibration
         from mvpose.formats.views.plausibility import UNKNOWN_SIZE
 
@@ -96,6 +96,8 @@ def run(calibration: Calibration, videos: Videos, *, wanted: Wanted, networks: N
         rig = read_calibration(calibration, size=UNKNOWN_SIZE, only=choices.only, key="--cameras")
         sources = assigned(rig.cameras, open_videos(videos))
         check_sizes(rig.cameras, sources)
+        if choices.frames is None:
+            check_lengths(sources)
         _detect(sources, detections, networks)
         note(f"detections are kept in {detections}: another run does not detect again")
         sizes = {source.size for source in sources}

@@ -187,6 +187,12 @@ class TestRun:
         write_folder(tmp_path / "hall" / "cam3", spots(2))
         small = call("run", tmp_path / "Calib.toml", tmp_path / "hall", *options)
         ends(small, 2, "not of the calibrated size: cam0 320 x 240 instead of 1280 x 960, cam1")
+        pose2sim.write_calibration(tmp_path / "Calib.toml", Rig([replace(camera, size=SIZE) for camera in studio()]))
+        write_folder(tmp_path / "longer" / "cam0", spots(9))
+        cameras = [tmp_path / "longer" / "cam0", *(tmp_path / "hall" / f"cam{view}" for view in range(1, 4))]
+        longer = call("run", tmp_path / "Calib.toml", *cameras, *options)
+        ends(longer, 2, "different numbers of pictures: cam0 9, cam1 2, cam2 2, cam3 2; cut them")
+        assert "--frames 0:1" in longer.stderr
         assert not list(tmp_path.glob("out*"))
 
     def test_an_output_that_cannot_be_written_is_found_first(self, networks, tmp_path):
