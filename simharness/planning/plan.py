@@ -38,8 +38,8 @@ from simharness.planning.search import Found, exchange_search, refine
 from simharness.planning.simulation import interval_of
 from simharness.planning.usual_rigs import corner_rig, ring_rig
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
-from simharness.runtime.code_digest import digest_of_folders
 from simharness.runtime.progress import Reporter, Silence
+from simharness.runtime.version import code_version
 
 _MOST_CANDIDATES = 1200
 _STARTS = 6  # of the search for the requested number of cameras
@@ -409,14 +409,9 @@ def _alike(one: Candidate, other: Candidate) -> bool:
 
 def _identity(room: Room, seed: int, most: int) -> str:
     """Return a text that changes with everything on which finished steps depend."""
-    import mvpose
-    import simharness
-
-    ours, its = Path(simharness.__file__).parent, Path(mvpose.__file__).parent
-    code = [digest_of_folders(ours, ("planning", "world", "capture", "detector")), digest_of_folders(its, ("",))]
     lenses = [(lens.name, lens.turned) for lens in room.lenses]
-    values = [room.keys.model_dump(mode="json"), room.detector.model_dump(mode="json"), lenses, seed, most, code]
-    return hashlib.blake2b(json.dumps(values, sort_keys=True).encode(), digest_size=16).hexdigest()
+    values = [room.keys.model_dump(mode="json"), room.detector.model_dump(mode="json"), lenses, seed, most]
+    return hashlib.blake2b(json.dumps([*values, code_version()], sort_keys=True).encode(), digest_size=16).hexdigest()
 
 
 def _figures(values: Sequence[Any]) -> Figures:
