@@ -81,7 +81,7 @@ class FastLayer:
         Raises:
             ValueError: no people, or no place where a person can stand.
         """
-        pool = pose_pool(tuple(activities), children=children)
+        pool = pose_pool(activities, children=children)
         scenes = standing_scenes(
             volume,
             pool,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Self
+from typing import Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.detector.bias import body_axes
 from simharness.planning.volume import Volume
+from simharness.scenario.sections.people import ActivityName
 from simharness.types.random_streams import stream
 
 ACTIVITIES = ("walk", "wave", "turn", "talk", "reach", "point")
@@ -75,15 +76,26 @@ class PosePool:
         return ((given**2).sum(axis=1)[:, None] - 2 * given @ own.T + (own**2).sum(axis=1)).argmin(axis=1)
 
 
-@cache
-def pose_pool(activities: tuple[str, ...] = ACTIVITIES, *, children: float = 0.0, seed: int = 0) -> PosePool:
+def pose_pool(activities: Sequence[str] = ACTIVITIES, *, children: float = 0.0, seed: int = 0) -> PosePool:
     """Simulate the poses of a pool; the result is kept, because this takes a second or two.
 
     Args:
         activities: activities of the simulator, assigned to the bodies in turn.
         children: share of children.
         seed: seed of bodies and motions.
+
+    Raises:
+        ValueError: an activity that the simulator does not have.
     """
+    known = [name for name in get_args(ActivityName) if name != "mocap"]
+    if not activities or (unknown := [name for name in activities if name not in known]):
+        got = f"{unknown[0]!r}" if activities else "none"
+        raise ValueError(f"activities: expected one or more of {', '.join(known)}, got {got}")
+    return _pose_pool(tuple(activities), float(children), seed)
+
+
+@cache
+def _pose_pool(activities: tuple[str, ...], children: float, seed: int) -> PosePool:
     from simharness.capture.body_outlines import Outline, even_directions
     from simharness.capture.ray_casting import RayCaster
     from simharness.scenario.sections.cameras import Cameras

@@ -77,6 +77,11 @@ class TestScenes:
         away = np.linalg.norm(hips[:, :, None] - hips[:, None], axis=-1)[:, *np.triu_indices(3, 1)]
         assert np.mean(away >= APART) > 0.99
 
+    def test_activities_that_do_not_exist_are_refused(self):
+        for activities, got in ((("walk", "fly"), "'fly'"), ((), "none")):
+            with pytest.raises(ValueError, match=f"expected one or more of walk.*got {got}"):
+                pose_pool(activities)
+
     def test_directions_at_a_place_are_evenly_spread(self, pool):
         scenes = standing_scenes(Volume.box(2, 2), pool, people=1, spacing=1.0, repeats=8)
         facing = bearings_of(scenes.joints)
