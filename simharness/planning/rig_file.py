@@ -32,7 +32,7 @@ def read_rig(
     try:
         return build_rig(cameras, room=room)
     except ValueError as error:
-        message = str(error)
+        message = str(error).replace("add cameras.size = [width, height], pixels", "give --size WIDTHxHEIGHT, pixels")
         raise ValueError(message if str(path) in message else f"{path}: {message}") from None
 
 

@@ -201,7 +201,7 @@ def interval_of(results: Sequence[SceneResult], condition: Condition, score: str
         score: name of a field of :class:`Scores`.
     """
     values = [getattr(each.scores[condition], score) for each in results]
-    # A mixed group is one of hundreds, no event of a whole scene: its bounds are those of a length.
+    # A mixed group is one of hundreds in a scene, not an event that lasts for all of it.
     return mean_interval(values, unit="%" if score in ("pcp", "recall") else "mm")
 
 
@@ -231,6 +231,8 @@ def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) ->
         takes, settings = 1, replace(settings, frames=_TAKES * settings.frames)
         frame = replace(frame, half=np.full(2, frame.half.max()))
     rig = frame.rig(settings.rig)
+    whole = Condition(settings.whole or tuple(range(len(rig))))
+    conditions = tuple(dict.fromkeys((whole, *conditions)))  # the maps are those of all cameras
     scenario = _scenario(settings, frame, seed)
     try:
         built = _build(scenario, rig)
@@ -243,7 +245,7 @@ def _run(settings: SceneSettings, conditions: Sequence[Condition], seed: int) ->
     places = np.concatenate([each.places for each in parts])
     inside = settings.volume.contains(places)
     scored = {each: _Scored.joined([part.scored[each] for part in parts]) for each in conditions}
-    shown = scored[Condition(settings.whole or tuple(range(len(rig))))]
+    shown = scored[whole]
     return SceneResult(
         seed, places, inside, shown.correct, shown.error, {key: each.scores(inside) for key, each in scored.items()}
     )

@@ -7,12 +7,14 @@ import pytest
 from typer.testing import CliRunner
 
 from mvpose import Rig
+from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
 from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, target_of, volume_of
 from simharness.planning.rehearse import rehearse
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
 from simharness.world.rigs.layouts import look_at
+from simharness.world.rigs.presets import preset_rig
 
 
 def test_nothing_visible_is_one_message():
@@ -44,6 +46,14 @@ def test_nothing_visible_is_one_message():
 def test_options_that_cannot_be_read(read, text, message):
     with pytest.raises(ValueError, match=message):
         read(text)
+
+
+def test_a_calibration_without_the_size_of_its_pictures(tmp_path):
+    file = tmp_path / "calibration.json"
+    write_calibration(file, preset_rig("shelf"))
+    result = CliRunner().invoke(app, ["rehearse", str(file), "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "give --size WIDTHxHEIGHT" in result.output
 
 
 def test_options_that_can():

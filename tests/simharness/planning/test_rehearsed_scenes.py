@@ -96,3 +96,12 @@ def test_clutter_hides_people_in_one_long_take():
     cluttered = simulated([Condition(WHOLE)], clutter=Clutter(boxes=3))
     assert cluttered.places.shape[0] == 16
     assert 50 < cluttered.scores[Condition(WHOLE)].pcp <= 100
+
+
+@pytest.mark.slow
+def test_results_do_not_depend_on_the_number_of_processes():
+    batches = [SceneBatch(settings(), (Condition(WHOLE), WORSE), (0, 1)), SceneBatch(settings(people=3), (LATE,), (0,))]
+    alone, shared = (simulate_scenes(batches, workers=workers) for workers in (1, 2))
+    for one, other in zip([each for batch in alone for each in batch], [e for b in shared for e in b], strict=True):
+        assert one.scores == other.scores
+        assert np.array_equal(one.places, other.places)
