@@ -23,13 +23,12 @@ from mvpose.arrays import Floats
 from mvpose.files.input_files import read_json_object
 from mvpose.formats.detection_files import DetectionFiles
 from mvpose.formats.joint_names import BODY_25, KNOWN, JointNames, to_coco17
+from mvpose.skeleton import Skeleton
 
 _WHAT = "OpenPose output of one image: {'people': [{'pose_keypoints_2d': [25 x (x, y, score)]}, ...]}"
 _BODY25 = KNOWN["body25"]
 _VERSION = 1.3  # of OpenPose's files
 _OTHERS = ("face", "hand_left", "hand_right")
-BODY_25_OF_COCO17 = [BODY_25.index(joint) for joint in COCO17.joints]
-"""Index in BODY_25 of each joint of COCO-17."""
 _MIDDLES = {"neck": "shoulder", "mid_hip": "hip"}
 
 
@@ -147,19 +146,27 @@ def natural_order(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
-def people_file(keypoints: ArrayLike, scores: ArrayLike) -> dict[str, Any]:
+def people_file(keypoints: ArrayLike, scores: ArrayLike, *, skeleton: Skeleton = COCO17) -> dict[str, Any]:
     """Return OpenPose's file of one picture, JSON-ready. People without any keypoint are left out.
 
+    The file has BODY_25: joints that it does not know are left out, and of a skeleton without them neck and middle of
+    the hips are the midpoints of shoulders and of hips.
+
     Args:
-        keypoints: COCO-17, (n, 17, 2), pixels; NaN where missing.
-        scores: score of each keypoint, (n, 17); 0 where missing.
+        keypoints: (n, J, 2), pixels; NaN where missing.
+        scores: score of each keypoint, (n, J); 0 where missing.
+        skeleton: the J joints, which contain those of COCO17.
     """
     keypoints, scores = np.asarray(keypoints, float), np.asarray(scores, float)
     triples = np.where(scores[..., None] > 0, np.concatenate([keypoints, scores[..., None]], axis=-1), 0.0)
     body = np.zeros((len(scores), len(BODY_25), 3))
-    body[:, BODY_25_OF_COCO17] = triples
+    for row, joint in enumerate(BODY_25):
+        if joint in skeleton.joints:
+            body[:, row] = triples[:, skeleton.index(joint)]
     for joint, end in _MIDDLES.items():
-        ends = triples[:, [COCO17.index(f"left_{end}"), COCO17.index(f"right_{end}")]]
+        if joint in skeleton.joints:
+            continue
+        ends = triples[:, [skeleton.index(f"left_{end}"), skeleton.index(f"right_{end}")]]
         middle = np.concatenate([ends[..., :2].mean(axis=1), ends[..., 2:].min(axis=1)], axis=-1)
         body[:, BODY_25.index(joint)] = np.where(middle[:, 2:] > 0, middle, 0.0)
     return {"version": _VERSION, "people": [_person(each) for each in body[(scores > 0).any(axis=1)]]}

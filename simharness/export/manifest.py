@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from mvpose.formats.joint_names import BODY_25
-from mvpose.skeleton import PANOPTIC19
+from mvpose.skeleton import COCO17, PANOPTIC19
+from mvpose.wholebody import skeleton_by_name
 from simharness.export.layout import BODIES, FORMAT, PEOPLE, PICTURES
 from simharness.formats.panoptic_poses import CONFIDENCES
+from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.provenance import provenance
 from simharness.trial.stages.build_trial import Trial
 from simharness.world.humans.population import is_child
@@ -39,7 +41,7 @@ _BODIES = (
     "all people in every frame, hidden or not, at the time of the frame, also where clocks of cameras differ; an id "
     "stands for one person in all frames"
 )
-_MADE = "neck and mid_hip are midpoints of shoulders and of hips, where both were detected; feet are missing"
+_MADE = "neck and mid_hip are midpoints of shoulders and of hips, where both were detected"
 
 
 def manifest(
@@ -91,12 +93,19 @@ def manifest(
             "none": "hidden in all pictures, which show other joints of the person",
             "nobody": "no picture shows any joint of the person",
         },
-        "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _MADE},
+        "skeletons": {"joints19": PANOPTIC19.joints, "pose_keypoints_2d": BODY_25, "made": _made(scenario)},
         "rolling_shutter": trial.exposures.readout,
         "cameras": [_camera(trial.exposures, trial.scene.time, frames, view, name) for view, name in enumerate(names)],
         "people": _people(trial),
         "provenance": provenance(command=command, seeds=[scenario.seed], variants=[], seconds=seconds),
     }
+
+
+def _made(scenario: Scenario) -> str:
+    """Say which joints of the detections were not detected, but made or missing."""
+    names = () if scenario.detector.skeleton == COCO17.name else skeleton_by_name(scenario.detector.skeleton).joints
+    parts = [] if {"neck", "mid_hip"} <= set(names) else [_MADE]
+    return "; ".join([*parts, "feet are as detected" if "left_heel" in names else "feet are missing"])
 
 
 def _camera(exposures: ExposureSchedule, time: np.ndarray, frames: range, view: int, name: str) -> dict[str, Any]:

@@ -106,7 +106,8 @@ def export_sequence(
                 rate=scenario.rate,
             )
             _write_json(layout.bodies(frame), bodies)
-            _write_people(layout, names, frame, current.detections)
+            shown = current.detections if current.whole is None else current.whole.detections
+            _write_people(layout, names, frame, shown)
             if picture_source is not None:
                 for view, name in enumerate(names):
                     _write_picture(
@@ -137,7 +138,8 @@ def _same_cameras(one: Rig, other: Rig) -> bool:
 def _write_people(layout: Layout, names: Sequence[str], frame: int, detections: Detections) -> None:
     for view, name in enumerate(names):
         of_view = detections.view == view
-        _write_json(layout.people(name, frame), people_file(detections.keypoints[of_view], detections.scores[of_view]))
+        keypoints, scores = detections.keypoints[of_view], detections.scores[of_view]
+        _write_json(layout.people(name, frame), people_file(keypoints, scores, skeleton=detections.skeleton))
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:

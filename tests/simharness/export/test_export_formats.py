@@ -10,10 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mvpose import COCO17
+from mvpose.formats.joint_names import BODY_25
 from mvpose.formats.openpose import people_file, read_people
 from mvpose.skeleton import PANOPTIC19
+from mvpose.wholebody import skeleton_by_name
 from simharness.export.cameras import hd_names
+from simharness.export.panoptic_sequence import ExportPlan, export_sequence
 from simharness.formats.panoptic_poses import body_scene, confidences
+from simharness.scenario.sections.detector import Detector
 from simharness.types.views import Visibility
 
 HIDDEN = (Visibility.SELF_OCCLUDED, Visibility.OCCLUDED_BY_PERSON, Visibility.OCCLUDED_BY_CLUTTER, Visibility.OUTSIDE)
@@ -106,6 +110,30 @@ def test_neck_and_mid_hip_are_midpoints_where_both_ends_are_detected():
     np.testing.assert_allclose(first[[LEFT_SHOULDER, RIGHT_SHOULDER, LEFT_HIP], 0], (0, 10, 20))
     assert (first[:, 2] > 0).sum() == 4
     assert (second[:, 2] > 0).sum() == 3
+
+
+@pytest.mark.parametrize("name", ["body25", "halpe26"])
+def test_feet_are_written_where_they_are_detected(name):
+    skeleton = skeleton_by_name(name)
+    keypoints = np.random.default_rng(1).uniform(0, 500, (1, len(skeleton), 2))
+    (person,) = people_file(keypoints, np.ones((1, len(skeleton))), skeleton=skeleton)["people"]
+    written = dict(zip(BODY_25, np.reshape(person["pose_keypoints_2d"], (25, 3)), strict=True))
+    for joint, keypoint in zip(skeleton.joints, keypoints[0], strict=True):
+        if joint in BODY_25:
+            np.testing.assert_array_equal(written[joint], [*keypoint, 1.0])
+    hips = [skeleton.index(f"{side}_hip") for side in ("left", "right")]
+    middle = keypoints[0, skeleton.index("mid_hip")] if name == "body25" else keypoints[0, hips].mean(axis=0)
+    np.testing.assert_allclose(written["mid_hip"][:2], middle)
+
+
+def test_an_export_holds_the_feet_that_its_detector_reports(tmp_path, scenario):
+    plan = ExportPlan(tmp_path / "feet", pictures=False)
+    folder = export_sequence(scenario(detector=Detector(skeleton="halpe26")), plan)
+    files = sorted((folder / "openpose").rglob("*.json"))
+    people = [person for file in files for person in json.loads(file.read_text())["people"]]
+    feet = np.array([person["pose_keypoints_2d"] for person in people]).reshape(-1, 25, 3)[:, 19:]
+    assert (feet[..., 2] > 0).mean() > 0.5
+    assert json.loads((folder / "manifest.json").read_text())["skeletons"]["made"].endswith("feet are as detected")
 
 
 def test_files_have_the_keys_of_openpose(shared_data):
