@@ -12,17 +12,29 @@ from doc_pages import FENCE, PAGES, ROOT, blocks
 
 import simharness
 from mvpose.wholebody import read_skeleton
+from simharness.planning.candidates import candidates_in
+from simharness.planning.room_file import read_room
 from simharness.scenario.sections.detector import Detector
 
 
 def test_every_block_is_tested_here():
     languages = Counter(language for page in PAGES.values() for language, _ in FENCE.findall(page))
-    assert languages == {"python": 14, "toml": 8, "yaml": 1}
+    assert languages == {"python": 15, "toml": 9, "yaml": 1}
 
 
 def test_the_shares_of_the_face_are_valid():
     (block,) = {block for block in blocks("toml") if block.startswith("[keypoints.face]\n")}
     assert Detector.model_validate(tomllib.loads(block)).keypoints.face.ears[9] == 0.99  # 270 degrees: the far side
+
+
+def test_the_room_of_the_plan_is_read_and_has_places(tmp_path):
+    (file,) = [block for block in blocks("toml") if "[[lenses]]" in block]
+    (tmp_path / "my-room.toml").write_text(file, encoding="utf-8")
+    room = read_room(tmp_path / "my-room.toml")
+    assert {mount.kind for mount in room.mounts} == {"wall", "ceiling", "tripod"}
+    assert len(candidates_in(room, most=300)) > 50
+    (block,) = [block for block in blocks("python") if "candidates_in(lab)" in block]
+    exec(block, {})
 
 
 @pytest.fixture
