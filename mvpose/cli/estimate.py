@@ -118,10 +118,13 @@ def estimate_into(
     from mvpose.cli.estimation import estimate_people, estimator
     from mvpose.cli.examination import examine
 
-    if sources is None and wanted.pictures:
-        sources = open_videos(wanted.pictures)
+    own = sources is None and wanted.pictures
+    if own:
+        sources = open_videos(wanted.pictures or [])
     inputs = read_inputs(calibration, detections, choices)
     views = None if sources is None else assigned(inputs.rig.cameras, sources)
+    if views is not None and own:  # detections of another program have the numbers of the pictures
+        views = [view.numbered_for(inputs.numbers.tolist()) for view in views]
     method = estimator(wanted.method, lag=wanted.lag, period=inputs.period)
     people = estimate_people(inputs, method, trust=wanted.trust)
     diagnosis = examine(inputs) if wanted.doctor else None

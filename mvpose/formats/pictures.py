@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.files.input_files import read_bytes
-from mvpose.formats.openpose import natural_order
+from mvpose.formats.openpose import file_numbers, natural_order
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of pictures in folders."""
@@ -33,6 +33,7 @@ class PictureSource:
         count: number of pictures, of a video as its header states it.
         fps: frames per second of a video; NaN where unknown.
         size: width and height of the first picture.
+        numbers: number of each picture of a folder; empty: they count from 0, as those of a video.
     """
 
     path: Path
@@ -40,22 +41,31 @@ class PictureSource:
     count: int
     fps: float
     size: tuple[int, int]
+    numbers: tuple[int, ...] = ()
+
+    def numbered_for(self, frames: Sequence[int]) -> PictureSource:
+        """Return the source with the numbers in the names of a folder's files, if these are the numbers of all frames.
+
+        Args:
+            frames: numbers of frames.
+        """
+        numbers = tuple(file_numbers(_files(self.path))) if self.path.is_dir() else ()
+        return replace(self, numbers=numbers) if set(frames) <= set(numbers) else self
 
     def picture(self, number: int) -> NDArray[np.uint8] | None:
         """Return the picture of a number, (h, w, 3) uint8; None where there is none that can be read."""
-        try:
-            return next(self.pictures(number), None)
-        except ValueError:
-            return None
+        return next(self.some([number]), None)
 
     def some(self, numbers: Sequence[int]) -> Iterator[NDArray[np.uint8] | None]:
         """Yield the pictures of ascending numbers, each read once; None where there is none that can be read."""
         if self.path.is_dir():
-            files = _files(self.path)
+            found = _files(self.path)
+            files = dict(zip(self.numbers or range(len(found)), found, strict=True))
             for number in numbers:
-                yield _readable(files[number]) if number < len(files) else None
+                yield _readable(files[number]) if number in files else None
             return
-        pictures, following = self.pictures(), 0
+        following = numbers[0] if len(numbers) else 0
+        pictures = self.pictures(following)
         for number in numbers:
             picture = None
             try:

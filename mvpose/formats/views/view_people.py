@@ -13,7 +13,6 @@ stays on its skeleton where all joints are asked for and :mod:`mvpose.wholebody`
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -138,7 +137,7 @@ def _read_folder(source: Source, skeleton: JointNames | None) -> ViewPeople:
     if not files:
         raise ValueError(f"{source.path}: an empty folder; expected a *.json file for each picture")
     pictures, kind = {}, "OpenPose"
-    for number, file in zip(_numbers(files), files, strict=True):
+    for number, file in zip(openpose.file_numbers(files), files, strict=True):
         content = read_json(file, what=_WHAT)
         if isinstance(content, dict) and "people" in content:
             pictures[number] = _of_openpose(file, content["people"], skeleton)
@@ -150,17 +149,6 @@ def _read_folder(source: Source, skeleton: JointNames | None) -> ViewPeople:
                 f"{file}: expected the people of one picture, {{'people': [...]}}, got {_summary(content)}"
             )
     return ViewPeople(source, dict(sorted(pictures.items())), complete=True, kind=kind)
-
-
-def _numbers(files: Sequence[Path]) -> list[int]:
-    """Return the number of each picture: the last one in the names that differs for all files, or else the row."""
-    found = [[int(digits) for digits in re.findall(r"\d+", file.stem)] for file in files]
-    if len({len(each) for each in found}) == 1:
-        for column in range(len(found[0]) - 1, -1, -1):
-            values = [each[column] for each in found]
-            if len(set(values)) == len(values):
-                return values
-    return list(range(len(files)))
 
 
 def _read_file(source: Source, skeleton: JointNames | None) -> ViewPeople:

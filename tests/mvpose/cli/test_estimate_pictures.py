@@ -46,6 +46,21 @@ def test_films_show_the_pictures_of_the_frames(lab, tmp_path):
     assert page.count("<video ") == 4
 
 
+def test_pictures_have_the_numbers_of_the_frames(lab, tmp_path):
+    """Files called 10, 12, 14, 16 are those of the frames 10, 12, 14, 16; others are taken in order."""
+    source = open_pictures(lab / "pictures" / "cam0")
+    for row, file in enumerate(sorted((lab / "pictures" / "cam0").iterdir())):
+        (tmp_path / f"cam0_{10 + 2 * row}.png").write_bytes(file.read_bytes())
+    named = open_pictures(tmp_path)
+    for number, brightness in ((10, 40), (12, 80), (16, 160)):
+        assert np.median(named.numbered_for([10, 12]).picture(number)) == brightness
+    assert named.numbered_for([10]).picture(11) is None
+    assert named.numbered_for([0, 1]) == named
+    assert [np.median(each) for each in named.some([1, 3])] == [80, 160]
+    assert np.median(source.numbered_for([1]).picture(3)) == 160
+    assert source.picture(4) is None
+
+
 def test_films_may_be_left_out(lab, tmp_path):
     result = estimate(lab, tmp_path / "out", "--pictures", lab / "pictures", "--no-films")
     assert result.exit_code == 0, result.output
