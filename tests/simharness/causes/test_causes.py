@@ -208,3 +208,26 @@ def test_numbers_as_text():
 def test_wrong_requests(options, message):
     with pytest.raises(ValueError, match=message):
         blame(load("quickstart"), **options)
+
+
+@pytest.mark.parametrize(
+    ("key", "cause"),
+    [
+        pytest.param("faults.clock_offset=0.1", "clocks", marks=pytest.mark.slow),
+        pytest.param("faults.rotation_drift=60.0", "calibration", marks=pytest.mark.slow),
+        ("faults.dropped=0.3", "lost-pictures"),
+    ],
+)
+def test_a_mended_fault_gives_the_trial_without_the_fault(key, cause):
+    """Pictures are taken again where a fault of the rig changes them; nothing else changes."""
+    small = (*SMALL, "people.count=2", "duration=0.2")
+    faulty = MendedTrial(load("quickstart", overrides=[*small, key]), "fast")
+    plain = MendedTrial(load("quickstart", overrides=small), "fast").detected(())
+    before, mended = faulty.detected(()), faulty.detected(causes_by_name([cause]))
+    pixels = [np.stack([each.truth.pixels for each in detected.frames]) for detected in (before, mended, plain)]
+    assert not np.array_equal(pixels[0], pixels[2], equal_nan=True)
+    assert np.array_equal(pixels[1], pixels[2], equal_nan=True)
+    one, other = keypoints(mended), keypoints(plain)
+    assert one.keys() == other.keys()
+    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+    assert all(np.array_equal(a.P, b.P) for a, b in zip(mended.rig, plain.rig, strict=True))
