@@ -5,9 +5,10 @@ the cameras: bundle adjustment with a Schur complement (Triggs et al., "Bundle A
 Errors of keypoints have a Student distribution. Both the diagnosis, which compares faults of single cameras over time
 (:mod:`.cameras`), and the repair, which adjusts all cameras (:mod:`.adjustment`), use these equations.
 
-Parameters of a camera, :data:`PARAMETERS`: rotation about its own axes (rad; ``R' = exp(w) R``), centre along the axes
-of the world (m), logarithm of the focal length, principal point (pixels), k1 of the lens, and the offset of the clock
-(true minus given time of its pictures, s): keypoints move back by their velocity times the offset.
+Parameters of a camera, :data:`~mvpose.calibration.joint_elimination.PARAMETERS`: rotation about its own axes (rad;
+``R' = exp(w) R``), centre along the axes of the world (m), logarithm of the focal length, principal point (pixels), k1
+of the lens, and the offset of the clock (true minus given time of its pictures, s): keypoints move back by their
+velocity times the offset.
 """
 
 from __future__ import annotations

@@ -86,7 +86,9 @@ def cast_bands(
     targets: Floats,
     in_picture: Bools,
 ) -> tuple[Integers, Floats]:
-    """Cast a ray to each target in a picture, each at the time of its row; results as of :meth:`RayCaster.cast`.
+    """Cast a ray to each target in a picture, each at the time of its row.
+
+    Results are those of :meth:`~simharness.capture.ray_casting.RayCaster.cast`.
 
     Args:
         caster: ray caster of the scene.
