@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from simharness.planning.volume import Volume
 
 _MOST_PEOPLE = 40
+_PEOPLE = 4
+_DETECTOR = "typical"
 _CROWD = 6  # scenes of other numbers of people
 
 
@@ -37,8 +39,9 @@ def rehearse(
     room: Annotated[
         str,
         typer.Option(
-            metavar="XxY[xZ]",
-            help="Size of the room around the origin, metres, as [cyan]8x6x3[/]. Cameras have to be in it.",
+            metavar="ROOM",
+            help="Size of the room around the origin, metres, as [cyan]8x6x3[/], or a room file of "
+            "[cyan]simharness plan[/], with its volume, obstacles, people and detector. Cameras have to be in it.",
         ),
     ] = "",
     volume: Annotated[
@@ -49,10 +52,16 @@ def rehearse(
             "corners [cyan]0,0 4,0 4,3[/]. [dim]\\[default: what three cameras see][/]",
         ),
     ] = "",
-    people: Annotated[int, typer.Option(metavar="N", min=1, max=_MOST_PEOPLE, help="People in the volume.")] = 4,
+    people: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, max=_MOST_PEOPLE, help="People in the volume. [dim]\\[default: 4][/]"),
+    ] = None,
     detector: Annotated[
-        str, typer.Option(metavar="PROFILE", help="A detector profile: a shipped name or a TOML file.")
-    ] = "typical",
+        str | None,
+        typer.Option(
+            metavar="PROFILE", help="A detector profile: a shipped name or a TOML file. [dim]\\[default: typical][/]"
+        ),
+    ] = None,
     obstacle: Annotated[
         list[str] | None,
         typer.Option(
@@ -102,7 +111,7 @@ def rehearse(
             clutter_of,
             obstacle_of,
             picture_size,
-            room_of,
+            surroundings_of,
             target_of,
             volume_of,
         )
@@ -114,16 +123,20 @@ def rehearse(
         from simharness.scenario.presets import read_profile
         from simharness.trial.provenance import provenance
 
-        where: Volume | None = volume_of(volume) if volume else None
-        walls: Volume | None = room_of(room) if room else None
+        around = surroundings_of(room) if room else None
+        walls: Volume | None = None if around is None else around.room
+        where: Volume | None = volume_of(volume) if volume else None if around is None else around.volume
         boxes: list[Obstacle] = [obstacle_of(each) for each in obstacle or ()]
+        boxes += () if around is None else around.obstacles
         wanted, objects = target_of(target), clutter_of(clutter or ())
         rig = read_rig(
             calibration,
             size=picture_size(size) if size else None,
             room=None if walls is None else (*(2 * walls.outline.max(axis=0)).tolist(), walls.height),
         )
-        profile = read_profile(detector)
+        profile = None if around is None or detector is not None else around.detector
+        profile = read_profile(detector or _DETECTOR) if profile is None else profile
+        count = people or (None if around is None else around.people) or _PEOPLE
         name = calibration.stem or calibration.resolve().name
         place = out or Path("results/rehearsal") / name
         _prepare(place)
@@ -132,7 +145,7 @@ def rehearse(
                 rig,
                 detector=profile,
                 volume=where,
-                people=people,
+                people=count,
                 room=walls,
                 obstacles=boxes,
                 clutter=objects,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from simharness.planning.rehearsal import Target
 from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
+from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.room import Clutter
 
 _ROOM_HEIGHT = 3.0  # metres, unless another is given
@@ -45,6 +47,46 @@ def volume_of(text: str) -> Volume:
         return Volume(corners)
     except ValueError as error:
         raise ValueError(f"--volume {text}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a room says of a rehearsal.
+
+    Attributes:
+        room: its floor and height.
+        volume: where people are; None where the room does not say it.
+        obstacles: boxes that hide people.
+        people: their number; None where the room does not say it.
+        detector: profile of the detector; None likewise.
+    """
+
+    room: Volume
+    volume: Volume | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    people: int | None = None
+    detector: Detector | None = None
+
+
+def surroundings_of(text: str) -> Surroundings:
+    """Return what a room says: a size around the origin, "8x6x3", or a room file of ``simharness plan``.
+
+    Raises:
+        ValueError: neither a size nor a room file, or a mistake in the file.
+    """
+    if all(each.isnumeric() or each in ".x" for each in text):
+        return Surroundings(room_of(text))
+    from simharness.planning.room_file import read_room
+    from simharness.planning.value_fit import obstacles_of
+
+    room = read_room(text)
+    return Surroundings(
+        Volume(room.outline, room.height),
+        Volume(room.volume, room.volume_height),
+        obstacles_of(room),
+        room.keys.people.count,
+        room.detector,
+    )
 
 
 def room_of(text: str) -> Volume:

@@ -9,10 +9,12 @@ from typer.testing import CliRunner
 from mvpose import Rig
 from mvpose.formats.calibration.voxelpose import write_calibration
 from simharness.cli import app
-from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, target_of, volume_of
+from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, surroundings_of, target_of, volume_of
 from simharness.planning.rehearse import rehearse
+from simharness.planning.room_file import read_room
 from simharness.planning.volume import Volume
 from simharness.scenario.presets import read_profile
+from simharness.scenario.shipped import shipped_folder
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.presets import preset_rig
 
@@ -46,6 +48,19 @@ def test_nothing_visible_is_one_message():
 def test_options_that_cannot_be_read(read, text, message):
     with pytest.raises(ValueError, match=message):
         read(text)
+
+
+def test_a_room_file_gives_volume_obstacles_people_and_detector():
+    rooms = sorted((shipped_folder() / "rooms").glob("*.toml"))
+    around = surroundings_of(str(rooms[0]))
+    room = read_room(rooms[0])
+    assert around.people == room.keys.people.count
+    assert around.volume.area > 0
+    assert len(around.obstacles) == len(room.blocking)
+    for each, box in zip(around.obstacles, room.blocking, strict=True):
+        assert np.allclose(each.size, 2 * np.array(box.half))
+    assert surroundings_of("8x6x2.5").room.height == 2.5
+    assert surroundings_of("8x6").volume is None
 
 
 def test_a_calibration_without_the_size_of_its_pictures(tmp_path):
