@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,10 +172,31 @@ def trials(count: int, first: int) -> None:
         )
 
 
+def _error_by_place(outcomes: Sequence[Outcome], places: Floats) -> tuple[Floats, Floats]:
+    """Return the mean error at each place, (P,), millimetres, NaN where nobody was, and how many people were there."""
+    position = np.concatenate([each.position for each in outcomes])
+    error = np.concatenate([each.error_mm for each in outcomes])
+    known = np.isfinite(error)
+    place = ((position[known][:, None] - places) ** 2).sum(axis=-1).argmin(axis=1)
+    count = np.bincount(place, minlength=len(places)).astype(float)
+    total = np.bincount(place, error[known], minlength=len(places))
+    return np.divide(total, count, out=np.full(len(places), np.nan), where=count > 0), count
+
+
+def _agreement(one: Floats, other: Floats) -> str:
+    """Return how well two lists of errors agree."""
+    off = 100 * np.median(np.abs(other / one - 1))
+    return f"Spearman {spearmanr(one, other)[0]:.3f}, median relative error {off:.1f} %"
+
+
 def maps(count: int, first: int, recordings: int) -> None:
-    """Print how well the predicted error of each place agrees with that of simulated recordings."""
-    everything: list[tuple[float, float]] = []
-    for done, scenario in enumerate(possible(first, walking=True)):
+    """Print how well the predicted error of each place agrees with that of simulated recordings.
+
+    Beside it: how well one half of the recordings agrees with the other, which no prediction can exceed by much.
+    """
+    pairs: list[tuple[float, float, float, float]] = []  # simulated, predicted, in either half
+    done = 0
+    for scenario in possible(first, walking=True):
         if done == count:
             break
         outcomes = []
@@ -183,30 +204,29 @@ def maps(count: int, first: int, recordings: int) -> None:
             again = scenario.model_copy(update={"seed": scenario.seed + 100_000 * (number + 1), "duration": 20.0})
             try:
                 outcomes.append(simulated(again))
-            except ValueError:
+            except ValueError:  # the people do not fit
                 continue
+        if len(outcomes) < 2:
+            continue
         prediction = predicted(scenario, spacing=1.0, draws=4)
-        position = np.concatenate([each.position for each in outcomes])
-        error = np.concatenate([each.error_mm for each in outcomes])
-        known = np.isfinite(error)
-        place = ((position[known][:, None] - prediction.places) ** 2).sum(axis=-1).argmin(axis=1)
-        number_at = np.bincount(place, minlength=len(prediction.places))
-        total = np.bincount(place, error[known], minlength=len(prediction.places))
-        chosen = np.flatnonzero((number_at >= _FEWEST) & np.isfinite(prediction.error_mm))
-        real = total[chosen] / number_at[chosen]
-        expected = prediction.error_mm[chosen]
-        everything += list(zip(real.tolist(), expected.tolist(), strict=True))
+        real, number_at = _error_by_place(outcomes, prediction.places)
+        halves = [_error_by_place(outcomes[k::2], prediction.places)[0] for k in range(2)]
+        chosen = (number_at >= _FEWEST) & np.isfinite([prediction.error_mm, *halves]).all(axis=0)
+        if not chosen.any():
+            continue
+        done += 1
+        rows = np.stack([real, prediction.error_mm, *halves])[:, chosen]
+        pairs += [tuple(row) for row in rows.T.tolist()]
         print(
             f"seed {scenario.seed}: {len(scenario.cameras.positions)} cameras, {scenario.people.count} people, "
-            f"{len(chosen)} places: Spearman {spearmanr(real, expected)[0]:.2f}, median relative error "
-            f"{100 * np.median(np.abs(expected / real - 1)):.0f} %, {real.mean():.0f} mm, "
-            f"predicted {expected.mean():.0f} mm",
+            f"{chosen.sum()} places: {rows[0].mean():.0f} mm, predicted {rows[1].mean():.0f} mm, "
+            f"{_agreement(rows[0], rows[1])}",
             flush=True,
         )
-        real, expected = np.array(everything).T
+        simulated_error, expected, *parts = np.array(pairs).T
         print(
-            f"  so far {len(real)} places: Spearman {spearmanr(real, expected)[0]:.3f} (bar .9), median relative error "
-            f"{100 * np.median(np.abs(expected / real - 1)):.1f} % (bar 20)",
+            f"  so far {len(pairs)} places: {_agreement(simulated_error, expected)} (bars .9, 20 %); of the two halves "
+            f"of the recordings: {_agreement(*parts)}",
             flush=True,
         )
 
