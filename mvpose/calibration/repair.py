@@ -37,8 +37,9 @@ from mvpose.detections import Detections
 Freedom = Literal["extrinsics", "focal", "center"]
 """What a repair may change: places and orientations; focal lengths; principal points."""
 
-Size = Literal["calibration", "people"]
-"""What decides the size of the whole rig: the believed calibration, or the bone lengths of people."""
+Size = Literal["calibration", "people", "both"]
+"""What decides the size of the whole rig: the believed calibration, the bone lengths of people, or both by their
+uncertainties."""
 
 _PLACES = {"extrinsics": POSE, "focal": FOCAL, "center": CENTER}
 _SPACING = 0.2  # seconds between the frames that are used: errors of detectors last as long
@@ -150,7 +151,8 @@ def repair(
         clocks: whether the clocks of the cameras may be off.
         prior: plausible errors of the believed rig.
         size: what decides the size of the whole rig. By ``"people"`` adults have the published mean stature, which is
-            known up to 5.5 % for one person and to the root of their number less for several.
+            known up to 5.5 % for one person and to the root of their number less for several. By ``"both"`` a careful
+            calibration decides nearly alone, and people do where all cameras were far off.
 
     Returns:
         The repaired rig, or the given one with the reason in ``refused``.
@@ -173,7 +175,7 @@ def repair(
     if reason:
         return _refused(rig, reason)
     result = _result(rig, sightings, adjusted, held)
-    return _of_known_size(result, sightings, adjusted) if size == "people" else result
+    return result if size == "calibration" else _of_size(size, result, sightings, adjusted)
 
 
 def _alternate(
@@ -323,8 +325,8 @@ def _result(rig: Rig, sightings: Sightings, adjusted: Adjustment, held: list[str
     )
 
 
-def _of_known_size(result: Repair, sightings: Sightings, adjusted: Adjustment) -> Repair:
-    """Return the repair with the size of the rig by the bone lengths of people."""
+def _of_size(size: Size, result: Repair, sightings: Sightings, adjusted: Adjustment) -> Repair:
+    """Return the repair with the size of the rig by the bone lengths of people, or by both."""
     joints, first = adjusted.joints, adjusted.rows[adjusted.joints.start[:-1]]
     assert joints.cluster is not None
     people, sigma = size_of_people(
@@ -333,12 +335,18 @@ def _of_known_size(result: Repair, sightings: Sightings, adjusted: Adjustment) -
     if not np.isfinite(people):
         reason = "size of the rig: too few limbs are seen whole to measure people; record people from head to foot"
         return replace(result, held=(*result.held, reason))
-    rig = resized(result.rig, 1.0 / people)
+    arms = result.rig.centers - result.rig.centers.mean(axis=0)
+    growth = np.zeros_like(adjusted.parameters)  # logarithm of the size by the parameters of all cameras
+    growth[:, TRANSLATION] = arms / (arms**2).sum()
+    believed = float(growth.ravel() @ adjusted.covariance @ growth.ravel())  # variance of the size of the rig
+    share = 1.0 if size == "people" else believed / (believed + sigma**2)
+    factor = float(people**-share)
+    rig, grown = resized(result.rig, factor), sigma**2 * share - believed
     corrections, covariance = result.corrections.copy(), result.covariance.copy()
     corrections[:, TRANSLATION] += rig.centers - result.rig.centers
-    arms = rig.centers - rig.centers.mean(axis=0)
-    covariance[:, TRANSLATION, TRANSLATION] += sigma**2 * arms[:, :, None] * arms[:, None]
-    return replace(result, rig=rig, corrections=corrections, covariance=covariance, scale=1.0 / people)
+    if grown > 0:  # a smaller variance of the size is not taken off: position and size are not independent
+        covariance[:, TRANSLATION, TRANSLATION] += grown * arms[:, :, None] * arms[:, None]
+    return replace(result, rig=rig, corrections=corrections, covariance=covariance, scale=factor)
 
 
 def _refused(rig: Rig, reason: str) -> Repair:

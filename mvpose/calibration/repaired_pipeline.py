@@ -21,9 +21,10 @@ from mvpose.pipeline import Estimator, SequenceEstimator
 class RepairedPipeline:
     """Estimator of recordings (:class:`mvpose.pipeline.SequenceEstimator`) that repairs the rig first.
 
-    All frames are read before the first estimate. The repaired rig is used where the repair is not refused. Clocks are
-    corrected where one of them is wrong for certain: an estimator with memory gets the corrected times of pictures, an
-    estimator of single frames gets detections that are moved to the times of the frames.
+    All frames are read before the first estimate. The repaired rig is used where the repair is not refused; its size is
+    that of the believed calibration and of bone lengths together. Clocks are corrected where one is an alarm: an
+    estimator with memory gets the corrected times of pictures, an estimator of single frames gets detections that are
+    moved to the times of the frames.
 
     Attributes:
         estimator: what estimates people.
@@ -42,7 +43,7 @@ class RepairedPipeline:
         given = list(frames)
         if not given:
             return
-        rig = repair(rig, given, period=self.period).rig
+        rig = repair(rig, given, period=self.period, size="both").rig
         clocks = estimate_clocks(rig, given, period=self.period)
         wrong = any(each.severity == "alarm" for each in clocks.findings())
         if isinstance(self.estimator, SequenceEstimator):

@@ -39,7 +39,7 @@ def repair(
     ] = None,
     rig_size: Annotated[
         str,
-        typer.Option(metavar="NAME", help="What decides the size of the rig: calibration, or people by bone lengths."),
+        typer.Option(metavar="NAME", help="Size of the rig by: calibration, people (bone lengths), both."),
     ] = "calibration",
     *,
     choices: Choices,
@@ -79,9 +79,9 @@ def _freedoms(given: str) -> tuple[Freedom, ...]:
 
 
 def _size(given: str) -> Size:
-    known: dict[str, Size] = {"calibration": "calibration", "people": "people"}
+    known: dict[str, Size] = {"calibration": "calibration", "people": "people", "both": "both"}
     if given not in known:
-        raise ValueError(f"--rig-size {given}: expected calibration or people")
+        raise ValueError(f"--rig-size {given}: expected calibration, people or both")
     return known[given]
 
 

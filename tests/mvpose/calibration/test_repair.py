@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from mvpose import COCO17, Detections, Rig
 from mvpose.calibration import repair
+from mvpose.calibration.calibration_prior import Prior
 from mvpose.calibration.normal_equations import FOCAL, changed, difference
 from mvpose.calibration.rig_size import published_limbs, resized
 
@@ -158,8 +159,12 @@ def test_the_size_of_people_decides_that_of_the_rig_where_asked(frames):
     assert by_rig.scale == 1.0
     assert arms[0] == pytest.approx(1.3 * size * true, rel=0.01)
     assert arms[1] == pytest.approx(true, rel=0.02)
-    assert (by_people.covariance[:, 3:, 3:].trace(axis1=1, axis2=2) > 0.01).all()
-    with pytest.raises(ValueError, match="size must be one of calibration, people, got 'mine'"):
+    assert (by_people.covariance.trace(axis1=1, axis2=2) > by_rig.covariance.trace(axis1=1, axis2=2)).all()
+    both = repair(large, frames, period=PERIOD, size="both").scale
+    assert by_people.scale < both < 1.0
+    sure = repair(large, frames, period=PERIOD, size="both", prior=Prior(1e-5, 1e-5)).scale
+    assert sure == pytest.approx(1.0, abs=0.01)
+    with pytest.raises(ValueError, match="size must be one of calibration, people, both, got 'mine'"):
         repair(RIG, frames, period=PERIOD, size="mine")
 
 

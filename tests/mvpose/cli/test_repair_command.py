@@ -81,4 +81,4 @@ def test_a_refused_repair_writes_nothing(call):
     assert "--free colour: expected some of extrinsics, focal, center" in wrong.stderr
     wrong = run(folder / "Calib.toml", folder / "openpose", "--out", folder / "new.toml", "--rig-size", "me")
     assert wrong.exit_code == 2
-    assert "--rig-size me: expected calibration or people" in wrong.stderr
+    assert "--rig-size me: expected calibration, people or both" in wrong.stderr
