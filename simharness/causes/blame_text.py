@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from simharness.causes.blame import RESTORED, Blame
@@ -31,12 +29,14 @@ def conclusion(blame: Blame) -> str:
     if blame.mending is None:
         return f"Nothing is to be gained: mending all causes together does not improve {info.title}."
     mending = blame.mending
-    after = f"{info.title} {_value(blame, mending.score)}{_ends(mending.score, info.digits)}"
+    what = ", ".join(cause.title for cause in mending.about)
+    after = f"{_value(blame, mending.score)}{_ends(mending.score, info.digits)}"
     part = f"{100 * mending.restored:.0f} % of what mending everything would gain"
-    what = listing([cause.title for cause in mending.about])
     if mending.restored < RESTORED:
-        return f"The largest causes together are not enough: with {what} mended it is {after}, {part}."
-    return f"Mend {what}: {after}, {part}."
+        return (
+            f"The largest causes together are not enough. With these mended, {what}, {info.title} is {after}: {part}."
+        )
+    return f"Mend first: {what}. {info.title} is then {after}: {part}."
 
 
 def surest(blame: Blame) -> str:
@@ -52,11 +52,6 @@ def surest(blame: Blame) -> str:
         f"The largest cause is {first.about.title}, {points(first.share)} points, but its interval reaches below zero: "
         "run more seeds before you decide."
     )
-
-
-def listing(names: Sequence[str]) -> str:
-    """Return names as people list them: "a, b and c"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def gain(number: Interval, *, interval: bool = True) -> str:

@@ -258,7 +258,7 @@ def test_what_cost_the_score_stands_on_the_page(tmp_path):
     write_blame(found, tmp_path)
     assert read_blame(tmp_path) == found
     page = render_study(results, found=found)
-    assert "Mend missed and merged boxes and inversions and swaps: PCP 98.0 % (97.0 to 99.0)" in page
+    assert "Mend first: missed and merged boxes, inversions and swaps. PCP is then 98.0 % (97.0 to 99.0): 100 %" in page
     assert "Not in this setting: clocks." in page
     assert page.count("<circle") == 2
     (tmp_path / FILE).write_text("{}")
