@@ -11,6 +11,7 @@ import numpy as np
 from mvpose import Camera, Rig
 from mvpose.arrays import Bools, Floats, Integers
 from simharness.planning.tolerance import CLIFF, Tolerance
+from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
 from simharness.statistics.intervals import Interval
 
@@ -153,6 +154,7 @@ class Rehearsal:
         mixed: simulated percentage of matched groups that hold two people, all cameras.
         seconds: time that the fast layer and the simulation took.
         sentences: the result in plain sentences, the most important first.
+        obstacles: boxes that hide people.
     """
 
     name: str
@@ -175,6 +177,7 @@ class Rehearsal:
     mixed: Interval
     seconds: Mapping[str, float] = field(default_factory=dict)
     sentences: tuple[str, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def good_share(self) -> float:

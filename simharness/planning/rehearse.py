@@ -213,6 +213,7 @@ class _Rehearsing:
             tolerances=tolerances(scenes, self.whole),
             scenes=tuple(scenes),
             mixed=mixed,
+            obstacles=question.obstacles,
             seconds={"layer": layer_seconds, "all": perf_counter() - start},
         )
         return replace(rehearsal, sentences=sentences(rehearsal))

@@ -17,6 +17,7 @@ from mvpose.report.rig_plots import camera_from_above, fit_view
 from mvpose.report.svg_plots import FAINT, INK, svg_plot
 from simharness.planning.rehearsal import Rehearsal
 from simharness.planning.sentences import grid_spacing
+from simharness.planning.visibility import Obstacle
 
 GOOD = "#1f8a5b"
 """Colour of the line around places that meet the target."""
@@ -29,7 +30,7 @@ SIZE = (4.6, 4.5)
 
 _TALL = 1.0  # height of the axes by their width
 _USED = 0.82  # share of the width that the axes have
-_LEAST = 15.0  # px: smaller cells share a number
+_LEAST = 13.0  # px: smaller cells share a number
 _DARK = 0.5  # luminance under which numbers are white
 _BETTER = LinearSegmentedColormap.from_list("better", ["#f3efe6", "#b9d3e8", "#5f9bd0", "#1f5f9f"])
 _WORSE = LinearSegmentedColormap.from_list("worse", ["#f3f1ee", "#f3cfae", "#dd8452", "#a3341f"])
@@ -145,6 +146,16 @@ def outline_of(places: Floats, chosen: Bools) -> list[Floats]:
     return lines
 
 
+def corners_of(obstacle: Obstacle) -> Floats:
+    """Return the corners of a box, in order around its floor and then around its top, (8, 3), metres."""
+    half = obstacle.size / 2
+    around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[:2]
+    cos, sin = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    floor = around @ np.array([[cos, sin], [-sin, cos]]) + obstacle.center[:2]
+    low, high = obstacle.center[2] - half[2], obstacle.center[2] + half[2]
+    return np.concatenate([np.column_stack([floor, np.full(4, z)]) for z in (low, high)])
+
+
 def simulated_map(rehearsal: Rehearsal, values: Sequence[Floats], *, least: int = 4) -> Floats:
     """Return the mean of values of simulated people at each place, (P,); NaN where fewer than ``least`` were.
 
@@ -171,6 +182,8 @@ def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> fl
     axes.add_patch(Polygon(outline, fill=False, ec=INK, lw=1.1, zorder=3.2))
     if len(rehearsal.room):
         axes.add_patch(Polygon(rehearsal.room, fill=False, ec=FAINT, lw=2.2, zorder=1.2))
+    for obstacle in rehearsal.obstacles:
+        axes.add_patch(Polygon(corners_of(obstacle)[:4, :2], fc=FAINT, ec=INK, lw=0.9, alpha=0.55, zorder=2.5))
     for camera in rehearsal.rig:
         camera_from_above(axes, camera, name=names)
     if rehearsal.extra is not None:

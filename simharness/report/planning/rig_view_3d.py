@@ -18,7 +18,7 @@ from mvpose import Camera
 from mvpose.arrays import Floats
 from simharness.planning.rehearsal import Rehearsal
 from simharness.planning.sentences import grid_spacing
-from simharness.report.planning.floor_maps import EXTRA, GOOD, outline_of
+from simharness.report.planning.floor_maps import EXTRA, GOOD, corners_of, outline_of
 from simharness.world.rigs.layouts import look_at
 from simharness.world.rigs.lenses import intrinsics
 
@@ -50,7 +50,7 @@ class RigView3D:
 def rig_view_3d(rehearsal: Rehearsal) -> RigView3D:
     """Return the view of a rehearsal."""
     rig, volume, height = rehearsal.rig, rehearsal.volume.outline, rehearsal.volume.height
-    points = np.concatenate([volume, rig.centers[:, :2]])
+    points = np.concatenate([volume, rig.centers[:, :2], rehearsal.room])
     center = np.array([*(points.min(axis=0) + points.max(axis=0)) / 2, height / 2])
     radius = max(1.5, float(np.linalg.norm(points - center[:2], axis=1).max()))
     places = rehearsal.prediction.places
@@ -61,11 +61,13 @@ def rig_view_3d(rehearsal: Rehearsal) -> RigView3D:
     frusta = [frustum(camera) for camera in rig]
     extra = [] if rehearsal.extra is None else [frustum(rehearsal.extra.camera)]
     edges = _prism(volume, height)
+    boxes = [line for each in rehearsal.obstacles for line in _box(corners_of(each))]
     room = [] if not len(rehearsal.room) else _loop(rehearsal.room, 0.0)
     data: dict[str, Any] = {
         "lines": _groups(
             (_floor(points), "--line", 1.0),
             (room, "--faint", 2.0),
+            (boxes, "--faint", 1.0),
             (edges, "--ink", 1.2),
             (sides, GOOD, 1.8),
             ([line for each in frusta for line in _pyramid(each)], "--accent", 1.1),
@@ -107,6 +109,11 @@ def _loop(outline: Floats, height: float) -> list[Floats]:
 def _prism(outline: Floats, height: float) -> list[Floats]:
     posts = [np.array([[*corner, 0.0], [*corner, height]]) for corner in outline]
     return [*_loop(outline, 0.0), *_loop(outline, height), *posts]
+
+
+def _box(corners: Floats) -> list[Floats]:
+    """Return the edges of a box with corners (8, 3), those of its floor before those of its top."""
+    return [*_closed(corners[:4]), *_closed(corners[4:]), *(corners[[k, k + 4]] for k in range(4))]
 
 
 def _upright(lines: list[Floats], height: float) -> list[Floats]:

@@ -34,7 +34,7 @@ function showRig(place) {
     pen.lineCap = "round";
     const [sy, cy, sp, cp] = [Math.sin(yaw), Math.cos(yaw), Math.sin(pitch), Math.cos(pitch)];
     axes = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
-    scale = zoom * data.far * Math.min(width / 2.3, height / 1.6);
+    scale = zoom * data.far * Math.min(width / 2.3, height / 1.75);
     pen.fillStyle = data.tile;
     pen.globalAlpha = 0.22;
     for (const tile of data.tiles) if (shape(tile, true)) pen.fill();

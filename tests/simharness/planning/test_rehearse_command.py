@@ -12,7 +12,9 @@ from simharness.cli import app
 from simharness.cli.rehearse_values import clutter_of, obstacle_of, room_of, surroundings_of, target_of, volume_of
 from simharness.planning.rehearse import rehearse
 from simharness.planning.room_file import read_room
+from simharness.planning.visibility import Obstacle
 from simharness.planning.volume import Volume
+from simharness.report.planning.floor_maps import corners_of
 from simharness.scenario.presets import read_profile
 from simharness.scenario.shipped import shipped_folder
 from simharness.world.rigs.layouts import look_at
@@ -94,3 +96,12 @@ def test_bad_input_is_one_message(arguments, message, tmp_path):
     assert result.exit_code == 2
     assert message in result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+def test_a_turned_obstacle_is_drawn_where_it_stands():
+    corners = corners_of(Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=np.pi / 2))
+    assert np.allclose(corners.min(axis=0), [0.8, 1.0, 0.0])
+    assert np.allclose(corners.max(axis=0), [1.2, 3.0, 1.0])
+    floor = Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=0.4).floor
+    drawn = corners_of(Obstacle(np.array([1.0, 2.0, 0.5]), np.array([2.0, 0.4, 1.0]), yaw=0.4))
+    assert floor.contains(drawn[:, :2]).all()
