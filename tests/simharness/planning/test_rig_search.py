@@ -75,6 +75,22 @@ def test_search_finds_the_best_of_all_sets(seed: int) -> None:
     assert found[0][1] == pytest.approx(values.value([terms[k] for k in found[0][0]]))
 
 
+class Union(Coverage):
+    """Value of sets of cameras by the number of points that any of them sees."""
+
+    def value(self, terms: Sequence[Floats]) -> float:
+        return float(np.any(terms, axis=0).sum())
+
+
+def test_exchange_leaves_the_first_choice_of_a_greedy_start() -> None:
+    room = small_room(spacing=0.0)
+    candidates = few(room, 3, 0)
+    terms = [
+        np.isin(np.arange(10), seen).astype(float) for seen in ([0, 1, 2, 3, 4, 5], [0, 1, 2, 6, 7], [3, 4, 5, 8, 9])
+    ]
+    assert exchange_search(Union(), terms, Limits.of(room, candidates, 2), starts=1, seed=0) == [((1, 2), 10.0)]
+
+
 def test_budget_spacing_and_kinds_hold_in_every_set() -> None:
     room, values = small_room(budget=5.0, spacing=1.5), Coverage()
     candidates = few(room, 40, 1)
