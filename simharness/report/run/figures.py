@@ -1,4 +1,4 @@
-"""Registry of figures: plots in the right column of the report of a run.
+"""Registry of figures: plots in the report of a run.
 
 How to add a figure:
 
@@ -36,13 +36,11 @@ class Figure:
         title: heading.
         caption: what the figure shows, a sentence; ``{variant}`` stands for the name of the variant.
         draw: function of the run and of the variant to show; returns SVG, or None without data.
-        grows: whether the figure takes the height that is left in its column.
     """
 
     title: str
     caption: str
     draw: Draw
-    grows: bool = False
 
 
 @dataclass(frozen=True)
@@ -52,13 +50,12 @@ class DrawnFigure:
     title: str
     caption: str
     svg: Markup
-    grows: bool
 
 
 _registered: dict[str, Figure] = {}
 
 
-def figure(title: str, caption: str, *, grows: bool = False) -> Callable[[Draw], Draw]:
+def figure(title: str, caption: str) -> Callable[[Draw], Draw]:
     """Register the decorated function as a figure; the arguments are the attributes of :class:`Figure`.
 
     Raises:
@@ -68,7 +65,7 @@ def figure(title: str, caption: str, *, grows: bool = False) -> Callable[[Draw],
         raise ValueError(f"the figure {title!r} is registered twice: choose another title for one of them")
 
     def register(draw: Draw) -> Draw:
-        _registered[title] = Figure(title, caption, draw, grows)
+        _registered[title] = Figure(title, caption, draw)
         return draw
 
     return register
@@ -80,7 +77,7 @@ def draw_figures(record: Record, variant: str) -> list[DrawnFigure]:
     figures = sorted(_registered.values(), key=lambda each: modules.index(each.draw.__module__))
     drawn = [(each, each.draw(record, variant)) for each in figures]
     return [
-        DrawnFigure(each.title, each.caption.replace("{variant}", variant), Markup(svg), each.grows)
+        DrawnFigure(each.title, each.caption.replace("{variant}", variant), Markup(svg))
         for each, svg in drawn
         if svg is not None
     ]

@@ -36,7 +36,6 @@ def error_over_time(record: Record, variant: str) -> str | None:
 @figure(
     "Visibility of the joints in each camera",
     "Share of all joints of all people in all frames, visible or by the cause of the occlusion.",
-    grows=True,
 )
 def visibility(record: Record, variant: str) -> str | None:
     """Plot the visibility of the joints in each camera; None without people."""
