@@ -95,10 +95,11 @@ def diagnose(rig: Rig, frames: Sequence[Detections], *, period: float = 0.04) ->
     findings += [
         camera_findings.of_turn(rig, after, result.covariance[view], view, names) for view in sorted(turned - useless)
     ]
-    clocks = estimate_clocks(_with_found_lenses(mended, reading, result), sightings, period=period)
-    findings += [each for each in clocks.findings() if each.view not in useless]
+    different = any(DIFFERENT in each.text for each in missing)  # then neither files nor clocks can be compared
+    if not different:
+        clocks = estimate_clocks(_with_found_lenses(mended, reading, result), sightings, period=period)
+        findings += [each for each in clocks.findings() if each.view not in useless]
     if undetermined:
-        different = any(DIFFERENT in each.text for each in missing)  # then no reading of the files is right
         findings = [replace(each, severity="unknown") if _doubtful(each, different) else each for each in findings]
     residuals = residuals_of_others(mended.packed, joints, scale=result.equations.scale)
     return Diagnosis.of(
