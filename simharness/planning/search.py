@@ -2,8 +2,8 @@
 
 Greedy selection is within 1 - 1/e of the best set for coverage (Nemhauser, Wolsey and Fisher, Mathematical
 Programming 1978); exchanges of single members (Fedorov's algorithm for designs of experiments, 1972) remove most of
-what it loses, and several randomised starts the rest. ``benchmarks/planning`` compares it with differential evolution
-and with CMA-ES at equal time.
+what it loses, and several randomised starts the rest. ``benchmarks/planning/optimisers.py`` compares it with
+differential evolution and dual annealing at equal time.
 
 Every start and every refinement draws from its own stream and is a step of a :class:`~.ledger.Ledger`, so that the
 result depends on the seed alone and an interrupted search goes on.
