@@ -40,7 +40,7 @@ nitpick_ignore_regex = [
         "py:(class|obj)",
         r"(?!(simharness|mvpose)\.).*",
     ),  # types in signatures: of other projects, and aliases by short names
-    ("py:(class|obj)", r".*\.(_\w+|\w+_co|Result|Perform|Move)"),  # private aliases and type variables
+    ("py:(class|obj)", r".*\.(_\w+|\w+_co|Result|Perform|Move|Terms)"),  # private aliases and type variables
     ("py:exc", r"(tomllib\.)?[A-Z]\w+"),  # exceptions of Python
 ]
 suppress_warnings = ["ref.python"]  # a short name in a signature that two modules have
