@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mvpose.files.atomic_files import write_atomic
+from mvpose.files.input_files import read_json_object
 
 
 class Ledger:
@@ -25,7 +26,7 @@ class Ledger:
         self._steps: dict[str, Any] = {}
         if path is not None and path.is_file():
             try:
-                kept = json.loads(path.read_text(encoding="utf-8"))
+                kept = read_json_object(path, what="finished steps of a search")
                 if kept["identity"] == identity:
                     self._steps = dict(kept["steps"])
             except (ValueError, KeyError, TypeError, OSError):

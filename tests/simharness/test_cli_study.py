@@ -88,15 +88,11 @@ def test_a_study_in_shards_and_then_complete(simharness, reports):
     results = read_study("out/quickstart")
     assert results.info["command"].startswith("simharness")
     assert results.trials["cameras.count"].to_list() == [3, 3, 4, 4]
-    lines = [line.split() for line in whole.stdout.splitlines()]
-    for count in (3, 4):  # a row for each setting: its mean over the two seeds, and its interval below
-        rows = results.trials.filter(results.trials["cameras.count"] == count)
-        (place,) = [place for place, words in enumerate(lines) if words[:2] == [f"{count}", "fast"]]
-        assert lines[place][2] == f"{rows['pcp'].mean():.1f}"
-        assert len(lines[place + 1]) == 6
-        assert len(lines[place + 2]) == 6
-        assert all(word.endswith("–") for word in lines[place + 1])
-        assert float(lines[place + 1][0].rstrip("–")) <= rows["pcp"].mean() <= float(lines[place + 2][0])
+    pcp = {count: rows["pcp"].mean() for (count,), rows in results.trials.group_by("cameras.count")}
+    best, worst = max(pcp, key=pcp.get), min(pcp, key=pcp.get)
+    (words,) = [line.split() for line in whole.stdout.splitlines() if line.startswith("cameras.count")]
+    assert words[1:5] == ["fast", f"{pcp[best]:.1f}", "at", f"{best}"]
+    assert words[5:8] == [f"{pcp[worst]:.1f}", "at", f"{worst}"]
 
 
 class TestFailures:

@@ -119,13 +119,13 @@ def _background(scene: _Scene, camera: Camera) -> Background:
 
 def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighting: Lighting) -> LitBackground:
     """Return the background in a light; the last one is kept."""
-    view, seen = geometry.shadows(lighting).light, (background.triangle, background.inverse_depth)
-    if background.lit is None or (background.lit.lighting, background.lit.view) != (lighting, view):
+    shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
+    if background.lit is None or (background.lit.lighting, background.lit.view) != (lighting, shadows.light):
         empty = np.round(255 * np.array(lighting.background)).astype(np.uint8)
         rgb = np.full((*background.triangle.shape, 3), empty, np.uint8)
-        place, depth = shadow_places(*seen, camera.center, _rays(camera), view.P, SHADOW_SIZE)
+        place, depth = shadow_places(*seen, camera.center, _rays(camera), shadows.light.P, SHADOW_SIZE)
         _shade(geometry, camera, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
-        background.lit = LitBackground(lighting, view, rgb, place, depth)
+        background.lit = LitBackground(lighting, shadows.light, rgb, place, depth)
     return background.lit
 
 

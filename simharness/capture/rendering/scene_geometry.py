@@ -24,7 +24,7 @@ from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
 
-_AROUND = 0.2  # metres around what stands still that shadow maps cover: feet sink in, hands reach through walls
+_CUT = 0.2  # metres beyond a whole metre that need no other one: feet sink in; shadow maps have room at their borders
 
 
 @dataclass(frozen=True)
@@ -59,13 +59,20 @@ class StillGeometry:
             return np.array([[np.inf] * 3, [-np.inf] * 3])
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], float)
 
+    def casters(self, direction: tuple[float, float, float]) -> tuple[NDArray[np.uint32], Floats, Floats]:
+        """Return the faces that cast shadows, (m, 3), and the box of their vertices; the last ones are cached."""
+        kept = self.__dict__.get("_casters")
+        if kept is None or kept[0] != direction:
+            faces = self.topology.faces
+            kept = direction, casters(self.vertices, faces, self.normals[0], np.array(direction), self.box)
+            self.__dict__["_casters"] = kept
+        return kept[1]
+
     def shadow(self, light: LightView) -> ShadowMap:
         """Return the shadow map of these meshes; the last one is cached."""
         kept: tuple[LightView, ShadowMap] | None = self.__dict__.get("_shadow")
         if kept is None or kept[0] != light:
-            direction = np.array(light.direction)
-            faces, _, _ = casters(self.vertices, self.topology.faces, self.normals[0], direction, self.box)
-            kept = light, shadow_map(light, self.vertices, faces)
+            kept = light, shadow_map(light, self.vertices, self.casters(light.direction)[0])
             self.__dict__["_shadow"] = kept
         return kept[1]
 
@@ -137,18 +144,17 @@ class SceneGeometry:
 
         Only faces turned to the light cast shadows: this is sufficient for closed bodies, and lets the light into a
         room, whose walls face inwards. The floor and the walls that receive light have nothing behind them. The maps
-        cover what stands still with a margin, and the rest to the next metre if it reaches beyond: so the map of still
-        meshes serves many frames.
-        Without still meshes they cover the faces that cast shadows.
+        cover these faces; those of meshes that move, to the next metre, so that the map of still meshes serves many
+        frames.
         """
         vertices, still = self.moving_vertices, self.still
         faces, low, high = casters(
             vertices, self.topology.moving_faces, self._moving_normals[0], np.array(direction), still.box
         )
         if len(still.vertices):
-            covered = still.box + [[-_AROUND], [_AROUND]]
-            low = np.where(low < covered[0], np.floor(low), covered[0])
-            high = np.where(high > covered[1], np.ceil(high), covered[1])
+            _, still_low, still_high = still.casters(direction)
+            low, high = np.floor(low + _CUT), np.ceil(high - _CUT)
+            low, high = np.minimum(low, still_low), np.maximum(high, still_high)
         light = LightView.of(direction, low, high)
         return Shadows(light, still.shadow(light), shadow_map(light, vertices, faces))
 

@@ -106,7 +106,10 @@ AROUND = {
     "mvpose/kernels.py": "code",
     "mvpose/files/input_files.py": "the reader",
     "mvpose/files/archives.py": "bytes that were read",
+    "mvpose/formats/people_table.py": "bytes that were read",
     "simharness/runtime/parquet_tables.py": "bytes that were read",
+    "simharness/planning/ledger.py": "text that was just written",
+    "simharness/report/run/film.py": "a film that was just written",
     "simharness/runtime/code_digest.py": "code",
     "simharness/runtime/machine.py": "what the kernel says of the machine",
     "simharness/trial/identity.py": "digests of regular files, read in blocks",
@@ -119,6 +122,7 @@ AROUND = {
 }
 SHIPPED = {
     "simharness/world/rigs/presets.py", "simharness/world/humans/body.py", "simharness/detector/guesses.py",
+    "simharness/world/humans/outer_joints.py",
 }  # fmt: skip
 CALLS = re.compile(
     r"(?:^|\.)(?:read_text|read_bytes|loadmat|read_parquet|scan_parquet|FileStorage|imread)$|^(?:np\.load|json\.loads?|"
