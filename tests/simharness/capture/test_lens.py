@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesh_shapes import ball, box, chequered, crowd, disc
+from scipy.ndimage import binary_dilation
 from test_renderers import VIEWS, axis_rays, camera_at, pixel_grid, plane_depth
 
 from simharness.capture.rendering.lens import lens_of, through_lens
@@ -105,7 +106,13 @@ def test_the_pinhole_picture_covers_the_view_at_full_resolution(k1, k2, p1, p2, 
     lens = lens_of(camera)
     pixels = pixel_grid(camera)
     rays = camera.rays(pixels)
-    imaged = np.isfinite(rays).all(axis=-1)
+    by_method, drawn = (
+        np.isfinite(rays).all(axis=-1),
+        np.full(rays.shape[:2], True) if lens.dark is None else ~lens.dark,
+    )
+    # Where the lens folds over, rounding decides whether a pixel is imaged: the two may differ there and only there.
+    assert not ((by_method != drawn) & ~binary_dilation(~(by_method | drawn), np.ones((3, 3)))).any()
+    imaged = by_method & drawn
     pinhole = lens.pinhole(camera)
     places = pinhole.project(camera.center + rays[imaged])
     np.testing.assert_allclose(np.stack([lens.columns, lens.rows], -1)[imaged], places, atol=2e-3)
@@ -114,7 +121,6 @@ def test_the_pinhole_picture_covers_the_view_at_full_resolution(k1, k2, p1, p2, 
     columns, rows = lens.nearest[imaged] % lens.size[0], lens.nearest[imaged] // lens.size[0]
     back = camera.project(pinhole.center + pinhole.rays(np.stack([columns, rows], -1).astype(float)))
     assert np.linalg.norm(back - pixels[imaged], axis=-1).max() < 0.75
-    assert (lens.dark is None) == imaged.all()
 
 
 def test_pixels_beyond_the_fold_are_dark(renderer):
