@@ -16,6 +16,7 @@ from benchmarks.doctor.measures import aligned, camera_errors, pcp
 from benchmarks.doctor.recordings import BenchRecording
 from mvpose import Detections, Rig
 from mvpose.calibration import Diagnosis, Repair, diagnose, estimate_clocks, repair
+from mvpose.calibration.repair import Size
 from mvpose.calibration.resampling import resampled
 
 EVERY = 5  # frames: of those that the slower variants estimate
@@ -149,8 +150,10 @@ def _repaired(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
     }  # fmt: skip
 
 
-def _repair(rig: Rig, frames: tuple[Detections, ...], recording: BenchRecording) -> Repair:
-    return repair(rig, frames, period=recording.period)
+def _repair(
+    rig: Rig, frames: tuple[Detections, ...], recording: BenchRecording, *, size: Size = "calibration"
+) -> Repair:
+    return repair(rig, frames, period=recording.period, size=size)
 
 
 def _errors(rig: Rig, recording: BenchRecording, view: int | None) -> Result:
@@ -173,7 +176,7 @@ def _rigs_off(key: TrialKey, recordings: Mapping[str, BenchRecording]) -> Result
     degrees, metres = (4.0, 0.4) if key.case.startswith("4") else (2.0, 0.2)
     case = faults.move_all(recording, degrees, metres, key.rng)
     start = time.perf_counter()
-    fixed = _repair(case.rig, case.frames, recording)
+    fixed = _repair(case.rig, case.frames, recording, size="both")  # as variants `NAME+repair`
     seconds = time.perf_counter() - start
     rigs = {"perfect": recording.rig, "before": case.rig, "after": fixed.rig}
     return {
