@@ -7,12 +7,18 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simharness.types.light_sources import LightSources
+
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Lighting:
-    """Lighting of a whole scene; both renderers use the same shading rule.
+    """Lighting of a whole scene.
+
+    With ``sources``, the renderer ``raster`` shows the light of these sources: soft shadows, light that surfaces
+    reflect to each other, and the tone curve of a camera. All other attributes are then the nearest lighting in closed
+    form, which ``gl`` shows. Without ``sources`` both renderers show the lighting in closed form:
 
     For a surface with unit normal n on the side of the camera, the light is ``key max(n . direction, 0)`` (0 in
     shadow) ``+ sky (0.65 + 0.35 n_z) + fill max(n . direction to the camera, 0)``. The surface reflects this times
@@ -26,6 +32,7 @@ class Lighting:
         fill: strength of the light at the camera, which keeps surfaces in shadow from looking flat.
         tint: colour of all light, linear, 0 to 1.
         background: sRGB of pixels that show no surface, 0 to 1; light does not change it.
+        sources: lamps, windows, sun and sky; None for the lighting in closed form.
 
     Raises:
         ValueError: a wrong shape, a direction of length 0 or below the horizon, a negative strength, or a colour
@@ -38,9 +45,12 @@ class Lighting:
     fill: float = 0.12
     tint: Vector = (1.0, 1.0, 1.0)
     background: Vector = (0.82, 0.85, 0.88)
+    sources: LightSources | None = None
 
     def __post_init__(self) -> None:
         for entry in fields(self):
+            if entry.name == "sources":
+                continue
             value = np.asarray(getattr(self, entry.name), float)
             shape = () if entry.name in ("key", "sky", "fill") else (3,)
             if value.shape != shape or not np.isfinite(value).all():

@@ -29,10 +29,14 @@ class Mesh:
             :class:`simharness.world.humans.segments.Segment`. None if no face has a label.
         still: whether the mesh stays where it is as long as the scene lasts: renderers draw it once for each camera
             that stays too.
+        emission: radiance that the surface sends out, linear RGB, multiplied by ``colors`` and ``texture``: what a
+            picture shows of a lamp or a window. It lights nothing else (that is an
+            :class:`~simharness.types.light_sources.AreaLight`), and only lighting with ``sources`` shows it.
 
     Raises:
         ValueError: a wrong shape, a vertex or texture coordinate that is not finite, a face that refers to a missing
-            vertex, a colour outside 0..1, a texture without pixels, or one of ``texture`` and ``uv`` alone.
+            vertex, a colour outside 0..1, a texture without pixels, an emission below 0, or one of ``texture`` and
+            ``uv`` alone.
     """
 
     vertices: NDArray[np.float32]
@@ -43,6 +47,7 @@ class Mesh:
     uv: NDArray[np.float32] | None = None
     parts: NDArray[np.int8] | None = None
     still: bool = False
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, "n")
@@ -74,6 +79,8 @@ class Mesh:
             if len(parts) and parts.min() < -1:
                 raise ValueError(f"mesh parts must be labels from 0, or -1 for none, got {parts.min()}")
             object.__setattr__(self, "parts", parts)
+        if len(self.emission) != 3 or not all(0 <= value < np.inf for value in self.emission):
+            raise ValueError(f"mesh emission must be three numbers of at least 0, got {self.emission}")
 
     def moved(self, vertices: ArrayLike) -> Self:
         """Return the mesh with other vertex positions, (n, 3); it is not ``still``.
