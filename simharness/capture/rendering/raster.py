@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
 from simharness.capture.rendering.lens import through_lens
-from simharness.capture.rendering.raster_kernels import NOTHING_DRAWN, rasterise, resolve
+from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.shading_kernels import shade
@@ -60,7 +60,16 @@ class RasterRenderer:
         lighting: Lighting = DAYLIGHT,
         parts: bool = False,
     ) -> Image:
-        """Render ``meshes`` from ``camera``: see :class:`~simharness.capture.rendering.renderer.Renderer`."""
+        """Render ``meshes`` from ``camera``: see :class:`~simharness.capture.rendering.renderer.Renderer`.
+
+        Raises:
+            ValueError: too many meshes, or a picture with a side above ``LONGEST_SIDE``.
+        """
+        if max(camera.size) > LONGEST_SIDE:
+            raise ValueError(
+                f"camera {camera.name!r}: a picture must have at most {LONGEST_SIDE} pixels a side, got "
+                f"{camera.size[0]} x {camera.size[1]}"
+            )
         check_count(meshes, most=_MOST_MESHES)
         scene = self._scene(meshes)
         return through_lens(camera, lambda pinhole: self._picture(scene, pinhole, color, lighting, parts))

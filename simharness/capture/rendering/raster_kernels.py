@@ -9,7 +9,8 @@ them.
 
 All arithmetic is in float64, for large triangles (the floor of a room) and small ones (a fingertip) alike. Most
 triangles of a body are about as large as a pixel, and their cost is dominated by mispredicted branches, a dozen each.
-So they pass through short branch-free loops that select, cover and fill; each loop passes a list to the next.
+So they pass through short branch-free loops that select, sort, set up, cover and fill; each loop passes a list to the
+next. Half of the triangles of a body lie between the pixel centres: they are dropped by a code of their vertices.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -24,11 +25,14 @@ from mvpose.kernels import njit
 # negative would be checked at every use, and prevents vectorisation of loops.
 
 NOTHING_DRAWN = np.zeros((0, 3))  # pixel coordinates of no vertices
+LONGEST_SIDE = 0x7FFE  # pixels: codes of vertices have 15 bits for a column or row
 
 _SLACK = 4e-3  # pixels: bounding boxes are in single precision; the edges decide
 _TILE = 4  # pixels
 _SMALL = 12  # pixels: larger triangles are drawn row by row
-_CHUNK = 512  # triangles processed together: their lists stay in the first-level cache
+_BATCH = 256  # vertices processed together
+_ROWS_OF_WORK = 12  # quantities of a triangle, see _set_up
+_CHUNK = 256  # triangles processed together: their lists stay in the first-level cache
 _LOWEST = np.array([0, 1, 2, 5, 3, 9, 6, 11, 15, 4, 8, 10, 14, 7, 13, 12])  # lowest set bit by de Bruijn sequence
 _DE_BRUIJN = 0x09AF
 
@@ -57,7 +61,7 @@ def rasterise(
         faces: vertex indices, (k, 3) uint32.
         P: projection matrix ``K [R | t]``, (3, 4), with a last row of unit length.
         near: depth below which nothing is drawn.
-        inverse_depth: (h, w) float32, zeros before the first call.
+        inverse_depth: (h, w) float32, zeros before the first call; sides of at most ``LONGEST_SIDE``.
         triangle: index of the visible face, (h, w) int32; -1 before the first call.
         drawn: homogeneous pixel coordinates of the first vertices, (m, 3), as an earlier call returned them.
         first: number of triangles that an earlier call has drawn; those that follow have none of the first m vertices.
@@ -66,48 +70,115 @@ def rasterise(
         Homogeneous pixel coordinates of the vertices, (n, 3).
     """
     height, width = triangle.shape
-    q, seen = np.empty((len(vertices), 3)), np.empty((len(vertices), 3), np.float32)
-    # Local copies: otherwise P is read again for every vertex, because q might alias it.
-    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
-    p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
-    p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
-    q[: len(drawn)] = drawn
-    for i in range(len(drawn), len(vertices)):
-        x, y, z = np.float64(vertices[i, 0]), np.float64(vertices[i, 1]), np.float64(vertices[i, 2])
-        q[i, 0], q[i, 1] = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
-        q[i, 2] = p20 * x + p21 * y + p22 * z + p23
-        # Pixel and inverse depth, which is 0 behind the near plane: there the pixel is not used.
-        scale = 1.0 / q[i, 2]
-        seen[i, 0], seen[i, 1] = q[i, 0] * scale, q[i, 1] * scale
-        seen[i, 2] = scale if q[i, 2] >= near else 0.0
-
-    lists, counts = _select(faces, first, seen, width, height)
+    q, seen, codes = _project(vertices, P, near, drawn, width, height)
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
-    for averted in range(2):
-        small, large = lists[2 * averted, : counts[2 * averted]], lists[2 * averted + 1, : counts[2 * averted + 1]]
-        if averted:
-            small = small[: _drop_hidden(small, faces, seen, _blocks(inverse_depth))]
+    kept, work = np.empty(_CHUNK + 1, np.uint32), np.empty(_ROWS_OF_WORK * _CHUNK)
+    lists, counts = np.empty((4, len(faces) - first + 1), np.uint32), np.zeros(4, np.int64)
+    for start in range(first, len(faces), _CHUNK):
+        drawn_small = counts[0]
+        candidates = kept[: _candidates(start, min(start + _CHUNK, len(faces)), faces, codes, kept)]
+        _sort(candidates, faces, seen, lists, counts)
+        count = _cover(lists[0, drawn_small : counts[0]], faces, q, seen, codes, work, hits, planes)
+        _fill(hits, planes, count, inverse_depth, triangle)
+    _draw(lists[1, : counts[1]], faces, q, seen, near, inverse_depth, triangle)
+    if counts[2] + counts[3]:
+        blocks = _blocks(inverse_depth)
+        small = lists[2, : _drop_hidden(lists[2, : counts[2]], faces, codes, seen, inverse_depth, blocks)]
         for start in range(0, len(small), _CHUNK):
-            count = _cover(small[start : start + _CHUNK], faces, q, seen, width, height, hits, planes)
+            count = _cover(small[start : start + _CHUNK], faces, q, seen, codes, work, hits, planes)
             _fill(hits, planes, count, inverse_depth, triangle)
+        large = lists[3, : _drop_hidden(lists[3, : counts[3]], faces, codes, seen, inverse_depth, blocks)]
         _draw(large, faces, q, seen, near, inverse_depth, triangle)
     return q
 
 
 @njit(cache=True, error_model="numpy")
-def _select(
-    faces: np.ndarray, first_face: int, seen: np.ndarray, width: int, height: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return triangles from ``first_face`` on that may cover a pixel centre: four lists, (4, k), and their lengths.
+def _project(
+    vertices: np.ndarray, P: np.ndarray, near: float, drawn: np.ndarray, width: int, height: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Project vertices (n, 3), the first of which are ``drawn`` already.
+
+    Returns:
+        Homogeneous pixel coordinates, (n, 3); pixels and inverse depths, (n, 3) float32, for the vertices that follow
+        the first ones, the latter 0 behind the near plane, where the pixel is not used; and their codes, (n,) uint32.
+
+    The upper half of a code is for the columns of pixels, the lower half for the rows. It is twice the number of the
+    first column that is not left of the vertex, from 0 to ``width``, plus 1 if the vertex is on this column, within
+    ``_SLACK``. So the columns between vertices are those from ``min(codes) // 2`` to ``(max(codes) + 1) // 2 - 1``.
+    All bits are set behind the near plane.
+    """
+    n, first = len(vertices), len(drawn)
+    q, seen, codes = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty(n, np.uint32)
+    q[:first] = drawn
+    # Local copies: otherwise P is read again for every vertex, because q might alias it.
+    p00, p01, p02, p03 = P[0, 0], P[0, 1], P[0, 2], P[0, 3]
+    p10, p11, p12, p13 = P[1, 0], P[1, 1], P[1, 2], P[1, 3]
+    p20, p21, p22, p23 = P[2, 0], P[2, 1], P[2, 2], P[2, 3]
+    slack, right, bottom = np.float32(_SLACK), np.float32(width), np.float32(height)
+    work, code = np.empty(6 * _BATCH), np.empty(_BATCH, np.int32)
+    for start in range(first, n, _BATCH):
+        count = min(n - start, _BATCH)
+        for i in range(count):
+            work[i], work[_BATCH + i] = vertices[start + i, 0], vertices[start + i, 1]
+            work[2 * _BATCH + i] = vertices[start + i, 2]
+        for i in range(count):  # vectorised by the compiler, as coordinates are apart
+            x, y, z = work[i], work[_BATCH + i], work[2 * _BATCH + i]
+            depth = p20 * x + p21 * y + p22 * z + p23
+            x, y = p00 * x + p01 * y + p02 * z + p03, p10 * x + p11 * y + p12 * z + p13
+            scale = 1.0 / depth
+            column, row = np.float32(x * scale), np.float32(y * scale)
+            work[i], work[_BATCH + i], work[2 * _BATCH + i] = x, y, depth
+            work[3 * _BATCH + i], work[4 * _BATCH + i] = x * scale, y * scale
+            work[5 * _BATCH + i] = scale if depth >= near else 0.0
+            code_x, code_y = _code(column, slack, right), _code(row, slack, bottom)
+            code[i] = (code_x << np.int32(16)) | code_y if depth >= near else np.int32(-1)
+        for i in range(count):
+            q[start + i, 0], q[start + i, 1], q[start + i, 2] = work[i], work[_BATCH + i], work[2 * _BATCH + i]
+            seen[start + i, 0], seen[start + i, 1] = work[3 * _BATCH + i], work[4 * _BATCH + i]
+            seen[start + i, 2] = work[5 * _BATCH + i]
+            codes[start + i] = code[i]
+    return q, seen, codes
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _code(place: np.float32, slack: np.float32, size: np.float32) -> np.int32:
+    """Return half of the code of a vertex; see :func:`_project`."""
+    zero = np.float32(0.0)
+    first, last = np.ceil(place - slack), np.floor(place + slack)
+    on_pixel = (first == last) & (first >= zero) & (first < size)
+    first = first if first > zero else zero
+    first = first if first < size else size
+    return (np.int32(first) << np.int32(1)) | np.int32(on_pixel)
+
+
+@njit(cache=True, error_model="numpy")
+def _candidates(start: int, end: int, faces: np.ndarray, codes: np.ndarray, kept: np.ndarray) -> int:
+    """Write to ``kept`` the triangles from ``start`` to before ``end`` that may cover a pixel; return their number.
+
+    They have pixel columns between their vertices, and pixel rows: codes that differ, or a vertex on a pixel.
+    """
+    count, none = np.uint32(0), np.uint32(0)
+    columns, rows, on_pixel = np.uint32(0xFFFF0000), np.uint32(0xFFFF), np.uint32(0x10001)
+    for t in range(start, end):
+        a, b, c = codes[faces[t, 0]], codes[faces[t, 1]], codes[faces[t, 2]]
+        spans = (a ^ b) | (a ^ c) | (a & on_pixel)
+        kept[count] = t
+        count += np.uint32((spans & columns) != none) & np.uint32((spans & rows) != none)
+    return int(count)
+
+
+@njit(cache=True, error_model="numpy")
+def _sort(candidates: np.ndarray, faces: np.ndarray, seen: np.ndarray, lists: np.ndarray, counts: np.ndarray) -> None:
+    """Append triangles to four lists, (4, k), of lengths ``counts``.
 
     Small triangles that face the camera; large ones, and all that the near plane cuts; then small and large ones seen
     from behind.
     """
-    lists, counts = np.empty((4, len(faces) - first_face + 1), np.uint32), np.zeros(4, np.int64)
-    facing_small, facing_large, averted_small, averted_large, slack = 0, 0, 0, 0, np.float32(_SLACK)
-    right, bottom, most = np.float32(width), np.float32(height), np.float32(_SMALL)
-    for t in range(first_face, len(faces)):
+    facing_small, facing_large, averted_small, averted_large = counts[0], counts[1], counts[2], counts[3]
+    slack, most = np.float32(_SLACK), np.float32(_SMALL)
+    for index in range(len(candidates)):
+        t = candidates[index]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
         ahead_a, ahead_b, ahead_c = seen[a, 2] > 0, seen[b, 2] > 0, seen[c, 2] > 0
@@ -115,25 +186,20 @@ def _select(
         cut = (ahead_a | ahead_b | ahead_c) & ~whole
         low, high = (ax, bx) if ax < bx else (bx, ax)
         low, high = cx if cx < low else low, cx if cx > high else high
-        first, last = np.ceil(low - slack), np.floor(high + slack)
-        whole = whole & (first <= last) & (last >= 0) & (first < right)
-        small = last - first < most
+        small = np.floor(high + slack) - np.ceil(low - slack) < most
         low, high = (ay, by) if ay < by else (by, ay)
         low, high = cy if cy < low else low, cy if cy > high else high
-        first, last = np.ceil(low - slack), np.floor(high + slack)
-        whole = whole & (first <= last) & (last >= 0) & (first < bottom)
-        small = small & (last - first < most) & whole
+        small = small & (np.floor(high + slack) - np.ceil(low - slack) < most) & whole
         averted = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)  # y is down: clockwise
-        lists[0, facing_small] = t
-        lists[1, facing_large] = t
-        lists[2, averted_small] = t
-        lists[3, averted_large] = t
+        lists[0, np.uint64(facing_small)] = t
+        lists[1, np.uint64(facing_large)] = t
+        lists[2, np.uint64(averted_small)] = t
+        lists[3, np.uint64(averted_large)] = t
         facing_small += small & ~averted
         facing_large += cut | (whole & ~small & ~averted)
         averted_small += small & averted
         averted_large += whole & ~small & averted
     counts[0], counts[1], counts[2], counts[3] = facing_small, facing_large, averted_small, averted_large
-    return lists, counts
 
 
 @njit(cache=True, error_model="numpy")
@@ -153,42 +219,63 @@ def _blocks(inverse_depth: np.ndarray) -> np.ndarray:
     return blocks
 
 
-@njit(cache=True, error_model="numpy")
-def _box(
-    a: int, b: int, c: int, seen: np.ndarray, width: int, height: int
-) -> tuple[np.int32, np.int32, np.int32, np.int32, np.float32, np.float32]:
-    """Return the pixel box (left, right, top, bottom) of a triangle ahead, and its range of inverse depth."""
-    slack = np.float32(_SLACK)
-    ax, bx, cx, ay, by, cy = seen[a, 0], seen[b, 0], seen[c, 0], seen[a, 1], seen[b, 1], seen[c, 1]
-    low, high = (ax, bx) if ax < bx else (bx, ax)
-    low, high = cx if cx < low else low, cx if cx > high else high
-    left, right = np.int32(np.ceil(low - slack)), np.int32(np.floor(high + slack))
-    low, high = (ay, by) if ay < by else (by, ay)
-    low, high = cy if cy < low else low, cy if cy > high else high
-    top, bottom = np.int32(np.ceil(low - slack)), np.int32(np.floor(high + slack))
-    low, high = (seen[a, 2], seen[b, 2]) if seen[a, 2] < seen[b, 2] else (seen[b, 2], seen[a, 2])
-    low, high = seen[c, 2] if seen[c, 2] < low else low, seen[c, 2] if seen[c, 2] > high else high
-    left, right = max(left, np.int32(0)), min(right, np.int32(width - 1))
-    top, bottom = max(top, np.int32(0)), min(bottom, np.int32(height - 1))
-    return left, right, top, bottom, low, high
+@njit(cache=True, error_model="numpy", inline="always")
+def _box(a: np.uint32, b: np.uint32, c: np.uint32) -> tuple[np.int32, np.int32]:
+    """Return the first and the last pixel column or row between vertices with these halves of codes."""
+    low, high = (a, b) if a < b else (b, a)
+    low, high = c if c < low else low, c if c > high else high
+    return np.int32(low >> np.uint32(1)), np.int32((high + np.uint32(1)) >> np.uint32(1)) - np.int32(1)
 
 
 @njit(cache=True, error_model="numpy")
-def _drop_hidden(small: np.ndarray, faces: np.ndarray, seen: np.ndarray, blocks: np.ndarray) -> int:
+def _drop_hidden(
+    small: np.ndarray,
+    faces: np.ndarray,
+    codes: np.ndarray,
+    seen: np.ndarray,
+    inverse_depth: np.ndarray,
+    blocks: np.ndarray,
+) -> int:
     """Move the triangles that may be visible to the front of a list, and return their number."""
-    rows, columns, kept = blocks.shape[0], blocks.shape[1], 0
+    kept, rows, shift = 0, np.uint32(0xFFFF), np.uint32(16)
     for index in range(len(small)):
         t = small[index]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        left, right, top, bottom, _, nearest = _box(a, b, c, seen, _TILE * columns, _TILE * rows)
+        left, right = _box(codes[a] >> shift, codes[b] >> shift, codes[c] >> shift)
+        top, bottom = _box(codes[a] & rows, codes[b] & rows, codes[c] & rows)
+        nearest = seen[a, 2] if seen[a, 2] > seen[b, 2] else seen[b, 2]
+        nearest = seen[c, 2] if seen[c, 2] > nearest else nearest
+        # The corners of the box are tested, first pixels, then blocks of pixels: enough if it spans at most two of them
+        # in each direction, as most do.
+        one = _least(inverse_depth, np.uint32(left), np.uint32(right), np.uint32(top), np.uint32(bottom))
+        may_be_seen = (nearest >= one) | (right - left > 1) | (bottom - top > 1)
         left, right, top, bottom = left // _TILE, right // _TILE, top // _TILE, bottom // _TILE
-        one, two, three, four = blocks[top, left], blocks[top, right], blocks[bottom, left], blocks[bottom, right]
-        one, three = two if two < one else one, four if four < three else three
-        one = three if three < one else one
-        # Only the corners of the box are tested: enough if it spans at most two blocks in each direction.
+        one = _least(blocks, np.uint32(left), np.uint32(right), np.uint32(top), np.uint32(bottom))
+        wide = (right - left > 1) | (bottom - top > 1)
+        may_be_seen = may_be_seen & ((nearest >= one) | wide)
+        if wide and nearest < one:
+            may_be_seen = _pierces(nearest, blocks[top : bottom + 1, left : right + 1])
         small[kept] = t
-        kept += (nearest >= one) | (right - left > 1) | (bottom - top > 1)
+        kept += may_be_seen
     return kept
+
+
+@njit(cache=True, error_model="numpy")
+def _pierces(nearest: np.float32, blocks: np.ndarray) -> bool:
+    """Return whether an inverse depth is not below that of every block."""
+    for row in range(blocks.shape[0]):
+        for column in range(blocks.shape[1]):
+            if nearest >= blocks[row, column]:
+                return True
+    return False
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _least(values: np.ndarray, left: np.uint32, right: np.uint32, top: np.uint32, bottom: np.uint32) -> np.float32:
+    """Return the least value at the corners of a box."""
+    one, two, three, four = values[top, left], values[top, right], values[bottom, left], values[bottom, right]
+    one, three = two if two < one else one, four if four < three else three
+    return three if three < one else one
 
 
 @njit(cache=True, error_model="numpy")
@@ -197,20 +284,20 @@ def _cover(
     faces: np.ndarray,
     q: np.ndarray,
     seen: np.ndarray,
-    width: int,
-    height: int,
+    codes: np.ndarray,
+    work: np.ndarray,
     hits: np.ndarray,
     planes: np.ndarray,
 ) -> int:
     """Find the pixels that small triangles cover, in tiles of 4 x 4.
 
     Args:
-        small: indices of triangles.
+        small: indices of at most ``_CHUNK`` triangles.
         faces: vertex indices, (k, 3) uint32.
         q: homogeneous pixel coordinates of the vertices, (n, 3).
         seen: pixels and inverse depths of the vertices, (n, 3) float32.
-        width: width of the picture.
-        height: height of the picture.
+        codes: codes of the vertices, (n,), see :func:`_project`.
+        work: memory for intermediate values.
         hits: output; for every tile with covered pixels the triangle, the first column and row of the tile, and one bit
             for each of its pixels, (most, 4) int32.
         planes: output; plane of inverse depth over pixels, and its lowest and highest value, (most, 5).
@@ -218,22 +305,25 @@ def _cover(
     Returns:
         Number of tiles.
     """
-    count = 0
+    for index in range(len(small)):
+        t = small[index]
+        for k in range(3):
+            at = faces[t, k]
+            for j in range(3):
+                work[(3 * k + j) * _CHUNK + index] = q[at, j]
+    _set_up(work, len(small))
+    count, rows_of, shift = 0, np.uint32(0xFFFF), np.uint32(16)
     for index in range(len(small)):
         t = small[index]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-        left, right, top, bottom, low, high = _box(a, b, c, seen, width, height)
-        ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
-        cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
-        ex, ey, ez = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        fx, fy, fz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-        gx, gy, gz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        determinant = ax * ex + ay * ey + az * ez
-        scale = 1.0 / determinant
-        px, py, pz = (ex + fx + gx) * scale, (ey + fy + gy) * scale, (ez + fz + gz) * scale
-        sign = 1.0 if determinant > 0 else -1.0
-        ex, ey, ez, fx, fy, fz = sign * ex, sign * ey, sign * ez, sign * fx, sign * fy, sign * fz
-        gx, gy, gz = sign * gx, sign * gy, sign * gz
+        left, right = _box(codes[a] >> shift, codes[b] >> shift, codes[c] >> shift)
+        top, bottom = _box(codes[a] & rows_of, codes[b] & rows_of, codes[c] & rows_of)
+        low, high = (seen[a, 2], seen[b, 2]) if seen[a, 2] < seen[b, 2] else (seen[b, 2], seen[a, 2])
+        low, high = seen[c, 2] if seen[c, 2] < low else low, seen[c, 2] if seen[c, 2] > high else high
+        ex, ey, ez = work[index], work[_CHUNK + index], work[2 * _CHUNK + index]
+        fx, fy, fz = work[3 * _CHUNK + index], work[4 * _CHUNK + index], work[5 * _CHUNK + index]
+        gx, gy, gz = work[6 * _CHUNK + index], work[7 * _CHUNK + index], work[8 * _CHUNK + index]
+        px, py, pz = work[9 * _CHUNK + index], work[10 * _CHUNK + index], work[11 * _CHUNK + index]
         for tile_top in range(top, bottom + 1, _TILE):
             for tile_left in range(left, right + 1, _TILE):
                 inside, first, row = np.int32(0), np.int32(tile_left), np.int32(tile_top)
@@ -242,13 +332,36 @@ def _cover(
                     e, f, g = ex * x + (ey * y + ez), fx * x + (fy * y + fz), gx * x + (gy * y + gz)
                     inside |= np.int32((e >= 0.0) & (f >= 0.0) & (g >= 0.0)) << np.int32(i)
                 columns, rows = min(right - tile_left + 1, _TILE), min(bottom - tile_top + 1, _TILE)
-                box = (0x1111 * ((1 << columns) - 1)) & ((1 << (_TILE * rows)) - 1)
-                covered = (inside & box) if determinant != 0.0 else 0  # 0: seen edge-on
+                covered = inside & (0x1111 * ((1 << columns) - 1)) & ((1 << (_TILE * rows)) - 1)
                 hits[count, 0], hits[count, 1], hits[count, 2], hits[count, 3] = t, tile_left, tile_top, covered
                 planes[count, 0], planes[count, 1], planes[count, 2] = px, py, pz
                 planes[count, 3], planes[count, 4] = low, high
                 count += covered != 0
     return count
+
+
+@njit(cache=True, error_model="numpy")
+def _set_up(work: np.ndarray, count: int) -> None:
+    """Replace the corners of triangles by their edges, with positive insides, and planes of inverse depth.
+
+    Every quantity is a row of ``_CHUNK`` numbers: nine of corners, or nine of edges and three of planes. The edges of a
+    triangle that is seen edge-on are NaN.
+    """
+    for i in range(count):  # vectorised by the compiler, as the rows are apart by a constant
+        ax, ay, az = work[i], work[_CHUNK + i], work[2 * _CHUNK + i]
+        bx, by, bz = work[3 * _CHUNK + i], work[4 * _CHUNK + i], work[5 * _CHUNK + i]
+        cx, cy, cz = work[6 * _CHUNK + i], work[7 * _CHUNK + i], work[8 * _CHUNK + i]
+        ex, ey, ez = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        fx, fy, fz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+        gx, gy, gz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        determinant = ax * ex + ay * ey + az * ez
+        scale = 1.0 / determinant
+        sign = 1.0 if determinant > 0 else (-1.0 if determinant < 0 else np.nan)
+        work[9 * _CHUNK + i], work[10 * _CHUNK + i] = (ex + fx + gx) * scale, (ey + fy + gy) * scale
+        work[11 * _CHUNK + i] = (ez + fz + gz) * scale
+        work[i], work[_CHUNK + i], work[2 * _CHUNK + i] = sign * ex, sign * ey, sign * ez
+        work[3 * _CHUNK + i], work[4 * _CHUNK + i], work[5 * _CHUNK + i] = sign * fx, sign * fy, sign * fz
+        work[6 * _CHUNK + i], work[7 * _CHUNK + i], work[8 * _CHUNK + i] = sign * gx, sign * gy, sign * gz
 
 
 @njit(cache=True, error_model="numpy")
