@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from mvpose.arrays import Floats
 from mvpose.camera import Camera, Rig
 from mvpose.report.doctor_drawings import nice_factor
-from mvpose.report.rig_plots import camera_from_above, cone_from_above, fit_view
+from mvpose.report.rig_plots import camera_from_above, cone_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
 
 BEFORE, AFTER = "#d9643a", "#3b82c4"
@@ -92,6 +92,8 @@ def rig_from_above(
         axes.plot([], [], ".", ms=6, mew=0, color=FAINT, label="joints of people")
         fit_view(axes, low, high, tall=_TALL)
         legend_above(axes, columns=3)
+        shown_cones = [cone_from_above(camera, reach)[[1, 0, 2]] for camera in rig]
+        name_cameras(axes, rig, lines=shown_cones)
     return written[0]
 
 

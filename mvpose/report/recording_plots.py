@@ -9,7 +9,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Rig
 from mvpose.recording import People
 from mvpose.report.palette import identity_color
-from mvpose.report.rig_plots import camera_from_above, fit_view
+from mvpose.report.rig_plots import camera_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, legend_above, svg_plot
 from mvpose.report.track_plots import draw_bar, half_step, label_ends, runs_of, thinned
 
@@ -68,6 +68,7 @@ def paths_from_above(name: str, people: People, rig: Rig) -> str:
                 axes.plot(*ends[str(people.ids[person])], "o", ms=5, color=color, mew=0, zorder=5)
         fit_view(axes, low, high, tall=_TALL)
         label_ends(axes, ends)
+        name_cameras(axes, rig)
     return written[0]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,20 +11,20 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
+from mvpose.report.map_labels import MapLabel, write_labels
 from mvpose.report.svg_plots import FAINT, INK, Color
 
 _LEVEL = 1e-6  # horizontal part of a viewing direction below which the camera looks straight down
 
 
-def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: float = 1.2, name: bool = True) -> None:
-    """Draw a camera from above: its centre, the cone of its horizontal field of view, and its name behind it.
+def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: float = 1.2) -> None:
+    """Draw a camera from above: its centre, and the cone of its horizontal field of view.
 
     Args:
         axes: plot in metres, x and y of the world.
         camera: the camera.
         color: colour of the centre.
         reach: length of the cone, metres.
-        name: write the name of the camera.
     """
     center, forward = camera.center[:2], camera.R[2, :2]
     if np.linalg.norm(forward) < _LEVEL:
@@ -31,11 +32,25 @@ def camera_from_above(axes: Axes, camera: Camera, *, color: Color = INK, reach: 
         return
     axes.add_patch(Polygon(cone_from_above(camera, reach), fc=FAINT, ec="none", alpha=0.18, zorder=1))
     axes.plot(*center, "o", color=color, ms=3.5, zorder=4)
-    if name:
-        aside = center + 0.3 * np.array([-forward[1], forward[0]]) / np.linalg.norm(forward)
-        axes.text(
-            float(aside[0]), float(aside[1]), camera.name, ha="center", va="center", fontsize=8, color=FAINT, zorder=4
-        )
+
+
+def name_cameras(
+    axes: Axes,
+    cameras: Iterable[Camera],
+    *,
+    lines: Iterable[Floats] = (),
+    areas: Iterable[tuple[Floats, Floats]] = (),
+) -> None:
+    """Write the name of each camera behind it, or where it hides less.
+
+    Args:
+        axes: plot in metres with its final limits.
+        cameras: the cameras.
+        lines: polylines that names do not cross, as in :func:`mvpose.report.map_labels.write_labels`.
+        areas: rectangles that names keep free, likewise.
+    """
+    labels = [MapLabel(each.name, each.center[:2], -each.R[2, :2], color=FAINT) for each in cameras]
+    write_labels(axes, labels, lines=lines, areas=areas)
 
 
 def fit_view(axes: Axes, low: Floats, high: Floats, *, tall: float) -> None:

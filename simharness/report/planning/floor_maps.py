@@ -13,7 +13,7 @@ from matplotlib.patches import Ellipse, Polygon, Rectangle
 
 from mvpose import Camera
 from mvpose.arrays import Bools, Floats
-from mvpose.report.rig_plots import camera_from_above, fit_view
+from mvpose.report.rig_plots import camera_from_above, fit_view, name_cameras
 from mvpose.report.svg_plots import FAINT, INK, svg_plot
 from simharness.planning.rehearsal import Rehearsal
 from simharness.planning.sentences import grid_spacing
@@ -185,7 +185,7 @@ def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> fl
     for obstacle in rehearsal.obstacles:
         axes.add_patch(Polygon(corners_of(obstacle)[:4, :2], fc=FAINT, ec=INK, lw=0.9, alpha=0.55, zorder=2.5))
     for camera in rehearsal.rig:
-        camera_from_above(axes, camera, name=names)
+        camera_from_above(axes, camera)
     if rehearsal.extra is not None:
         _extra(axes, rehearsal.extra.camera)
     points = np.concatenate([outline, rehearsal.room, rehearsal.rig.centers[:, :2]])
@@ -193,7 +193,10 @@ def _surroundings(axes: Axes, rehearsal: Rehearsal, *, names: bool = True) -> fl
         points = np.concatenate([points, rehearsal.extra.camera.center[None, :2]])
     low, high = points.min(axis=0) - 0.6, points.max(axis=0) + 0.6
     fit_view(axes, low, high, tall=_TALL)
-    if not names:
+    if names:
+        walls = [np.vstack([each, each[:1]]) for each in (outline, rehearsal.room) if len(each)]
+        name_cameras(axes, rehearsal.rig, lines=walls, areas=[(outline.min(axis=0), outline.max(axis=0))])
+    else:
         axes.set(xlabel="", ylabel="")
     left, right = axes.get_xlim()
     return right - left

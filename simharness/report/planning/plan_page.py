@@ -81,7 +81,9 @@ def render_preview(room: Room) -> str:
         cards=[],
         key=_KEY_OF_PLACES,
         above=Markup(room_from_above("above", room, places=places, cameras=room.fixed)),
-        side=Markup(room_from_side("side", room, places=places, cameras=room.fixed)),
+        sides=[
+            Markup(room_from_side(f"side{axis}", room, axis=axis, places=places, cameras=room.fixed)) for axis in (0, 1)
+        ],
         cameras=[],
         command="",
     )
@@ -102,7 +104,7 @@ def render_plan(plan: Plan, *, command: str = "") -> str:
         cards=_cards(plan),
         key=_KEY,
         above=Markup(room_from_above("above", room, cameras=list(plan.rig))),
-        side=Markup(room_from_side("side", room, cameras=list(plan.rig))),
+        sides=[Markup(room_from_side(f"side{axis}", room, axis=axis, cameras=list(plan.rig))) for axis in (0, 1)],
         cameras=_camera_rows(plan),
         people="one" if room.keys.people.count == 1 else room.keys.people.count,
         maps=[

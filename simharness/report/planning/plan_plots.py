@@ -32,7 +32,7 @@ def place_map(name: str, plan: Plan, values: Floats, *, worst: float, best: floa
     tall = float((high - low)[1] / (high - low)[0])
     side = _spacing(places)
     with svg_plot(name, size=(_SIZE[0], _SIZE[0] * tall)) as (axes, written):
-        draw_room(axes, plan.room, labels=False)
+        draw_room(axes, plan.room)
         for place, value in zip(places, values, strict=True):
             share = float(np.clip((value - worst) / (best - worst), 0.0, 1.0)) if np.isfinite(value) else 0.0
             color = _COLORS(share) if np.isfinite(value) else (0.5, 0.5, 0.5, 0.4)

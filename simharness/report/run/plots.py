@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 
 from mvpose.arrays import Floats
 from mvpose.camera import Rig
-from mvpose.report.rig_plots import camera_from_above
+from mvpose.report.rig_plots import camera_from_above, name_cameras
 from mvpose.report.svg_plots import (
     FAINT,
     INK,
@@ -157,4 +157,5 @@ def floor_plan(
         axes.set_aspect("equal")
         axes.spines[:].set_visible(False)
         legend_above(axes, columns=min(5, paths.shape[1] + 1))
+        name_cameras(axes, rig, lines=[np.vstack([each, each[:1]]) for each in (corners, *things)])
     return written[0]
