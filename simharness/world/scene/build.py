@@ -15,12 +15,9 @@ from simharness.scenario.sections.scenario import Scenario
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.types.mirror import Mirror
-from simharness.types.random_streams import stream
-from simharness.world.humans.body import Body, make_body
-from simharness.world.humans.clothing import dress, paint
-from simharness.world.humans.population import draw_shape, is_child
+from simharness.world.humans.body import Body
 from simharness.world.humans.shape import Shape
-from simharness.world.humans.wardrobe import Look, draw_looks
+from simharness.world.humans.wardrobe import draw_looks
 from simharness.world.motion.choreography import choreograph
 from simharness.world.motion.mocap import load_tracks, recorded_shape
 from simharness.world.motion.motion import Motion
@@ -31,6 +28,7 @@ from simharness.world.scene.camera_clearance import check_rig
 from simharness.world.scene.dynamics.tracking import track
 from simharness.world.scene.objects.props import make_prop
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.people import make_person, shape_of_person
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
@@ -94,14 +92,14 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     _check_area(scenario)
     clock = motion_clock(scenario.duration, margin=CLOCK_MARGIN)
     looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
-    bodies = tuple(dress(make_body(shape), look) for shape, look in zip(_shapes(scenario), looks, strict=True))
-    cast = [Kinematics(body) for body in bodies]
-    plan = choreograph(scenario, cast, clock, widest=_largest_area(scenario), cameras=rig.centers)
+    cast = tuple(make_person(shape, look) for shape, look in zip(_shapes(scenario), looks, strict=True))
+    movers = [person.mover for person in cast]
+    plan = choreograph(scenario, movers, clock, widest=_largest_area(scenario), cameras=rig.centers)
     props = tuple(make_prop(prop, name=f"prop{k} {prop.kind}") for k, prop in enumerate(plan.props))
     motions = plan.motions
     present = [presence.at(clock) for presence in plan.presence]
     pelvises = [held(motion.root[:, :3], here) for motion, here in zip(motions, present, strict=True)]
-    joints = [held(mover.joints(motion), here) for mover, motion, here in zip(cast, motions, present, strict=True)]
+    joints = [held(mover.joints(motion), here) for mover, motion, here in zip(movers, motions, present, strict=True)]
     space = FreeSpace(
         room=scenario.room,
         area=people.area,
@@ -116,10 +114,11 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys))
     solids = (*make_room(scenario.room, seed), *props, *decoys, *clutter)
     check_rig(scenario, solids, rig)
-    model = compile_model(cast, solids)
+    bodies = tuple(person.body for person in cast)
+    model = compile_model(movers, solids)
     if people.playback == "dynamic":
         motions = track(model, bodies, motions, assist=people.assist, solids=solids)
-    figures = tuple(_figure(body, look) for body, look in zip(bodies, looks, strict=True))
+    figures = tuple(person.figure for person in cast)
     time = np.arange(scenario.frames) / scenario.rate
     return Scene(model, bodies, figures, motions, plan.presence, solids, room_lighting(scenario.room, seed), time)
 
@@ -127,27 +126,11 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
 def _shapes(scenario: Scenario) -> list[Shape]:
     """Return the shapes of all people; people who re-enact joint tracks have the recorded size."""
     seed, people = scenario.seed, scenario.people
-    shapes = [
-        draw_shape(stream(seed, "people", i, "shape"), child=is_child(seed, i, people.children))
-        for i in range(people.count)
-    ]
+    shapes = [shape_of_person(seed, i, people.children) for i in range(people.count)]
     if not people.motion.tracks:
         return shapes
     tracks = load_tracks(people)
     return [recorded_shape(shape, tracks, i) for i, shape in enumerate(shapes)]
-
-
-def _figure(body: Body, look: Look) -> Mesh:
-    coat = paint(body, look)
-    return Mesh(
-        vertices=body.vertices,
-        faces=body.faces,
-        colors=coat.colors,
-        smooth=True,
-        texture=coat.texture,
-        uv=coat.uv,
-        parts=body.segments,
-    )
 
 
 def compile_model(cast: Sequence[Kinematics], solids: Sequence[Solid]) -> mujoco.MjModel:
