@@ -150,7 +150,7 @@ class PictureSource:
             bands = zip(self._playback.over(times), band_cameras(camera, len(times)), strict=True)
             exposed.append(np.concatenate([self._render(state, strip, finer) for state, strip in bands]))
         taken = int(exposures.source[frame, view])
-        return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken)
+        return develop(blur(exposed), self._sensor, seed=self._seed, view=view, frame=taken, camera=camera, scale=scale)
 
     def image(self, exposures: ExposureSchedule, frame: int, view: int) -> Image:
         """Return depth, ids and body parts at the middle of the exposure.

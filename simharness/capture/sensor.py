@@ -1,4 +1,4 @@
-"""Image sensor: exposure, white balance, contrast, noise, compression and motion blur.
+"""Image sensor of a camera: from an ideal picture to the one that the camera delivers.
 
 The geometry of the picture does not change, so its ground truth stays valid. Each camera has a response drawn once;
 noise is drawn for every picture.
@@ -7,12 +7,17 @@ noise is drawn for every picture.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.camera import Camera
+from simharness.capture.raw import BLACK, WHITE, is_ideal, raw_picture
+from simharness.capture.raw_kernels import look_up
+from simharness.capture.srgb import from_linear, linear_table, rounded, to_linear
 from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
 
@@ -47,11 +52,14 @@ def draw_response(sensor: Sensor, *, seed: int, view: int) -> Response:
     )
 
 
-def develop(rgb: Rgb, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rgb:
+def develop(
+    rgb: Rgb, sensor: Sensor, *, seed: int, view: int, frame: int, camera: Camera | None = None, scale: float = 1.0
+) -> Rgb:
     """Apply the sensor of camera ``view`` to a picture; with all parameters at zero the picture is unchanged.
 
-    The order is that of a camera: white balance and exposure of the light, which clips; contrast; noise; compression.
-    Motion blur comes before, from several pictures: :func:`blur`.
+    The order is that of a camera: lens, exposure and noise of the light (:mod:`simharness.capture.raw`), which clips;
+    white balance, tone and contrast; additional noise; sharpening; compression. Motion blur comes before, from several
+    pictures: :func:`blur`.
 
     Args:
         rgb: ideal picture, (h, w, 3) uint8, sRGB.
@@ -59,19 +67,35 @@ def develop(rgb: Rgb, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rg
         seed: seed of the scenario.
         view: index of the camera.
         frame: index of the frame in which the picture was taken.
+        camera: camera of the picture, for vignetting and aberration.
+        scale: width of the picture, relative to that of the picture which the camera takes. A reduced picture has less
+            blur and noise, because its pixels are means.
+
+    Raises:
+        ValueError: vignetting or aberration without a camera.
     """
-    response = draw_response(sensor, seed=seed, view=view)
-    table = _lookup_table(response)
-    result = rgb
+    response, tone = draw_response(sensor, seed=seed, view=view), sensor.tone
+    if scale < 1:
+        sensor = _reduced(sensor, scale)
+    if not is_ideal(sensor):
+        random = stream(seed, "sensor", "raw", view, frame)
+        raw = raw_picture(rgb, sensor, random, camera=camera, exposure=2.0**response.stops)
+        rgb = np.empty_like(rgb)
+        look_up(raw, _table_of_raw(replace(response, stops=0.0), tone), rgb)
+        response, tone = Response(), 0.0
     if sensor.noise:
         # Drawn at unit strength and then scaled: a larger parameter gives the same noise, only stronger.
         noise = stream(seed, "sensor", "noise", view, frame).standard_normal(rgb.shape, np.float32)
+        table = _table(response, tone)
         exact = np.stack([table[k, rgb[..., k]] for k in range(3)], axis=-1)
-        result = np.clip(exact + np.float32(sensor.noise) * noise + np.float32(0.5), 0, 255).astype(np.uint8)
-    elif response != Response():
-        rounded = np.clip(table + 0.5, 0, 255).astype(np.uint8)
-        result = cv2.LUT(rgb, np.ascontiguousarray(rounded.T)[:, None]).astype(np.uint8, copy=False)
-    return compressed(result, sensor.jpeg) if sensor.jpeg else result
+        rgb = np.clip(exact + np.float32(sensor.noise) * noise + np.float32(0.5), 0, 255).astype(np.uint8)
+    elif response != Response() or tone:
+        whole = np.clip(_table(response, tone) + 0.5, 0, 255).astype(np.uint8)
+        rgb = cv2.LUT(rgb, np.ascontiguousarray(whole.T)[:, None]).astype(np.uint8, copy=False)
+    if sensor.sharpening:
+        blurred = cv2.GaussianBlur(rgb, (0, 0), 1.0)
+        rgb = cv2.addWeighted(rgb, 1 + sensor.sharpening, blurred, -sensor.sharpening, 0).astype(np.uint8, copy=False)
+    return compressed(rgb, sensor.jpeg) if sensor.jpeg else rgb
 
 
 def blur(pictures: Iterable[Rgb]) -> Rgb:
@@ -80,42 +104,55 @@ def blur(pictures: Iterable[Rgb]) -> Rgb:
     Raises:
         ValueError: no pictures are given.
     """
-    total, count = None, 0
-    linear = to_linear(np.arange(256)).astype(np.float32)
-    for picture in pictures:
-        light = linear[picture]
-        total = light if total is None else total + light
-        count += 1
-    if total is None:
+    exposed = [*pictures]
+    if not exposed:
         raise ValueError("an exposure needs at least one picture, got none")
-    return np.clip(from_linear(total / count) + 0.5, 0, 255).astype(np.uint8)
+    first, *others = exposed
+    if not others:
+        return first
+    linear = linear_table()
+    total = linear[first]
+    for picture in others:
+        total += linear[picture]
+    return rounded(total / (1 + len(others)))
 
 
 def compressed(rgb: Rgb, quality: int) -> Rgb:
     """Return the picture after JPEG compression with ``quality`` 1 to 100."""
-    success, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    success, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
     decoded = cv2.imdecode(data, cv2.IMREAD_COLOR) if success else None
     if decoded is None:
         raise RuntimeError(f"JPEG compression with quality {quality} failed for a picture of shape {rgb.shape}")
-    return np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8, copy=False)
+    return cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
-def to_linear(values: NDArray) -> NDArray[np.floating]:
-    """Convert sRGB values 0 to 255 to linear light 0 to 1 (IEC 61966-2-1)."""
-    share = np.asarray(values) / 255
-    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+def _reduced(sensor: Sensor, scale: float) -> Sensor:
+    """Return the sensor of a reduced picture, in which each pixel is the mean of ``1 / scale^2`` pixels."""
+    less = {
+        key: scale * getattr(sensor, key) for key in ("shot_noise", "read_noise", "noise", "softness", "sharpening")
+    }
+    return sensor.model_copy(update={**less, "mosaic": False})
 
 
-def from_linear(light: NDArray) -> NDArray[np.floating]:
-    """Convert linear light 0 to 1 to sRGB values 0 to 255; brighter light gives values above 255."""
-    light = np.maximum(light, 0)
-    return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+@lru_cache(maxsize=64)  # as many as a rig has cameras
+def _table_of_raw(response: Response, tone: float) -> NDArray[np.uint8]:
+    """Return the output for each raw value of red, green and blue, (3, 65536)."""
+    light = (np.arange(1 << 16) - BLACK) / (WHITE - BLACK)
+    return np.clip(_developed(light, response, tone) + 0.5, 0, 255).astype(np.uint8)
 
 
-def _lookup_table(response: Response) -> NDArray[np.float32]:
+def _table(response: Response, tone: float) -> NDArray[np.float32]:
     """Return the output for each value 0 to 255 of red, green and blue, (3, 256); neither rounded nor clipped."""
-    if response == Response():
+    if response == Response() and not tone:
         return np.tile(np.arange(256, dtype=np.float32), (3, 1))  # exact
+    return _developed(to_linear(np.arange(256.0)), response, tone).astype(np.float32)
+
+
+def _developed(light: NDArray[np.floating], response: Response, tone: float) -> NDArray[np.floating]:
+    """Return the values 0 to 255 of red, green and blue that a camera makes of linear light (n,), (3, n)."""
     factors = np.array(response.balance)[:, None] * 2.0**response.stops
-    values = np.minimum(from_linear(to_linear(np.arange(256.0)) * factors), 255)
-    return (255 * _GRAY + response.contrast * (values - 255 * _GRAY)).astype(np.float32)
+    values = np.minimum(from_linear(light * factors), 255)
+    if tone:
+        share = values / 255
+        values += 255 * tone * (share * share * (3 - 2 * share) - share)
+    return 255 * _GRAY + response.contrast * (values - 255 * _GRAY)

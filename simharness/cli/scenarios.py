@@ -26,9 +26,9 @@ def add_to(app: typer.Typer) -> None:
 
 
 def scenarios() -> None:
-    """List the shipped scenarios, and the rigs and detector profiles with which a scenario may begin."""
+    """List the shipped scenarios, and the rigs, sensor and detector profiles with which a scenario may begin."""
     with exit_on_error():
-        from simharness.scenario.presets import PROFILES, RIGS, summary_of
+        from simharness.scenario.presets import PROFILES, RIGS, SENSORS, summary_of
         from simharness.scenario.resolution import read_plan
         from simharness.scenario.shipped import shipped_folder
 
@@ -40,7 +40,7 @@ def scenarios() -> None:
         ]
         presets = {
             kind: [(path.stem, summary_of(path), "") for path in sorted(kind.shipped.glob("*.toml"))]
-            for kind in (RIGS, PROFILES)
+            for kind in (RIGS, SENSORS, PROFILES)
         }
     width = max(len(name) for table in (rows, *presets.values()) for name, *_ in table)
     console = Console()

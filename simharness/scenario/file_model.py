@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import Cameras, Sensor
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.gate import Gate
 from simharness.scenario.sections.scenario import Scenario
@@ -24,6 +24,16 @@ class CamerasSection(Cameras):
     rig: str = Field(
         "",
         description="rig with which the section begins: a name in scenarios/rigs, or a TOML file; other keys change it",
+    )
+
+
+class SensorSection(Sensor):
+    """[sensor] of a file."""
+
+    profile: str = Field(
+        "machine-vision",
+        description="sensor profile with which the section begins: a name in scenarios/sensors, or a TOML file; other "
+        "keys change it; perfect: the pictures as rendered",
     )
 
 
@@ -51,6 +61,7 @@ class ScenarioFile(Scenario):
     ) = Field(1, description="number of seeds, from the scenario's seed on, or a list of seeds")
     variants: tuple[str, ...] = Field((), max_length=100, description="the same as method.variants")
     cameras: CamerasSection = CamerasSection()
+    sensor: SensorSection = SensorSection()
     detector: DetectorSection = DetectorSection()
     sweep: dict[str, Any] = Field({}, description="keys of a scenario, each with a list or a range of values")
     cases: dict[str, dict[str, Any]] = Field({}, description="named changes, each run with every setting of the sweep")

@@ -9,7 +9,7 @@ from typing import Any
 from simharness.scenario.layers import Key
 from simharness.scenario.sections.scenario import FILE_KEYS
 
-_PRESET_KEYS = (("cameras", "rig"), ("detector", "profile"))  # a TOML file or the name of a preset
+_PRESET_KEYS = (("cameras", "rig"), ("sensor", "profile"), ("detector", "profile"))  # TOML files or names
 _ESTIMATORS = ("method", "estimators")  # "FILE.py:ATTRIBUTE" or "PACKAGE.MODULE:ATTRIBUTE", by name
 
 

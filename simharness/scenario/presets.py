@@ -1,8 +1,9 @@
-"""Presets of a section: rigs and detector profiles, files of settings that scenarios name.
+"""Presets of a section: rigs, sensor profiles and detector profiles, files of settings that scenarios name.
 
-``[detector] profile = "typical"`` takes ``scenarios/detectors/typical.toml`` and ``[cameras] rig = "dome12"`` takes
-``scenarios/rigs/dome12.toml``: from a folder ``detectors`` or ``rigs`` beside the scenario, or else from the shipped
-scenarios. Other keys of the section change the preset. A preset may begin with another preset by the same key.
+``[detector] profile = "typical"`` takes ``scenarios/detectors/typical.toml``, ``[sensor] profile = "webcam"`` takes
+``scenarios/sensors/webcam.toml`` and ``[cameras] rig = "dome12"`` takes ``scenarios/rigs/dome12.toml``: from a folder
+``detectors``, ``sensors`` or ``rigs`` beside the scenario, or else from the shipped scenarios. Other keys of the
+section change the preset. A preset may begin with another preset by the same key.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from mvpose.files.input_files import SETTINGS, read_bytes
 from mvpose.files.message_text import all_in_one_line, listed, shown
 from simharness.scenario.layers import Origins, merge
 from simharness.scenario.named_files import locate_files
-from simharness.scenario.sections.cameras import Cameras
+from simharness.scenario.sections.cameras import Cameras, Sensor
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.section import Section
 from simharness.scenario.shipped import shipped_folder
@@ -68,7 +69,8 @@ class Kind:
 
 PROFILES = Kind("detector", "profile", "detector profile", "detectors", Detector, "typical")
 RIGS = Kind("cameras", "rig", "rig", "rigs", Cameras, "")
-KINDS = (PROFILES, RIGS)
+SENSORS = Kind("sensor", "profile", "sensor profile", "sensors", Sensor, "machine-vision")
+KINDS = (PROFILES, RIGS, SENSORS)
 
 
 def file_of(kind: Kind, name: str, folders: Sequence[Path], *, near: Path = Path()) -> Path:
@@ -193,13 +195,13 @@ class Presets:
             raise ScenarioError(
                 f"{where}{kind.section}.{kind.key}: expected the name of a {kind.title}, got {shown(name)}"
             )
-        if (kind.key, name) not in self._read:
+        if (kind.section, name) not in self._read:
             try:
                 path = file_of(kind, name, self._folders)
             except ScenarioError as error:
                 raise ScenarioError(f"{where}{error}") from None
-            self._read[kind.key, name] = read_preset(kind, path)
-        return self._read[kind.key, name]
+            self._read[kind.section, name] = read_preset(kind, path)
+        return self._read[kind.section, name]
 
 
 def merge_with_presets(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

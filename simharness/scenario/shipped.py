@@ -8,7 +8,7 @@ import simharness
 
 
 def shipped_folder() -> Path:
-    """Return the folder of the shipped scenarios, with ``rigs`` and ``detectors`` in it.
+    """Return the folder of the shipped scenarios, with ``rigs``, ``sensors`` and ``detectors`` in it.
 
     An installed wheel has it inside the package, a checkout beside the package.
     """

@@ -14,6 +14,7 @@ ALONE = {
     "simharness run quickstart --set people.count=6 --set cameras.count=3 --seed 1 --workers 2": f"{RAYS} --workers 1",
     "simharness export gathering benchmark": f"{PICTURES} --every 2",
     "simharness render gathering --video --overlay truth,detections,estimates": PICTURES,
+    "simharness render gathering --set sensor.profile=webcam --set sensor.jpeg=60": PICTURES,
     "simharness run passage": RAYS,
     "simharness scenarios": "",
     "simharness schema": "",

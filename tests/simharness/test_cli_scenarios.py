@@ -50,9 +50,9 @@ def test_all_shipped_files_are_listed_with_a_description(simharness):
     result = simharness("scenarios")
     assert result.exit_code == 0
     *tables, files = result.stdout.split("\n\n")
-    assert len(tables) == 3
+    assert len(tables) == 4
     assert files.startswith("Files: ")
-    for table, folder in zip(tables, (".", "rigs", "detectors"), strict=True):
+    for table, folder in zip(tables, (".", "rigs", "sensors", "detectors"), strict=True):
         names = [line.split()[0] for line in table.splitlines()[3:] if not line.startswith("  ")]
         assert names == sorted(path.stem for path in (SCENARIOS / folder).glob("*.toml"))
     assert max(len(line) for table in tables for line in table.splitlines()) <= 100

@@ -34,6 +34,7 @@ NAMES: Mapping[str, str] = MappingProxyType(
         "people.hidden": "time hidden from all cameras",
         "people.look_alike": "similarity of clothes, 1: one uniform",
         "people.passing": "distance between people who pass",
+        "sensor.profile": "quality of the pictures",
     }
 )
 """Names of the keys that the studies of this project sweep: the descriptions of keys are too long for an axis."""

@@ -10,6 +10,7 @@ from simharness.scenario.sections.section import (
     MOST_CAMERAS,
     Coordinate,
     Elements,
+    Factor,
     Length,
     Point,
     Section,
@@ -156,11 +157,61 @@ class Faults(Section):
 
 
 class Sensor(Section):
-    """Quality of the pictures; none of it moves anything in them. Spreads are over the cameras."""
+    """Quality of the pictures; none of it moves anything in them. Spreads are over the cameras.
+
+    With all keys at zero the pictures are as rendered. ``profile = "webcam"`` in a scenario's [sensor] takes
+    ``scenarios/sensors/webcam.toml``, which names the sources of its values.
+    """
 
     gain: Share = Field(0.0, description="relative spread of contrast")
     white_balance: Share = Field(0.0, description="relative spread of red and blue against green")
     exposure: float = Field(0.0, ge=0.0, le=10.0, description="spread of exposure, stops")
     shutter: float = Field(0.0, ge=0.0, le=10.0, description="exposure time, which blurs motion, seconds")
-    noise: float = Field(0.0, ge=0.0, le=255.0, description="standard deviation of the noise of every pixel, of 255")
+    shot_noise: Share = Field(
+        0.0,
+        description="standard deviation of the noise of light at white, of 1: 1 / sqrt(electrons) of a white pixel; "
+        "its variance is proportional to the light (EMVA Standard 1288)",
+    )
+    read_noise: Share = Field(
+        0.0,
+        description="standard deviation of the noise of the readout, of 1: temporal dark noise / electrons of a white "
+        "pixel, both in EMVA 1288 data sheets",
+    )
+    noise: float = Field(
+        0.0,
+        ge=0.0,
+        le=255.0,
+        description="standard deviation of additional noise of every finished pixel, of 255, equal in light and dark",
+    )
+    softness: float = Field(
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="standard deviation of the blur by lens and pixels, pixels: 0.187 / MTF50 in cycles per pixel (for "
+        "a Gaussian; measured as in ISO 12233)",
+    )
+    mosaic: bool = Field(
+        False,
+        description="a filter of one colour on every pixel (B. Bayer, US patent 3971065), the others interpolated",
+    )
+    vignetting: Share = Field(
+        0.0,
+        description="light far from the optical axis, as an exponent of the cos^4 law: 1 is the law itself (natural "
+        "vignetting of a thin lens), 0.5 a wide lens, less one that the camera corrects",
+    )
+    aberration: float = Field(
+        0.0,
+        ge=-0.05,
+        le=0.05,
+        description="lateral chromatic aberration: magnification of red above that of green, and of blue below it; "
+        "Imatest calls 0.0004 of the radius insignificant, 0.0008 low, 0.0015 moderate",
+    )
+    tone: Share = Field(
+        0.0,
+        description="steepness of the camera's response beside sRGB: 1 is 3 v^2 - 2 v^3, which darkens shadows and "
+        "brightens lights (for S-shaped responses see M. Grossberg and S. Nayar, CVPR 2003)",
+    )
+    sharpening: Factor = Field(
+        0.0, description="unsharp mask with a radius of one pixel: share of the difference to the blurred picture added"
+    )
     jpeg: int = Field(0, ge=0, le=100, description="quality of JPEG compression; 0: none")

@@ -138,4 +138,5 @@ def test_settings_are_merged_like_dictionaries_of_dotted_keys(base, changes):
 
 
 def test_a_scenario_without_extends_is_as_before(write):
-    assert load(write("a.toml", 'name = "a"\n[detector]\nprofile = "perfect"')) == Scenario(name="a")
+    text = 'name = "a"\n[sensor]\nprofile = "perfect"\n[detector]\nprofile = "perfect"'
+    assert load(write("a.toml", text)) == Scenario(name="a")

@@ -68,7 +68,8 @@ def test_the_path_of_a_shipped_scenario_that_is_missing_gives_its_name(path):
 def test_a_wheel_has_them_inside_the_package(tmp_path, monkeypatch):
     package = tmp_path / "site-packages" / "simharness"
     (package / "scenarios").mkdir(parents=True)
-    (package / "scenarios" / "only.toml").write_text('name = "only"\n[detector]\nname = "perfect"')
+    text = 'name = "only"\n[detector]\nname = "perfect"\n[sensor]\nprofile = ""'
+    (package / "scenarios" / "only.toml").write_text(text)
     assert shipped_folder() == Path(simharness.__file__).parents[1] / "scenarios"
     monkeypatch.setattr(simharness, "__file__", str(package / "__init__.py"))
     assert shipped_folder() == package / "scenarios"
