@@ -1,16 +1,12 @@
 """Films of the cameras: pictures with the people in 3D and the detections drawn into them, which browsers play.
 
-WebM files with VP8, which OpenCV brings along: all browsers play them. Drawings are those of the page
-(:mod:`.picture_drawings`): broad limbs for people in 3D, thin lines with dots for detections.
+VP9 in MP4, or VP8 in WebM without PyAV (:mod:`.film_file`). Drawings are those of the page (:mod:`.picture_drawings`):
+broad limbs for people in 3D, thin lines with dots for detections.
 """
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import os
 import re
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +19,7 @@ from numpy.typing import NDArray
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
+from mvpose.report.film_file import FilmFile, film_suffix
 from mvpose.report.limbs import Edges, limbs_of
 from mvpose.report.palette import UNMATCHED, identity_color
 from mvpose.report.picture_drawings import jpeg_uri
@@ -43,7 +40,6 @@ _SHIFT = 4  # bits of a pixel's fraction in OpenCV's coordinates
 _BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
 _OPACITY = 0.6  # of people in 3D
 _GROUND = (236, 238, 240)  # where a picture is missing
-_SPACE = 2**20  # bytes that must be free after a film
 _SLOWEST = 1.0  # frames per second that players can be relied on to show
 
 
@@ -89,10 +85,10 @@ def write_films(
     rate = max(_SLOWEST, recording.people.rate / step)
     films, names = [], _file_names(recording.names)
     for view, camera in enumerate(recording.rig):
-        address = f"{FOLDER}/{names[view]}.webm"
+        address = f"{FOLDER}/{names[view]}{film_suffix()}"
         scale = min(1.0, _WIDEST / camera.size[0])
         size = tuple(max(2, 2 * round(0.5 * scale * side)) for side in camera.size)  # colour has half the resolution
-        writer, pen = _Writer(folder / address, (size[0], size[1]), rate), _Pen(recording, view, scale)
+        writer, pen = FilmFile(folder / address, (size[0], size[1]), rate), _Pen(recording, view, scale)
         most, poster = -1, np.full((size[1], size[0], 3), _GROUND, np.uint8)
         for row, picture in enumerate(pictures(view, frames)):
             drawn = pen.drawn(row, picture, (size[0], size[1]))
@@ -109,29 +105,6 @@ def _file_names(cameras: Sequence[str]) -> list[str]:
     """Return names for files that are those of the cameras as far as files may have them; all different."""
     plain = [re.sub(r"[^\w-]+", "_", name, flags=re.ASCII)[:60] for name in cameras]
     return [f"{name}_{view}" if plain.count(name) > 1 or not name else name for view, name in enumerate(plain)]
-
-
-class _Writer:
-    """File of a film that is being written."""
-
-    def __init__(self, path: Path, size: tuple[int, int], rate: float) -> None:
-        self._path = path
-        with _no_messages():  # about a tag that WebM does not have
-            self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
-        if not self._writer.isOpened():
-            raise OSError(errno.EIO, "cannot be written as a WebM film by this OpenCV; --no-films leaves it out", path)
-
-    def add(self, picture: Rgb) -> None:
-        self._writer.write(np.ascontiguousarray(picture[..., ::-1]))
-
-    def close(self) -> None:
-        """Finish the file, and check that there is space left: OpenCV does not say when a disk is full."""
-        self._writer.release()
-        probe = self._path.with_suffix(".partial")
-        try:
-            probe.write_bytes(bytes(_SPACE))
-        finally:
-            probe.unlink(missing_ok=True)
 
 
 class _Pen:
@@ -193,20 +166,6 @@ class _Pen:
         with np.errstate(invalid="ignore"):
             near = (points > -_BEYOND * size) & (points < (1 + _BEYOND) * size)
         return np.where(near.all(axis=1, keepdims=True), (points + 0.5) * self._scale - 0.5, np.nan)
-
-
-@contextlib.contextmanager
-def _no_messages() -> Iterator[None]:
-    """Leave out what native code prints on stderr."""
-    sys.stderr.flush()
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
 
 
 def _draw_limbs(canvas: Rgb, points: Floats, edges: Edges, color: Sequence[int], width: int) -> None:

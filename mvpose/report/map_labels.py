@@ -66,7 +66,9 @@ def write_labels(
     Returns:
         Lower left and upper right corner of each label, points from the lower left corner of the figure.
     """
-    axes.figure.draw_without_rendering()  # fixes where the axes lie in the figure
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # fixes where the axes lie in the figure
     frame = axes.get_window_extent()
     low, high = (_points(axes, np.array(corner)) for corner in (frame.min, frame.max))
     segments = [
@@ -77,7 +79,9 @@ def write_labels(
     ]
     dots = [_points(axes, axes.transData.transform(label.place)) for label in labels]
     taken = [(dot - _DOT, dot + _DOT) for dot in dots]
-    taken += [tuple(_points(axes, axes.transData.transform(corner)) for corner in area) for area in areas]
+    for corners in areas:
+        lower, upper = _points(axes, axes.transData.transform(np.array(corners)))
+        taken.append((lower, upper))
     placed = []
     for label, dot in zip(labels, dots, strict=True):
         box = _best_box(label, dot, taken, segments, (low, high))

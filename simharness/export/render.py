@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mvpose import Detections, Estimate
 from mvpose.files.atomic_files import atomic_folder
+from mvpose.report.film_file import FilmFile
 from simharness.capture.picture import PictureSource
 from simharness.report.figures.mosaic import mosaic
 from simharness.report.run.pictures import annotate
@@ -32,6 +33,7 @@ LAYERS = ("truth", "detections", "estimates")
 CHANNELS = ("depth", "ids", "parts")
 """Images that can be written beside the pictures."""
 
+_FILM_QUALITY = 24  # constant rate factor of VP9: finer than on pages
 _MOSAIC_WIDTH = 1920  # largest width, pixels
 
 
@@ -196,23 +198,18 @@ class _VideoWriter:
     def __init__(self, folder: Path, *, rate: float) -> None:
         self._folder = folder
         self._rate = rate
-        self._writers: dict[str, cv2.VideoWriter] = {}
+        self._writers: dict[str, FilmFile] = {}
 
     def __enter__(self) -> _VideoWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
         for writer in self._writers.values():
-            writer.release()
+            writer.close()
 
     def __call__(self, name: str, frame: int, rgb: Rgb) -> None:
         even = rgb[: rgb.shape[0] // 2 * 2, : rgb.shape[1] // 2 * 2]  # the codec halves the resolution of colour
         if name not in self._writers:
             path, size = self._folder / f"{name}.mp4", (even.shape[1], even.shape[0])
-            writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), self._rate, size)
-            if not writer.isOpened():
-                raise RuntimeError(
-                    f"OpenCV cannot write a film of {size[0]} x {size[1]} at {self._rate:g} Hz to {path}"
-                )
-            self._writers[name] = writer
-        self._writers[name].write(cv2.cvtColor(even, cv2.COLOR_RGB2BGR))
+            self._writers[name] = FilmFile(path, size, self._rate, quality=_FILM_QUALITY)
+        self._writers[name].add(even)

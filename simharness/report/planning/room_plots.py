@@ -68,7 +68,8 @@ def _label(axes: Axes, room: Room, cameras: Sequence[Camera]) -> None:
     labels = []
     for box, keys in zip(room.obstacles, room.keys.obstacles, strict=True):
         text = f"{keys.name}\n{box.center[2] + box.half[2]:.1f} m".strip()
-        labels.append(MapLabel(text, box.center[:2], middle - box.center[:2], size=7.0))
+        place = np.array(box.center[:2])
+        labels.append(MapLabel(text, place, middle - place, size=7.0))
     for camera in cameras:
         text = f"{camera.name}\n{camera.center[2]:.1f} m"
         labels.append(MapLabel(text, camera.center[:2], camera.center[:2] - middle, size=7.5))

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.report.film_file import FilmFile
 from simharness.capture.picture import scaled
 from simharness.report.figures.mosaic import legend, mosaic
 from simharness.report.run.pictures import annotate, legend_entries
@@ -22,7 +22,6 @@ Rgb = NDArray[np.uint8]
 
 _MAX_FRAMES = 60  # more would be larger than the rest of the page
 _MAX_VIEWS = 8  # with the legend, three rows of three tiles
-_CODEC = "vp09"  # VP9 in MP4: free, plays in all current browsers, and OpenCV's wheels bring an encoder
 _LEAST_RATE = 1.0  # pictures per second: players show nothing of a slower film for long
 
 
@@ -117,10 +116,11 @@ def encode_mp4(pictures: Sequence[Rgb], *, rate: float) -> bytes | None:
     height, width = (side - side % 2 for side in pictures[0].shape[:2])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*_CODEC), rate, (width, height))
-        if not writer.isOpened():
+        try:
+            film = FilmFile(path, (width, height), rate)
+        except OSError:
             return None
         for rgb in pictures:
-            writer.write(cv2.cvtColor(rgb[:height, :width], cv2.COLOR_RGB2BGR))
-        writer.release()
+            film.add(rgb[:height, :width])
+        film.close()
         return path.read_bytes()

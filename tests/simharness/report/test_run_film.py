@@ -51,6 +51,7 @@ def test_a_film_is_vp9_in_mp4():
 
 
 def test_no_film_without_an_encoder(monkeypatch):
+    monkeypatch.setattr("mvpose.report.film_file.has_pyav", lambda: False)
     closed = SimpleNamespace(isOpened=lambda: False)
     monkeypatch.setattr(cv2, "VideoWriter", type("Writer", (), {"__new__": lambda *a: closed, "fourcc": lambda *a: 0}))
     assert encode_mp4([np.zeros((60, 80, 3), np.uint8)], rate=1.0) is None
