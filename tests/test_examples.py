@@ -1,23 +1,20 @@
-"""The examples run from anywhere, and print results that make sense."""
+"""The examples run from anywhere, and print results that make sense.
+
+Here they run in this process, without workers; CI also runs each as a program, with the wheels.
+"""
 
 from __future__ import annotations
 
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
 import pytest
 
+from simharness.study import runner
+
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-
-
-def output_of(example, folder):
-    done = subprocess.run(
-        [sys.executable, str(example)], capture_output=True, text=True, cwd=folder, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def test_there_are_five_examples():
@@ -26,8 +23,16 @@ def test_there_are_five_examples():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs(example, tmp_path):
-    output = output_of(example, tmp_path)
+def test_an_example_runs(example, tmp_path, monkeypatch, capfd):
+    def run_study_here(*given, **options):
+        return run_study(*given, **{**options, "workers": 1})
+
+    run_study = runner.run_study
+    monkeypatch.setattr(runner, "run_study", run_study_here)
+    monkeypatch.setattr(sys, "argv", [str(example)])
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(example), run_name="__main__")
+    output = capfd.readouterr().out
     assert list(tmp_path.iterdir()) == []
     if scores := re.findall(r"PCP +([\d.]+) %", output):
         assert float(scores[-1]) > 70  # of the preset, which is printed last

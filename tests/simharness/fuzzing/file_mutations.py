@@ -8,6 +8,7 @@ import re
 import socket
 import zipfile
 import zlib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -385,13 +386,24 @@ def _special(path, original, draw):
 def _archive(content, draw):
     """Replace the content by an archive that unpacks to much, or that has other members; of other files cut a gzip."""
     how = draw.choice(("bomb", "pickle", "shape", "order", "lying", "bare", "member", "strings", "empty", "gzip"))
+    if how == "bare":
+        return _npy(np.zeros((2, 1, 17, 3))), how
+    if how == "gzip":
+        return zlib.compress(content * 3, wbits=31)[: draw.choice((10, 50, 10**9))], how
+    names = tuple(_members(content)) or ("joints.npy", "trial.json")
+    noise = tuple(draw.randbytes(100) for _ in names) if how == "member" else ()
+    return _packed(how, names, noise), how
+
+
+@cache
+def _packed(how, names, noise):
+    """Return an archive with members of given names; it is packed once, because a bomb takes a fifth of a second."""
     buffer = io.BytesIO()
-    names = _members(content) or ["joints.npy", "trial.json"]
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name in names:
+        for k, name in enumerate(names):
             if how == "bomb":
                 with archive.open(name, "w", force_zip64=True) as member:
-                    for _ in range(48 if name == names[0] else 1):
+                    for _ in range(48 if k == 0 else 1):
                         member.write(bytes(2**20))
             elif how == "pickle":
                 archive.writestr(name, _npy(np.array([{"a": 1}, None], dtype=object)))
@@ -402,19 +414,15 @@ def _archive(content, draw):
             elif how == "lying":
                 archive.writestr(name, _npy_header((-1, 17, 3)) + bytes(800))
             elif how == "member":
-                archive.writestr(name, draw.randbytes(100))
+                archive.writestr(name, noise[k])
             elif how == "strings":
                 archive.writestr(name, _npy(np.array(["a", "b"])))
             elif how == "empty":
                 archive.writestr(name, _npy(np.zeros((0, 0, 0, 3))))
-    changed = buffer.getvalue()
+    packed = buffer.getvalue()
     if how == "lying":
-        changed = changed.replace((928).to_bytes(4, "little"), (2**31 - 1).to_bytes(4, "little"))
-    elif how == "bare":
-        changed = _npy(np.zeros((2, 1, 17, 3)))
-    elif how == "gzip":
-        changed = zlib.compress(content * 3, wbits=31)[: draw.choice((10, 50, 10**9))]
-    return changed, how
+        packed = packed.replace((928).to_bytes(4, "little"), (2**31 - 1).to_bytes(4, "little"))
+    return packed
 
 
 def _members(content):

@@ -4,6 +4,7 @@
 table; with names of readers behind the number, theirs only.
 """
 
+import contextlib
 import json
 import os
 import selectors
@@ -96,31 +97,27 @@ class Worker:
         return line
 
 
-def fuzz(numbers, folder, readers=()):
+def fuzz(numbers, worker, readers=()):
     """Yield the readers, all or some, each with the tally of some numbers of mutations of its file.
 
     Raises:
         ValueError: a name that no reader has; the message lists those of the readers.
     """
-    worker = Worker(folder)
-    try:
-        if unknown := [name for name in readers if name not in worker.readers]:
-            raise ValueError(f"no reader is called {', '.join(unknown)}; the readers are {', '.join(worker.readers)}")
-        for reader in readers or worker.readers:
-            tally = Tally()
-            for number in numbers:
-                tally.add(number, worker.attempt(reader, number))
-            yield reader, tally
-    finally:
-        worker.close()
+    if unknown := [name for name in readers if name not in worker.readers]:
+        raise ValueError(f"no reader is called {', '.join(unknown)}; the readers are {', '.join(worker.readers)}")
+    for reader in readers or worker.readers:
+        tally = Tally()
+        for number in numbers:
+            tally.add(number, worker.attempt(reader, number))
+        yield reader, tally
 
 
 def main():
     columns = ("mutations", "accepted", "refused", "failed", "odd", "worst s", "MiB")
     header = f"{'reader':26}" + "".join(f"{column:>10}" for column in columns)
     count = int(sys.argv[1])
-    with tempfile.TemporaryDirectory() as folder:
-        for name, tally in fuzz(range(count), Path(folder), sys.argv[2:]):
+    with tempfile.TemporaryDirectory() as folder, contextlib.closing(Worker(Path(folder))) as worker:
+        for name, tally in fuzz(range(count), worker, sys.argv[2:]):
             if header:
                 print(header, flush=True)
                 header = ""
