@@ -22,6 +22,9 @@ _STANDALONE_COLORS = {"currentColor": "#1b1d21", "var(--faint)": "#666b75", "var
 _STANDALONE_PAPER = "#ffffff"
 
 SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable on a phone
+_LEGEND_SIZES = (8.5, 8.0, 7.5)  # points, from the usual to the smallest
+_LEGEND_LEFT = 36.0  # points: what stands to the left of the axes
+_LETTER, _HANDLE = 0.56, 3.1  # width of a letter, and of a mark with its gaps, as shares of the font size
 _SHEET_GAP = 14.0  # points between the plots of a sheet, and around them
 _SHEET_SCALE = 1.3  # plots have the width of a phone; a sheet is shown on wider screens
 
@@ -92,18 +95,41 @@ def _inline(svg: str) -> str:
     return re.sub(r"\n\s*", "\n", svg).strip()
 
 
-def legend_above(axes: Axes, *, columns: int) -> None:
-    """Draw the legend above the axes, where it hides no data; nothing where no line has a label."""
-    if axes.get_legend_handles_labels()[0]:
+def legend_above(axes: Axes, *, columns: int | None = None) -> None:
+    """Draw the legend above the axes, where it hides no data; nothing where no line has a label.
+
+    It has one row where that fits, if need be in smaller letters, and else as many columns as fit.
+
+    Args:
+        axes: the plot.
+        columns: most columns; None: all labels.
+    """
+    names = axes.get_legend_handles_labels()[1]
+    if names:
+        figure = axes.get_figure(root=True)
+        assert figure is not None
+        fitting, size = _fitting_columns([len(name) for name in names], 72 * figure.get_figwidth() - _LEGEND_LEFT)
         axes.legend(
             loc="lower left",
             bbox_to_anchor=(0, 1.0),
-            ncols=columns,
+            ncols=min(fitting, columns or fitting),
+            fontsize=size,
             labelcolor=INK,
             handlelength=1.1,
             columnspacing=1.2,
             borderaxespad=0.2,
         )
+
+
+def _fitting_columns(letters: Sequence[int], width: float) -> tuple[int, float]:
+    """Return the most columns of labels with so many letters that fit into a width in points, and their font size."""
+    for count in range(len(letters), 0, -1):
+        for size in _LEGEND_SIZES if count == len(letters) else _LEGEND_SIZES[:1]:
+            rows = -(-len(letters) // count)  # labels fill one column after the other
+            widest = [max(letters[k : k + rows]) for k in range(0, len(letters), rows)]
+            if sum(widest) * _LETTER * size + len(widest) * _HANDLE * size <= width:
+                return count, size
+    return 1, _LEGEND_SIZES[0]
 
 
 def plot_sheet(rows: Sequence[Sequence[str]]) -> str:

@@ -54,7 +54,7 @@ def timeline(name: str, identities: Identities) -> str:
         axes.spines["left"].set_visible(False)
         axes.grid(axis="x")
         _legend_of_states(axes, identities)
-        legend_above(axes, columns=3)
+        legend_above(axes)
     return written[0]
 
 
@@ -99,7 +99,7 @@ def trajectories(name: str, identities: Identities) -> str:
         for track, place in ends.items():
             axes.plot(*place, "o", ms=5, color=identities.colors[track], mew=0, zorder=5)
         label_ends(axes, {str(identities.frames.ids[track]): place for track, place in ends.items()})
-        legend_above(axes, columns=4)
+        legend_above(axes)
     return written[0]
 
 

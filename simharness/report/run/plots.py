@@ -44,7 +44,7 @@ def error_over_time(time: Floats, errors: Floats, *, colors: Sequence[Color]) ->
         axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= top])
         axes.set_xlim(time[0], max(time[-1], time[0] + 1e-6))
         axes.grid(axis="y")
-        legend_above(axes, columns=min(4, max(1, errors.shape[1])))
+        legend_above(axes)
     return written[0]
 
 
@@ -80,7 +80,7 @@ def visibility_shares(cameras: Sequence[str], shares: Floats, *, labels: Sequenc
         axes.invert_yaxis()
         axes.tick_params(axis="y", length=0, labelcolor=INK)
         axes.spines["left"].set_visible(False)
-        legend_above(axes, columns=3)
+        legend_above(axes)
     return written[0]
 
 
@@ -107,7 +107,7 @@ def stage_times(times: Mapping[str, Mapping[str, float]]) -> str:
         axes.invert_yaxis()
         axes.tick_params(axis="y", length=0, labelcolor=INK)
         axes.spines["left"].set_visible(False)
-        legend_above(axes, columns=3)
+        legend_above(axes)
     return written[0]
 
 
@@ -156,6 +156,6 @@ def floor_plan(
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", ylabel="y, m")
         axes.set_aspect("equal")
         axes.spines[:].set_visible(False)
-        legend_above(axes, columns=min(5, paths.shape[1] + 1))
+        legend_above(axes)
         name_cameras(axes, rig, lines=[np.vstack([each, each[:1]]) for each in (corners, *things)])
     return written[0]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from mvpose.arrays import Floats
-from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, legend_above, svg_plot
+from mvpose.report.svg_plots import FAINT, INK, LINE, VARIANT_COLORS, Color, svg_plot
 from simharness.report.study.factor_names import axis_label
 from simharness.runtime.number_text import fixed
 from simharness.scoring.catalogue import ScoreInfo
@@ -22,6 +22,8 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2
 _BARS_FROM = 3  # lines from which on intervals are bars: areas of three are one grey area
 _APART = 0.012  # distance of variants at one value, as a share of the axis
 _NAME_HEIGHT = 0.075  # of the name of a line, as a share of the axis
+_ROOM = 0.6  # of the span of the means, for intervals beyond them
+_LEAST_SPAN = 0.04  # of the means, as a share of all percent or of the largest mean
 _WIDE_RANGE = 30.0  # from this ratio of the largest value to the smallest on, the axis is logarithmic
 _MAX_LISTED = 6  # values of a key in a note on a mean
 _LINE, _LINE_HEIGHT = 62, 0.15  # letters in a line below an axis, and its height in inches
@@ -77,6 +79,7 @@ def curve(
             axes.plot(
                 at, mean, "o", ls=dashes if numeric else "none", color=color, lw=1.7, ms=4.0, zorder=4, clip_on=False
             )
+            _mark_cut_ends(axes, at, low, high, color)
             known = np.flatnonzero(np.isfinite(mean))
             if len(known):
                 ends.append((variant, color, float(at[known[-1]]), float(mean[known[-1]])))
@@ -87,6 +90,14 @@ def curve(
             axes.figure.suptitle(title, fontsize=10, fontweight="bold")
         axes.grid(axis="y")
     return written[0]
+
+
+def _mark_cut_ends(axes: Axes, at: Floats, low: Floats, high: Floats, color: Color) -> None:
+    """Mark intervals that go on beyond the axis with a small arrow at its end."""
+    bottom, top = axes.get_ylim()
+    for cut, place, mark in ((low < bottom, bottom, "v"), (high > top, top, "^")):
+        if cut.any():
+            axes.plot(at[cut], np.full(cut.sum(), place), mark, color=color, ms=4.0, mew=0, zorder=5, clip_on=False)
 
 
 def _beside_each_other(axes: Axes, places: Floats, index: int, count: int, numeric: bool) -> Floats:
@@ -150,12 +161,19 @@ def _span_of(group: Sequence[float], least: float) -> tuple[float, float]:
 
 
 def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
-    """Set the limits of the vertical axis: all finite values; shares end at 100, errors and counts begin at 0."""
-    ends = [end for line in lines for each in line for end in (each.mean, each.low, each.high)]
-    known = np.array([*ends, *([] if threshold is None else [threshold])])
-    known = known[np.isfinite(known)]
-    if not len(known):
+    """Set the limits of the vertical axis by the means; shares end at 100, errors and counts begin at 0.
+
+    Intervals have room as far as they go beyond the means by no more than :data:`_ROOM` of the span of the means, so that
+    one wide interval does not flatten all curves.
+    """
+    means = np.array([each.mean for line in lines for each in line] + ([] if threshold is None else [threshold]))
+    means = means[np.isfinite(means)]
+    if not len(means):
         return
+    room = _ROOM * max(float(np.ptp(means)), _LEAST_SPAN * (100.0 if score.unit == "%" else float(means.max())))
+    ends = np.array([end for line in lines for each in line for end in (each.low, each.high)])
+    ends = np.clip(ends[np.isfinite(ends)], means.min() - room, means.max() + room)
+    known = np.concatenate([means, ends])
     if score.better == "higher":
         pad = max(0.07 * np.ptp(known), 0.5)
         top = 100.0 + 0.35 * pad if score.unit == "%" and known.max() + pad > 100 else known.max() + pad
@@ -259,7 +277,10 @@ def mean_over(over: Mapping[str, Sequence[Any]]) -> str:
 
 
 def time_distribution(times: Mapping[str, Floats]) -> str:
-    """Plot the cumulative distribution of the time per frame for each variant; times (n,) in milliseconds."""
+    """Plot the cumulative distribution of the time per frame for each variant; times (n,) in milliseconds.
+
+    The legend stands beside the curves, the fastest variant (by its median) first.
+    """
     with svg_plot("time-distribution", size=_SIZE) as (axes, written):
         for (variant, values), color in zip(times.items(), VARIANT_COLORS * max(1, len(times)), strict=False):
             ranked = np.sort(values[np.isfinite(values)])
@@ -272,5 +293,16 @@ def time_distribution(times: Mapping[str, Floats]) -> str:
             axes.xaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:g}"))
             axes.xaxis.set_minor_formatter(FuncFormatter(lambda tick, _: ""))
         axes.grid()
-        legend_above(axes, columns=min(4, max(1, len(times))))
+        _legend_beside(axes, times)
     return written[0]
+
+
+def _legend_beside(axes: Axes, times: Mapping[str, Floats]) -> None:
+    handles, names = axes.get_legend_handles_labels()
+    if not names:
+        return
+    order = sorted(range(len(names)), key=lambda k: float(np.nanmedian(times[names[k]])))
+    axes.legend(
+        [handles[k] for k in order], [names[k] for k in order], loc="upper left", bbox_to_anchor=(1.0, 1.0),
+        labelcolor=INK, handlelength=1.1, borderaxespad=0.3,
+    )  # fmt: skip

@@ -58,7 +58,7 @@ class WorstFramePictures:
         view: 3D view of the people over time.
         setting: setting of the trial in one line.
         trial: identity of the trial.
-        command: command that renders the trial again.
+        command: command that renders the trial again; empty where no command gives the same scenario.
     """
 
     picture: Picture
@@ -135,8 +135,13 @@ def show(
 
 
 def _command(study: Study, scenario: Scenario) -> str:
-    """Return the shell command that renders a trial of a study again."""
-    setting = next(each for each in study.settings if study.at(each, scenario.seed) == scenario)
+    """Return the shell command that renders a trial of a study again.
+
+    Empty where no setting of the study gives this scenario: another version ran it, whose defaults were others.
+    """
+    setting = next((each for each in study.settings if study.at(each, scenario.seed) == scenario), None)
+    if setting is None:
+        return ""
     files = [f"{'.'.join(key)}={toml(value)}" for key, value in relative_files(dict(study.data))]
     sets = [part for override in (*files, *overrides(study, setting)) for part in ("--set", override)]
     layers = ["--overlay", "truth,detections,estimates"]

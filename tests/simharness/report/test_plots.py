@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from mvpose.report.svg_plots import STAGE_COLORS
+from mvpose.report.svg_plots import STAGE_COLORS, _fitting_columns
 from simharness.report.run import plots
 from simharness.report.study import plots as study_plots
 from simharness.scenario.sections.scenario import Cameras
@@ -144,3 +144,35 @@ def test_the_note_on_a_mean_is_short():
     assert note == "mean over cameras.count 2, 4 and cameras.spread (5 to 180, 7 values)"
     assert study_plots.mean_over({"detector.profile": tuple("abcdefg")}) == "mean over detector.profile (7 values)"
     assert study_plots.mean_over({}) == ""
+
+
+def _drawn_curve(lines):
+    return study_plots.curve(
+        "c", factor="cameras.count", values=(2, 3, 5), numeric=True, lines=lines, score=SCORES["pcp"]
+    )
+
+
+def _heights(svg, color):
+    """Return the heights of the points of a line of one colour, from the top of the plot."""
+    paths = re.findall(rf'<path d="([^"]*)"[^>]*style="[^"]*stroke: {color}[^"]*stroke-width: 1.7', svg)
+    return [float(y) for y in re.findall(r"[ML] [\d.]+ ([\d.]+)", paths[0])]
+
+
+def test_a_wide_interval_does_not_flatten_the_curve_and_is_marked_where_it_is_cut():
+    narrow = [Interval(mean, mean - 1.0, mean + 1.0, 5) for mean in (60.0, 80.0, 95.0)]
+    wide = [narrow[0], Interval(80.0, 0.0, 100.0, 5), narrow[2]]
+    plain, cut = (_drawn_curve({"full": each, "fast": each, "track": each}) for each in (narrow, wide))
+    color = study_plots.VARIANT_COLORS[0]
+    span, with_wide = (np.ptp(_heights(svg, color)) for svg in (plain, cut))
+    assert with_wide > 0.45 * span  # of the height that the curve has without the wide interval
+    marks = [len(re.findall(rf'<use[^>]*style="[^"]*fill: {color}', svg)) for svg in (plain, cut)]
+    assert marks == [3, 4]  # a dot for each value, and the arrow at the lower end of the wide interval
+
+
+@pytest.mark.parametrize("letters", [[4, 5], [7, 13, 15, 14, 7], [30] * 4, [90]])
+def test_a_legend_has_one_row_where_it_fits(letters):
+    count, size = _fitting_columns(letters, 340.0)
+    assert 1 <= count <= len(letters)
+    assert 7.5 <= size <= 8.5
+    if sum(letters) * 0.56 * 7.5 + len(letters) * 3.1 * 7.5 <= 340.0:
+        assert count == len(letters)
