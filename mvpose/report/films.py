@@ -20,7 +20,7 @@ from mvpose.arrays import Bools, Floats, Integers
 from mvpose.files.message_text import one_line
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.film_file import FilmFile, film_suffix
-from mvpose.report.limbs import Edges, limbs_of
+from mvpose.report.limbs import SMALL_FACE, Edges, face_of, limbs_of, plain_face
 from mvpose.report.palette import UNMATCHED, identity_color
 from mvpose.report.picture_drawings import jpeg_uri
 
@@ -38,6 +38,7 @@ _WIDEST = 768  # pixels
 _USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
 _SHIFT = 4  # bits of a pixel's fraction in OpenCV's coordinates
 _BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
+_BROAD = 2.0  # times as large a face as for thin lines has room for broad limbs
 _OPACITY = 0.6  # of people in 3D
 _GROUND = (236, 238, 240)  # where a picture is missing
 _SLOWEST = 1.0  # frames per second that players can be relied on to show
@@ -113,7 +114,7 @@ class _Pen:
     def __init__(self, recording: ExaminedRecording, view: int, scale: float) -> None:
         self._recording, self._view, self._scale = recording, view, scale
         people = recording.people
-        self._limbs = limbs_of(people.skeleton)
+        self._limbs, self._face = limbs_of(people.skeleton), face_of(people.skeleton)
         self._colors = [_rgb(identity_color(row)) for row in range(len(people))]
         self._unit = scale * recording.rig[view].size[1] / _USUAL_HEIGHT
 
@@ -140,6 +141,7 @@ class _Pen:
         names = []
         for person in np.flatnonzero(people.present[frame].any(axis=1)).tolist():
             points = self._placed(camera, camera.project(people.joints[frame, person]))
+            points = plain_face(points, least=_BROAD * SMALL_FACE * self._unit, face=self._face)
             _draw_limbs(layer, points, self._limbs, self._colors[person], max(2, round(8 * self._unit)))
             if np.isfinite(points).any():
                 names.append((points, person))
@@ -150,11 +152,13 @@ class _Pen:
     def _draw_detections(self, canvas: Rgb, row: int, *, plain: bool) -> None:
         recording, seen = self._recording, self._recording.seen
         detections, owners = recording.frames[int(seen.frames[row])], seen.owners[row]
+        face = face_of(detections.skeleton)
         edges, line = limbs_of(detections.skeleton), (27, 29, 33) if plain else (255, 255, 255)
         for index in np.flatnonzero(detections.view == self._view):
             owner = int(owners[index])
             color = UNMATCHED if owner < 0 else self._colors[owner]
             points = self._placed(recording.rig[self._view], detections.keypoints[index])
+            points = plain_face(points, least=SMALL_FACE * self._unit, face=face)
             _draw_limbs(canvas, points, edges, line if owner >= 0 else UNMATCHED, max(1, round(1.2 * self._unit)))
             for point in points[_known(points)]:
                 place, radius = _fixed(point), round(2.6 * self._unit * 2**_SHIFT)

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mvpose.arrays import Floats
 from mvpose.skeleton import COCO17, Skeleton
 
 Edges = Sequence[tuple[int, int]]
@@ -16,6 +20,36 @@ COCO17_BODY: Edges = (
     *((11, 13), (13, 15), (12, 14), (14, 16)),  # legs
 )
 COCO17_LIMBS: Edges = (*COCO17_FACE, *COCO17_BODY)
+
+_FACE = COCO17.joints[:5]
+SMALL_FACE = 30.0
+"""Extent in pixels of a picture 600 pixels high under which the dots of a face run into one patch."""
+
+
+def face_of(skeleton: Skeleton) -> list[int]:
+    """Return the joints of the face: nose, eyes, ears, and numbered points (``face_0``, ...)."""
+    return [k for k, joint in enumerate(skeleton.joints) if joint in _FACE or joint.startswith("face_")]
+
+
+def plain_face(joints: ArrayLike, *, least: float, face: Sequence[int] = tuple(range(len(_FACE)))) -> Floats:
+    """Return a person's joints, (J, 2) pixels, with a plain face where it is small.
+
+    The dots of a face that spans less than ``least`` pixels run into one patch. Of such a face only the joint
+    nearest to the middle stays.
+
+    Args:
+        joints: pixels; NaN for a joint that is not known.
+        least: extent of a face that is drawn whole, pixels.
+        face: joints of the face (:func:`face_of`); by default those of COCO17.
+    """
+    joints = np.array(joints, float)
+    points = joints[list(face)]
+    known = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if len(known) < 2 or float(np.ptp(points[known], axis=0).max()) >= least:
+        return joints
+    middle = known[np.linalg.norm(points[known] - points[known].mean(axis=0), axis=1).argmin()]
+    joints[[face[k] for k in known.tolist() if k != middle]] = np.nan
+    return joints
 
 
 def limbs_of(skeleton: Skeleton) -> Edges:

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
 from mvpose.detections import Detections
-from mvpose.report.limbs import Edges, limbs_of
+from mvpose.report.limbs import SMALL_FACE, Edges, face_of, limbs_of, plain_face
 from mvpose.report.palette import UNMATCHED, css
+from mvpose.skeleton import Skeleton
 
 Pictures = Callable[[int, int], NDArray[np.uint8] | None]
 """Function of frame and view that returns the picture, (h, w, 3) uint8 RGB, or None where there is none."""
 
 _USUAL_HEIGHT = 600.0  # pixels; height of a picture at which widths apply unscaled
 _BEYOND = 0.5  # of the size of the picture: what lies farther outside of it is not drawn
+_BROAD = 2.0  # times as large a face as for thin lines has room for broad limbs
 _WIDEST = 960  # pixels of an embedded picture
 _QUALITY = 80
 
@@ -78,22 +80,22 @@ def draw_detections(
         owners: person of each detection, (m,); -1 for none.
         colors: colours of the people.
     """
-    unit, edges = _unit(camera), limbs_of(detections.skeleton)
+    unit, edges, face = _unit(camera), limbs_of(detections.skeleton), face_of(detections.skeleton)
     for row in np.flatnonzero(detections.view == view):
         owner = int(owners[row])
         color = css(UNMATCHED) if owner < 0 else colors[owner]
-        points = detections.keypoints[row]
+        points = plain_face(detections.keypoints[row], least=SMALL_FACE * unit, face=face)
         path, dots = _path(camera, points, edges), _dots(camera, points, 2.4 * unit)
         dashed = f' stroke-dasharray="{4 * unit:.3g} {3 * unit:.3g}"' if owner < 0 else ""
         yield f'<g class="detected"><path d="{path}" stroke-width="{1.2 * unit:.3g}"{dashed}/>'
         yield f'<path class="dots" d="{dots}" style="fill: {color}" stroke-width="{0.8 * unit:.3g}"/></g>'
 
 
-def draw_people(camera: Camera, people: Sequence[Person], edges: Edges) -> Iterator[str]:
+def draw_people(camera: Camera, people: Sequence[Person], skeleton: Skeleton) -> Iterator[str]:
     """Yield people as broad translucent limbs."""
-    unit = _unit(camera)
+    unit, edges, face = _unit(camera), limbs_of(skeleton), face_of(skeleton)
     for person in people:
-        path = _path(camera, person.pixels, edges)
+        path = _path(camera, plain_face(person.pixels, least=_BROAD * SMALL_FACE * unit, face=face), edges)
         if path:
             yield (
                 f'<path class="limbs" d="{path}" stroke="{person.color}" stroke-width="{8 * unit:.3g}">'

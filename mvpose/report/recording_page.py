@@ -22,7 +22,6 @@ from mvpose.report.documents import fill_template, program_version
 from mvpose.report.examined_recording import ExaminedRecording
 from mvpose.report.expected_error import expected_error
 from mvpose.report.films import MovingPictures, write_films
-from mvpose.report.limbs import limbs_of
 from mvpose.report.measures import median_by, share_on_one_view
 from mvpose.report.palette import identity_color
 from mvpose.report.picture_drawings import Person, Pictures, draw_detections, draw_people, picture_element
@@ -226,7 +225,7 @@ def _drawing(recording: ExaminedRecording, row: int, view: int, pictures: Pictur
         for person in np.flatnonzero(people.present[frame].any(axis=1)).tolist()
     ]
     parts = [
-        *draw_people(camera, shown, limbs_of(people.skeleton)),
+        *draw_people(camera, shown, people.skeleton),
         *draw_detections(camera, recording.frames[frame], view, seen.owners[row], colors),
     ]
     picture = None if pictures is None else pictures(frame, view)

@@ -28,9 +28,6 @@ _RIM = 0.5  # pixels of the mask: cv2 fills every pixel that an outline touches
 _USUAL_HEIGHT = 600.0  # picture height in pixels at which widths and sizes apply unscaled
 
 
-_FACE_JOINTS = tuple(range(5))  # nose, eyes, ears of COCO-17
-
-
 @dataclass(frozen=True)
 class BoxTag:
     """Tag of a box.
@@ -44,22 +41,6 @@ class BoxTag:
     text: str
     box: tuple[float, ...]
     color: Color
-
-
-def plain_face(joints: ArrayLike, *, least: float) -> NDArray[np.float64]:
-    """Return a person's joints, (J, 2) pixels that begin with those of COCO-17, with a plain face where it is small.
-
-    The five dots of a face that spans less than ``least`` pixels run into one patch. Of such a face only the joint
-    nearest to the middle stays.
-    """
-    joints = np.array(joints, float)
-    face = joints[: len(_FACE_JOINTS)]
-    known = np.flatnonzero(np.isfinite(face).all(axis=1))
-    if len(known) < 2 or float(np.ptp(face[known], axis=0).max()) >= least:
-        return joints
-    middle = known[np.linalg.norm(face[known] - face[known].mean(axis=0), axis=1).argmin()]
-    face[[joint for joint in known.tolist() if joint != middle]] = np.nan
-    return joints
 
 
 class Overlay:

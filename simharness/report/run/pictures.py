@@ -12,12 +12,12 @@ import polars as pl
 from numpy.typing import NDArray
 
 from mvpose import Camera, Detections, Estimate
-from mvpose.report.limbs import COCO17_BODY
+from mvpose.report.limbs import COCO17_BODY, SMALL_FACE, plain_face
 from mvpose.report.palette import TRUTH, UNMATCHED, Color, person_color
 from simharness.capture.picture import PictureSource
 from simharness.pairing.pairing import LIMIT, pair
 from simharness.report.figures.mosaic import Mark, legend, mosaic, rooms_in_grid
-from simharness.report.figures.overlay import BoxTag, Overlay, plain_face
+from simharness.report.figures.overlay import BoxTag, Overlay
 from simharness.scenario.sections.scenario import Scenario
 from simharness.trial.run_folder import Record
 from simharness.trial.stages.build_trial import Trial
@@ -32,7 +32,6 @@ Rgb = NDArray[np.uint8]
 
 MAX_VIEWS = 8  # with the legend, three rows of three tiles
 MAX_NAMED = 6  # people in the legend
-_FACE = 30.0  # pixels of a picture 600 pixels high: dots of the joints of a smaller face would run into one another
 _MAX_WIDTH = 2400  # pixels of a picture on the page
 _JPEG_QUALITY = 88
 
@@ -188,7 +187,7 @@ def annotate(
     if show_truth:
         for pixels in truth.pixels[view]:
             overlay.skeleton(
-                plain_face(pixels, least=_FACE * overlay.scale), color=TRUTH, width=1.3, dots=1.8, outline=0.9
+                plain_face(pixels, least=SMALL_FACE * overlay.scale), color=TRUTH, width=1.3, dots=1.8, outline=0.9
             )
     if detections is not None:
         tags = [
@@ -210,7 +209,7 @@ def _draw_detection(overlay: Overlay, detections: Detections, index: int, *, ass
     if assigned not in (-1, true):
         label += " (no person)" if true < 0 else f" (is {true})"
     overlay.box(detections.boxes[index], color=color)
-    keypoints = plain_face(detections.keypoints[index], least=_FACE * overlay.scale)
+    keypoints = plain_face(detections.keypoints[index], least=SMALL_FACE * overlay.scale)
     overlay.skeleton(keypoints, color=color, edges=(), dots=2.6, outline=0.9)
     return BoxTag(label, tuple(detections.boxes[index].tolist()), color)
 

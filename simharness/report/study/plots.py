@@ -163,8 +163,8 @@ def _span_of(group: Sequence[float], least: float) -> tuple[float, float]:
 def _limits(axes: Axes, lines: Sequence[Sequence[Interval]], score: ScoreInfo, threshold: float | None) -> None:
     """Set the limits of the vertical axis by the means; shares end at 100, errors and counts begin at 0.
 
-    Intervals have room as far as they go beyond the means by no more than :data:`_ROOM` of the span of the means, so that
-    one wide interval does not flatten all curves.
+    Intervals have room as far as they go beyond the means by no more than :data:`_ROOM` of the span of the means, so
+    that one wide interval does not flatten all curves.
     """
     means = np.array([each.mean for line in lines for each in line] + ([] if threshold is None else [threshold]))
     means = means[np.isfinite(means)]

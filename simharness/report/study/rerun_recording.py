@@ -1,4 +1,4 @@
-"""Export of a trial for the rerun viewer (https://rerun.io): truth and estimates in 3D and in every view."""
+"""Export of a trial for the rerun viewer (https://rerun.io): truth and estimates in 3D and in the pictures."""
 
 from __future__ import annotations
 
@@ -6,19 +6,27 @@ import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
 from mvpose.report.limbs import COCO17_LIMBS
 from mvpose.report.palette import TRUTH, Color, person_color
+from simharness.trial.stages.capture import picture_source_of
+from simharness.world.scene.playback import Playback
 
 if TYPE_CHECKING:
+    from simharness.capture.picture import PictureSource
     from simharness.report.study.replay import Replay
 
 
 _THICK, _THIN = 0.02, 0.006  # metres, radii of estimated and of true limbs
 _DOT = 3.0  # pixels, radius of a keypoint
+MOST_PICTURES = 1000
+"""Pictures of a recording: about 60 MB."""
+
+_QUALITY = 80  # of JPEG
 _IMAGE_PLANE = 0.4  # metres from a camera's centre to its image plane
 
 
@@ -27,8 +35,9 @@ def write_rerun(replay: Replay, path: Path) -> None:
 
     The world is in metres, z up. ``world/truth/person0`` and so on hold the true limbs, ``world/estimates`` the limbs
     of every estimate in the colour of its person (grey: a ghost). ``world/cameras/NAME`` are the cameras of the
-    believed rig, with ``detections`` and ``truth`` in their pixels. The timelines are ``time`` in seconds, and
-    ``frame``.
+    believed rig, with their pictures, and with ``detections`` and ``truth`` in their pixels. The timelines are ``time``
+    in seconds, and ``frame``. Of long trials every n-th frame has pictures, so that there are at most
+    :data:`MOST_PICTURES`; a trial that was run without pictures is rasterised.
 
     Raises:
         ValueError: the rerun SDK is not installed, or the file cannot be written.
@@ -41,10 +50,14 @@ def write_rerun(replay: Replay, path: Path) -> None:
     recording.save(path)
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_still(recording, replay)
+    step = max(1, -(-len(replay.time) * len(replay.trial.exposures.believed_rig) // MOST_PICTURES))
+    source = picture_source_of(replay.trial.scenario, Playback(replay.trial.scene))
     for frame, time in enumerate(replay.time):
         recording.set_time("time", duration=float(time))
         recording.set_time("frame", sequence=frame)
         _log_frame(recording, replay, frame)
+        if frame % step == 0:
+            _log_pictures(recording, replay, source, frame)
     recording.flush()
     recording.disconnect()
 
@@ -111,6 +124,18 @@ def _log_frame(recording: Any, replay: Replay, frame: int) -> None:
         recording.log(f"{place}/detections", rerun.Points2D(points, colors=shades, radii=_DOT))
         drawn = [limb for pixels in truth.pixels[view] for limb in _limbs(pixels)]
         recording.log(f"{place}/truth", rerun.LineStrips2D(drawn, colors=TRUTH))
+
+
+def _log_pictures(recording: Any, replay: Replay, source: PictureSource, frame: int) -> None:
+    import rerun
+
+    for view, camera in enumerate(replay.trial.exposures.believed_rig):
+        bgr = cv2.cvtColor(source.picture(replay.trial.exposures, frame, view), cv2.COLOR_RGB2BGR)
+        done, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        if not done:
+            raise RuntimeError(f"OpenCV cannot encode a picture of shape {bgr.shape} as JPEG")
+        picture = rerun.EncodedImage(contents=jpeg.tobytes(), media_type="image/jpeg")
+        recording.log(f"world/cameras/{camera.name}", picture)
 
 
 def _limbs(joints: Floats) -> list[Floats]:

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mvpose.report.limbs import COCO17_LIMBS
+from mvpose.report.limbs import COCO17_LIMBS, plain_face
 from mvpose.report.palette import INK, OUTLINE, PAPER, TRUTH, UNMATCHED, css, person_color
 from mvpose.skeleton import COCO17
 from simharness.report.figures.mosaic import legend, mosaic
-from simharness.report.figures.overlay import BoxTag, Overlay, plain_face, readable_on, text_mask
+from simharness.report.figures.overlay import BoxTag, Overlay, readable_on, text_mask
 
 BLACK = np.zeros((600, 800, 3), np.uint8)
 WHITE = (255, 255, 255)

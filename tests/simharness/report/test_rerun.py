@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -99,6 +100,22 @@ class TestWithTheSdk:
             times = [time for batch in entities[entity] for time in batch.column("time").to_pylist()]
             seconds = sorted(time.total_seconds() for time in times)
             np.testing.assert_allclose(seconds, again.time, atol=1e-6)
+
+    def test_every_camera_has_its_picture_of_every_frame(self, shown, tmp_path):
+        _, again = shown[0]
+        write_rerun(again, tmp_path / "worst.rrd")
+        entities = self.read(tmp_path / "worst.rrd")
+        for camera in again.trial.exposures.believed_rig:
+            found = {}
+            for batch in entities[f"world/cameras/{camera.name}"]:
+                for name in batch.schema.names:
+                    if name.endswith("blob"):
+                        blobs = batch.column(name).to_pylist()
+                        found |= dict(zip(batch.column("frame").to_pylist(), blobs, strict=True))
+            assert sorted(found) == list(range(len(again.time)))
+            picture = cv2.imdecode(np.array(found[0], np.uint8).ravel(), cv2.IMREAD_COLOR)
+            assert picture.shape == (camera.size[1], camera.size[0], 3)
+            assert picture.std() > 5  # something is in it
 
     def test_a_run_is_written_from_its_result_folder(self, run_folder, tmp_path):
         arguments = ["report", str(run_folder), "--rerun", str(tmp_path / "run.rrd")]
