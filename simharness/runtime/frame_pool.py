@@ -6,7 +6,6 @@ frames from its caller, for work that needs its frames in one process.
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -15,6 +14,7 @@ from typing import Any, Protocol, TypeVar
 import threadpoolctl
 
 from simharness.runtime.errors import RunError
+from simharness.runtime.worker_processes import worker_context
 
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
@@ -50,8 +50,8 @@ def map_frames(
     Args:
         function: see :class:`FrameFunction`.
         frames: consecutive frame indices.
-        workers: number of processes; with 1 the work is done in this process. Processes are spawned, not forked,
-            because the parent may hold threads or a GL context. Their linear algebra uses one thread.
+        workers: number of processes; with 1 the work is done in this process. Others start as
+            :mod:`simharness.runtime.worker_processes` says. Their linear algebra uses one thread.
         progress: called with the number of frames of each finished chunk.
 
     Raises:
@@ -112,8 +112,8 @@ def _map_in_process(
 def _map_in_pool(
     function: Callable[..., Result], jobs: Sequence[_Job], workers: int, progress: Callable[[int], None]
 ) -> list[Result]:
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawn, initializer=_install, initargs=(function,)) as pool:
+    context = worker_context()
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_install, initargs=(function,)) as pool:
         futures: dict[Future[Result], range] = {}
         try:
             for job in jobs:

@@ -18,6 +18,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from simharness.runtime.errors import RunError
+from simharness.runtime.worker_processes import worker_context
 from simharness.scenario.sections.scenario import Scenario
 from simharness.study.measure import StoredTrial, TrialOutput
 from simharness.trial.archive import TrialArchive
@@ -114,8 +115,8 @@ def run_units(
     Args:
         units: units in the order in which they start; no two of the same trial.
         measure: function that measures a unit.
-        workers: number of processes. With 1 the work is done in this process, and a crash ends it. Processes are
-            spawned, so a script that calls this needs ``if __name__ == "__main__"``.
+        workers: number of processes. With 1 the work is done in this process, and a crash ends it. Each imports
+            the main module, so a script that calls this needs ``if __name__ == "__main__"``.
         scheduler: address of a Dask scheduler whose workers are used instead.
 
     Raises:
@@ -309,8 +310,9 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
         return
     # Report a dead worker at once: _run_on_cluster decides what follows, and reports it, so nothing is logged.
     quiet = {"distributed.scheduler.allowed-failures": 0, "logging": {"distributed": "critical"}}
+    start = {"distributed.worker.multiprocessing-method": worker_context().get_start_method()}
     with (
-        dask.config.set(quiet),
+        dask.config.set({**quiet, **start}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
