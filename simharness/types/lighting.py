@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simharness.types.light_sources import LightSources
+from simharness.types.mirror import Mirror
 
 Vector = tuple[float, float, float]
 
@@ -33,6 +34,7 @@ class Lighting:
         tint: colour of all light, linear, 0 to 1.
         background: sRGB of pixels that show no surface, 0 to 1; light does not change it.
         sources: lamps, windows, sun and sky; None for the lighting in closed form.
+        mirror: mirror in which the meshes of the picture are reflected; ``sources`` are those before it.
 
     Raises:
         ValueError: a wrong shape, a direction of length 0 or below the horizon, a negative strength, or a colour
@@ -46,10 +48,11 @@ class Lighting:
     tint: Vector = (1.0, 1.0, 1.0)
     background: Vector = (0.82, 0.85, 0.88)
     sources: LightSources | None = None
+    mirror: Mirror | None = None
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            if entry.name == "sources":
+            if entry.name in ("sources", "mirror"):
                 continue
             value = np.asarray(getattr(self, entry.name), float)
             shape = () if entry.name in ("key", "sky", "fill") else (3,)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from simharness.capture.rendering.room_light import RoomLight
 from simharness.capture.rendering.shadow_maps import LightView
 from simharness.types.lighting import Lighting
 
@@ -24,15 +25,16 @@ class LitBackground:
 
     Attributes:
         lighting: the light.
-        view: what the shadow maps cover.
+        light: what the shadow maps cover, or the light of the sources.
         rgb: picture without the shadows of anything that moves, (h, w, 3) uint8.
         shadow_place: place of each pixel in the shadow maps, (h, w) uint16: see
-            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`.
-        shadow_depth: inverse depth of each pixel from the light, (h, w) float32.
+            :func:`~simharness.capture.rendering.shadow_kernels.shadow_places`; with sources, of the blocks of
+            :class:`~simharness.capture.rendering.lit_scene.Grid`.
+        shadow_depth: inverse depth of each pixel from the light, (h, w) float32; empty with sources.
     """
 
     lighting: Lighting
-    view: LightView
+    light: LightView | RoomLight
     rgb: NDArray[np.uint8]
     shadow_place: NDArray[np.uint16]
     shadow_depth: NDArray[np.float32]

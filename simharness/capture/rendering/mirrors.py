@@ -56,7 +56,9 @@ def with_mirrors(
         if "lighting" in reflected_options:
             towards = np.asarray(options["lighting"].direction, float)
             turned = towards - 2 * (towards @ np.array(mirror.normal)) * np.array(mirror.normal)
-            reflected_options["lighting"] = replace(options["lighting"], direction=tuple(turned.tolist()))
+            reflected_options["lighting"] = replace(
+                options["lighting"], direction=tuple(turned.tolist()), mirror=mirror
+            )
         other = renderer.render(camera, [mesh for mesh in behind if len(mesh.faces)], **reflected_options).rgb
         rgb = np.where(glass[..., None], np.round(other * np.array(_REFLECTANCE)).astype(np.uint8), rgb)
     return rgb

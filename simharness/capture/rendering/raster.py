@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
 from simharness.capture.rendering.lens import through_lens
+from simharness.capture.rendering.lit_scene import LitScene
 from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
@@ -93,7 +94,12 @@ class RasterRenderer:
             geometry.vertices, topology.faces, projection, NEAR, inverse_depth, triangle, background.corners, first
         )
         depth, ids = resolve(inverse_depth, triangle, topology.mesh)
-        if color:
+        sources = LitScene.of(geometry, lighting) if color else None
+        if sources is not None:
+            rays = _rays(camera)
+            lit = sources.background(background, camera, rays)
+            rgb = sources.draw(lit, (triangle, inverse_depth, corners), camera, rays)
+        elif color:
             lit = _lit(background, geometry, camera, lighting)
             rgb = lit.rgb.copy()
             seen, moving = (triangle, inverse_depth, corners), geometry.shadows(lighting).moving
@@ -129,7 +135,7 @@ def _background(scene: _Scene, camera: Camera) -> Background:
 def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighting: Lighting) -> LitBackground:
     """Return the background in a light; the last one is kept."""
     shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
-    if background.lit is None or (background.lit.lighting, background.lit.view) != (lighting, shadows.light):
+    if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
         empty = np.round(255 * np.array(lighting.background)).astype(np.uint8)
         rgb = np.full((*background.triangle.shape, 3), empty, np.uint8)
         place, depth = shadow_places(*seen, camera.center, _rays(camera), shadows.light.P, SHADOW_SIZE)

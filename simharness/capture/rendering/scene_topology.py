@@ -73,6 +73,15 @@ class SceneTopology:
         return np.concatenate([np.zeros((0, 3), np.float32), *(mesh.colors for mesh in self.meshes)])
 
     @cached_property
+    def emission(self) -> Floats:
+        """Radiance that the faces send out, (k, 3)."""
+        return np.repeat(
+            np.array([mesh.emission for mesh in self.meshes], np.float32).reshape(-1, 3),
+            [len(mesh.faces) for mesh in self.meshes],
+            axis=0,
+        )
+
+    @cached_property
     def smooth(self) -> NDArray[np.bool_]:
         """Whether each face has interpolated normals, (k,)."""
         return self._per_face(mesh.smooth for mesh in self.meshes).astype(bool)
@@ -129,6 +138,7 @@ def _same_topology(one: Mesh, other: Mesh) -> bool:
         and one.parts is other.parts
         and one.smooth == other.smooth
         and one.still == other.still
+        and one.emission == other.emission
         and len(one.vertices) == len(other.vertices)
     )
 

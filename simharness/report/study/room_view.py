@@ -57,13 +57,15 @@ class RoomView:
         state = Playback(scene).at(float(self.replay.time[self.frame]))
         solids = zip(meshes_at(scene, state)[len(scene.bodies) :], scene.solids, strict=True)
         shown = [mesh for mesh, solid in solids if solid.kind != "room" or not self._hides_room(mesh.vertices)]
-        lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0))
+        lighting = replace(scene.lighting, background=(1.0, 1.0, 1.0), sources=None)  # it has no ceiling
         rgb = antialiased(renderer_of("raster"), scaled(self.eye, finer), shown, lighting=lighting)
         return Picture("The room", "", rgb)
 
     def _hides_room(self, vertices: NDArray[np.floating]) -> bool:
         """Return whether a part of the room stands between the middle of the room and the camera."""
-        return float(vertices[:, :2].mean(axis=0) @ self.eye.center[:2]) > 1e-6
+        middle = vertices.mean(axis=0)
+        above = middle[2] > 0.9 * self.replay.trial.scenario.room.size[2]  # ceiling and lamps
+        return above or float(middle[:2] @ self.eye.center[:2]) > 1e-6
 
     @property
     def truth(self) -> Floats:

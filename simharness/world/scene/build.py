@@ -32,7 +32,8 @@ from simharness.world.scene.people import make_person, shape_of_person
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
-from simharness.world.scene.rooms.lighting import room_lighting
+from simharness.world.scene.rooms.lamps import has_ceiling, make_ceiling, shown_lights
+from simharness.world.scene.rooms.lighting import room_areas, room_lighting
 from simharness.world.scene.rooms.room import make_room
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
@@ -112,7 +113,9 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     )
     decoys = place_decoys(seed, scenario.decoys, space)
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys))
-    solids = (*make_room(scenario.room, seed), *props, *decoys, *clutter)
+    areas = room_areas(scenario.room, seed) if has_ceiling(scenario.room, rig) else ()
+    above = (make_ceiling(scenario.room), *shown_lights(areas)) if areas else ()
+    solids = (*make_room(scenario.room, seed), *above, *props, *decoys, *clutter)
     check_rig(scenario, solids, rig)
     bodies = tuple(person.body for person in cast)
     model = compile_model(movers, solids)
@@ -120,7 +123,8 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         motions = track(model, bodies, motions, assist=people.assist, solids=solids)
     figures = tuple(person.figure for person in cast)
     time = np.arange(scenario.frames) / scenario.rate
-    return Scene(model, bodies, figures, motions, plan.presence, solids, room_lighting(scenario.room, seed), time)
+    lighting = room_lighting(scenario.room, seed, areas)
+    return Scene(model, bodies, figures, motions, plan.presence, solids, lighting, time)
 
 
 def _shapes(scenario: Scenario) -> list[Shape]:

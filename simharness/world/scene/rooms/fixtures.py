@@ -11,8 +11,6 @@ from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
 
-BRIGHTEST = 4.0
-"""Radiance that a picture shows of a lamp; a brighter one is as white."""
 _AHEAD = 0.004  # metres in front of the rectangle of the light
 
 
@@ -20,5 +18,4 @@ def fixture(light: AreaLight, name: str) -> Solid:
     """Return the glowing front of an area light, for pictures alone: no ray and no person touches it."""
     corners = light.corners + _AHEAD * light.normal
     mesh = quad_mesh(corners, np.array([[0, 1, 2, 3]]), np.ones((1, 3)))
-    glow = np.minimum(light.radiance, BRIGHTEST)
-    return Solid("room", name, replace(mesh, emission=tuple(glow.tolist())), (), Box.around(corners))
+    return Solid("room", name, replace(mesh, emission=light.radiance), (), Box.around(corners))

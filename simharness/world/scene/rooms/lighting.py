@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
 from simharness.scenario.sections.room import Room
+from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
 from simharness.types.lighting import Lighting
 from simharness.types.random_streams import stream
+from simharness.world.scene.rooms.lamps import MOODS, Mood, ceiling_lamps, wall_windows
 
 LIGHTS: Mapping[str, Lighting] = MappingProxyType(
     {
@@ -36,12 +38,49 @@ LIGHTS: Mapping[str, Lighting] = MappingProxyType(
 """Lightings by name: daylight; lamps in the evening; a low sun from one side; little light."""
 
 
-def room_lighting(room: Room, seed: int) -> Lighting:
-    """Return the lighting of a room; for "any" one of ``LIGHTS`` with a random bearing, drawn by the seed."""
+def room_lighting(room: Room, seed: int, areas: Sequence[AreaLight] | None = None) -> Lighting:
+    """Return the lighting of a room; for "any" one of ``LIGHTS`` with a random bearing, drawn by the seed.
+
+    Args:
+        room: room.
+        seed: seed of the scenario.
+        areas: windows and lamps of a room with a ceiling, see :func:`room_areas`; None for a room under the sky, whose
+            lighting is in closed form.
+    """
+    name, light = _named(room, seed)
+    if not areas:
+        return light
+    mood = MOODS[name]
+    sun = None if mood.sun is None else replace(mood.sun, direction=_towards(light.direction, mood.sun))
+    return replace(light, sources=LightSources(tuple(areas), sun, brightness=mood.brightness))
+
+
+def room_areas(room: Room, seed: int) -> tuple[AreaLight, ...]:
+    """Return the windows and lamps of a room with a ceiling whose kind has none of its own."""
+    name, light = _named(room, seed)
+    mood = MOODS[name]
+    return (*ceiling_lamps(room, mood), *wall_windows(room, mood, light.direction))
+
+
+def mood_of(room: Room, seed: int) -> Mood:
+    """Return how strong windows and lamps of a room are."""
+    return MOODS[_named(room, seed)[0]]
+
+
+def _towards(direction: Vector, sun: Sun) -> Vector:
+    """Return the direction of the sun at its own height, in the bearing of another direction."""
+    reach = float(np.hypot(direction[0], direction[1])) or 1.0
+    across = float(np.hypot(sun.direction[0], sun.direction[1]))
+    return direction[0] / reach * across, direction[1] / reach * across, sun.direction[2]
+
+
+def _named(room: Room, seed: int) -> tuple[str, Lighting]:
+    """Return the name of a lighting and the lighting in closed form."""
     if room.light != "any":
-        return LIGHTS[room.light]
+        return room.light, LIGHTS[room.light]
     rng = stream(seed, "room", "light")
-    light = LIGHTS[list(LIGHTS)[rng.integers(len(LIGHTS))]]
+    name = list(LIGHTS)[rng.integers(len(LIGHTS))]
+    light = LIGHTS[name]
     x, y, z = light.direction
     bearing, reach = rng.uniform(0, 2 * np.pi), float(np.hypot(x, y))
-    return replace(light, direction=(float(reach * np.cos(bearing)), float(reach * np.sin(bearing)), z))
+    return name, replace(light, direction=(float(reach * np.cos(bearing)), float(reach * np.sin(bearing)), z))

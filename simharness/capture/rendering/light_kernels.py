@@ -1,0 +1,360 @@
+"""Compiled kernels of the light that reaches still surfaces and places in the air: private, on plain arrays.
+
+Irradiance is in the unit of :mod:`simharness.types.light_sources`: under a hemisphere of radiance L it is L.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mvpose.kernels import njit
+from simharness.capture.rendering.ray_kernels import DEEPEST, trace
+
+_SIDE = 4  # points on an area light along each side, of which shadow rays are cast
+_OFF = 2e-3  # metres from a surface to the start of its rays
+SKY, DARK = -1, -2  # what a ray meets: nothing; the back of a surface
+
+
+@njit(cache=True, error_model="numpy")
+def from_area(
+    x: float, y: float, z: float, area: np.ndarray, boxes: np.ndarray, links: np.ndarray, triangles: np.ndarray,
+    stack: np.ndarray, received: np.ndarray,
+) -> float:  # fmt: skip
+    """Write the light of an area light at a place by direction, and return the share of the light that is not blocked.
+
+    Args:
+        x: place, as ``y`` and ``z``.
+        y: see ``x``.
+        z: see ``x``.
+        area: centre, right, up, radiance (the last is not used here), focus, (13,).
+        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        links: see ``boxes``.
+        triangles: see ``boxes``.
+        stack: memory.
+        received: for every point of the light the unit direction to it, and the irradiance of a surface that faces it,
+            for a radiance of 1, written, (``_SIDE ** 2``, 4); 0 where something blocks it.
+    """
+    ax, ay, az, bx, by, bz = area[3], area[4], area[5], area[6], area[7], area[8]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    nx, ny, nz = nx / size, ny / size, nz / size
+    share = 4.0 * size / (_SIDE * _SIDE * math.pi)
+    total = 0.0
+    for n in range(_SIDE * _SIDE):
+        i, j = n // _SIDE, n % _SIDE
+        across, up = (2.0 * i + 1.0) / _SIDE - 1.0, (2.0 * j + 1.0) / _SIDE - 1.0
+        dx = area[0] + across * ax + up * bx - x
+        dy = area[1] + across * ay + up * by - y
+        dz = area[2] + across * az + up * bz - z
+        square = max(dx * dx + dy * dy + dz * dz, 1e-6)
+        scale = 1.0 / math.sqrt(square)
+        ahead = -(nx * dx + ny * dy + nz * dz) * scale
+        value = 0.0
+        if ahead > 0:
+            value = share * ahead / square
+            if area[12] > 0:
+                value *= ahead ** area[12]
+        received[n, 0], received[n, 1], received[n, 2], received[n, 3] = dx * scale, dy * scale, dz * scale, value
+        total += value
+    if total <= 0:
+        return 0.0
+    # The outer points first: if they agree, so do mostly those between them.
+    seen = 0
+    for n in (0, _SIDE - 1, _SIDE * (_SIDE - 1), _SIDE * _SIDE - 1):
+        seen += _open_to(x, y, z, area, n, boxes, links, triangles, stack)
+    if seen == 4:
+        return 1.0
+    left = 0.0
+    for n in range(_SIDE * _SIDE):
+        if seen == 0 or not _open_to(x, y, z, area, n, boxes, links, triangles, stack):
+            received[n, 3] = 0.0
+        left += received[n, 3]
+    return left / total
+
+
+@njit(cache=True, error_model="numpy")
+def _open_to(
+    x: float,
+    y: float,
+    z: float,
+    area: np.ndarray,
+    n: int,
+    boxes: np.ndarray,
+    links: np.ndarray,
+    triangles: np.ndarray,
+    stack: np.ndarray,
+) -> bool:
+    across, up = (2.0 * (n // _SIDE) + 1.0) / _SIDE - 1.0, (2.0 * (n % _SIDE) + 1.0) / _SIDE - 1.0
+    dx = area[0] + across * area[3] + up * area[6] - x
+    dy = area[1] + across * area[4] + up * area[7] - y
+    dz = area[2] + across * area[5] + up * area[8] - z
+    return trace(boxes, links, triangles, stack, (x, y, z), (dx, dy, dz), 0.995, True)[0] < 0
+
+
+@njit(cache=True, error_model="numpy")
+def sunlit(
+    x: float, y: float, z: float, sun: np.ndarray, areas: np.ndarray, windows: np.ndarray, boxes: np.ndarray,
+    links: np.ndarray, triangles: np.ndarray, stack: np.ndarray,
+) -> bool:  # fmt: skip
+    """Return whether the sun shines at a place: through a window if there are any, else where nothing is in the way.
+
+    Args:
+        x: place, as ``y`` and ``z``.
+        y: see ``x``.
+        z: see ``x``.
+        sun: unit direction to the sun, (3,).
+        areas: area lights, see :func:`from_area`, (n, 13).
+        windows: which of them are windows, (n,) bool.
+        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        links: see ``boxes``.
+        triangles: see ``boxes``.
+        stack: memory.
+    """
+    for k in range(len(areas)):
+        if not windows[k]:
+            continue
+        ax, ay, az, bx, by, bz = areas[k, 3], areas[k, 4], areas[k, 5], areas[k, 6], areas[k, 7], areas[k, 8]
+        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        along = nx * sun[0] + ny * sun[1] + nz * sun[2]
+        if along >= 0:
+            continue
+        cx, cy, cz = areas[k, 0] - x, areas[k, 1] - y, areas[k, 2] - z
+        far = (nx * cx + ny * cy + nz * cz) / along
+        if far <= 0:
+            continue
+        hx, hy, hz = far * sun[0] - cx, far * sun[1] - cy, far * sun[2] - cz
+        right, up = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz
+        if abs(hx * ax + hy * ay + hz * az) > right or abs(hx * bx + hy * by + hz * bz) > up:
+            continue
+        if trace(boxes, links, triangles, stack, (x, y, z), (sun[0], sun[1], sun[2]), far - 0.02, True)[0] < 0:
+            return True
+    if windows.any():
+        return False
+    return trace(boxes, links, triangles, stack, (x, y, z), (sun[0], sun[1], sun[2]), 1e4, True)[0] < 0
+
+
+@njit(cache=True, error_model="numpy")
+def direct_light(
+    places: np.ndarray,
+    normals: np.ndarray,
+    reach_of: np.ndarray,
+    areas: np.ndarray,
+    windows: np.ndarray,
+    sun: np.ndarray,
+    boxes: np.ndarray,
+    links: np.ndarray,
+    triangles: np.ndarray,
+) -> np.ndarray:
+    """Return the irradiance (n, 3) of surfaces by area lights and the sun, with soft shadows.
+
+    Args:
+        places: points on surfaces, (n, 3).
+        normals: their unit normals, (n, 3).
+        reach_of: side of the square that each stands for, metres, (n,).
+        areas: area lights, see :func:`from_area`, (m, 13).
+        windows: which of them are windows, (m,) bool.
+        sun: unit direction to the sun and its irradiance, (6,); zeros without sun.
+        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        links: see ``boxes``.
+        triangles: see ``boxes``.
+    """
+    light = np.zeros((len(places), 3), np.float32)
+    received, stack = np.empty((_SIDE * _SIDE, 4)), np.empty(DEEPEST, np.int32)
+    for s in range(len(places)):
+        nx, ny, nz = np.float64(normals[s, 0]), np.float64(normals[s, 1]), np.float64(normals[s, 2])
+        x, y, z = places[s, 0] + _OFF * nx, places[s, 1] + _OFF * ny, places[s, 2] + _OFF * nz
+        for k in range(len(areas)):
+            reach = 0.0
+            for c in range(3):
+                reach += abs(areas[k, 3 + c]) + abs(areas[k, 6 + c])
+            if nx * (areas[k, 0] - x) + ny * (areas[k, 1] - y) + nz * (areas[k, 2] - z) < -reach:
+                continue  # the light is behind the surface
+            if from_area(x, y, z, areas[k], boxes, links, triangles, stack, received) <= 0:
+                continue
+            value = 0.0
+            for n in range(_SIDE * _SIDE):
+                cosine = nx * received[n, 0] + ny * received[n, 1] + nz * received[n, 2]
+                value += received[n, 3] * max(cosine, 0.0)
+            for c in range(3):
+                light[s, c] += np.float32(value * areas[k, 9 + c])
+        cosine = nx * sun[0] + ny * sun[1] + nz * sun[2]
+        if cosine <= 0 or sun[3] + sun[4] + sun[5] <= 0:
+            continue
+        # The edges of sunlight are sharper than the distances between samples: each stands for its neighbourhood.
+        sign = 1.0 if nz >= 0 else -1.0
+        a = -1.0 / (sign + nz)
+        b = nx * ny * a
+        hits = 0
+        for n in range(_SIDE * _SIDE):
+            u = reach_of[s] * ((n // _SIDE + 0.5) / _SIDE - 0.5)
+            v = reach_of[s] * ((n % _SIDE + 0.5) / _SIDE - 0.5)
+            hits += sunlit(
+                x + u * (1.0 + sign * nx * nx * a) + v * b, y + u * sign * b + v * (sign + ny * ny * a),
+                z - u * sign * nx - v * ny, sun, areas, windows, boxes, links, triangles, stack,
+            )  # fmt: skip
+        for c in range(3):
+            light[s, c] += np.float32(cosine * sun[3 + c] * hits / (_SIDE * _SIDE))
+    return light
+
+
+@njit(cache=True, error_model="numpy")
+def met(
+    places: np.ndarray,
+    normals: np.ndarray,
+    ways: np.ndarray,
+    boxes: np.ndarray,
+    links: np.ndarray,
+    triangles: np.ndarray,
+    order: np.ndarray,
+    face_normals: np.ndarray,
+    corner_samples: np.ndarray,
+    divisions: np.ndarray,
+) -> np.ndarray:
+    """Return the light sample that every ray meets, or ``SKY`` or ``DARK``, (n, rays) int32.
+
+    Args:
+        places: starts, (n, 3).
+        normals: unit normals there, about which the directions are turned, (n, 3); zeros: they are not turned.
+        ways: unit directions of the rays, for a normal along z, (rays, 3).
+        boxes: see :func:`.ray_kernels.build_tree`, as ``links``, ``triangles`` and ``order``.
+        links: see ``boxes``.
+        triangles: see ``boxes``.
+        order: see ``boxes``; here the index of the face.
+        face_normals: unit normals of the faces, (k, 3).
+        corner_samples: see :class:`.light_samples.LightSamples`.
+        divisions: see :class:`.light_samples.LightSamples`.
+    """
+    found, stack = np.full((len(places), len(ways)), SKY, np.int32), np.empty(DEEPEST, np.int32)
+    for s in range(len(places)):
+        nx, ny, nz = np.float64(normals[s, 0]), np.float64(normals[s, 1]), np.float64(normals[s, 2])
+        x, y, z = places[s, 0] + _OFF * nx, places[s, 1] + _OFF * ny, places[s, 2] + _OFF * nz
+        turned = nx * nx + ny * ny + nz * nz > 0.5
+        # Axes about the normal (Duff et al., "Building an orthonormal basis, revisited", 2017).
+        sign = 1.0 if nz >= 0 else -1.0
+        a = -1.0 / (sign + nz)
+        b = nx * ny * a
+        for r in range(len(ways)):
+            u, v, w = ways[r, 0], ways[r, 1], ways[r, 2]
+            if turned:
+                dx = u * (1.0 + sign * nx * nx * a) + v * b + w * nx
+                dy = u * sign * b + v * (sign + ny * ny * a) + w * ny
+                dz = -u * sign * nx - v * ny + w * nz
+            else:
+                dx, dy, dz = u, v, w
+            t, _, second, third = trace(boxes, links, triangles, stack, (x, y, z), (dx, dy, dz), 1e4, False)
+            if t < 0:
+                continue
+            f = order[t]
+            if dx * face_normals[f, 0] + dy * face_normals[f, 1] + dz * face_normals[f, 2] > 0:
+                found[s, r] = DARK
+                continue
+            n = divisions[f]
+            if n > 1:
+                i, j = int(second * n + 0.5), int(third * n + 0.5)
+                i = min(i, n)
+                j = min(j, n - i)
+                found[s, r] = corner_samples[f, 0] + i * (n + 1) - i * (i - 1) // 2 + j
+            else:
+                first = 1.0 - second - third
+                best = 0 if first >= max(second, third) else (1 if second >= third else 2)
+                found[s, r] = corner_samples[f, best]
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def gathered(found: np.ndarray, radiance: np.ndarray, sky: np.ndarray) -> np.ndarray:
+    """Return the mean radiance (n, 3) that the rays of each place bring.
+
+    Args:
+        found: see :func:`met`, (n, rays).
+        radiance: radiance of the light samples, (m, 3).
+        sky: radiance of the sky, (3,).
+    """
+    light = np.zeros((len(found), 3), np.float32)
+    share = np.float32(1.0 / found.shape[1])
+    for s in range(len(found)):
+        red, green, blue = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+        for r in range(found.shape[1]):
+            k = found[s, r]
+            if k >= 0:
+                red, green, blue = red + radiance[k, 0], green + radiance[k, 1], blue + radiance[k, 2]
+            elif k == SKY:
+                red, green, blue = red + sky[0], green + sky[1], blue + sky[2]
+        light[s, 0], light[s, 1], light[s, 2] = share * red, share * green, share * blue
+    return light
+
+
+@njit(cache=True, error_model="numpy")
+def probe_light(
+    places: np.ndarray,
+    found: np.ndarray,
+    ways: np.ndarray,
+    radiance: np.ndarray,
+    sky: np.ndarray,
+    areas: np.ndarray,
+    windows: np.ndarray,
+    sun: np.ndarray,
+    boxes: np.ndarray,
+    links: np.ndarray,
+    triangles: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the light at places in the air.
+
+    Args:
+        places: places, (n, 3).
+        found: what the rays from them meet, see :func:`met`, (n, rays).
+        ways: unit directions of the rays, all around, (rays, 3).
+        radiance: radiance of the light samples, (m, 3).
+        sky: radiance of the sky, (3,).
+        areas: see :func:`direct_light`, as ``windows`` and ``sun``.
+        windows: see ``areas``.
+        sun: see ``areas``.
+        boxes: see :func:`.ray_kernels.build_tree`, as ``links`` and ``triangles``.
+        links: see ``boxes``.
+        triangles: see ``boxes``.
+
+    Returns:
+        Irradiance of surfaces that face +x, -x, +y, -y, +z, -z, with all light (n, 6, 3), and by area lights and the
+        sun alone (n, 6, 3); share of each area light, and last of the sun, that nothing blocks (n, areas + 1).
+    """
+    every, straight = np.zeros((len(places), 6, 3), np.float32), np.zeros((len(places), 6, 3), np.float32)
+    shares = np.zeros((len(places), len(areas) + 1), np.float32)
+    received, stack = np.empty((_SIDE * _SIDE, 4)), np.empty(DEEPEST, np.int32)
+    sums = np.zeros(6)
+    for r in range(len(ways)):
+        for axis in range(6):
+            sums[axis] += max(ways[r, axis // 2] * (1.0 - 2.0 * (axis % 2)), 0.0)
+    for s in range(len(places)):
+        x, y, z = np.float64(places[s, 0]), np.float64(places[s, 1]), np.float64(places[s, 2])
+        for k in range(len(areas)):
+            shares[s, k] = from_area(x, y, z, areas[k], boxes, links, triangles, stack, received)
+            if shares[s, k] <= 0:
+                continue
+            for axis in range(6):
+                value, sign = 0.0, 1.0 - 2.0 * (axis % 2)
+                for n in range(_SIDE * _SIDE):
+                    value += received[n, 3] * max(sign * received[n, axis // 2], 0.0)
+                for c in range(3):
+                    straight[s, axis, c] += np.float32(value * areas[k, 9 + c])
+        if sun[3] + sun[4] + sun[5] > 0 and sunlit(x, y, z, sun, areas, windows, boxes, links, triangles, stack):
+            shares[s, len(areas)] = 1.0
+            for axis in range(6):
+                cosine = max(sun[axis // 2] * (1.0 - 2.0 * (axis % 2)), 0.0)
+                for c in range(3):
+                    straight[s, axis, c] += np.float32(cosine * sun[3 + c])
+        for r in range(len(ways)):
+            k = found[s, r]
+            if k == DARK:
+                continue
+            for axis in range(6):
+                cosine = max(ways[r, axis // 2] * (1.0 - 2.0 * (axis % 2)), 0.0) / sums[axis]
+                if cosine <= 0:
+                    continue
+                for c in range(3):
+                    every[s, axis, c] += np.float32(cosine * (radiance[k, c] if k >= 0 else sky[c]))
+        for axis in range(6):
+            for c in range(3):
+                every[s, axis, c] += straight[s, axis, c]
+    return every, straight, shares
