@@ -3,8 +3,9 @@
     python -m benchmarks.doctor --prepare recordings.npz --shelf FOLDER     # needs simharness
     python -m benchmarks.doctor --from recordings.npz --trials trials.jsonl --workers 16 --out results/doctor
 
-The first command simulates the recordings and reads real Shelf; the second needs mvpose, NumPy and SciPy only. Trials
-that are in the file already are not run again. Tables are printed and written to the folder.
+The first command simulates the recordings and reads real Shelf; the second needs mvpose, NumPy and SciPy only
+(and ``mvpose[recordings]`` for ``--out``). Trials that are in the file already are not run again. Tables are printed
+and written to the folder.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
@@ -122,7 +121,9 @@ def write_report(results: Results, folder: Path) -> None:
     }
     (folder / "doctor.json").write_text(json.dumps(summary, indent=1) + "\n")
     (folder / "doctor.md").write_text(_markdown(rows, matrix, misses))
-    (folder / "confusion.html").write_text(_page(rows, matrix))
+    from benchmarks.doctor.confusion_page import write_page  # needs the extra mvpose[recordings]
+
+    write_page(folder)
 
 
 def _share(
@@ -273,7 +274,7 @@ def _refusal_rows(results: Sequence[Mapping[str, Any]]) -> list[Row | None]:
 def _markdown(rows: Sequence[Row], matrix: Mapping[str, Counter[str]], misses: Sequence[str]) -> str:
     """Return the tables and the misses as Markdown."""
     marks = {True: "yes", False: "**no**", None: ""}
-    kinds = _kinds(matrix)
+    kinds = kinds_of(matrix)
     lines = [
         "# The doctor", "", "| what | bar | measured | met | trials |", "|---|---|---|---|---|",
         *(f"| {row.what.strip()} | {row.bar} | {row.measured} | {marks[row.met]} | {row.trials} |" for row in rows),
@@ -288,36 +289,6 @@ def _markdown(rows: Sequence[Row], matrix: Mapping[str, Counter[str]], misses: S
     return "\n".join(lines)
 
 
-def _kinds(matrix: Mapping[str, Counter[str]]) -> list[str]:
+def kinds_of(matrix: Mapping[str, Counter[str]]) -> list[str]:
     """Return the kinds of alarms that occur."""
     return [kind for kind in (*KINDS, _NOTHING, _UNSURE) if any(kind in counts for counts in matrix.values())]
-
-
-def _page(rows: Sequence[Row], matrix: Mapping[str, Counter[str]]) -> str:
-    """Return both tables as a page without scripts; the darker a cell, the more recordings."""
-    kinds = _kinds(matrix)
-    bars = "".join(
-        f"<tr><td>{html.escape(row.what)}<td>{html.escape(row.bar)}<td>{html.escape(row.measured)}"
-        f"<td>{ {True: '✓', False: '✗', None: ''}[row.met] }<td>{row.trials}"
-        for row in rows
-    )
-    head = "".join(f"<th><span>{html.escape(kind)}</span>" for kind in kinds)
-    body = "".join(
-        f"<tr><th>{html.escape(fault)}" + "".join(_cell(counts[kind], counts["recordings"]) for kind in kinds)
-        for fault, counts in matrix.items()
-    )
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><title>The doctor: faults and findings</title><style>'
-        "body{font:14px system-ui,sans-serif;margin:2em}td,th{padding:2px 6px;text-align:left;font-weight:normal}"
-        "th span{writing-mode:vertical-rl;transform:rotate(180deg)}table{border-collapse:collapse;margin:1em 0}"
-        "td{border:1px solid #ddd}</style><h1>The doctor</h1><h2>Bars</h2><table><tr><th>what<th>bar<th>measured<th>"
-        f"<th>trials{bars}</table><h2>Faults (rows) and alarms (columns)</h2><p>Recordings with an alarm of each kind."
-        f"</p><table><tr><th>{head}{body}</table></html>\n"
-    )
-
-
-def _cell(count: int, of: int) -> str:
-    if not count:
-        return "<td>"
-    share = count / of
-    return f'<td style="background:rgba(40,90,160,{share:.2f});color:{"#fff" if share > 0.5 else "#000"}">{count}'
