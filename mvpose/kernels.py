@@ -27,7 +27,13 @@ from mvpose.kernel_code import code_digest
 __all__ = ["njit"]
 
 # All that numba inherits from callers.
-_DEFAULTS = {"error_model": "numpy", "fastmath": False, "forceinline": False, "_nrt": True}
+_DEFAULTS = {
+    "error_model": "numpy",
+    "fastmath": False,
+    "forceinline": False,
+    "_nrt": True,
+    "no_cfunc_wrapper": True,  # nobody calls kernels from C; a tenth of the time of compilation
+}
 _CHECKSUM = hashlib.sha256().digest_size  # bytes at the start of a file: the digest of the rest
 # Arguments whose types say all of them that is compiled. Others, such as functions, bring code that no key would see.
 _PLAIN = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.Omitted, types.Array)

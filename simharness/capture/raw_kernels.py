@@ -73,7 +73,7 @@ def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, sho
                 _read_row(rows[channel], words[:, y], channel, normals, shot, read, levels, raw[channel, y])
 
 
-@njit
+@njit(cache=True)
 def _falloff_of_row(aside, beside, curvature, falloff, cosine, share):
     """Write the share of light that reaches each pixel of a row: a polynomial of the squared cosine of its angle."""
     for x in range(len(share)):
@@ -85,14 +85,14 @@ def _falloff_of_row(aside, beside, curvature, falloff, cosine, share):
             share[x] = share[x] * cosine[x] + factor
 
 
-@njit
+@njit(cache=True)
 def _read_light(line, channel, linear, light):
     """Write the light of one row of a picture and one colour."""
     for x in range(len(light)):
         light[x] = linear[line[x, channel]]
 
 
-@njit
+@njit(cache=True)
 def _filter_column(above, same, below, shift, variance, row):
     """Write a row of light, filtered along the columns."""
     half, one = np.float32(0.5), np.float32(1)
@@ -102,7 +102,7 @@ def _filter_column(above, same, below, shift, variance, row):
         row[x] = before * above[x] + here * same[x] + after * below[x]
 
 
-@njit
+@njit(cache=True)
 def _filter_row(column, pad, aside, magnified, variance, share, row):
     """Write the light on one row, filtered along the row; the shift grows with the distance from the axis."""
     half = np.float32(0.5)
@@ -129,7 +129,7 @@ def _filter_row(column, pad, aside, magnified, variance, share, row):
         start = end
 
 
-@njit
+@njit(cache=True)
 def _filter_stretch(left, same, right, aside, magnified, offset, variance, share, row):
     half, one = np.float32(0.5), np.float32(1)
     for x in range(len(row)):
@@ -139,14 +139,14 @@ def _filter_stretch(left, same, right, aside, magnified, offset, variance, share
         row[x] = share[x] * value
 
 
-@njit
+@njit(cache=True)
 def _interleave(even, odd, row):
     """Write the pixels of even columns from one row and those of odd columns from another."""
     for x in range(len(row)):
         row[x] = odd[x] if x & 1 else even[x]
 
 
-@njit
+@njit(cache=True)
 def _read_row(row, words, channel, normals, shot, read, levels, raw):
     """Write light as numbers with noise, whose variance grows with the light: the counted photons, and the readout."""
     if words.size:

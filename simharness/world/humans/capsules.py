@@ -249,9 +249,11 @@ def _normal_equations(points, capsules, nearest, weights, hessian, gradient):
             gradient[c, row] += weights[i] * slope[row] * (length - capsules[c, 6])
             for column in range(7):
                 hessian[c, row, column] += weights[i] * slope[row] * slope[column]
-    for c in range(len(capsules)):
-        hessian[c] /= total[c]
-        gradient[c] /= total[c]
+    for c in range(len(capsules)):  # element by element: an array divided in place takes three seconds to compile
+        for row in range(7):
+            gradient[c, row] /= total[c]
+            for column in range(7):
+                hessian[c, row, column] /= total[c]
 
 
 @njit(cache=True)

@@ -40,7 +40,8 @@ def mix(
 
     A threaded BLAS would take ten times as long.
     """
-    out[:] = mean
+    for i in range(out.shape[0]):  # an assignment of arrays would take two seconds to compile
+        out[i] = mean[i]
     for c in range(deltas.shape[0]):
         for i in range(out.shape[0]):
             out[i] += shares[c] * deltas[c, i]

@@ -1,5 +1,10 @@
 """Digests of code change with what it does, not with its documentation."""
 
+import os
+
+import pytest
+
+from simharness.runtime import code_digest
 from simharness.runtime.code_digest import digest_of_folders
 
 SOURCE = '"""A module."""\n\nVALUE = 1  # a comment\n'
@@ -31,3 +36,44 @@ def test_what_a_build_leaves_does_not_count(tmp_path):
     (tmp_path / "build").mkdir()
     (tmp_path / "build" / "module.py").write_text(SOURCE)
     assert digest_of_folders(tmp_path, [""]) == before
+
+
+class TestKeptTrees:
+    @pytest.fixture
+    def package(self, tmp_path, monkeypatch):
+        monkeypatch.delenv("PYTHONPYCACHEPREFIX", raising=False)
+        (tmp_path / "module.py").write_text(SOURCE)
+        (tmp_path / "data.bin").write_bytes(b"1")
+        return tmp_path
+
+    @staticmethod
+    def in_a_new_process(package):
+        code_digest._known_trees.cache_clear()
+        code_digest._meaning.cache_clear()
+        return digest_of_folders(package, [""])
+
+    def test_a_module_is_parsed_once(self, package, monkeypatch):
+        first = self.in_a_new_process(package)
+        monkeypatch.setattr(code_digest.ast, "parse", lambda _: pytest.fail("the module is parsed again"))
+        assert self.in_a_new_process(package) == first
+
+    def test_an_edit_counts_even_with_the_size_and_time_of_before(self, package):
+        first, module = self.in_a_new_process(package), package / "module.py"
+        times = module.stat()
+        module.write_text(SOURCE.replace("1", "2"))
+        os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))
+        assert self.in_a_new_process(package) != first
+        module.write_text(SOURCE)
+        assert self.in_a_new_process(package) == first
+
+    @pytest.mark.parametrize("content", [b"", b"[1]", b'{"a": 1}', b'{"a": "b"}', b"\xff"])
+    def test_a_damaged_file_is_made_anew(self, package, content):
+        first = self.in_a_new_process(package)
+        (kept,) = (package / "__pycache__").iterdir()
+        kept.write_bytes(content)
+        assert self.in_a_new_process(package) == first
+        assert len(kept.read_bytes()) > len(content)
+
+    def test_a_folder_that_cannot_be_written_does_not_matter(self, package):
+        (package / "__pycache__").write_text("a file in the way")
+        assert self.in_a_new_process(package) == self.in_a_new_process(package)

@@ -146,7 +146,8 @@ def _solve_all(axes, anchors, end, ranges, turn, place, turn_weight, pull, follo
     stuck = np.empty(n, np.bool_)
     for t in range(len(angles)):
         if follow and t > 0:
-            angles[t] = angles[t - 1]
+            for k in range(angles.shape[1]):
+                angles[t, k] = angles[t - 1, k]
         for _ in range(_ITERATIONS):
             _forward(axes, anchors, end, angles[t], got_turn, got_place, spin, at)
             for i in range(3):
