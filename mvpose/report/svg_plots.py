@@ -23,8 +23,8 @@ _STANDALONE_PAPER = "#ffffff"
 
 SIZE = (5.2, 3.1)  # inches of 72 px: small, so that the letters stay readable on a phone
 _LEGEND_SIZES = (8.5, 8.0, 7.5)  # points, from the usual to the smallest
-_LEGEND_LEFT = 36.0  # points: what stands to the left of the axes
-_LETTER, _HANDLE = 0.56, 3.1  # width of a letter, and of a mark with its gaps, as shares of the font size
+_LEGEND_LEFT = 32.0  # points: what stands to the left of the axes
+_LETTER, _HANDLE = 0.53, 3.1  # width of a letter, and of a mark with its gaps, as shares of the font size
 _SHEET_GAP = 14.0  # points between the plots of a sheet, and around them
 _SHEET_SCALE = 1.3  # plots have the width of a phone; a sheet is shown on wider screens
 

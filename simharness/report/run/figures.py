@@ -8,7 +8,8 @@ How to add a figure:
        def detections_over_time(record: Record, variant: str) -> str | None: ...
 
    It returns the SVG text, made with :func:`mvpose.report.svg_plots.svg_plot`, or None without data. The
-   caption may contain ``{variant}``.
+   caption may contain ``{variant}``. With ``finding=``, a function of the run and of the variant, a sentence
+   above the figure says what it shows.
 2. Add the name of the module to :data:`MODULES`.
 """
 
@@ -36,11 +37,13 @@ class Figure:
         title: heading.
         caption: what the figure shows, a sentence; ``{variant}`` stands for the name of the variant.
         draw: function of the run and of the variant to show; returns SVG, or None without data.
+        finding: function of the same that returns what the figure shows, a sentence, or an empty text.
     """
 
     title: str
     caption: str
     draw: Draw
+    finding: Callable[[Record, str], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -50,12 +53,13 @@ class DrawnFigure:
     title: str
     caption: str
     svg: Markup
+    finding: str = ""
 
 
 _registered: dict[str, Figure] = {}
 
 
-def figure(title: str, caption: str) -> Callable[[Draw], Draw]:
+def figure(title: str, caption: str, *, finding: Callable[[Record, str], str] | None = None) -> Callable[[Draw], Draw]:
     """Register the decorated function as a figure; the arguments are the attributes of :class:`Figure`.
 
     Raises:
@@ -65,7 +69,7 @@ def figure(title: str, caption: str) -> Callable[[Draw], Draw]:
         raise ValueError(f"the figure {title!r} is registered twice: choose another title for one of them")
 
     def register(draw: Draw) -> Draw:
-        _registered[title] = Figure(title, caption, draw)
+        _registered[title] = Figure(title, caption, draw, finding)
         return draw
 
     return register
@@ -77,7 +81,12 @@ def draw_figures(record: Record, variant: str) -> list[DrawnFigure]:
     figures = sorted(_registered.values(), key=lambda each: modules.index(each.draw.__module__))
     drawn = [(each, each.draw(record, variant)) for each in figures]
     return [
-        DrawnFigure(each.title, each.caption.replace("{variant}", variant), Markup(svg))
+        DrawnFigure(
+            each.title,
+            each.caption.replace("{variant}", variant),
+            Markup(svg),
+            each.finding(record, variant) if each.finding else "",
+        )
         for each, svg in drawn
         if svg is not None
     ]

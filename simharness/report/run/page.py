@@ -17,7 +17,7 @@ from simharness.causes.blame import Blame
 from simharness.pairing.pairing import pair
 from simharness.report.documents import fill_template
 from simharness.report.figures.blame_section import blame_section
-from simharness.report.run import plots
+from simharness.report.run import findings, plots
 from simharness.report.run.figures import draw_figures
 from simharness.report.run.film import Film
 from simharness.report.run.headline import COLUMNS, NOTHING, WHOLE_BODY_COLUMNS, has_whole_body
@@ -71,6 +71,7 @@ def render(
         blame=found and blame_section(found),
         blame_hint=f"{_command(record)} --blame 10",
         plots=_plots(record, main, things),
+        findings=_findings(record, main),
         figures=draw_figures(record, main),
         tracking_columns=TRACKING_COLUMNS,
         tracked=tracked_variants(record),
@@ -151,6 +152,25 @@ def joint_errors(record: Record, variant: str) -> Floats:
     return errors
 
 
+def _stage_times(record: Record) -> dict[str, dict[str, float]]:
+    """Return the median time of each stage by variant, milliseconds."""
+    return {
+        variant: {stage: time["median"] for stage, time in scores["timings_ms"].items() if time["median"] is not None}
+        for variant, scores in record.summary["variants"].items()
+    }
+
+
+def _findings(record: Record, main: str) -> dict[str, str]:
+    """Return what each figure shows, a sentence, by name; empty where there is nothing to tell."""
+    return {
+        "parts": findings.of_parts(record.summary["variants"][main], GROUPS),
+        "times": findings.of_times(_stage_times(record)),
+        "distribution": findings.of_joint_errors(
+            {variant: joint_errors(record, variant).ravel() for variant in record.estimates}
+        ),
+    }
+
+
 def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Markup]:
     """Return the SVG of each plot by name; plots without data are left out."""
     joints = np.stack([true.joints for true in record.truth])
@@ -166,14 +186,7 @@ def _plots(record: Record, main: str, things: Sequence[Floats]) -> dict[str, Mar
             estimates=found,
             colors=colors,
         ),
-        "times": plots.stage_times(
-            {
-                variant: {
-                    stage: time["median"] for stage, time in scores["timings_ms"].items() if time["median"] is not None
-                }
-                for variant, scores in record.summary["variants"].items()
-            }
-        ),
+        "times": plots.stage_times(_stage_times(record)),
     }
     if people:
         drawn["distribution"] = plots.error_distribution(

@@ -7,7 +7,7 @@ import polars as pl
 
 from mvpose.arrays import Floats
 from mvpose.report.palette import line_color
-from simharness.report.run import plots
+from simharness.report.run import findings, plots
 from simharness.report.run.figures import figure
 from simharness.trial.run_folder import Record
 from simharness.types.views import Visibility
@@ -25,6 +25,7 @@ _VISIBILITY_LABELS = {
     "Error over time",
     "Mean joint error of each person, variant {variant}. "
     "Squares below the axis: frames in which the person was not found.",
+    finding=lambda record, variant: findings.of_people(person_errors(record.scores, variant)),
 )
 def error_over_time(record: Record, variant: str) -> str | None:
     """Plot the mean joint error of each person over time; None without people."""
@@ -36,17 +37,28 @@ def error_over_time(record: Record, variant: str) -> str | None:
 @figure(
     "Visibility of the joints in each camera",
     "Share of all joints of all people in all frames, visible or by the cause of the occlusion.",
+    finding=lambda record, variant: _visibility_finding(record),
 )
 def visibility(record: Record, variant: str) -> str | None:
     """Plot the visibility of the joints in each camera; None without people."""
+    shares = _visibility_shares(record)
+    names = [camera.name for camera in record.rig]
+    return None if shares is None else plots.visibility_shares(names, shares, labels=list(_VISIBILITY_LABELS.values()))
+
+
+def _visibility_finding(record: Record) -> str:
+    shares = _visibility_shares(record)
+    names = [camera.name for camera in record.rig]
+    return "" if shares is None else findings.of_visibility(names, shares, list(_VISIBILITY_LABELS.values()))
+
+
+def _visibility_shares(record: Record) -> Floats | None:
+    """Return the share of the joints of each camera by label, (V, 5); None without people."""
     labels = np.stack([true.visibility for true in record.truth], axis=1)  # (V, T, P, J)
     labels = labels[:, np.stack([true.present for true in record.truth])]  # absent people have no visibility
     if not labels.shape[1]:
         return None
-    shares = np.stack([(labels == label).mean(axis=(1, 2)) for label in _VISIBILITY_LABELS], axis=1)
-    return plots.visibility_shares(
-        [camera.name for camera in record.rig], shares, labels=list(_VISIBILITY_LABELS.values())
-    )
+    return np.stack([(labels == label).mean(axis=(1, 2)) for label in _VISIBILITY_LABELS], axis=1)
 
 
 def person_errors(scores: pl.DataFrame, variant: str) -> Floats:

@@ -174,5 +174,5 @@ def test_a_legend_has_one_row_where_it_fits(letters):
     count, size = _fitting_columns(letters, 340.0)
     assert 1 <= count <= len(letters)
     assert 7.5 <= size <= 8.5
-    if sum(letters) * 0.56 * 7.5 + len(letters) * 3.1 * 7.5 <= 340.0:
+    if sum(letters) * 0.53 * 7.5 + len(letters) * 3.1 * 7.5 <= 340.0:
         assert count == len(letters)
