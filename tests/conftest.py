@@ -1,4 +1,5 @@
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,11 @@ from hypothesis import settings
 # What a terminal or a CI service says of itself would change what is printed: rich and typer read these on import.
 for _name in ("FORCE_COLOR", "CLICOLOR_FORCE", "PY_COLORS", "GITHUB_ACTIONS", "TERMINAL_WIDTH", "TTY_COMPATIBLE"):
     os.environ.pop(_name, None)
+
+# Every worker of xdist rewrites the assertions of 470 modules, and tests start a hundred processes: what Python
+# compiles is kept beside the sources, even where the environment of the caller says otherwise.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Kernels compile on first use, and machines are noisy: a deadline would time those, not the code.
 settings.register_profile("simharness", deadline=None, max_examples=50, derandomize=True)
