@@ -13,7 +13,8 @@ import numpy as np
 from mvpose.kernels import njit
 from simharness.capture.rendering.shading_kernels import STRIDE, gather
 
-_ZERO = np.float32(0.0)
+_ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
+_FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 # Linear value of sRGB s: s (s (s a + b) + c), within 0.2 % of white of IEC 61966-2-1.
 _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.float32(0.012522878)
 
@@ -67,8 +68,8 @@ def shade_lit(
     """
     height, width = triangle.shape
     albedo, normal = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
-    received = np.empty((3, width), np.float32)
-    edge, across = np.zeros((3, 3)), np.zeros((3, 3))
+    received, weights = np.empty((3, width), np.float32), np.empty((2, width), np.float32)
+    index, edge, across = np.empty((3, width), np.int32), np.zeros((3, 3)), np.zeros((3, 3))
     steps, mixed = np.empty((2, STRIDE), np.int32), np.empty(STRIDE, np.uint64)
     top = np.float32(len(curve) - 1)
     scale = np.float32(top * top / brightest)
@@ -86,28 +87,28 @@ def shade_lit(
                 continue
             gather(
                 line, y, first, last, q, faces, colors, smooth, face_normals, vertex_normals, texture, uv, texels,
-                pyramids, rays, edge, across, steps, mixed, albedo, normal,
+                pyramids, rays, edge, across, steps, mixed, albedo, normal, weights,
             )  # fmt: skip
-            _received(line, y, first, last, q, faces, emission, light, corner_samples, divisions, first_face, received)
+            _received(line, first, last, weights, emission, light, corner_samples, divisions, first_face, received)
             for k in range(3):
-                dyes, lights = albedo[k], received[k]
+                dyes, lights, indices = albedo[k], received[k], index[k]
                 for x in range(first, last):
                     dye = dyes[x]
                     value = lights[x] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN))
-                    dyes[x] = min(np.float32(math.sqrt(scale * max(value, _ZERO))), top)
+                    indices[x] = np.int32(min(np.float32(math.sqrt(scale * max(value, _ZERO))), top) + np.float32(0.5))
+            red, green, blue = index[0], index[1], index[2]
             for x in range(first, last):
-                for k in range(3):
-                    rgb[y, x, k] = curve[np.int32(albedo[k, x] + np.float32(0.5))]
+                rgb[y, x, 0] = curve[np.uint32(red[x])]
+                rgb[y, x, 1] = curve[np.uint32(green[x])]
+                rgb[y, x, 2] = curve[np.uint32(blue[x])]
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def _received(
     triangle: np.ndarray,
-    y: int,
     first: int,
     last: int,
-    q: np.ndarray,
-    faces: np.ndarray,
+    weights: np.ndarray,
     emission: np.ndarray,
     light: np.ndarray,
     corner_samples: np.ndarray,
@@ -115,52 +116,49 @@ def _received(
     first_face: int,
     received: np.ndarray,
 ) -> None:
-    """Write the light on the pixels ``first`` to before ``last`` of a row, (3, w); arguments as :func:`shade_lit`."""
-    red, green, blue = received[0], received[1], received[2]
+    """Write the light on the pixels ``first`` to before ``last`` of a row, (3, w); arguments as :func:`shade_lit`.
+
+    ``weights`` are those of the second and third corner of the triangle, (2, w).
+    """
+    red, green, blue, second, third = received[0], received[1], received[2], weights[0], weights[1]
     end = first
     while end < last:
         start, label = end, triangle[end]
         end += 1
-        while end < last and triangle[end] == label:
-            end += 1
-        f = label - first_face
-        a, b, c = faces[label, 0], faces[label, 1], faces[label, 2]
-        ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
-        cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
-        # Weights of the corners, up to a common factor, at the first pixel and their change along the row.
-        turn_a, turn_b, turn_c = by * cz - bz * cy, cy * az - cz * ay, ay * bz - az * by
-        wa = turn_a * start + (bz * cx - bx * cz) * y + (bx * cy - by * cx)
-        wb = turn_b * start + (cz * ax - cx * az) * y + (cx * ay - cy * ax)
-        wc = turn_c * start + (az * bx - ax * bz) * y + (ax * by - ay * bx)
-        total, turn = wa + wb + wc, turn_a + turn_b + turn_c
+        f = np.uint32(label - first_face)
         glow_red, glow_green, glow_blue = emission[f, 0], emission[f, 1], emission[f, 2]
         n = divisions[f]
         i, j, k = corner_samples[f, 0], corner_samples[f, 1], corner_samples[f, 2]
         if n <= 1:
-            for x in range(start, end):
-                scale = 1.0 / total
-                va, vb, vc = np.float32(wa * scale), np.float32(wb * scale), np.float32(wc * scale)
-                red[x] = va * light[i, 0] + vb * light[j, 0] + vc * light[k, 0] + glow_red
-                green[x] = va * light[i, 1] + vb * light[j, 1] + vc * light[k, 1] + glow_green
-                blue[x] = va * light[i, 2] + vb * light[j, 2] + vc * light[k, 2] + glow_blue
-                wa, wb, wc, total = wa + turn_a, wb + turn_b, wc + turn_c, total + turn
+            a, b, c = np.uint32(i), np.uint32(j), np.uint32(k)
+            red_a, green_a, blue_a = light[a, 0] + glow_red, light[a, 1] + glow_green, light[a, 2] + glow_blue
+            red_b, green_b, blue_b = light[b, 0] - light[a, 0], light[b, 1] - light[a, 1], light[b, 2] - light[a, 2]
+            red_c, green_c, blue_c = light[c, 0] - light[a, 0], light[c, 1] - light[a, 1], light[c, 2] - light[a, 2]
+            end = start
+            while end < last and triangle[end] == label:
+                vb, vc = second[end], third[end]
+                red[end] = red_a + vb * red_b + vc * red_c
+                green[end] = green_a + vb * green_b + vc * green_c
+                blue[end] = blue_a + vb * blue_b + vc * blue_c
+                end += 1
             continue
+        while end < last and triangle[end] == label:
+            end += 1
+        size = np.float32(n)
         for x in range(start, end):
-            scale = n / total
-            u, v = min(max(wb * scale, 0.0), 1.0 * n), min(max(wc * scale, 0.0), 1.0 * n)
+            u, v = min(max(size * second[x], _ZERO), size), min(max(size * third[x], _ZERO), size)
             row = min(int(u), n - 1)
             column = min(int(v), n - 1 - row)
-            u, v = np.float32(u - row), np.float32(v - column)
+            u, v = u - np.float32(row), v - np.float32(column)
             here = i + row * (n + 1) - row * (row - 1) // 2 + column
             below = here + n + 1 - row  # the next row of the lattice
             one, two, three = here, below, here + 1
-            va, vb, vc = np.float32(1.0) - u - v, u, v
+            va, vb, vc = _UNIT - u - v, u, v
             if va < 0 and row + column < n - 1:
-                one, va, vb, vc = below + 1, -va, np.float32(1.0) - v, np.float32(1.0) - u
+                one, va, vb, vc = below + 1, -va, _UNIT - v, _UNIT - u
             red[x] = va * light[one, 0] + vb * light[two, 0] + vc * light[three, 0] + glow_red
             green[x] = va * light[one, 1] + vb * light[two, 1] + vc * light[three, 1] + glow_green
             blue[x] = va * light[one, 2] + vb * light[two, 2] + vc * light[three, 2] + glow_blue
-            wb, wc, total = wb + turn_b, wc + turn_c, total + turn
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
@@ -191,49 +189,69 @@ def dim(
         rays: see :func:`.shading_kernels.shade`.
         origin: x and y of the corner of the map, (2,).
         cell: size of a cell of ``fine``; a cell of ``coarse`` is twice as large.
-        fine: share of the light that is left on the floor, see :class:`.lit_scene.ShadowLayers`, (rows, columns).
-        coarse: the same at several heights, (heights, rows / 2, columns / 2).
-        heights: these heights, (heights,).
+        fine: share of the light that is left on the floor, (rows, columns) float32.
+        coarse: the same at several heights, (heights, rows / 2, columns / 2) float32.
+        heights: these heights, (heights,) float32.
         touched: blocks in which anything is dark, the last is always False, (blocks + 1,).
         dimming: see :func:`.tone.dimming`.
         rgb: picture to change, (h, w, 3) uint8.
     """
     height, width = triangle.shape
-    steps = np.float64(len(dimming) - 1)
-    per_cell, levels = 1.0 / cell, len(heights)
-    x0, y0 = origin[0], origin[1]
+    steps = np.float32(len(dimming) - 1)
+    per_cell, levels = np.float32(1.0 / cell), len(heights)
+    place_x, place_y, place_z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
+    from_x, from_y = np.float32(center[0] - origin[0]), np.float32(center[1] - origin[1])
+    from_z, half = np.float32(center[2]), np.float32(0.5)
     for y in range(height):
-        ray_x, ray_y = rays[0, 1] * y + rays[0, 2], rays[1, 1] * y + rays[1, 2]
-        ray_z = rays[2, 1] * y + rays[2, 2]
-        for x in range(width):
-            if not touched[place[y, x]] or triangle[y, x] >= first_face or triangle[y, x] < 0:
-                continue
-            far = 1.0 / inverse_depth[y, x]
-            pz = center[2] + far * (rays[2, 0] * x + ray_z)
-            u = (center[0] + far * (rays[0, 0] * x + ray_x) - x0) * per_cell
-            v = (center[1] + far * (rays[1, 0] * x + ray_y) - y0) * per_cell
-            if pz < 0.02:
-                left = _between(fine, u - 0.5, v - 0.5) * _between(coarse[0], 0.5 * u - 0.5, 0.5 * v - 0.5)
-            else:
-                level = 0
-                while level < levels - 2 and pz > heights[level + 1]:
-                    level += 1
-                share = min(max((pz - heights[level]) / (heights[level + 1] - heights[level]), 0.0), 1.0)
-                u, v = 0.5 * u - 0.5, 0.5 * v - 0.5
-                left = (1.0 - share) * _between(coarse[level], u, v) + share * _between(coarse[level + 1], u, v)
-            row = int(left * steps + 0.5)
-            for k in range(3):
-                rgb[y, x, k] = dimming[row, rgb[y, x, k]]
+        places, faces, depths = place[y], triangle[y], inverse_depth[y]
+        ray_x, ray_y = np.float32(rays[0, 1] * y + rays[0, 2]), np.float32(rays[1, 1] * y + rays[1, 2])
+        ray_z = np.float32(rays[2, 1] * y + rays[2, 2])
+        end = 0
+        while end < width:
+            start = end
+            while start < width and not touched[places[start]]:
+                start += 1
+            end = start
+            while end < width and touched[places[end]]:
+                end += 1
+            for x in range(start, end):
+                far, column = _UNIT / depths[x], np.float32(x)
+                place_x[x] = (from_x + far * (rise_x * column + ray_x)) * per_cell
+                place_y[x] = (from_y + far * (rise_y * column + ray_y)) * per_cell
+                place_z[x] = from_z + far * (rise_z * column + ray_z)
+            for x in range(start, end):
+                if faces[x] >= first_face:
+                    continue
+                u, v, z = place_x[x], place_y[x], place_z[x]
+                if z < _FLOOR:
+                    left = _between(fine, u - half, v - half)
+                else:
+                    level = 0
+                    while level < levels - 2 and z > heights[level + 1]:
+                        level += 1
+                    share = (z - heights[level]) / (heights[level + 1] - heights[level])
+                    share = min(max(share, _ZERO), _UNIT)
+                    u, v = half * u - half, half * v - half
+                    left = _between(coarse[level], u, v)
+                    left += share * (_between(coarse[level + 1], u, v) - left)
+                row = np.int32(left * steps + half)
+                if row < len(dimming) - 1:
+                    for k in range(3):
+                        rgb[y, x, k] = dimming[row, rgb[y, x, k]]
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def _between(grid: np.ndarray, u: float, v: float) -> float:
+def _between(grid: np.ndarray, u: np.float32, v: np.float32) -> np.float32:
     """Return the value of a grid at column u and row v, by bilinear interpolation."""
-    u, v = min(max(u, 0.0), grid.shape[1] - 1.001), min(max(v, 0.0), grid.shape[0] - 1.001)
-    i, j = int(u), int(v)
-    u, v = u - i, v - j
-    upper = (1.0 - u) * grid[j, i] + u * grid[j, i + 1]
-    return (1.0 - v) * upper + v * ((1.0 - u) * grid[j + 1, i] + u * grid[j + 1, i + 1])
+    u, v = min(max(u, _ZERO), np.float32(grid.shape[1] - 1.001)), min(max(v, _ZERO), np.float32(grid.shape[0] - 1.001))
+    i, j = np.uint32(u), np.uint32(v)
+    u, v = u - np.float32(i), v - np.float32(j)
+    below = j + np.uint32(1)
+    one, two = grid[j, i], grid[below, i]
+    one += u * (grid[j, i + np.uint32(1)] - one)
+    two += u * (grid[below, i + np.uint32(1)] - two)
+    return one + v * (two - one)
 
 
 @njit(cache=True, error_model="numpy")

@@ -17,7 +17,7 @@ from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
-from simharness.capture.rendering.occlusion_kernels import capsules, cast, moving_light, touched_blocks
+from simharness.capture.rendering.occlusion_kernels import capsules, cast, joined, moving_light
 from simharness.capture.rendering.room_light import LUMINANCE, RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
@@ -28,7 +28,7 @@ Floats = NDArray[np.float32]
 
 _CELL, _MOST_CELLS = 0.06, 384  # metres; cells of the map along each side: beyond, they are larger
 _BLOCK = 8  # cells
-_HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9])  # metres, of the maps above the floor
+_HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)  # metres, of the maps above the floor
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ class ShadowLayers:
     """Share of the light that moving bodies leave to still surfaces that face up.
 
     Attributes:
-        fine: on the floor, of the light that comes from the surroundings, (rows, columns).
-        coarse: at ``_HEIGHTS``, in cells twice as large; at the first, the floor, of that of area lights and sun alone.
+        fine: on the floor, (rows, columns).
+        coarse: at ``_HEIGHTS``, in cells twice as large; at the first, the floor, only of area lights and sun.
         touched: blocks of cells in which anything is dark.
     """
 
@@ -207,7 +207,8 @@ class LitScene:
             cast(layer, height, 2 * grid.cell, grid.corner, *fixed, False)
             if height > 0:
                 cast(layer, height, 2 * grid.cell, grid.corner, *fixed, True)
-        return ShadowLayers(fine, coarse, touched_blocks(fine, coarse))
+        touched = joined(fine, coarse)
+        return ShadowLayers(fine, coarse, touched)
 
     def background(self, background: Background, camera: Camera, rays: NDArray[np.float64]) -> LitBackground:
         """Return the background in this light; the last one is kept."""

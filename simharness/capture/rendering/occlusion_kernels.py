@@ -22,6 +22,7 @@ _AROUND = 0.35  # metres around where a shadow lies without penumbra
 _FAINT = 0.06  # share of the light: a lamp that brings less casts no shadow
 _STRONGEST = 4  # lamps that cast shadows of one body
 _EDGES = 8  # cells of a block
+_SEEN = 0.985  # share of the light: what is less dark cannot be seen
 _CHUNK = 512  # samples processed together
 _NONE, _ONE, _TWO, _THREE, _TINY = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(3.0), np.float32(1e-6)
 
@@ -440,17 +441,34 @@ def moving_light(
 
 
 @njit(cache=True, error_model="numpy")
-def touched_blocks(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """Return which blocks of a map are dark anywhere, and False for none, (blocks + 1,)."""
-    rows, columns = (fine.shape[0] + _EDGES - 1) // _EDGES, (fine.shape[1] + _EDGES - 1) // _EDGES
-    touched = np.zeros(rows * columns + 1, np.bool_)
-    for j in range(fine.shape[0]):
-        for i in range(fine.shape[1]):
-            if fine[j, i] < 0.99:
-                touched[j // _EDGES * columns + i // _EDGES] = True
-    for n in range(coarse.shape[0]):
-        for j in range(coarse.shape[1]):
-            for i in range(coarse.shape[2]):
-                if coarse[n, j, i] < 0.99:
-                    touched[2 * j // _EDGES * columns + 2 * i // _EDGES] = True
+def joined(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """Multiply ``fine`` by the first layer of ``coarse``, in place; return which blocks are dark anywhere.
+
+    Args:
+        fine: map of the floor, (rows, columns).
+        coarse: maps at several heights, in cells twice as large, (heights, rows / 2, columns / 2).
+
+    Returns:
+        (blocks + 1,) bool; the last, for none, is False.
+    """
+    rows, columns = fine.shape
+    wide = columns // _EDGES
+    touched = np.zeros(rows // _EDGES * wide + 1, np.bool_)
+    floor = coarse[0]
+    for j in range(rows):
+        m = min(max(j - 1, 0) // 2, floor.shape[0] - 2)
+        v = min(max(np.float32(0.5 * j - 0.25) - m, np.float32(0.0)), np.float32(1.0))
+        for i in range(columns):
+            n = min(max(i - 1, 0) // 2, floor.shape[1] - 2)
+            u = min(max(np.float32(0.5 * i - 0.25) - n, np.float32(0.0)), np.float32(1.0))
+            one = floor[m, n] + u * (floor[m, n + 1] - floor[m, n])
+            two = floor[m + 1, n] + u * (floor[m + 1, n + 1] - floor[m + 1, n])
+            fine[j, i] *= one + v * (two - one)
+            if fine[j, i] < _SEEN:
+                touched[j // _EDGES * wide + i // _EDGES] = True
+    for layer in range(1, coarse.shape[0]):
+        for j in range(rows // 2):
+            for i in range(columns // 2):
+                if coarse[layer, j, i] < _SEEN:
+                    touched[2 * j // _EDGES * wide + 2 * i // _EDGES] = True
     return touched

@@ -115,7 +115,7 @@ def shade(
     key_light, other_light = np.empty(width, np.float32), np.empty(width, np.float32)
     map_x, map_y, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     fresh, shaded_from = np.empty(width, np.bool_), np.append(blocks.ravel(), np.float32(0.0))
-    edge, across = np.zeros((3, 3)), np.zeros((3, 3))
+    no_weights, edge, across = np.empty((2, 0), np.float32), np.zeros((3, 3)), np.zeros((3, 3))
     steps, mixed = np.empty((2, STRIDE), np.int32), np.empty(STRIDE, np.uint64)
     for y in range(height):
         for x in range(width):
@@ -131,6 +131,7 @@ def shade(
             gather(
                 triangle[y], y, first, last, q, faces, colors, smooth, face_normals, vertex_normals, texture, uv,
                 texels, pyramids, rays, edge, across, steps, mixed, albedo, normal,
+                no_weights,
             )  # fmt: skip
             _light(y, first, last, inverse_depth[y], normal, rays, light, strengths, bias, seen, away, key_light,
                    other_light, map_x, map_y, near)  # fmt: skip
@@ -233,6 +234,7 @@ def gather(
     mixed: np.ndarray,
     albedo: np.ndarray,
     normal: np.ndarray,
+    weights: np.ndarray,
 ) -> None:
     """Write what the surfaces at the pixels ``first`` to before ``last`` of a row are like; no light is used.
 
@@ -258,6 +260,7 @@ def gather(
         mixed: memory, (``STRIDE``,) uint64.
         albedo: colour, sRGB, 0 to 1, written, (3, w).
         normal: unit normal on the side of the camera, written, (3, w).
+        weights: weights of the second and the third corner of the triangle, written, (2, w); not if it is (2, 0).
     """
     rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
     ray_x = np.float32(rays[0, 1] * y + rays[0, 2])
@@ -266,6 +269,7 @@ def gather(
     half, steps_x, steps_y = np.int32(_STEPS // 2), steps[0], steps[1]
     red, green, blue = albedo[0], albedo[1], albedo[2]
     normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
+    second, third, weighted = weights[0], weights[1], weights.shape[1] > 0
     base, rows, columns, stride, wide, high = 0, 1, 1, 3, 1.0, 1.0
     end, kept, kept_until = first, -1, 0
     while end < last:
@@ -275,7 +279,7 @@ def gather(
         textured = texture[t]
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         is_smooth = smooth[t]
-        if is_smooth or textured >= 0:
+        if is_smooth or textured >= 0 or weighted:
             ax, ay, az, bx, by, bz = q[a, 0], q[a, 1], q[a, 2], q[b, 0], q[b, 1], q[b, 2]
             cx, cy, cz = q[c, 0], q[c, 1], q[c, 2]
             edge[0, 0], edge[0, 1], edge[0, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
@@ -304,8 +308,6 @@ def gather(
                 normal_x[x], normal_y[x], normal_z[x] = nx * scale, ny * scale, nz * scale
                 red[x], green[x], blue[x] = dye_red, dye_green, dye_blue
                 nx, ny, nz = nx + turn_x, ny + turn_y, nz + turn_z
-            if textured < 0:
-                continue
         else:
             while end < last and triangle[end] == label:
                 end += 1
@@ -315,8 +317,18 @@ def gather(
             turn = -_UNIT if glance > 0 else _UNIT  # seen from behind: the other side of the face
             normal_x[start:end], normal_y[start:end], normal_z[start:end] = turn * nx, turn * ny, turn * nz
 
+        if weighted:
+            rise_b, rise_c = edge[1, 0], edge[2, 0]
+            wb, wc = rise_b * start + (edge[1, 1] * y + edge[1, 2]), rise_c * start + (edge[2, 1] * y + edge[2, 2])
+            total = wb + wc + (edge[0, 0] * start + (edge[0, 1] * y + edge[0, 2]))
+            rise = edge[0, 0] + rise_b + rise_c
+            for x in range(start, end):
+                scale_of = 1.0 / total
+                second[x], third[x] = np.float32(wb * scale_of), np.float32(wc * scale_of)
+                wb, wc, total = wb + rise_b, wc + rise_c, total + rise
         if textured < 0:
-            red[start:end], green[start:end], blue[start:end] = dye_red, dye_green, dye_blue
+            if not is_smooth:
+                red[start:end], green[start:end], blue[start:end] = dye_red, dye_green, dye_blue
             continue
         for k in range(3):
             across[0, k] = edge[0, k] * uv[t, 0, 0] + edge[1, k] * uv[t, 1, 0] + edge[2, k] * uv[t, 2, 0]
