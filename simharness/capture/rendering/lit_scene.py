@@ -17,7 +17,7 @@ from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
-from simharness.capture.rendering.occlusion_kernels import capsules, cast, joined, moving_light
+from simharness.capture.rendering.occlusion_kernels import capsules, cast, moving_light, touched_blocks
 from simharness.capture.rendering.room_light import LUMINANCE, RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
@@ -97,7 +97,7 @@ class ShadowLayers:
 
     Attributes:
         fine: on the floor, (rows, columns).
-        coarse: at ``_HEIGHTS``, in cells twice as large; at the first, the floor, only of area lights and sun.
+        coarse: at ``_HEIGHTS``, in cells twice as large.
         touched: blocks of cells in which anything is dark.
     """
 
@@ -201,14 +201,13 @@ class LitScene:
             np.ascontiguousarray(up[..., None]), probes.shares,
         )  # fmt: skip
         fine = np.ones(grid.shape, np.float32)
-        cast(fine, 0.0, grid.cell, grid.corner, *fixed, True)
         coarse = np.ones((len(_HEIGHTS), grid.shape[0] // 2, grid.shape[1] // 2), np.float32)
-        for layer, height in zip(coarse, _HEIGHTS.tolist(), strict=True):
-            cast(layer, height, 2 * grid.cell, grid.corner, *fixed, False)
-            if height > 0:
-                cast(layer, height, 2 * grid.cell, grid.corner, *fixed, True)
-        touched = joined(fine, coarse)
-        return ShadowLayers(fine, coarse, touched)
+        for around in (True, False):
+            cast(fine, 0.0, grid.cell, grid.corner, *fixed, around)
+            for layer, height in zip(coarse[1:], _HEIGHTS[1:].tolist(), strict=True):
+                cast(layer, height, 2 * grid.cell, grid.corner, *fixed, around)
+        coarse[0] = fine.reshape(coarse.shape[1], 2, coarse.shape[2], 2).mean(axis=(1, 3))
+        return ShadowLayers(fine, coarse, touched_blocks(fine, coarse))
 
     def background(self, background: Background, camera: Camera, rays: NDArray[np.float64]) -> LitBackground:
         """Return the background in this light; the last one is kept."""

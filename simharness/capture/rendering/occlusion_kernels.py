@@ -21,6 +21,7 @@ _LONGEST = 2.0  # metres: longest shadow
 _AROUND = 0.35  # metres around where a shadow lies without penumbra
 _FAINT = 0.06  # share of the light: a lamp that brings less casts no shadow
 _STRONGEST = 4  # lamps that cast shadows of one body
+_LEAST_AROUND = 0.5  # share of the light that comes from the surroundings at least: other lamps are part of them
 _EDGES = 8  # cells of a block
 _SEEN = 0.985  # share of the light: what is less dark cannot be seen
 _CHUNK = 512  # samples processed together
@@ -226,7 +227,7 @@ def cast(
         for m in range(lamps):
             strength[m] = share[m] * _brought(areas, sun, normals, sizes, m, mid_x, mid_y, z)
             straight += strength[m]
-        around = max(1.0 - straight / total[0], 0.1)
+        around = max(1.0 - straight / total[0], _LEAST_AROUND)
         for _ in range(lamps - _STRONGEST):
             weakest = -1
             for m in range(lamps):
@@ -441,29 +442,18 @@ def moving_light(
 
 
 @njit(cache=True, error_model="numpy")
-def joined(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """Multiply ``fine`` by the first layer of ``coarse``, in place; return which blocks are dark anywhere.
+def touched_blocks(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """Return which blocks of a map are dark anywhere, (blocks + 1,) bool; the last, for none, is False.
 
     Args:
         fine: map of the floor, (rows, columns).
         coarse: maps at several heights, in cells twice as large, (heights, rows / 2, columns / 2).
-
-    Returns:
-        (blocks + 1,) bool; the last, for none, is False.
     """
     rows, columns = fine.shape
     wide = columns // _EDGES
     touched = np.zeros(rows // _EDGES * wide + 1, np.bool_)
-    floor = coarse[0]
     for j in range(rows):
-        m = min(max(j - 1, 0) // 2, floor.shape[0] - 2)
-        v = min(max(np.float32(0.5 * j - 0.25) - m, np.float32(0.0)), np.float32(1.0))
         for i in range(columns):
-            n = min(max(i - 1, 0) // 2, floor.shape[1] - 2)
-            u = min(max(np.float32(0.5 * i - 0.25) - n, np.float32(0.0)), np.float32(1.0))
-            one = floor[m, n] + u * (floor[m, n + 1] - floor[m, n])
-            two = floor[m + 1, n] + u * (floor[m + 1, n + 1] - floor[m + 1, n])
-            fine[j, i] *= one + v * (two - one)
             if fine[j, i] < _SEEN:
                 touched[j // _EDGES * wide + i // _EDGES] = True
     for layer in range(1, coarse.shape[0]):

@@ -1,4 +1,4 @@
-"""Room: floor and four walls without ceiling, or a floor alone.
+"""Room: floor and four walls (the ceiling is in :mod:`~simharness.world.scene.rooms.lamps`), or a floor alone.
 
 The faces of the floor look up and those of the walls look into the room: counter-clockwise as seen from inside the
 room, which is the outside of a wall as a solid.

@@ -3,8 +3,11 @@ import pytest
 from walkers import Rays
 
 from simharness.scenario.sections.room import Room
+from simharness.scenario.sections.scenario import Cameras
 from simharness.types.lighting import Lighting
-from simharness.world.scene.rooms.lighting import LIGHTS, room_lighting
+from simharness.world.rigs.layouts import build_rig
+from simharness.world.scene.rooms.lamps import MOODS, has_ceiling, make_ceiling, shown_lights
+from simharness.world.scene.rooms.lighting import LIGHTS, room_areas, room_lighting
 from simharness.world.scene.rooms.room import make_room
 from simharness.world.scene.rooms.textures import FLOORS, WALLS
 
@@ -119,6 +122,37 @@ def test_lighting_by_name():
     assert seen["dim"] < 0.5 * seen["day"]
     assert LIGHTS["warm"].tint[0] > LIGHTS["warm"].tint[2]
     assert LIGHTS["side"].direction[2] < 0.6 < LIGHTS["day"].direction[2]
+
+
+def test_a_ceiling_is_for_pictures_alone_and_looks_into_the_room():
+    ceiling = make_ceiling(ROOM)
+    normals, areas = normals_and_areas(ceiling.mesh)
+    np.testing.assert_allclose(normals, np.tile((0, 0, -1), (len(normals), 1)), atol=1e-6)
+    assert areas.sum() == pytest.approx(SIZE[0] * SIZE[1], rel=1e-5)
+    assert ceiling.mesh.vertices[:, 2].min() == SIZE[2]
+    lights = room_areas(ROOM, 0)
+    assert not any(solid.geoms for solid in (ceiling, *shown_lights(lights)))
+
+
+@pytest.mark.parametrize(("height", "walls", "has"), [(2.8, True, True), (2.8, False, False), (3.0, True, False)])
+def test_a_room_has_a_ceiling_if_all_cameras_hang_below_it(height, walls, has):
+    rig = build_rig(Cameras(count=2, radius=2.0, height=height))
+    assert has_ceiling(ROOM.model_copy(update={"walls": walls}), rig) == has
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_lamps_and_windows_shine_into_the_room(name):
+    room = ROOM.model_copy(update={"light": name})
+    areas = room_areas(room, 0)
+    assert {area.kind for area in areas} >= ({"lamp"} if any(MOODS[name].lamp) else {"window"})
+    for area in areas:
+        low, high = area.corners.min(axis=0), area.corners.max(axis=0)
+        assert (low >= [-3, -4, 0]).all()
+        assert (high <= [3, 4, 3]).all()
+        assert area.normal @ (np.array([0, 0, 1.5]) - area.center) > 0
+    sources = room_lighting(room, 0, areas).sources
+    assert sources.areas == areas
+    assert room_lighting(room, 0).sources is None
 
 
 def test_without_walls_the_ground_fades_outwards():
