@@ -16,7 +16,7 @@ from mvpose.report.svg_plots import FAINT, INK, LINE, svg_plot
 from simharness.planning.room import Room
 
 CAMERA, FIXED, PLACE, VOLUME, OBSTACLE, DOOR = "#d9643a", "#8a63c9", "#3b82c4", "#2e9e6b", "#8b93a1", "#d9a514"
-_WIDTH, _SIDE_WIDTH = 7.4, 4.9  # inches of 72 px
+_WIDTH, _SIDE_WIDTH = 5.8, 4.9  # inches of 72 px
 _MARGIN = 0.5  # metres around the room
 _REACH = 1.3  # metres: length of the drawn cones
 _PAD = (0.75, 0.5)  # inches of a figure that its axes do not fill
