@@ -5,8 +5,9 @@ exactly; parts need a second pass. Multi-sampling would blend ids and take depth
 30 % of the pixels wrong by more than 5 mm), so the frame buffer has one sample per pixel.
 
 The shaders (``shaders/``) implement the lighting, shadows and textures of the rasteriser, and use the shadow map that
-its kernel draws. So pictures look the same with both renderers in closed-form lighting. Lighting with sources (lamps and
-windows of rooms) is shown by its nearest closed form: what :class:`~simharness.types.lighting.Lighting` holds beside them.
+its kernel draws. So pictures look the same with both renderers in lighting in closed form. Lighting with sources (lamps
+and windows of rooms) is shown by its nearest closed form, which is what
+:class:`~simharness.types.lighting.Lighting` holds beside them.
 """
 
 from __future__ import annotations
