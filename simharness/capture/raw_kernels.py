@@ -35,11 +35,14 @@ def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, sho
         raw: the result, (c, h, w) uint16, c is 1 for a mosaic, else 3.
     """
     height, width = rgb.shape[:2]
-    aside = np.arange(width).astype(np.float32) - axis[0]
+    aside = np.empty(width, np.float32)
+    for x in range(width):
+        aside[x] = np.float32(x) - axis[0]
     pad = math.ceil(abs(aberration) * max(abs(aside[0]), abs(aside[-1]))) + 2
     column = np.empty(width + 2 * pad, np.float32)
     share, cosine, rows = np.empty(width, np.float32), np.empty(width, np.float32), np.empty((3, width), np.float32)
-    lines, held = np.empty((3, 3, width), np.float32), np.full((3, 3), -1)  # the last three rows of light read
+    lines, held = np.empty((3, 3, width), np.float32), np.zeros((3, 3), np.int64)  # the last rows of light, and which
+    mixed = np.empty(width, np.float32)
     for y in range(height):
         beside = np.float32(y) - axis[1]
         _falloff_of_row(aside, beside * beside, axis[2], falloff, cosine, share)
@@ -51,9 +54,9 @@ def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, sho
                 middle = min(max(y + int(whole), 0), height - 1)
                 above, below = max(middle - 1, 0), min(middle + 1, height - 1)
                 for line in range(above, below + 1):
-                    if held[channel, line % 3] != line:
+                    if held[channel, line % 3] != 1 + line:
                         _read_light(rgb[line], channel, linear, lines[channel, line % 3])
-                        held[channel, line % 3] = line
+                        held[channel, line % 3] = 1 + line
                 _filter_column(
                     lines[channel, above % 3],
                     lines[channel, middle % 3],
@@ -66,11 +69,10 @@ def expose(rgb, linear, words, normals, axis, falloff, variance, aberration, sho
                 column[pad + width :] = column[pad + width - 1]
                 _filter_row(column, pad, aside, magnified, variance, share, rows[channel])
         if mosaic:
-            _interleave(rows[y & 1], rows[1 + (y & 1)], share)
-            _read_row(share, words[:, y], 0, normals, shot, read, levels, raw[0, y])
-        else:
-            for channel in range(3):
-                _read_row(rows[channel], words[:, y], channel, normals, shot, read, levels, raw[channel, y])
+            _interleave(rows[y & 1], rows[1 + (y & 1)], mixed)
+        for channel in range(len(raw)):
+            row = mixed if mosaic else rows[channel]
+            _read_row(row, words[:, y], channel, normals, shot, read, levels, raw[channel, y])
 
 
 @njit(cache=True)
