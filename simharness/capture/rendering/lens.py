@@ -23,6 +23,7 @@ _MAX_PIXEL_RATIO = 16.0  # pixels of the pinhole picture per pixel of the distor
 _MARGIN = 1  # pixels around the pinhole picture, for interpolation
 _LONGEST_SIDE = 16384  # pixels, limit of OpenGL
 _SAMPLES = 64  # samples of the magnification along each side; it changes smoothly
+_BAND = 64  # rows that are undistorted at once: whole pictures would take several times the memory of the lens
 _KEPT = 64  # cached lenses: as many as a rig has cameras
 
 
@@ -97,10 +98,14 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
     K, distortion = np.frombuffer(K_bytes).reshape(3, 3), np.frombuffer(distortion_bytes)
     camera = Camera(K, np.eye(3), np.zeros(3), distortion=distortion, size=size)
     width, height = size
-    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
-    straight = undistorted(camera, pixels)
-    imaged = np.isfinite(straight[..., 0] + straight[..., 1])
-    low, high = straight[imaged].min(axis=0), straight[imaged].max(axis=0)
+    bands = [slice(top, min(top + _BAND, height)) for top in range(0, height, _BAND)]
+    straight, imaged = np.empty((height, width, 2)), np.empty((height, width), np.bool_)
+    for band in bands:
+        pixels = np.stack(np.meshgrid(np.arange(width), np.arange(band.start, band.stop)), axis=-1).astype(float)
+        straight[band] = undistorted(camera, pixels)
+        imaged[band] = np.isfinite(straight[band].sum(axis=-1))
+    low = np.min(straight, axis=(0, 1), where=imaged[..., None], initial=np.inf)
+    high = np.max(straight, axis=(0, 1), where=imaged[..., None], initial=-np.inf)
     few = straight[:: max(1, height // _SAMPLES), :: max(1, width // _SAMPLES)].reshape(-1, 2)
     few = np.concatenate([few, straight[-1], straight[:, -1]])
     finer = max(1.0, _magnification(camera, few[np.isfinite(few).all(axis=-1)]))
@@ -113,14 +118,20 @@ def _lens(K_bytes: bytes, distortion_bytes: bytes, size: tuple[int, int]) -> Len
         )
     enlarged = np.diag([finer, finer, 1.0]) @ K
     enlarged[:2, 2] += _MARGIN - finer * low
-    places = np.where(imaged[..., None], (straight - low) * finer + _MARGIN, -100.0)
-    column, row = np.moveaxis(np.where(imaged[..., None], np.floor(places + 0.5), 0).astype(np.intp), -1, 0)
+    columns, rows = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    nearest = np.empty((height, width), np.int32)
+    for band in bands:
+        inside = imaged[band][..., None]
+        places = np.where(inside, (straight[band] - low) * finer + _MARGIN, -100.0)
+        column, row = np.moveaxis(np.where(inside, np.floor(places + 0.5), 0).astype(np.intp), -1, 0)
+        columns[band], rows[band] = places[..., 0], places[..., 1]
+        nearest[band] = row * int(shape[0]) + column
     return Lens(
         K=enlarged,
         size=(int(shape[0]), int(shape[1])),
-        columns=np.ascontiguousarray(places[..., 0], np.float32),
-        rows=np.ascontiguousarray(places[..., 1], np.float32),
-        nearest=(row * int(shape[0]) + column).astype(np.int32),
+        columns=columns,
+        rows=rows,
+        nearest=nearest,
         dark=None if imaged.all() else ~imaged,
     )
 
