@@ -310,7 +310,10 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
         return
     # Report a dead worker at once: _run_on_cluster decides what follows, and reports it, so nothing is logged.
     quiet = {"distributed.scheduler.allowed-failures": 0, "logging": {"distributed": "critical"}}
-    start = {"distributed.worker.multiprocessing-method": worker_context().get_start_method()}
+    start = {
+        "distributed.worker.multiprocessing-method": worker_context().get_start_method(),
+        "distributed.worker.profile.enabled": False,  # it samples the stack a hundred times a second; nobody reads it
+    }
     with (
         dask.config.set({**quiet, **start}),
         LocalCluster(
