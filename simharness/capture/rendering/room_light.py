@@ -23,6 +23,8 @@ from simharness.types.mesh import Mesh
 
 _SURFACE_RAYS, _AIR_RAYS = 36, 64
 _BOUNCES = 4
+_CLOSE = 0.05  # metres: of samples in a cell of this size one is computed
+_TURN = 0.15  # metres that count as much as a turn of a radian
 # Share of rays that meet the backs of surfaces: such a place is in a solid, and takes the light of its neighbours.
 _INSIDE = 0.25
 # Colours of scenes are those in full light, where white paint looks white: it reflects 85 %, worn and dusty less.
@@ -117,20 +119,37 @@ def _computed(
     lights = _arrays(sources)
     sky = np.array(sources.sky, np.float32)
 
-    direct = direct_light(samples.places, samples.normals, samples.apart, *lights, *tree)
+    chosen, stands_for = _few(samples)
+    places, facing = samples.places[chosen], samples.normals[chosen]
+    direct = direct_light(places, facing, samples.apart[chosen], *lights, *tree)
     surface = (order, normals[0], samples.corner_samples, samples.divisions)
-    found = met(samples.places, samples.normals, _hemisphere(_SURFACE_RAYS), *tree, *surface)
+    found = met(places, facing, _hemisphere(_SURFACE_RAYS), *tree, *surface)
+    sites = np.concatenate([places, _TURN * facing], axis=1)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     if inside.any() and not inside.all():
         outside = np.flatnonzero(~inside)
-        sites = np.concatenate([samples.places, samples.normals], axis=1)
         nearest = outside[cKDTree(sites[outside]).query(sites[inside])[1]]
         direct[inside], found[inside] = direct[nearest], found[nearest]
     light = direct
     for _ in range(_BOUNCES):
-        light = direct + gathered(found, _REFLECTED * samples.albedo * light, sky)
+        light = direct + gathered(found, _REFLECTED * samples.albedo * light[stands_for], sky)
+    everywhere = np.concatenate([samples.places, _TURN * samples.normals], axis=1)
+    away, nearest = cKDTree(sites).query(everywhere, k=min(3, len(sites)))
+    weight = (1 / (away.reshape(len(everywhere), -1) ** 2 + 1e-6)).astype(np.float32)[..., None]
+    nearest = nearest.reshape(len(everywhere), -1)
+    scale = weight.sum(axis=1)
+    light, direct = ((weight * part[nearest]).sum(axis=1) / scale for part in (light, direct))
     light = direct + _smoothed(samples, light - direct)
     return _exposed(sources, samples, light, _probes(sources, samples, light, vertices, lights, sky, tree, surface))
+
+
+def _few(samples: LightSamples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return samples that stand for all within a cell of space that face about the same way, and which for each."""
+    keys = np.concatenate([np.round(samples.places / _CLOSE), np.round(2 * samples.normals)], axis=1).astype(np.int64)
+    keys -= keys.min(axis=0)
+    packed = np.ravel_multi_index(tuple(keys.T), tuple(keys.max(axis=0) + 1))
+    _, chosen, stands_for = np.unique(packed, return_index=True, return_inverse=True)
+    return chosen, stands_for
 
 
 def _smoothed(samples: LightSamples, light: Floats) -> Floats:
