@@ -17,6 +17,7 @@ from benchmarks.simulator.scenes import scenario
 from mvpose.camera import Camera
 from simharness.capture.picture import meshes_at
 from simharness.capture.rendering.raster import RasterRenderer
+from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 from simharness.world.rigs.layouts import build_rig
 from simharness.world.scene.build import build
@@ -60,10 +61,10 @@ def measure(*, quick: bool = False) -> list[Measurement]:
     for size, target in SIZES.items():
         rig = list(build_rig(scenario(size=size).cameras))
         for color in (True, False):
-            times = _pictures(rig, shown, rounds, color)
+            times = _pictures(rig, shown, rounds, color, scene.lighting)
             name = f"{size[0]} x {size[1]}, {'RGB, depth, ids' if color else 'depth, ids'}: ms per picture"
             figures.append(_times(name, times, target if color else None))
-    figures.append(_parallel_rate(list(build_rig(staged.cameras)), shown, rounds))
+    figures.append(_parallel_rate(list(build_rig(staged.cameras)), shown, rounds, scene.lighting))
 
     people = len(scene.bodies)
     posing, skinning = [], []
@@ -84,25 +85,29 @@ def measure(*, quick: bool = False) -> list[Measurement]:
     return figures
 
 
-def _pictures(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int, color: bool) -> NDArray[np.float64]:
+def _pictures(
+    rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int, color: bool, lighting: Lighting
+) -> NDArray[np.float64]:
     """Return seconds per picture for rounds x frames; the views of a frame share its shadows and normals."""
     renderer, times = RasterRenderer(), []
-    renderer.render(rig[0], shown[0], color=color)
+    renderer.render(rig[0], shown[0], color=color, lighting=lighting)
     with collector_off():
         for _ in range(rounds):
             for meshes in shown:
                 start = time.perf_counter()
                 for camera in rig:
-                    renderer.render(camera, meshes, color=color)
+                    renderer.render(camera, meshes, color=color, lighting=lighting)
                 times.append((time.perf_counter() - start) / len(rig))
     return np.array(times)
 
 
-def _parallel_rate(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int) -> Measurement:
+def _parallel_rate(
+    rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], rounds: int, lighting: Lighting
+) -> Measurement:
     """Measure pictures per second of processes that start together; a round ends with the slowest process."""
     spawn = multiprocessing.get_context("spawn")
     barrier = spawn.Barrier(_PROCESSES)
-    with spawn.Pool(_PROCESSES, _initialise, (barrier, rig, shown)) as pool:
+    with spawn.Pool(_PROCESSES, _initialise, (barrier, rig, shown, lighting)) as pool:
         rates = []
         for k in range(rounds + 1):  # the first round loads the kernels
             spans = np.array(pool.map(_render_all, range(_PROCESSES), chunksize=1))
@@ -112,18 +117,18 @@ def _parallel_rate(rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], round
     return Measurement(name, float(np.median(rates)), float(max(rates)), PARALLEL_RATE, more=True)
 
 
-def _initialise(barrier: Barrier, rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]]) -> None:
-    globals()["_work"] = barrier, rig, shown, RasterRenderer()
+def _initialise(barrier: Barrier, rig: Sequence[Camera], shown: Sequence[Sequence[Mesh]], lighting: Lighting) -> None:
+    globals()["_work"] = barrier, rig, shown, lighting, RasterRenderer()
 
 
 def _render_all(_: int) -> tuple[float, float]:
     """Render all pictures and return the start and end time of this process, by a clock shared by all processes."""
-    barrier, rig, shown, renderer = globals()["_work"]
+    barrier, rig, shown, lighting, renderer = globals()["_work"]
     barrier.wait()
     start = time.monotonic()
     for meshes in shown:
         for camera in rig:
-            renderer.render(camera, meshes)
+            renderer.render(camera, meshes, lighting=lighting)
     return start, time.monotonic()
 
 

@@ -66,7 +66,7 @@ MOODS: Mapping[str, Mood] = MappingProxyType(
             sun=Sun((0.80, 0.34, 0.50), (3.6, 3.35, 3.0)),
             brightness=0.8,
         ),
-        "dim": Mood(window=(0.2, 0.25, 0.36), lamp=(2.6, 2.3, 1.9), brightness=0.4, every=3),
+        "dim": Mood(window=(0.06, 0.075, 0.11), lamp=(2.6, 2.3, 1.9), brightness=0.4, every=3),
     }
 )
 """Moods of the lightings of :data:`~simharness.world.scene.rooms.lighting.LIGHTS`, by their names."""
