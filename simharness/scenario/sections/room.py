@@ -2,23 +2,54 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from simharness.scenario.sections.section import Count, Elements, Length, Section, Share
 
 
 class Room(Section):
-    """The room: a floor and four walls around the origin. A look of "any" is drawn from the seed."""
+    """The room: a floor and four walls around the origin. A kind or look of "any" is drawn from the seed."""
 
     size: Annotated[tuple[Length, Length, Length], Elements(("x", "y", "z"))] = Field(
         (8.0, 8.0, 3.0), description="x, y, z in metres"
     )
     walls: bool = Field(True, description="false: an open floor, and cameras may stand anywhere above it")
-    floor: Literal["tiles", "wood", "carpet", "concrete", "any"] = Field("tiles", description="look of the floor")
-    wall: Literal["plain", "panels", "brick", "stripes", "any"] = Field("plain", description="look of the walls")
+    kind: Literal["laboratory", "office", "living_room", "gym", "ward", "shop", "stage", "outdoors", "any"] = Field(
+        "laboratory",
+        description="kind of the room: its furniture along the walls, windows, lamps, finishes and what hangs on the "
+        "walls; a laboratory has no furniture; outdoors has no walls",
+    )
+    floor: Literal[
+        "usual",
+        "tiles",
+        "wood",
+        "carpet",
+        "concrete",
+        "carpet_tiles",
+        "linoleum",
+        "parquet",
+        "sports_floor",
+        "stage_boards",
+        "paving",
+        "asphalt",
+        "grass",
+        "any",
+    ] = Field("usual", description="look of the floor; usual: one that rooms of this kind have, in a laboratory tiles")
+    wall: Literal["usual", "plain", "panels", "brick", "stripes", "tinted", "wallpaper", "tiled", "curtain", "any"] = (
+        Field("usual", description="look of the walls; usual: one that rooms of this kind have, in a laboratory plain")
+    )
     light: Literal["day", "warm", "side", "dim", "any"] = Field("day", description="lighting")
+
+    @model_validator(mode="after")
+    def _open_air(self) -> Self:
+        """Leave out the walls outdoors."""
+        if self.kind == "outdoors" and self.walls:
+            if "walls" in self.model_fields_set:
+                raise ValueError('room.kind = "outdoors" has no walls: remove room.walls = true')
+            object.__setattr__(self, "walls", False)
+        return self
 
 
 class Clutter(Section):

@@ -32,8 +32,13 @@ from simharness.world.scene.people import make_person, shape_of_person
 from simharness.world.scene.placement.clutter import place_clutter
 from simharness.world.scene.placement.decoys import place_decoys
 from simharness.world.scene.placement.free_space import BODY_HALF_WIDTH, FreeSpace
-from simharness.world.scene.rooms.lamps import has_ceiling, make_ceiling, shown_lights
-from simharness.world.scene.rooms.lighting import room_areas, room_lighting
+from simharness.world.scene.placement.furniture import place_furniture
+from simharness.world.scene.rooms.fittings import make_fittings
+from simharness.world.scene.rooms.kinds import check_size, settled
+from simharness.world.scene.rooms.lamps import has_ceiling, make_ceiling
+from simharness.world.scene.rooms.lighting import room_lighting
+from simharness.world.scene.rooms.lights_of_kinds import lights_of, shown_lights_of
+from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room import make_room
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
@@ -50,7 +55,7 @@ class Scene:
         figures: visible meshes of the people (body and clothing) in the rest pose.
         motions: motions of the people, which can be sampled at any time.
         presence: times at which each person is in the scene.
-        solids: room, then objects.
+        solids: room (its fittings have no geoms), then objects.
         lighting: lighting of the scene.
         time: times of the frames, (T,), seconds.
     """
@@ -89,7 +94,9 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     Raises:
         ValueError: people, objects or cameras do not fit; the message names the keys of the scenario to change.
     """
-    seed, people = scenario.seed, scenario.people
+    scenario = scenario.model_copy(update={"room": settled(scenario.room, scenario.seed)})
+    seed, people, room = scenario.seed, scenario.people, scenario.room
+    check_size(room)
     _check_area(scenario)
     clock = motion_clock(scenario.duration, margin=CLOCK_MARGIN)
     looks = draw_looks(seed, people.count, look_alike=people.look_alike, alike=people.alike)
@@ -102,7 +109,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     pelvises = [held(motion.root[:, :3], here) for motion, here in zip(motions, present, strict=True)]
     joints = [held(mover.joints(motion), here) for mover, motion, here in zip(movers, motions, present, strict=True)]
     space = FreeSpace(
-        room=scenario.room,
+        room=room,
         area=people.area,
         time=clock,
         pelvises=np.stack(pelvises, axis=1) if pelvises else np.zeros((len(clock), 0, 3)),
@@ -112,10 +119,13 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         around=people.around,
     )
     decoys = place_decoys(seed, scenario.decoys, space)
-    clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys))
-    areas = room_areas(scenario.room, seed) if has_ceiling(scenario.room, rig) else ()
-    above = (make_ceiling(scenario.room), *shown_lights(areas)) if areas else ()
-    solids = (*make_room(scenario.room, seed), *above, *props, *decoys, *clutter)
+    openings = draw_openings(room, seed, props + decoys)
+    areas = lights_of(room, seed, openings) if has_ceiling(room, rig) else ()
+    furniture = place_furniture(seed, replace(space, taken=props + decoys), openings)
+    clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys + furniture))
+    objects = (*furniture, *props, *decoys, *clutter)
+    above = (make_ceiling(room), *shown_lights_of(room, seed, openings, areas)) if areas else ()
+    solids = (*make_room(room, seed, openings), *above, *make_fittings(room, seed, openings, objects), *objects)
     check_rig(scenario, solids, rig)
     bodies = tuple(person.body for person in cast)
     model = compile_model(movers, solids)
@@ -123,8 +133,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
         motions = track(model, bodies, motions, assist=people.assist, solids=solids)
     figures = tuple(person.figure for person in cast)
     time = np.arange(scenario.frames) / scenario.rate
-    lighting = room_lighting(scenario.room, seed, areas)
-    return Scene(model, bodies, figures, motions, plan.presence, solids, lighting, time)
+    return Scene(model, bodies, figures, motions, plan.presence, solids, room_lighting(room, seed, areas), time)
 
 
 def _shapes(scenario: Scenario) -> list[Shape]:

@@ -18,7 +18,7 @@ from simharness.world.scene.objects.geoms import Box, Geom, carried
 if TYPE_CHECKING:
     import mujoco
 
-Kind = Literal["room", "clutter", "prop", "decoy"]
+Kind = Literal["room", "furniture", "clutter", "prop", "decoy"]
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,8 @@ class Solid:
     """Solid object in the scene, at rest or moving.
 
     Attributes:
-        kind: "room" (floor, walls), "clutter", "prop" (used by people) or "decoy" (may be taken for a person).
+        kind: "room" (floor, walls), "furniture" (of a kind of room), "clutter", "prop" (used by people) or "decoy" (may
+            be taken for a person).
         name: name in messages and in the MuJoCo model.
         mesh: mesh for pictures, in the world; in the frame of the trajectory if the solid moves. It is ``still`` if
             the solid does not move.

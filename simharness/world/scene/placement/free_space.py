@@ -135,6 +135,10 @@ class Site:
         """Return whether a hull fits into the room without touching present solids; people are not considered."""
         return self.space.fits(hull, at_wall=at_wall) and all(hull.gap_on_floor(box) >= GAP for box in self._boxes)
 
+    def leaves_pictures_free(self, solid: Solid) -> bool:
+        """Return whether one more solid leaves enough of every picture free."""
+        return self._pictures.allows(solid, MAX_PICTURE_FILL)
+
     def find(
         self,
         rng: np.random.Generator,
@@ -155,7 +159,7 @@ class Site:
             hull = model.hull(place, yaw)
             if self.clear(hull, at_wall=at_wall) and not self.space.obstructed(hull):
                 solid = model.at(place, yaw, kind=kind, name=name)
-                if self._pictures.allows(solid, MAX_PICTURE_FILL):
+                if self.leaves_pictures_free(solid):
                     return solid
         return None
 

@@ -6,24 +6,29 @@ room, which is the outside of a wall as a solid.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from mvpose.arrays import Floats
+from mvpose.arrays import Bools, Floats
 from simharness.scenario.sections.room import Room
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.objects.shapes import quad_mesh
 from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.rooms.finish import Finish
+from simharness.world.scene.rooms.kinds import settled
 from simharness.world.scene.rooms.lighting import room_lighting
-from simharness.world.scene.rooms.textures import FLOORS, WALLS, Finish
+from simharness.world.scene.rooms.openings import Opening
+from simharness.world.scene.rooms.textures import FLOORS, WALLS
+from simharness.world.scene.rooms.walls import Wall, walls_of
 
 Choice = TypeVar("Choice")
 
+_ANY = 4  # finishes from which "any" is drawn: the first of each list
 _CELL = 1.0  # metres: approximate cell size of the grids of floor and walls
 _THICK = 0.1  # metres: thickness of floor and walls as solids, outside the room
 _AROUND = 4.0  # metres of ground around an open floor
@@ -32,12 +37,13 @@ _RIM = 0.25  # metres: approximate cell size of that ground, which fades into th
 _TONES = {"x": (0.93, 0.97, 1.0), "y": (1.0, 0.98, 0.93)}
 
 
-def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
+def make_room(room: Room, seed: int, openings: Sequence[Opening] = ()) -> tuple[Solid, ...]:
     """Return floor and walls of a room around the origin, floor at z = 0; without walls, floor and ground around it.
 
     Finishes of floor and walls are drawn by separate streams: the size of the room changes neither, and neither changes
-    the other.
+    the other. In pictures the walls have holes at windows; for rays and contacts they are whole.
     """
+    room = settled(room, seed)
     x, y, z = room.size[0] / 2, room.size[1] / 2, room.size[2]
     rng = stream(seed, "room", "floor")
     finish = _chosen(FLOORS, room.floor, rng)(rng)
@@ -47,19 +53,15 @@ def make_room(room: Room, seed: int) -> tuple[Solid, ...]:
         return floor, _ground(room, seed, finish)
     rng = stream(seed, "room", "wall")
     paper = _chosen(WALLS, room.wall, rng)(rng, z)
-    # Each wall from its left to its right corner as seen from inside.
-    runs = {
-        "wall +x": ((x, y), (x, -y)),
-        "wall -x": ((-x, -y), (-x, y)),
-        "wall +y": ((-x, y), (x, y)),
-        "wall -y": ((x, -y), (-x, -y)),
-    }
-    return floor, *(_wall(name, np.array(left), np.array(right), z, paper) for name, (left, right) in runs.items())
+    return floor, *(
+        _wall(wall, paper, [opening for opening in openings if (opening.wall, opening.kind) == (wall, "window")])
+        for wall in walls_of(room)
+    )
 
 
 def _chosen(finishes: Mapping[str, Choice], name: str, rng: np.random.Generator) -> Choice:
     """Return a finish by name, or a drawn one for "any". It is always drawn, so that later draws do not shift."""
-    drawn = list(finishes)[rng.integers(len(finishes))]
+    drawn = list(finishes)[rng.integers(_ANY)]
     return finishes[drawn if name == "any" else name]
 
 
@@ -69,22 +71,31 @@ def _floor(x: float, y: float, finish: Finish) -> Mesh:
     return _textured_grid(grid, grid[..., :2], finish, (1.0, 1.0, 1.0))
 
 
-def _wall(name: str, left: Floats, right: Floats, height: float, finish: Finish) -> Solid:
-    length = float(np.linalg.norm(right - left))
-    along = (right - left) / length
-    out = np.array([-along[1], along[0]])
-    middle = (left + right) / 2 + out * _THICK / 2
+def _wall(wall: Wall, finish: Finish, windows: Sequence[Opening]) -> Solid:
+    length, height, along = wall.length, wall.height, np.array(wall.along)
+    middle = wall.at((length / 2, -_THICK / 2, height / 2))
     block = Box(
         (float(middle[0]), float(middle[1]), height / 2),
         (length / 2 + _THICK, _THICK / 2, height / 2),
         float(np.arctan2(along[1], along[0])),
     )
-    columns, rows = _ticks(0.0, length, _CELL), _ticks(0.0, height, _CELL)
-    grid = np.empty((len(columns), len(rows), 3))
-    grid[..., :2] = (left + columns[:, None] * along)[:, None]
-    grid[..., 2] = rows
+    columns = _cut(_ticks(0.0, length, _CELL), [edge for window in windows for edge in window.span])
+    rows = _cut(_ticks(0.0, height, _CELL), [edge for window in windows for edge in window.heights])
     place = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1)
-    return Solid("room", name, _textured_grid(grid, place, finish, _TONES[name[-1]]), (block,), block)
+    grid = wall.at(np.insert(place, 1, 0.0, axis=-1))
+    middles = (place[:-1, :-1] + place[1:, 1:]) / 2
+    solid = np.ones(middles.shape[:2], bool)
+    for window in windows:
+        low, high = np.transpose([window.span, window.heights])
+        solid &= ~((middles > low) & (middles < high)).all(axis=-1)
+    mesh = _textured_grid(grid, place, finish, _TONES[wall.name[-1]], solid)
+    return Solid("room", wall.name, mesh, (block,), block)
+
+
+def _cut(ticks: Floats, edges: Sequence[float]) -> Floats:
+    """Return sorted positions with additional ones, without those that are closer than a millimetre to another."""
+    both = np.sort(np.concatenate([ticks, edges]))
+    return both[np.concatenate([[True], np.diff(both) > 1e-3])]
 
 
 def _ground(room: Room, seed: int, finish: Finish) -> Solid:
@@ -122,7 +133,9 @@ def _ticks(low: float, high: float, step: float) -> Floats:
     return np.linspace(low, high, max(1, round((high - low) / step)) + 1)
 
 
-def _textured_grid(grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float]) -> Mesh:
+def _textured_grid(
+    grid: Floats, place: Floats, finish: Finish, tone: tuple[float, float, float], kept: Bools | None = None
+) -> Mesh:
     """Return the textured mesh of a grid of vertices (c, r, 3).
 
     Args:
@@ -131,11 +144,13 @@ def _textured_grid(grid: Floats, place: Floats, finish: Finish, tone: tuple[floa
             texture is at height 0.
         finish: texture and its size.
         tone: colour that multiplies the texture.
+        kept: cells of the grid that have a surface, (c - 1, r - 1); all by default.
     """
     columns, rows = grid.shape[:2]
     i, j = np.meshgrid(np.arange(columns - 1), np.arange(rows - 1), indexing="ij")
     corner = (i * rows + j).ravel()
     quads = np.stack([corner, corner + rows, corner + rows + 1, corner + 1], axis=-1)
+    quads = quads if kept is None else quads[kept.ravel()]
     mesh = quad_mesh(grid.reshape(-1, 3), quads, np.broadcast_to(np.array(tone), (len(quads), 3)))
     uv = place.reshape(-1, 2) / finish.size * [1.0, -1.0] + [0.0, 1.0]
     return replace(mesh, texture=finish.texture, uv=uv[mesh.faces].astype(np.float32))

@@ -1,0 +1,101 @@
+"""Windows and doors: where they are in the walls, and their frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from simharness.scenario.sections.room import Room
+from simharness.types.random_streams import stream
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.solids import Solid
+from simharness.world.scene.rooms.kinds import ROOM_KINDS
+from simharness.world.scene.rooms.lighting import room_lighting
+from simharness.world.scene.rooms.walls import Wall, walls_of
+
+_WINDOW = (1.1, 1.5)  # metres: least and largest width
+_APART = 0.45  # metres between windows
+_CORNER = 0.6  # metres from a window or a door to the corners of the room
+_LINTEL = 0.35  # metres of wall over a window
+_DOOR = (0.95, 2.05)  # metres: width and height
+_ON_WALL = 0.12  # metres: what is nearer to the wall hangs on it
+_FREE = 0.9  # metres of free floor in front of a door
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Window or door in a wall.
+
+    Attributes:
+        kind: "window" or "door".
+        wall: its wall.
+        span: left and right edge along the wall, metres.
+        heights: lower and upper edge, metres.
+    """
+
+    kind: Literal["window", "door"]
+    wall: Wall
+    span: tuple[float, float]
+    heights: tuple[float, float]
+
+    def keeps_free(self, hull: Box) -> bool:
+        """Return whether an object with this hull leaves the opening free: below a window, or away from a door."""
+        if self.kind == "window" and hull.corners[:, 2].max() <= self.heights[0] + 0.25:
+            return True
+        depth = _FREE if self.kind == "door" else 0.6
+        return self.wall.box(self.span, self.heights, depth).gap_on_floor(hull) > 0.0
+
+
+def draw_openings(room: Room, seed: int, solids: Sequence[Solid] = ()) -> tuple[Opening, ...]:
+    """Draw the windows and the door of a room; those that a solid on the wall would cover are left out.
+
+    The first wall with windows is that from which the light comes.
+
+    Args:
+        room: room with a drawn kind; without walls it has no openings.
+        seed: seed of the scenario.
+        solids: solids that may hang on the walls.
+    """
+    if not room.walls:
+        return ()
+    kind, walls = ROOM_KINDS[room.kind], walls_of(room)
+    rng = stream(seed, "room", "openings")
+    towards = room_lighting(room, seed).direction[:2]
+    sunny = int(np.argmax([-wall.inward @ towards * min(room.size[:2]) / wall.length for wall in walls]))
+    order = [sunny, *(k for k in rng.permutation(len(walls)) if k != sunny)]
+    count = int(rng.integers(kind.windows[0], kind.windows[1] + 1))
+    width, shares = rng.uniform(*_WINDOW), rng.uniform(size=2)
+    openings: list[Opening] = []
+    for k in order[:count]:
+        openings += _windows(walls[k], kind.sill, width)
+    door = walls[order[-1]]
+    if kind.doors and door.height >= _DOOR[1] + 0.05 and door.length >= _DOOR[0] + 2 * _CORNER:
+        left = _CORNER + shares[0] * (door.length - 2 * _CORNER - _DOOR[0])
+        openings.append(Opening("door", door, (left, left + _DOOR[0]), (0.0, _DOOR[1])))
+    return tuple(opening for opening in openings if not any(_covers(solid, opening) for solid in solids))
+
+
+def _windows(wall: Wall, sill: float, width: float) -> list[Opening]:
+    """Return a row of equal windows in the middle of a wall; none if the wall is too low or too short."""
+    top = min(wall.height - _LINTEL, 2.45)
+    room = wall.length - 2 * _CORNER
+    count = min(int((room + _APART) // (width + _APART)), 6)
+    if top - sill < 0.6 or count < 1:
+        return []
+    pitch = width + _APART + max(0.0, (room - count * (width + _APART) + _APART) / (count + 1)) * 0.5
+    first = wall.length / 2 - (count - 1) / 2 * pitch - width / 2
+    return [Opening("window", wall, (first + k * pitch, first + k * pitch + width), (sill, top)) for k in range(count)]
+
+
+def _covers(solid: Solid, opening: Opening) -> bool:
+    """Return whether a solid that hangs on the wall covers a part of an opening."""
+    if solid.kind == "room" or solid.trajectory is not None:
+        return False
+    rim = 0.1
+    (left, right), (low, high) = opening.span, opening.heights
+    front = opening.wall.box((left - rim, right + rim), (low, high), _ON_WALL)
+    z = solid.hull.corners[:, 2]
+    return bool(front.gap_on_floor(solid.hull) == 0.0 and z.max() > low and z.min() < high)
