@@ -7,12 +7,15 @@ from walkers import Rays, ring, space
 
 from simharness.scenario.load import load
 from simharness.scenario.sections.room import Clutter, Room
-from simharness.scenario.sections.scenario import Cameras, People, Scenario
+from simharness.scenario.sections.scenario import Cameras, People, Rendering, Scenario
+from simharness.trial.audit import audit
 from simharness.trial.stages.build_trial import build_trial
+from simharness.trial.stages.capture import CaptureFrames
 from simharness.world.scene.camera_clearance import WALL_MARGIN
 from simharness.world.scene.objects.geoms import Box
 from simharness.world.scene.placement.free_space import LENS
 from simharness.world.scene.placement.furniture import place_furniture
+from simharness.world.scene.playback import simulate
 from simharness.world.scene.rooms.fittings import make_fittings
 from simharness.world.scene.rooms.kinds import ROOM_KINDS, check_size, settled
 from simharness.world.scene.rooms.openings import draw_openings
@@ -142,3 +145,20 @@ def test_a_room_too_small_for_its_kind_is_refused():
 def test_scenarios_with_kinds_are_read():
     assert load("quickstart", overrides=["room.kind=shop"]).room.kind == "shop"
     assert not load("quickstart", overrides=["room.kind=outdoors"]).room.walls
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_truth_fits_the_pictures_of_each_kind(kind):
+    scenario = Scenario(
+        name="x",
+        seed=5,
+        duration=0.2,
+        rate=5.0,
+        room=Room(kind=kind),
+        people=People(count=2),
+        cameras=Cameras(count=3, size=(320, 240)),
+        rendering=Rendering(color=False),
+    )
+    trial = build_trial(scenario)
+    views = CaptureFrames(scenario, trial.scene, trial.exposures, frozenset())(range(scenario.frames))
+    audit(scenario, trial.scene, trial.exposures, simulate(trial.scene), views)
