@@ -111,6 +111,7 @@ MODULES = tuple(
 )
 REHEARSED_SHELF = "python -m benchmarks.planning.shelf_rehearsal FOLDER"  # five minutes, and the data of Shelf
 ON_SHELF = "python -m benchmarks.tracking --shelf FOLDER"  # tests/benchmarks/tracking/test_shelf_losses.py
+GALLERY = "python -m tools.gallery results/gallery"  # tests/tools/test_gallery.py; minutes of rendering
 # Without arguments these begin to bake the body.
 BAKE = ("python -m tools.body.bake", "python -m tools.body.hands_and_feet")
 KNOWN = {
@@ -132,6 +133,7 @@ KNOWN = {
     REHEARSED_SHELF,
     ON_SHELF,
     *BAKE,
+    GALLERY,
     CI,
     *PYTEST,
     *SHELL,
