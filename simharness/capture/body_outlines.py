@@ -88,7 +88,12 @@ NO_EDGES = np.zeros((0, 2), np.int64)
 """Edges for a mesh so fine that clipping its edges at the image border is not necessary."""
 
 
-def boxes(bands: Sequence[Sequence[NDArray]], edges: Sequence[Integers], cameras: Sequence[Camera]) -> Floats:
+def boxes(
+    bands: Sequence[Sequence[NDArray]],
+    edges: Sequence[Integers],
+    cameras: Sequence[Camera],
+    table: Floats | None = None,
+) -> Floats:
     """Return boxes x, y, width, height of the parts of people inside each image, (V, P, 4); zeros if none is inside.
 
     Args:
@@ -96,8 +101,10 @@ def boxes(bands: Sequence[Sequence[NDArray]], edges: Sequence[Integers], cameras
             rows are exposed at once.
         edges: edges of the outline of every person, (e, 2).
         cameras: V cameras.
+        table: their parameters if they are known, (V, 26), see :func:`packed`.
     """
-    table = np.stack([packed(camera) for camera in cameras])
+    if table is None:
+        table = np.stack([packed(camera) for camera in cameras])
     limits = np.empty((len(bands), len(cameras), len(edges), 4))
     for k, people in enumerate(bands):
         rows = k / len(bands), (k + 1) / len(bands)
@@ -117,7 +124,7 @@ def packed(camera: Camera) -> Floats:
     K = camera.K
     bent = float(camera.distortion.any())
     intrinsics = (K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2])
-    lens = (fold_radius2(camera.distortion), bent)
+    lens = (fold_radius2(camera.distortion) if bent else np.inf, bent)
     return np.array([*intrinsics, *camera.R.ravel(), *camera.t, *camera.distortion, *camera.size, *lens])
 
 
@@ -139,6 +146,8 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
     for view in range(len(cameras)):
         c = cameras[view]
         image[:] = -0.5, first_row * c[23] - 0.5, c[22] - 0.5, last_row * c[23] - 0.5
+        if c[25] == 0.0 and _frame_whole(points, c, image, out[view]):
+            continue
         box[:] = np.inf, np.inf, -np.inf, -np.inf
         all_in = True
         for i in range(n):
@@ -161,6 +170,25 @@ def bounding_box(points, edges, cameras, first_row, last_row, out):
                 if state[i] + state[j] < 2 * _IN_IMAGE:
                     _cut(i, j, local, pixel, state, c, image, box)
         out[view] = box
+
+
+@njit(cache=True)
+def _frame_whole(points, c, image, box):
+    """Write the box of points if a camera without distortion sees all of them; return whether it does."""
+    left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+    nearest = np.inf
+    for i in range(len(points)):
+        x, y, z = points[i, 0] + 0.0, points[i, 1] + 0.0, points[i, 2] + 0.0
+        a = c[5] * x + c[6] * y + c[7] * z + c[14]
+        b = c[8] * x + c[9] * y + c[10] * z + c[15]
+        d = c[11] * x + c[12] * y + c[13] * z + c[16]
+        x, y = a / d, b / d
+        u, v = c[0] * x + c[1] * y + c[2], c[3] * y + c[4]
+        left, right = u if u < left else left, u if u > right else right
+        top, bottom = v if v < top else top, v if v > bottom else bottom
+        nearest = d if d < nearest else nearest
+    box[0], box[1], box[2], box[3] = left, top, right, bottom
+    return nearest >= NEAR and image[0] <= left and right <= image[2] and image[1] <= top and bottom <= image[3]
 
 
 _BEYOND, _BEHIND, IN_FRONT, _IN_IMAGE = -1, 0, 1, 2  # beyond the fold of the lens; depth below ``NEAR``

@@ -15,6 +15,7 @@ import numpy as np
 from mvpose.arrays import Floats
 from mvpose.skeleton import Skeleton
 from mvpose.wholebody.detections import rows_of
+from simharness.capture.camera_arrays import CameraArrays
 from simharness.capture.film import simultaneous_exposures
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
@@ -23,7 +24,6 @@ from simharness.capture.shutter import joints_at_exposure
 from simharness.types.views import Visibility
 from simharness.types.whole_body import OuterViews
 from simharness.world.humans.outer_joints import OuterJoints
-from simharness.world.rigs.projection import project_to_image
 
 if TYPE_CHECKING:
     from simharness.world.rigs.exposure_schedule import ExposureSchedule
@@ -42,6 +42,7 @@ class OuterJointFilm:
         self._playback = playback
         self._joints = [OuterJoints.of(body, skeleton) for body in playback.scene.bodies]
         self._caster = RayCaster(playback.scene)
+        self._cameras: CameraArrays | None = None  # those of the last pictures
         _, others = rows_of(skeleton)
         self._depths = np.reshape([each.depths for each in self._joints], (len(self._joints), len(others)))
 
@@ -62,10 +63,10 @@ class OuterJointFilm:
             bands = np.stack([self._at(state) for state in states])
             here = np.all([state.present for state in states], axis=0)
             targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
-            at = np.stack([project_to_image(camera, each) for camera, each in zip(cameras, targets, strict=True)])
-            inside = np.stack([camera.inside(each) for camera, each in zip(cameras, at, strict=True)])
+            self._cameras = arrays = CameraArrays.of(cameras, self._cameras)
+            at, inside = arrays.project(targets)
             inside &= here[:, None] & np.isfinite(self._depths)
-            owner, in_front = cast_bands(self._caster, states, cameras, at, targets, inside)
+            owner, in_front = cast_bands(self._caster, states, arrays, at, targets, inside)
             labels = classify(owner, in_front, inside, radii=self._depths)
             for v, view in enumerate(view_group):
                 pixels[f, view, here], visibility[f, view, here] = at[v, here], labels[v, here]

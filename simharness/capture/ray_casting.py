@@ -1,7 +1,8 @@
 """First hits of rays from the cameras: on MuJoCo geoms of objects and on capsules of people.
 
 MuJoCo tests each ray against every geom of the model, so the cost of a ray grows with the number of people. People are
-therefore tested by a separate kernel, which skips people far from the ray; a test compares it with ``mj_multiRay``.
+therefore tested by a separate kernel, which skips people far from the ray; a test compares it with ``mj_multiRay``. Of
+the other geoms MuJoCo tests only rays that meet a box around one of them: most rays to people meet none.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mvpose.arrays import Floats, Integers
+from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
-from mvpose.kernels import njit
+from simharness.capture.ray_kernels import box_geoms, cast_views, place_capsules
 from simharness.capture.rendering.renderer import NEAR
 from simharness.world.humans.mujoco_model import SKIN_GROUP
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 
 _OBJECT_GROUPS = np.array([group != SKIN_GROUP for group in range(6)], np.uint8)  # geom groups tested by MuJoCo
+_ROUNDING = 1e-5  # metres: boxes around objects are larger by this than those of MuJoCo, which rounds meshes
+_ENDLESS = 1e9  # metres: half size of a plane
 
 
 class RayCaster:
@@ -53,15 +56,25 @@ class RayCaster:
         self._first = np.searchsorted(self._person, np.arange(self._people + 1))
         self._placed = np.empty((len(capsules), 2, 3))
         self._around = np.empty((self._people, 4))
+        self._objects = np.flatnonzero(model.geom_group != SKIN_GROUP)
+        self._local = np.array(model.geom_aabb)
+        self._local[model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE, 3:] = _ENDLESS
+        self._low, self._high = np.empty((2, 3, len(self._objects)))
+        self._box_objects()
 
     def place(self, state: State) -> None:
         """Move all people and objects to their positions in a state."""
         bones = np.ascontiguousarray(state.bones)
-        _place(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)
+        place_capsules(self._rest, self._bone, self._radii, self._first, bones, self._placed, self._around)
         if len(self._moving):
             self._data.mocap_pos[self._moving] = state.placements[:, :3]
             self._data.mocap_quat[self._moving] = state.placements[:, 3:]
             mujoco.mj_kinematics(self._model, self._data)
+            self._box_objects()
+
+    def _box_objects(self) -> None:
+        data = self._data
+        box_geoms(self._objects, self._local, data.geom_xpos, data.geom_xmat, _ROUNDING, self._low, self._high)
 
     def capsules_of(self, person: int) -> tuple[Floats, Floats]:
         """Return ends (c, 2, 3) and radii (c,), metres, of the capsules of a person in the state placed last."""
@@ -75,34 +88,42 @@ class RayCaster:
             Owner of the surface hit, (n,): 0 to P - 1 a person, P an object, -1 no hit before the target; and the
             distance of the hit in front of the target, (n,) metres, -inf without a hit.
         """
-        count = len(targets)
-        owner, distance = np.full(count, -1), np.full(count, np.inf)
-        if not count:
-            return owner, distance
-        direction = targets - camera.center
-        length = np.sqrt((direction * direction).sum(axis=1))
-        direction /= length[:, None]
-        near = NEAR / (direction @ camera.R[2])
-        hit_people(
-            camera.center,
-            direction,
-            near,
-            length,
-            self._placed,
-            self._radii,
-            self._first,
-            self._around,
-            owner,
-            distance,
+        owner, in_front = self.cast_views(
+            camera.center[None], camera.R[2:], targets[None], np.ones((1, len(targets)), bool)
         )
-        on_object, object_distance = self._hit_objects(camera.center, direction, near, length)
-        first = on_object & (object_distance < distance)
-        return np.where(first, self._people, owner), length - np.where(first, object_distance, distance)
+        return owner[0], in_front[0]
 
-    def _hit_objects(
-        self, start: Floats, direction: Floats, near: Floats, length: Floats
-    ) -> tuple[NDArray[np.bool_], Floats]:
-        """Return which rays hit an object before their ends, and the distances of the hits."""
+    def cast_views(self, centers: Floats, axes: Floats, targets: Floats, wanted: Bools) -> tuple[Integers, Floats]:
+        """Cast rays from several cameras; see :meth:`cast`.
+
+        Args:
+            centers: camera centres, (V, 3), metres.
+            axes: directions of the optical axes, (V, 3).
+            targets: ends of the rays, (V, n, 3), metres.
+            wanted: which of them are cast, (V, n).
+
+        Returns:
+            Owner and distance in front of the target, (V, n) each; -1 and -inf without a ray.
+        """
+        count = np.count_nonzero(wanted)
+        owner, distance, met = np.full(count, -1), np.full(count, np.inf), np.empty(count, bool)
+        direction, length, near = np.empty((count, 3)), np.empty(count), np.empty(count)
+        first = cast_views(
+            centers, axes, targets, wanted, NEAR, self._placed, self._radii, self._first, self._around, self._low,
+            self._high, direction, length, near, owner, distance, met,
+        )  # fmt: skip
+        rays = np.flatnonzero(met)
+        for v, of_view in enumerate(np.split(rays, np.searchsorted(rays, first[1:-1]))):
+            if len(of_view):
+                found = self._hit_objects(centers[v], direction[of_view], near[of_view], length[of_view])
+                hit = found < distance[of_view]
+                owner[of_view[hit]], distance[of_view[hit]] = self._people, found[hit]
+        owners, in_front = np.full(wanted.shape, -1), np.full(wanted.shape, -np.inf)
+        owners[wanted], in_front[wanted] = owner, length - distance
+        return owners, in_front
+
+    def _hit_objects(self, start: Floats, direction: Floats, near: Floats, length: Floats) -> Floats:
+        """Return the distances at which rays hit an object; infinite where they hit none before their ends."""
         geom, distance = np.empty(len(direction), np.int32), np.empty(len(direction))
         self._cast(start, direction, geom, distance, float(length.max()))
         for i in np.flatnonzero((geom >= 0) & (distance < near)):
@@ -110,7 +131,7 @@ class RayCaster:
                 start + near[i] * direction[i], direction[i : i + 1], geom[i : i + 1], distance[i : i + 1], length[i]
             )
             distance[i] += near[i]
-        return (geom >= 0) & (distance < length), distance
+        return np.where((geom >= 0) & (distance < length), distance, np.inf)
 
     def _cast(
         self, start: Floats, direction: Floats, geom: NDArray[np.int32], distance: Floats, farthest: float
@@ -137,83 +158,3 @@ def _ends(model: mujoco.MjModel, geom: int, head: Floats) -> tuple[Floats, Float
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
     reach = model.geom_size[geom, 1] * turn.reshape(3, 3)[:, 2]
     return head + model.geom_pos[geom] - reach, head + model.geom_pos[geom] + reach
-
-
-@njit(cache=True)
-def _place(rest, bone, radii, first, bones, placed, around):
-    """Transform capsules (c, 2, 3) by their bones (P, B, 3, 4) and compute a bounding sphere of each person, (P, 4)."""
-    for person in range(len(bones)):
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for c in range(first[person], first[person + 1]):
-            transform = bones[person, bone[c]]
-            for end in range(2):
-                for k in range(3):
-                    at = transform[k, 3]
-                    for j in range(3):
-                        at += transform[k, j] * rest[c, end, j]
-                    placed[c, end, k] = at
-                    low[k], high[k] = min(low[k], at - radii[c]), max(high[k], at + radii[c])
-        around[person, :3] = (low + high) / 2
-        around[person, 3] = np.sqrt(((high - low) ** 2).sum()) / 2
-
-
-@njit(cache=True)
-def hit_people(start, direction, near, length, placed, radii, first, around, owner, distance):
-    """Write the first person hit by each ray between ``near`` and ``length``, and the distance; none: unchanged."""
-    for i in range(len(direction)):
-        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
-        x, y, z = start[0] + near[i] * dx, start[1] + near[i] * dy, start[2] + near[i] * dz
-        best = length[i] - near[i]
-        for person in range(len(around)):
-            cx, cy, cz = around[person, 0] - x, around[person, 1] - y, around[person, 2] - z
-            if _misses(cx, cy, cz, around[person, 3], dx, dy, dz, best):
-                continue
-            for c in range(first[person], first[person + 1]):
-                ax, ay, az = placed[c, 0, 0] - x, placed[c, 0, 1] - y, placed[c, 0, 2] - z
-                bx, by, bz = placed[c, 1, 0] - x, placed[c, 1, 1] - y, placed[c, 1, 2] - z
-                ux, uy, uz = bx - ax, by - ay, bz - az
-                reach = radii[c] + 0.5 * np.sqrt(ux * ux + uy * uy + uz * uz)
-                if _misses((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2, reach, dx, dy, dz, best):
-                    continue
-                entry = _enter(ax, ay, az, bx, by, bz, radii[c], dx, dy, dz)
-                if entry < 0.0:  # the ray starts inside the capsule: it hits the far side, from inside
-                    entry = -_enter(ax, ay, az, bx, by, bz, radii[c], -dx, -dy, -dz)
-                if 0.0 <= entry < best:
-                    best = entry
-                    owner[i], distance[i] = person, entry + near[i]
-
-
-@njit(cache=True)
-def _misses(cx, cy, cz, radius, dx, dy, dz, best):
-    """Return whether a ray of length ``best`` from the origin misses a sphere."""
-    along = cx * dx + cy * dy + cz * dz
-    return along < -radius or along - radius > best or cx * cx + cy * cy + cz * cz - along * along > radius * radius
-
-
-@njit(cache=True)
-def _enter(ax, ay, az, bx, by, bz, radius, dx, dy, dz):
-    """Return where the line from the origin along (dx, dy, dz) enters a capsule from a to b; infinite if it misses."""
-    ux, uy, uz = bx - ax, by - ay, bz - az
-    square = ux * ux + uy * uy + uz * uz
-    aligned, begins = ux * dx + uy * dy + uz * dz, ux * ax + uy * ay + uz * az
-    seen, far = ax * dx + ay * dy + az * dz, ax * ax + ay * ay + az * az
-    # First the infinite cylinder, in units of the squared length of the axis.
-    p = square - aligned * aligned
-    q = square * seen - begins * aligned
-    r = square * far - begins * begins - radius * radius * square
-    cap_b = False
-    if p > 1e-12 * square:
-        inner = q * q - p * r
-        if inner < 0.0:
-            return np.inf
-        away = (q - np.sqrt(inner)) / p
-        height = away * aligned - begins
-        if 0.0 < height < square:
-            return away
-        cap_b = height >= square
-    else:
-        cap_b = aligned < 0.0  # parallel to the axis: the cap that is hit first
-    if cap_b:
-        seen, far = bx * dx + by * dy + bz * dz, bx * bx + by * by + bz * bz
-    inner = seen * seen - far + radius * radius
-    return seen - np.sqrt(inner) if inner >= 0.0 else np.inf

@@ -14,12 +14,12 @@ import numpy as np
 from mvpose.arrays import Bools, Floats, Integers
 from mvpose.camera import Camera
 from simharness.capture.body_outlines import Outline, boxes
+from simharness.capture.camera_arrays import CameraArrays
 from simharness.capture.film import Observation
 from simharness.capture.joint_visibility import classify
 from simharness.capture.ray_casting import RayCaster
 from simharness.capture.shutter import joints_at_exposure
 from simharness.types.views import Visibility
-from simharness.world.rigs.projection import project_to_image
 from simharness.world.scene.lookalikes import Lookalikes
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # Share of a box that the person fills: median over simulated people who walk and wave (10th to 90th percentile: 0.33 to
 # 0.60).
 _FILLED = 0.47
+_HEIGHT = 23  # column of the height of a picture in the parameters of a camera
 
 
 class RayObserver:
@@ -47,20 +48,24 @@ class RayObserver:
         self._radii = np.reshape([body.joint_radii for body in bodies], (len(bodies), 17))
         self._outlines = [Outline.of(body) for body in bodies]
         self._lookalikes = Lookalikes.of(playback.scene)
+        self._cameras: CameraArrays | None = None  # those of the last observation
         self._allowed = np.concatenate([np.zeros(len(bodies)), self._lookalikes.allowed])
 
     def observe(self, states: Sequence[State], cameras: Sequence[Camera]) -> list[Observation]:
         """Return the observations: see :class:`simharness.capture.film.Observer`."""
         people = len(self._radii)
+        self._cameras = views = CameraArrays.of(cameras, self._cameras)
         bands = np.stack([state.joints for state in states])
         bands = np.concatenate([bands, self._lookalikes.joints(bands)], axis=1)  # lookalikes after the people
-        targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
-        pixels = np.stack([project_to_image(camera, where) for camera, where in zip(cameras, targets, strict=True)])
-        in_picture = np.stack([camera.inside(at) for camera, at in zip(cameras, pixels, strict=True)])
-        for v, camera in enumerate(cameras):
-            targets[v, people:], shown = self._lookalikes.targets(camera.center, targets[v, people:])
+        if len(bands) > 1:
+            targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
+        else:
+            targets = np.repeat(bands, len(cameras), axis=0)
+        pixels, in_picture = views.project(targets)
+        for v, center in enumerate(views.centers if len(self._lookalikes) else ()):
+            targets[v, people:], shown = self._lookalikes.targets(center, targets[v, people:])
             in_picture[v, people:] &= shown
-        owner, in_front = cast_bands(self._caster, states, cameras, pixels, targets, in_picture)
+        owner, in_front = cast_bands(self._caster, states, views, pixels, targets, in_picture)
         inside = in_picture[:, :people]
         labels = classify(owner[:, :people], in_front[:, :people], inside, radii=self._radii)
         same_object = (owner == people) & (in_front <= self._allowed[:, None])
@@ -68,7 +73,7 @@ class RayObserver:
         skins = [
             [outline.at(bones) for outline, bones in zip(self._outlines, state.bones, strict=True)] for state in states
         ]
-        framed = boxes(skins, [outline.edges for outline in self._outlines], cameras)
+        framed = boxes(skins, [outline.edges for outline in self._outlines], cameras, views.table)
         unoccluded = ((labels == Visibility.VISIBLE) | (labels == Visibility.SELF_OCCLUDED)).sum(axis=-1)
         share = unoccluded / np.maximum(inside.sum(axis=-1), 1)
         areas = np.rint(_FILLED * framed[..., 2] * framed[..., 3] * share).astype(np.int64)
@@ -81,7 +86,7 @@ class RayObserver:
 def cast_bands(
     caster: RayCaster,
     states: Sequence[State],
-    cameras: Sequence[Camera],
+    cameras: CameraArrays,
     pixels: Floats,
     targets: Floats,
     in_picture: Bools,
@@ -101,13 +106,14 @@ def cast_bands(
     Returns:
         Owner and distance in front of the target, (V, n, J) each; -1 and -inf without a ray.
     """
-    owner, in_front = np.full(in_picture.shape, -1), np.full(in_picture.shape, -np.inf)
+    views, rays = len(in_picture), in_picture[0].size
+    ends, wanted = targets.reshape(views, rays, 3), in_picture.reshape(views, rays)
+    owner, in_front = np.full(wanted.shape, -1), np.full(wanted.shape, -np.inf)
+    share = (pixels[..., 1].reshape(views, rays) + 0.5) / cameras.table[:, _HEIGHT, None]
+    band = np.floor(np.where(wanted, share, -1.0) * len(states))
     for k, state in enumerate(states):
         caster.place(state)
-        for v, camera in enumerate(cameras):
-            in_band = in_picture[v]
-            if len(states) > 1:
-                share = (pixels[v, ..., 1] + 0.5) / camera.size[1]
-                in_band = in_band & (np.floor(np.where(in_band, share, -1.0) * len(states)) == k)
-            owner[v, in_band], in_front[v, in_band] = caster.cast(camera, targets[v][in_band])
-    return owner, in_front
+        now = band == k if len(states) > 1 else wanted
+        found, before = caster.cast_views(cameras.centers, cameras.axes, ends, now)
+        owner, in_front = np.where(now, found, owner), np.where(now, before, in_front)
+    return owner.reshape(in_picture.shape), in_front.reshape(in_picture.shape)

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simharness.capture.camera_arrays import CameraArrays
 from simharness.types.random_streams import stream
 from simharness.world.rigs.layouts import intrinsics, look_at
 from simharness.world.rigs.projection import project_to_image
@@ -12,8 +15,6 @@ SIZE = (640, 480)
 
 
 def camera(distortion=(0.0, 0, 0, 0, 0)):
-    from dataclasses import replace
-
     plain = look_at((3.0, 1, 2), (0, 0, 1), K=intrinsics(80, SIZE), size=SIZE)
     return replace(plain, distortion=np.array(distortion))
 
@@ -42,6 +43,20 @@ def test_points_beyond_the_fold_are_not_imaged():
     folded = eye.project(points)
     assert eye.inside(folded)[2:].any()  # otherwise the test is void
     assert np.isfinite(project_to_image(eye, points)).all(axis=-1).tolist() == [True, True, False, False]
+
+
+def test_cameras_together_image_the_same_bits_as_one_by_one():
+    eyes = [camera(), camera((-0.4, 0.0, 0.0, 0.0, 0.0)), replace(camera(), name="other", size=(200, 100))]
+    points = stream(1, "points").uniform([-6, -6, 0], [6, 6, 2], (1, 4, 50, 3))
+    points[0, 0, 0] = np.nan
+    arrays = CameraArrays.of(eyes)
+    pixels, inside = arrays.project(points)
+    for eye, seen, within in zip(eyes, pixels, inside, strict=True):
+        expected = project_to_image(eye, points[0])
+        np.testing.assert_array_equal(seen, expected)
+        np.testing.assert_array_equal(within, eye.inside(expected))
+    assert CameraArrays.of(eyes, arrays) is arrays
+    assert CameraArrays.of(eyes[::-1], arrays) is not arrays
 
 
 def test_shapes_are_kept():
