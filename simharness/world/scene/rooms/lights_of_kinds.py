@@ -36,7 +36,7 @@ _LAMPS: dict[LampKind, tuple[tuple[float, float], float, float, float, float]] =
 }
 """Half sides, pitch, distance from the ceiling (metres), strength relative to a panel, and focus of a lamp, by kind."""
 _BRIGHTEST = 4.0  # radiance that a picture shows of the sky; a brighter one is as white
-_SHOWN = 0.28  # radiance of the view as a share of that of the light: what is in the light of the sky, exposed by hand
+_SHOWN = 0.15  # radiance of the view as a share of that of the light: what is in the light of the sky, exposed by hand
 _MOST = 4  # lamps along a side of the room
 _DARK, _SHADE = np.array([0.14, 0.14, 0.15]), np.array([0.92, 0.90, 0.84])
 
