@@ -20,7 +20,7 @@ from simharness.planning.candidates import Candidate
 from simharness.planning.ledger import Ledger
 from simharness.planning.plan import plan
 from simharness.planning.rig_comparison import rig_of, simulate_rigs
-from simharness.planning.simulation import interval_of
+from simharness.planning.scene_results import interval_of
 from simharness.planning.usual_rigs import corner_rig, ring_rig
 
 RIGS = ("plan", "corners", "ring", "peer")

@@ -34,8 +34,8 @@ from simharness.planning.rig_comparison import rig_of, simulate_rigs
 from simharness.planning.rig_value import RigValue
 from simharness.planning.room import Room
 from simharness.planning.room_file import read_room
+from simharness.planning.scene_results import interval_of
 from simharness.planning.search import Found, exchange_search, refine
-from simharness.planning.simulation import interval_of
 from simharness.planning.usual_rigs import corner_rig, ring_rig
 from simharness.planning.value_fit import VARIANT, fit_value, layer_of
 from simharness.runtime.progress import Reporter, Silence

@@ -17,7 +17,7 @@ from simharness.statistics.intervals import Interval
 
 if TYPE_CHECKING:
     from simharness.planning.prediction import Prediction
-    from simharness.planning.simulation import SceneResult
+    from simharness.planning.scene_results import SceneResult
 
 HEIGHTS = (0.1, 0.9, 1.7, 2.2)
 """Heights of coverage maps, metres: feet, hips, crown, and a raised hand."""

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 
 from mvpose import Camera, Rig
 from simharness.planning.candidates import Candidate
+from simharness.planning.rehearsal_scene import SceneSettings
 from simharness.planning.room import Room
-from simharness.planning.simulation import Condition, SceneBatch, SceneResult, SceneSettings, simulate_scenes
+from simharness.planning.scene_results import Condition, SceneResult
+from simharness.planning.simulation import SceneBatch, simulate_scenes
 from simharness.planning.value_fit import VARIANT, obstacles_of
 from simharness.planning.volume import Volume
 from simharness.runtime.progress import Reporter, Silence

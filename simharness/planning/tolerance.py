@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from simharness.planning.simulation import Condition, SceneResult, interval_of, loss_of
+from simharness.planning.scene_results import Condition, SceneResult, interval_of, loss_of
 from simharness.statistics.intervals import Interval
 
 CLIFF = 5.0

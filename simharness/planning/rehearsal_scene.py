@@ -1,0 +1,154 @@
+"""Scenes in which a rig is rehearsed: people who walk, stand and reach in the volume, on an open floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mvpose import Rig
+from mvpose.arrays import Floats
+from simharness.planning.scene_frame import SceneFrame
+from simharness.planning.visibility import Obstacle
+from simharness.planning.volume import Volume
+from simharness.reality.validation.frame_scores import RULES, HeadRule
+from simharness.scenario.sections.detector import Detector
+from simharness.scenario.sections.room import Clutter
+from simharness.scenario.sections.scenario import Scenario
+from simharness.world.motion.poses.kinematics import Kinematics
+from simharness.world.scene.build import Scene, build, compile_model
+from simharness.world.scene.objects.geoms import Box
+from simharness.world.scene.objects.shapes import box_mesh
+from simharness.world.scene.objects.solids import Solid
+
+ACTIVITIES = ("walk", "wave", "walk", "reach")
+"""Activities of the people, in turn: half of them walk."""
+
+_STANDING = ("wave", "reach", "point")  # in a volume too small to walk in
+_LEAST_WALK = 0.7  # metres: half the side of the smallest square in which people walk
+_ROOM_TO_WALK = 1.2  # square metres for each person: in a denser crowd people stand
+_SPACINGS = (0.8, 0.6, 0.45)  # metres between pelvises: the first at which the people fit
+_OBSTACLE = (0.6, 0.6, 0.62)  # colour; obstacles are never rendered
+_MARGIN = 2.0  # metres of floor beyond cameras and people
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """What all scenes have in common.
+
+    Attributes:
+        rig: cameras in the world, floor at z = 0.
+        volume: where people are.
+        people: number of people in the volume.
+        detector: profile of the detector.
+        clutter: objects that the simulator places around the people, who then use the square around the volume.
+        obstacles: boxes at known places of the world.
+        activities: activities of the people, in turn.
+        frames: frames of a take; a scene has four takes, or one with clutter.
+        rate: frames per second.
+        variant: variant of the method.
+        head: rule for the head joints of PCP.
+        whole: indices of the cameras of the maps; all by default.
+    """
+
+    rig: Rig
+    volume: Volume
+    people: int
+    detector: Detector
+    clutter: Clutter = field(default_factory=Clutter)
+    obstacles: tuple[Obstacle, ...] = ()
+    activities: tuple[str, ...] = ACTIVITIES
+    frames: int = 8
+    rate: float = 2.0
+    variant: str = "full"
+    head: HeadRule = RULES[0]
+    whole: tuple[int, ...] = ()
+
+
+def scenario_of(settings: SceneSettings, frame: SceneFrame, seed: int) -> Scenario:
+    """Return the scenario of a scene; its people fill a square as large as the rectangle of the volume."""
+    half = float(np.sqrt(frame.half.prod()))
+    reach = 2 * max(half, float(np.abs(frame.rig(settings.rig).centers[:, :2]).max())) + 2 * _MARGIN
+    roomy = half >= _LEAST_WALK and 4 * half**2 >= _ROOM_TO_WALK * settings.people
+    activities = settings.activities if roomy else _STANDING
+    content: dict[str, Any] = {
+        "name": "rehearsal",
+        "seed": seed,
+        "duration": settings.frames / settings.rate,
+        "rate": settings.rate,
+        "room": {"size": (reach, reach, 3.0), "walls": False},
+        "people": {
+            "count": settings.people,
+            "area": half,
+            "activities": activities,
+            "spacing": _SPACINGS[0],
+        },
+        "clutter": settings.clutter,
+        "rendering": {"renderer": "rays"},
+    }
+    return Scenario.model_validate(content)
+
+
+def build_scene(scenario: Scenario, rig: Rig) -> Scene:
+    """Build a scene with the largest of the distances between people at which they fit.
+
+    Raises:
+        ValueError: people do not fit at any, or clutter does not.
+    """
+    for spacing in (each for each in _SPACINGS if _may_fit(scenario, each)):
+        people = scenario.people.model_copy(update={"spacing": spacing})
+        try:
+            return build(scenario.model_copy(update={"people": people}), rig)
+        except ValueError as error:
+            if "do not fit" not in str(error):
+                raise
+    raise ValueError(
+        f"{scenario.people.count} people do not fit into the volume, {_SPACINGS[-1]:g} m apart: use fewer people or a "
+        "larger volume"
+    )
+
+
+def _may_fit(scenario: Scenario, spacing: float) -> bool:
+    """Return whether discs of this diameter around all people have the room for it, in the densest packing."""
+    side = 2 * scenario.people.area + spacing
+    return scenario.people.count * spacing**2 * np.sqrt(3) / 2 <= side**2
+
+
+def spread_over_volume(scene: Scene, settings: SceneSettings, frame: SceneFrame, take: int) -> Scene:
+    """Return a scene whose people are spread over the rectangle of the volume, with the obstacles.
+
+    The simulator keeps people in a square. It is turned by a right angle for each take, so that people who stand are at
+    several places, and stretched to the rectangle of the same area.
+    """
+    turn = Rotation.from_euler("z", 90.0 * take, degrees=True)
+    stretch = frame.half / np.sqrt(frame.half.prod())
+    motions = tuple(replace(each, root=_moved(each.root, turn, stretch)) for each in scene.motions)
+    scene = replace(scene, motions=motions)
+    if not settings.obstacles:
+        return scene
+    obstacles = tuple(_solid(each, frame, number) for number, each in enumerate(settings.obstacles))
+    solids = (*scene.solids, *obstacles)
+    return replace(scene, solids=solids, model=compile_model([Kinematics(body) for body in scene.bodies], solids))
+
+
+def _moved(root: Floats, turn: Rotation, stretch: Floats) -> Floats:
+    """Return poses of pelvises (T, 7) turned about the vertical axis, their places then stretched along x and y."""
+    places = root[:, :3] @ turn.as_matrix().T
+    places[:, :2] *= stretch
+    turned = (turn * Rotation.from_quat(root[:, [4, 5, 6, 3]])).as_quat()  # SciPy has w last
+    return np.concatenate([places, turned[:, [3, 0, 1, 2]]], axis=1)
+
+
+def has_objects(clutter: Clutter) -> bool:
+    """Return whether there are objects."""
+    return any(clutter.model_dump().values())
+
+
+def _solid(obstacle: Obstacle, frame: SceneFrame, number: int) -> Solid:
+    """Return an obstacle of the world as a solid of the scene."""
+    x, y = frame.to_scene(obstacle.center[:2]).tolist()
+    half = (float(obstacle.size[0]) / 2, float(obstacle.size[1]) / 2, float(obstacle.size[2]) / 2)
+    box = Box((x, y, float(obstacle.center[2])), half, obstacle.yaw - frame.bearing)
+    return Solid("clutter", f"obstacle{number}", box_mesh([box], [_OBSTACLE]), (box,), box)
