@@ -47,7 +47,7 @@ class CameraArrays:
             np.array([packed(camera) for camera in cameras]).reshape(views, 26),
         )
 
-    def project(self, points: Floats) -> tuple[Floats, Bools]:
+    def pixels_of(self, points: Floats) -> tuple[Floats, Bools]:
         """Project points in the world, (V, ..., 3) or the same for all views, (1, ..., 3).
 
         Returns:

@@ -64,7 +64,7 @@ class OuterJointFilm:
             here = np.all([state.present for state in states], axis=0)
             targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
             self._cameras = arrays = CameraArrays.of(cameras, self._cameras)
-            at, inside = arrays.project(targets)
+            at, inside = arrays.pixels_of(targets)
             inside &= here[:, None] & np.isfinite(self._depths)
             owner, in_front = cast_bands(self._caster, states, arrays, at, targets, inside)
             labels = classify(owner, in_front, inside, radii=self._depths)

@@ -61,7 +61,7 @@ class RayObserver:
             targets = np.stack([joints_at_exposure(bands, camera) for camera in cameras])
         else:
             targets = np.repeat(bands, len(cameras), axis=0)
-        pixels, in_picture = views.project(targets)
+        pixels, in_picture = views.pixels_of(targets)
         for v, center in enumerate(views.centers if len(self._lookalikes) else ()):
             targets[v, people:], shown = self._lookalikes.targets(center, targets[v, people:])
             in_picture[v, people:] &= shown

@@ -24,6 +24,7 @@ from simharness.study.scheduler import TrialSuccess, Unit, run_units
 from simharness.trial.identity import trial_identity
 from simharness.trial.run_trial import run_trial
 from simharness.trial.stages.estimators import estimators_of
+from simharness.trial.stages.networks import ReadFrames
 
 Scores = Mapping[str, float | None]
 
@@ -111,12 +112,13 @@ def processor() -> str:
 def fingerprint(study: Study) -> str:
     """Return ten hexadecimal digits that change with the settings of a study, their files, its seeds and variants.
 
-    Names do not count, nor do keys with default values, so that keys added by a later version change nothing.
+    Names do not count, nor do keys with default values, so that keys added by a later version change nothing; nor does
+    the sensor where nothing reads pictures.
     """
     values = {
         "settings": {
             setting_name(setting, study): setting.scenario.model_dump(
-                mode="json", exclude_defaults=True, exclude={"name", "description", "seed", "method"}
+                mode="json", exclude_defaults=True, exclude=_exclude(setting.scenario)
             )
             for setting in study.settings
         },
@@ -133,3 +135,9 @@ def fingerprint(study: Study) -> str:
         digest.update(file.read_bytes() if file.is_file() else b"")
     digest.update(text.encode())
     return digest.hexdigest()
+
+
+def _exclude(scenario: Scenario) -> set[str]:
+    """Return the sections of a scenario that cannot change its results, or that count elsewhere."""
+    sensor = set() if ReadFrames.needed(scenario) else {"sensor"}
+    return {"name", "description", "seed", "method"} | sensor

@@ -50,7 +50,7 @@ def test_cameras_together_image_the_same_bits_as_one_by_one():
     points = stream(1, "points").uniform([-6, -6, 0], [6, 6, 2], (1, 4, 50, 3))
     points[0, 0, 0] = np.nan
     arrays = CameraArrays.of(eyes)
-    pixels, inside = arrays.project(points)
+    pixels, inside = arrays.pixels_of(points)
     for eye, seen, within in zip(eyes, pixels, inside, strict=True):
         expected = project_to_image(eye, points[0])
         np.testing.assert_array_equal(seen, expected)

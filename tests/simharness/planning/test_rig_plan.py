@@ -169,7 +169,7 @@ def test_preview_draws_the_room(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["plan", "lab", "--preview", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     page = (tmp_path / "lab" / "preview.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3  # from above, and two sides
     assert "pillar" in page
 
 
