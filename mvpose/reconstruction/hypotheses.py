@@ -140,6 +140,7 @@ def _meetings(view, rows, sigma, agreement):
     n = len(view)
     points, likelihood = np.empty((n * (n - 1) // 2, 3)), np.empty(n * (n - 1) // 2)
     ends = np.empty((len(points), 2), np.int64)
+    columns, exponents = rows.T.copy(), np.empty(n)
     pairs = 0
     for a in range(n):
         for b in range(a + 1, n):
@@ -153,12 +154,14 @@ def _meetings(view, rows, sigma, agreement):
             if gap * gap > agreement * agreement * (near[1] + far[1]):
                 continue
             ends[pairs, 0], ends[pairs, 1] = a, b
-            total, best = 0.0, 0.0
+            _exponents(points[pairs], columns, sigma, exponents)
+            total, best, last = 0.0, 0.0, -1
             for k in range(n):
-                if k > 0 and view[k] != view[k - 1]:
-                    total += np.log1p(best)
-                    best = 0.0
-                best = max(best, _odds(points, pairs, rows, k, sigma))
+                if exponents[k] <= 0.0:
+                    if view[k] != last:
+                        total += np.log1p(best)
+                        best, last = 0.0, view[k]
+                    best = max(best, rows[k, 7] * np.exp(exponents[k]))
             likelihood[pairs] = total + np.log1p(best)
             pairs += 1
     return points[:pairs], ends[:pairs], likelihood[:pairs]
@@ -194,27 +197,38 @@ def _distance_to_ray(points, s, rows, k, sigma):
     return max(x * x + y * y + z * z - along * along, 0.0), variance, along
 
 
-@njit(cache=True)
-def _odds(points, s, rows, k, sigma):
-    """Return the likelihood ratio of a keypoint with the joint at the point against without; 0 without support."""
-    e2, variance, along = _distance_to_ray(points, s, rows, k, sigma)
-    return rows[k, 7] * np.exp(-0.5 * e2 / variance) if along > 0.0 and e2 < rows[k, 9] * variance else 0.0
+@njit(cache=True, borrows=True)
+def _exponents(point, columns, sigma, exponents):
+    """Write the exponent of the likelihood of every keypoint with the joint at the point; 1 without support.
+
+    Hardly any keypoint supports a point, so the test of all of them has no branches and vectorises; the exponential is
+    for those that do. ``columns`` are the rows of :func:`_ray_rows`, transposed.
+    """
+    square = sigma * sigma
+    for k in range(len(exponents)):
+        x, y, z = point[0] - columns[0, k], point[1] - columns[1, k], point[2] - columns[2, k]
+        along = x * columns[3, k] + y * columns[4, k] + z * columns[5, k]
+        variance = (square + columns[8, k] * along * along) / (columns[6, k] * columns[6, k])
+        e2 = max(x * x + y * y + z * z - along * along, 0.0)
+        supports = (along > 0.0) & (e2 < columns[9, k] * variance)
+        exponents[k] = -0.5 * e2 / variance if supports else 1.0
 
 
 @njit(cache=True)
 def _supporting_rays(rows, points, sigma):
     """Return the number of rays that support each state of one joint, the rays, and the evidence of each."""
-    count = np.zeros(len(points), np.int64)
+    count, columns, exponents = np.zeros(len(points), np.int64), rows.T.copy(), np.empty(len(rows))
     for s in range(len(points)):
+        _exponents(points[s], columns, sigma, exponents)
         for k in range(len(rows)):
-            count[s] += _odds(points, s, rows, k, sigma) > 0.0
+            count[s] += exponents[k] <= 0.0
     which, evidence = np.empty(count.sum(), np.int64), np.empty(count.sum())
     filled = 0
     for s in range(len(points)):
+        _exponents(points[s], columns, sigma, exponents)
         for k in range(len(rows)):
-            odds = _odds(points, s, rows, k, sigma)
-            if odds > 0.0:
-                which[filled], evidence[filled] = k, np.log1p(odds)
+            if exponents[k] <= 0.0:
+                which[filled], evidence[filled] = k, np.log1p(rows[k, 7] * np.exp(exponents[k]))
                 filled += 1
     return count, which, evidence
 
@@ -223,7 +237,7 @@ def _supporting_rays(rows, points, sigma):
 def _link(start, points, parents, length, deviation, reach):
     """Return the last three fields of :class:`Links`; a bone of unknown length (infinite deviation) has no links."""
     link_start = np.zeros(len(points) + 1, np.int64)
-    link, cost = np.empty(0, np.int64), np.empty(0)
+    link, cost, columns = np.empty(0, np.int64), np.empty(0), points.T.copy()
     for filling in (False, True):
         if filling:
             link, cost = np.empty(link_start[-1], np.int64), np.empty(link_start[-1])
@@ -233,18 +247,24 @@ def _link(start, points, parents, length, deviation, reach):
             known = parent >= 0 and deviation[joint] < np.inf
             longest = length[joint] + reach * deviation[joint]
             shortest = max(length[joint] - reach * deviation[joint], 0.0)
+            limits = shortest * shortest, longest * longest
             for s in range(start[joint], start[joint + 1]):
-                for other in range(start[parent], start[parent + 1] if known else start[parent]):
-                    x, y, z = (
-                        points[s, 0] - points[other, 0],
-                        points[s, 1] - points[other, 1],
-                        points[s, 2] - points[other, 2],
-                    )
-                    d2 = x * x + y * y + z * z
-                    if shortest * shortest <= d2 <= longest * longest:
-                        if filling:
+                if filling and link_start[s + 1] > count:
+                    for other in range(start[parent], start[parent + 1]):
+                        d2 = _squared_distance(columns, s, other)
+                        if limits[0] <= d2 <= limits[1]:
                             link[count] = other
                             cost[count] = 0.5 * ((np.sqrt(d2) - length[joint]) / deviation[joint]) ** 2
-                        count += 1
-                link_start[s + 1] = count
+                            count += 1
+                elif not filling:
+                    for other in range(start[parent], start[parent + 1] if known else start[parent]):  # vectorises
+                        d2 = _squared_distance(columns, s, other)
+                        count += (limits[0] <= d2) & (d2 <= limits[1])
+                    link_start[s + 1] = count
     return link_start, link, cost
+
+
+@njit(cache=True, borrows=True)
+def _squared_distance(columns, s, other):
+    x, y, z = columns[0, s] - columns[0, other], columns[1, s] - columns[1, other], columns[2, s] - columns[2, other]
+    return x * x + y * y + z * z
