@@ -11,7 +11,8 @@ from mvpose.camera import Rig
 from simharness.scenario.sections.scenario import Scenario
 from simharness.world.scene.objects.solids import Solid
 
-WALL_MARGIN = 0.1  # metres between a camera and a wall
+WALL_MARGIN = 0.1
+"""Least distance between a camera and a wall, metres."""
 _ROUNDING = 1e-6  # metres: tolerance at limits, because processors round differently
 
 
