@@ -94,9 +94,10 @@ def _window(f: Furnishing, opening: Opening, color: np.ndarray) -> None:
     """Add the reveal, the sill, and a casement of two leaves with a fanlight; behind it is the view outside."""
     (a, b), (low, high) = opening.span, opening.heights
     deep, rim, plaster = REVEAL, 0.055, 0.95 * _WHITE
-    f.block((-deep, a - 0.01, low - 0.02), (0.0, a, high + 0.01), plaster)
-    f.block((-deep, b, low - 0.02), (0.0, b + 0.01, high + 0.01), plaster)
-    f.block((-deep, a, high), (0.0, b, high + 0.01), plaster)
+    face = -0.001  # behind the wall: of two surfaces in one plane, rounding would decide which is visible
+    f.block((-deep, a - 0.01, low - 0.02), (face, a, high + 0.01), plaster)
+    f.block((-deep, b, low - 0.02), (face, b + 0.01, high + 0.01), plaster)
+    f.block((-deep, a, high), (face, b, high + 0.01), plaster)
     f.block((-deep, a - 0.04, low - 0.03), (0.02, b + 0.04, low), 0.94 * _WHITE)
     x0, x1 = -deep, -deep + 0.06
     for y0, y1 in ((a, a + rim), (b - rim, b)):
