@@ -11,7 +11,7 @@ from mvpose.kernels import njit
 _BOUND = 0.02  # metres: depth behind a face below which it cannot shade anything
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def normals(vertices: np.ndarray, faces: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return unit normals of faces (k, 3), and of vertices (n, 3) area-weighted over the smooth faces; float32."""
     of_face = np.zeros((len(faces), 3), np.float32)

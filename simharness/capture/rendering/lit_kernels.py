@@ -19,7 +19,7 @@ _FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.float32(0.012522878)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade_lit(
     triangle: np.ndarray,
     q: np.ndarray,
@@ -103,7 +103,7 @@ def shade_lit(
                 rgb[y, x, 2] = curve[np.uint32(blue[x])]
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _received(
     triangle: np.ndarray,
     first: int,
@@ -161,7 +161,7 @@ def _received(
             blue[x] = va * light[one, 2] + vb * light[two, 2] + vc * light[three, 2] + glow_blue
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def dim(
     triangle: np.ndarray,
     inverse_depth: np.ndarray,
@@ -241,7 +241,7 @@ def dim(
                         rgb[y, x, k] = dimming[row, rgb[y, x, k]]
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _between(grid: np.ndarray, u: np.float32, v: np.float32) -> np.float32:
     """Return the value of a grid at column u and row v, by bilinear interpolation."""
     u, v = min(max(u, _ZERO), np.float32(grid.shape[1] - 1.001)), min(max(v, _ZERO), np.float32(grid.shape[0] - 1.001))

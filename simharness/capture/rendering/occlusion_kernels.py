@@ -28,7 +28,7 @@ _CHUNK = 512  # samples processed together
 _NONE, _ONE, _TWO, _THREE, _TINY = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(3.0), np.float32(1e-6)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def capsules(vertices: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
     """Return the capsules around groups of vertices: start, way to the end, radius, (count, 7); radius 0 for none.
 
@@ -74,7 +74,7 @@ def capsules(vertices: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
     return result
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _hide(
     body: np.ndarray, place: np.ndarray, way: np.ndarray, wide: np.ndarray, far: np.ndarray, left: np.ndarray
 ) -> None:
@@ -109,7 +109,7 @@ def _hide(
         left[n] *= _ONE - (hidden if t < far[n] else _NONE)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _enclose(body: np.ndarray, place: np.ndarray, normal: np.ndarray, left: np.ndarray) -> None:
     """Multiply by the share of the light from all around that a capsule leaves to surfaces, in place.
 
@@ -131,7 +131,7 @@ def _enclose(body: np.ndarray, place: np.ndarray, normal: np.ndarray, left: np.n
         left[n] *= _ONE - max(rise, _NONE) * min(own / distance, _ONE)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def light_at(
     origin: np.ndarray, step: np.ndarray, values: np.ndarray, x: float, y: float, z: float, out: np.ndarray
 ) -> None:
@@ -151,7 +151,7 @@ def light_at(
             out[c] += weight * values[i + di, j + dj, k + dk, c]
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def cast(
     left: np.ndarray,
     z: float,
@@ -305,7 +305,7 @@ def cast(
                     left[j, i0 + n] *= np.float32(1.0 - fade * share_of_light * (1.0 - open_[n]))
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _brought(
     areas: np.ndarray, sun: np.ndarray, normals: np.ndarray, sizes: np.ndarray, m: int, x: float, y: float, z: float
 ) -> float:
@@ -320,7 +320,7 @@ def _brought(
     return value * ahead ** areas[m, 10] if areas[m, 10] > 0 else value
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def moving_light(
     vertices: np.ndarray,
     face_normals: np.ndarray,

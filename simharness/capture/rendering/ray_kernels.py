@@ -102,7 +102,7 @@ def _cost(counts: np.ndarray, spans: np.ndarray) -> float:
     return total * (x * y + y * z + z * x)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def trace(
     boxes: np.ndarray,
     links: np.ndarray,

@@ -8,6 +8,9 @@ the same rule for every pixel, which the compiler vectorises.
 Over a triangle the weights of its corners are ``edge . d`` up to a common factor, in the notation of
 :mod:`simharness.capture.rendering.raster_kernels`. So attributes of the corners (normals, texture coordinates) and all
 quantities that are linear in space are linear in ``d = (x, y, 1)`` and in inverse depth.
+
+Kernels of this package may not reorder sums, contract products or approximate quotients (``fastmath`` names what they
+may do): a loop runs in vectors where its arrays are apart in memory, else not, and both must round alike.
 """
 
 # ruff: noqa: PLR0915 (a kernel is one loop over plain arrays: calls would cost it its speed)
@@ -34,7 +37,7 @@ _TWO_LANES = np.uint64(40)
 _MASK = np.uint64((1 << 20) - 1)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade(
     triangle: np.ndarray,
     inverse_depth: np.ndarray,
@@ -144,7 +147,7 @@ def shade(
                 rgb[y, x, 2] = np.uint8(min(bright * (gain_blue * blue[x]) + np.float32(0.5), np.float32(255.0)))
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _light(
     y: int,
     first: int,
@@ -211,7 +214,7 @@ def _light(
         near[x] = w * scale + slope_bias / max(cosine, least_cosine)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def gather(
     triangle: np.ndarray,
     y: int,
@@ -374,7 +377,7 @@ def gather(
                 blues[n] = dye_blue * np.float32(np.int32(mixed[n] >> _TWO_LANES))
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _level(across: np.ndarray, x: int, y: int, pyramid: np.ndarray) -> int:
     """Return the mipmap level whose texels are about as large as the pixel."""
     scale = 1.0 / (across[2, 0] * x + (across[2, 1] * y + across[2, 2]))

@@ -52,7 +52,7 @@ def shadow_places(
     return place, depth
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def darken(
     key_light: np.ndarray,
     map_x: np.ndarray,
@@ -85,7 +85,7 @@ def darken(
         key_light[x] *= 1.0 - blocked
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def _blocked(
     one: np.ndarray, other: np.ndarray, i: np.uint32, j: np.uint32, du: float, dv: float, here: float
 ) -> float:
@@ -111,7 +111,7 @@ def _blocked(
     return blocked
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def nearest_blocks(shadow: np.ndarray, first: int, end: int) -> np.ndarray:
     """Return the highest inverse depth under all filters that begin in each block of 8 x 8 pixels of a shadow map.
 
