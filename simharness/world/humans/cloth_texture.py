@@ -16,14 +16,16 @@ from mvpose.arrays import Floats
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.wardrobe import Color, Look
 
-WIDTH, BAND, WHITE = 256, 160, 16  # pixels
+# Pixels. Twice as many along a limb as around it: seen from the side, the texture is short in the latter direction, and
+# renderers that choose one level for both would blur horizontal stripes there.
+WIDTH, BAND, WHITE = 128, 320, 16
 LENGTH = 1.3  # height of a band, metres
 _AROUND = 1.05  # circumference of a trunk, metres: makes patterns as high as wide
 _MARGIN = 0.03  # unused margin at both ends of a band, metres, because renderers smooth textures
 _ROOT = 0.08  # position of the root of the neck in a band, metres; collars reach higher
 _OVERSAMPLE = 4
 _BLOCK, _YOKE = 0.24, 0.25  # metres; blocks start below the shoulders, where sleeves are set in
-_OPENING, _SHADE = 2, 0.35  # half the width of a coat's opening in pixels, and the factor that darkens it
+_OPENING, _SHADE = 1, 0.35  # half the width of a coat's opening in pixels, and the factor that darkens it
 _ARM, _LEG = 1 / 3, 1 / 2  # fraction of the texture's width around a limb
 _ARM_START = 0.1  # distance from the root of the neck to the start of a sleeve, metres
 

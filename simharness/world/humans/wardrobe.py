@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import colorsys
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from simharness.types.random_streams import stream
+from simharness.world.humans.clothing_colors import SHOES, TOPS, TROUSERS, Color, draw_color
 from simharness.world.humans.population import draw_sex
-
-Color = tuple[float, float, float]
 
 # Levels of a body's faces at which sleeves, trouser legs and shirts may end; the mesh has edges along each of them.
 SLEEVES = {"short": 0.55, "half": 0.9, "long": 1.95}
@@ -100,42 +98,41 @@ UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "r
 # Albedos, chosen by eye. Hair and skins both run from fair to dark, so that one draw can correlate the two.
 _SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
 _HAIR = ("c8a468", "8d6a3f", "8c8a88", "6b3a22", "5a3f2a", "3b281d", "2a1d17", "1b1512", "151112")
-_TROUSERS = ("2b3550", "3d5a80", "26282d", "5a5650", "8c7b60", "4a3f38", "6c7480")
-_SHOES = ("1c1c20", "dcdad5", "6b4630", "3a3f4a", "8a2f2b")
 _EYES = ("2a1b12", "3d5468", "3f4f36", "22160f")
-_ACCENTS = ("ece9e2", "f2d9a0", "20242c", "2d3e63", "7d2430")
+_ACCENTS = ("e4e1da", "cdbb95", "9fb0c4", "25282f", "313f5e", "6e2a36")
+_TOP_PATTERNS = (*("plain",) * 8, "stripes", "stripes", "checks", "blocks")
 _GOLDEN = (5**0.5 - 1) / 2
 _DRAWS = 32
 
 
-def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | None = None) -> Look:
-    """Draw one look.
+def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | None = None) -> Look:
+    """Draw one look, with colours as clothes have them (:mod:`simharness.world.humans.clothing_colors`).
 
     Args:
         rng: random stream.
         female: whether women's clothes and hair styles may be drawn.
-        hue: hue of the top, 0 to 1 around the colour circle; drawn if None.
+        place: place of the top's colour in the cumulated shares of the colours of tops, modulo 1; drawn if None.
     """
     drawn = rng.random(_DRAWS).tolist()
-    hue = drawn[0] if hue is None else hue
+    place = drawn[0] if place is None else place
     skin = _between(_SKINS, drawn[1])
     lower_garment = _pick(
         ("trousers", "trousers", "skirt", "dress", "coat") if female else (*("trousers",) * 7, "coat"), drawn[12]
     )
-    top = colorsys.hsv_to_rgb(hue % 1, 0.5 + 0.35 * drawn[4], 0.5 + 0.4 * drawn[5])
+    top = draw_color(TOPS, place % 1, drawn[4], drawn[5])
     return Look(
         skin=skin,
         hair=_color(_pick(_HAIR, drawn[1] + (1 - drawn[1]) * drawn[2])),
         lips=mix(skin, (0.62, 0.22, 0.22), 0.45),
         eyes=_color(_pick(_EYES, drawn[3])),
         top=top,
-        trousers=_color(_pick(_TROUSERS, drawn[6])),
-        shoes=_color(_pick(_SHOES, drawn[7])),
+        trousers=draw_color(TROUSERS, drawn[6], drawn[20], drawn[21]),
+        shoes=draw_color(SHOES, drawn[7], drawn[22], drawn[23]),
         accent=_contrasting(top, drawn[13]),
         sleeves="long" if lower_garment == "coat" else _pick(("short", "short", "half", "long", "long"), drawn[8]),
         legs="long" if lower_garment == "coat" else _pick(("shorts", "cropped", *("long",) * 4), drawn[9]),
         hem="tucked" if lower_garment != "trousers" else _pick(("tucked", "loose"), drawn[10]),
-        top_pattern="plain" if lower_garment == "coat" else _pick(("plain", "plain", *PATTERNS), drawn[14]),
+        top_pattern="plain" if lower_garment == "coat" else _pick(_TOP_PATTERNS, drawn[14]),
         bottom_pattern=_pick(("plain", "checks", "stripes"), drawn[15]) if lower_garment == "skirt" else "plain",
         repeats=6 * (2 + int(3 * drawn[16])),
         lower_garment=lower_garment,
@@ -149,11 +146,12 @@ def draw_look(rng: np.random.Generator, *, female: bool = False, hue: float | No
 def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0) -> tuple[Look, ...]:
     """Draw the looks of ``count`` people of one scene.
 
-    At ``look_alike`` 0 people are easy to distinguish, mainly by the hues of their tops. The hues step around the
-    colour circle by the golden ratio, which spreads any number of hues well, so an additional person does not change
-    the looks of the others. At 1 all wear the same uniform; skin, hair and body remain individual. In between, colours
-    and widths are mixed in proportion, and every cut or pattern switches to the uniform at a separate value, drawn
-    once for the scene. So the looks of any two people come closer as ``look_alike`` grows.
+    At ``look_alike`` 0 people are as easy to distinguish as people in a street are. The colours of their tops step
+    through the cumulated shares of clothing colours by the golden ratio, which spreads any number of places well: every
+    colour is as frequent as in the shares, few people of a scene have the same one, and an additional person does not
+    change the looks of the others. At 1 all wear the same uniform; skin, hair and body remain individual. In between,
+    colours and widths are mixed in proportion, and every cut or pattern switches to the uniform at a separate value,
+    drawn once for the scene. So the looks of any two people come closer as ``look_alike`` grows.
 
     Args:
         seed: seed of the scene.
@@ -172,7 +170,7 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     looks = []
     for i in range(count):
         female = draw_sex(stream(seed, "people", i, "shape")) == "female"
-        look = draw_look(stream(seed, "people", i, "look"), female=female, hue=float(start + i * _GOLDEN))
+        look = draw_look(stream(seed, "people", i, "look"), female=female, place=float(start + i * _GOLDEN))
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
