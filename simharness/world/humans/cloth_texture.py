@@ -24,7 +24,7 @@ _AROUND = 1.05  # circumference of a trunk, metres: makes patterns as high as wi
 _MARGIN = 0.03  # unused margin at both ends of a band, metres, because renderers smooth textures
 _ROOT = 0.08  # position of the root of the neck in a band, metres; collars reach higher
 _OVERSAMPLE = 4
-_BLOCK, _YOKE = 0.24, 0.25  # metres; blocks start below the shoulders, where sleeves are set in
+_BLOCK, _YOKE = 0.17, 0.25  # height and start of the panel of another colour across the chest and the sleeves, metres
 _OPENING, _SHADE = 1, 0.35  # half the width of a coat's opening in pixels, and the factor that darkens it
 _ARM, _LEG = 1 / 3, 1 / 2  # fraction of the texture's width around a limb
 _ARM_START = 0.1  # distance from the root of the neck to the start of a sleeve, metres
@@ -58,8 +58,8 @@ def _cloth(pattern: str, color: Color, accent: Color, repeats: int) -> Floats:
     elif pattern == "checks":
         share = 0.5 * rows + 0.5 * columns
     elif pattern == "blocks":
-        checkered = ((across * 6).astype(int) + ((down - _YOKE) / _BLOCK).astype(int)) % 2
-        share = np.where(down > _YOKE, checkered, 0.0)
+        panel = (down > _YOKE) & (down < _YOKE + _BLOCK)
+        share = np.broadcast_to(panel, (len(down), len(across))).astype(float)
     else:
         share = np.zeros((len(down), len(across)))
     share = share.reshape(BAND, _OVERSAMPLE, WIDTH, _OVERSAMPLE).mean((1, 3))[..., None]
