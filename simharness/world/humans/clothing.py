@@ -12,6 +12,7 @@ from scipy import sparse
 from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
 from simharness.world.humans.body import Body, FacePart
+from simharness.world.humans.grooming import groom
 from simharness.world.humans.skirts_and_hair import AddedMesh, bun, long_hair, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
 
@@ -64,6 +65,7 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
     """Return the albedo of every face without patterns, (k, 3) float32."""
     palette = np.array([look.skin, look.hair, look.top, look.trousers, look.shoes, _SOLE], np.float32)
     colors = palette[garments(body, look)]
+    groom(colors, body, skin=look.skin, hair=look.hair, beard=look.beard, bald=look.bald)
     colors[body.part == FacePart.BROW] = mix(look.hair, look.skin, 0.3)
     colors[body.part == FacePart.LIPS] = look.lips
     colors[body.part == FacePart.SCLERA] = _SCLERA

@@ -30,7 +30,7 @@ _CHOICES = {
     "lower_garment": LOWER_GARMENTS,
     "hair_style": HAIR_STYLES,
 }
-_NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0)}
+_NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0), "beard": (0.0, 1.0), "bald": (0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,8 @@ class Look:
         fit: width of the clothes, 0 close to 1 wide.
         hair_style: one of ``HAIR_STYLES``.
         volume: volume of the hair, 0 cropped to 2 full.
+        beard: density of the beard, 0 none to 1 full; adults only.
+        bald: extent of the bald skin, 0 none to 1 all but a rim; adults only.
 
     Raises:
         ValueError: an unknown choice, or a number out of its range.
@@ -75,6 +77,8 @@ class Look:
     fit: float = 0.3
     hair_style: str = "short"
     volume: float = 1.0
+    beard: float = 0.0
+    bald: float = 0.0
 
     def __post_init__(self) -> None:
         for key, choices in _CHOICES.items():
@@ -103,6 +107,7 @@ _ACCENTS = ("e4e1da", "cdbb95", "9fb0c4", "25282f", "313f5e", "6e2a36")
 _TOP_PATTERNS = (*("plain",) * 8, "stripes", "stripes", "checks", "blocks")
 _GOLDEN = (5**0.5 - 1) / 2
 _DRAWS = 32
+_BEARDS, _BALD, _CROPPED = 0.4, 0.25, 0.9  # shares of men, and of those with short hair below a volume of 0.9
 
 
 def draw_look(rng: np.random.Generator, *, female: bool = False, place: float | None = None) -> Look:
@@ -171,8 +176,21 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     for i in range(count):
         female = draw_sex(stream(seed, "people", i, "shape")) == "female"
         look = draw_look(stream(seed, "people", i, "look"), female=female, place=float(start + i * _GOLDEN))
+        if not female:
+            look = _groomed(look, stream(seed, "people", i, "grooming"))
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
+
+
+def _groomed(look: Look, rng: np.random.Generator) -> Look:
+    """Return the look of a man with a beard or a bald head drawn; the rates are assumptions."""
+    with_beard, density, with_bald, extent = rng.random(4).tolist()
+    cropped = look.hair_style == "short" and look.volume < _CROPPED
+    return replace(
+        look,
+        beard=0.25 + 0.75 * density if with_beard < _BEARDS else 0.0,
+        bald=0.3 + 0.7 * extent if cropped and with_bald < _BALD else 0.0,
+    )
 
 
 def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Look:

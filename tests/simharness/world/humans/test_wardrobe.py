@@ -19,7 +19,7 @@ from simharness.world.humans.wardrobe import (
     draw_looks,
 )
 
-INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style")
+INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style", "beard", "bald")
 
 
 def distance(a, b):
