@@ -17,6 +17,7 @@ from simharness.reality.validation.frame_scores import RULES, HeadRule
 from simharness.scenario.sections.detector import Detector
 from simharness.scenario.sections.room import Clutter
 from simharness.scenario.sections.scenario import Scenario
+from simharness.world.humans.wearing import take_off
 from simharness.world.motion.poses.kinematics import Kinematics
 from simharness.world.scene.build import Scene, build, compile_model
 from simharness.world.scene.objects.geoms import Box
@@ -130,7 +131,9 @@ def spread_over_volume(scene: Scene, settings: SceneSettings, frame: SceneFrame,
         return scene
     obstacles = tuple(_solid(each, frame, number) for number, each in enumerate(settings.obstacles))
     solids = (*scene.solids, *obstacles)
-    return replace(scene, solids=solids, model=compile_model([Kinematics(body) for body in scene.bodies], solids))
+    return replace(
+        scene, solids=solids, model=compile_model([Kinematics(take_off(body)) for body in scene.bodies], solids)
+    )
 
 
 def _moved(root: Floats, turn: Rotation, stretch: Floats) -> Floats:

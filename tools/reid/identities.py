@@ -17,6 +17,7 @@ from simharness.world.humans.body import Body, make_body
 from simharness.world.humans.clothing import dress, paint
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.wardrobe import Look, draw_looks
+from simharness.world.humans.wearing import wear
 
 Split = Literal["training", "validation", "held-out"]
 
@@ -105,7 +106,7 @@ def dressed_people(group: Group, people: Iterable[int]) -> tuple[DressedPerson, 
 
 def _dressed_person(seed: int, person: int, look: Look) -> DressedPerson:
     shape = draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, CHILDREN))
-    body = dress(make_body(shape), look)
+    body = wear(dress(make_body(shape), look), look)
     surface = paint(body, look)
     mesh = Mesh(body.vertices, body.faces, surface.colors, smooth=True, texture=surface.texture, uv=surface.uv)
     return DressedPerson(seed, person, body, mesh)

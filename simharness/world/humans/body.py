@@ -32,7 +32,8 @@ DENSITY = 985.0  # kg / m3 of the whole body; Dempster 1955 and others: 960 (lun
 class FacePart(IntEnum):
     """Body part that a face of the mesh shows.
 
-    Torso, arms, legs, shoes and soles are faces of a suit, which also have a level (see :class:`Body`).
+    Torso, arms, legs, shoes and soles are faces of a suit, which also have a level (see :class:`Body`). The parts
+    from ``GLASSES`` are accessories (:mod:`simharness.world.humans.accessories`), whose faces come last.
     """
 
     SKIN = 0
@@ -48,6 +49,13 @@ class FacePart(IntEnum):
     SHOE = 10
     SOLE = 11
     SKIRT = 12
+    GLASSES = 13
+    LENS = 14
+    HAT = 15
+    HAT_BAND = 16
+    MASK = 17
+    BAG = 18
+    STRAP = 19
 
 
 @dataclass(frozen=True)
@@ -227,8 +235,9 @@ class Body:
         thumbs: direction at rest from the little-finger side to the thumb side of the left and right palm, (2, 3).
         stature: height from soles to crown, metres.
         mass: kilograms.
-        skinned_count: number of vertices moved by skinning alone; they come first, those of skirt and long hair follow.
-        skirt: motion of the last vertices, where a skirt, dress or coat is worn.
+        skinned_count: number of vertices moved by skinning alone; they come first, those of long hair,
+            skirt and accessories follow.
+        skirt: motion of the vertices of a skirt, dress or coat, if one is worn.
     """
 
     shape: Shape

@@ -11,10 +11,13 @@ from scipy import sparse
 
 from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
+from simharness.world.humans.added_mesh import AddedMesh, add_mesh
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.grooming import groom
-from simharness.world.humans.skirts_and_hair import AddedMesh, bun, long_hair, skirt
+from simharness.world.humans.hair_styles import bob, curls, ponytail
+from simharness.world.humans.skirts_and_hair import bun, long_hair, skirt
 from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, Color, Look, mix
+from simharness.world.humans.wearing import accessory_colors
 
 
 class Garment(IntEnum):
@@ -32,6 +35,8 @@ _SCLERA: Color = (0.9, 0.9, 0.88)
 _SOLE: Color = (0.85, 0.85, 0.83)
 _DRAPE, _DRAPE_ROUNDS = 0.5, (6, 14)  # step of the smoothing, and its rounds for close-fitting and for wide clothes
 _WAIST = HEMS["tucked"]
+_HAIRLINE = 0.002  # greatest thickness of curly hair where it meets the skin, metres
+_UNDER_HAT = 0.005  # greatest thickness of hair below a hat, metres
 _BREAK = 0.025  # length of wide trousers that lies on the shoe, metres
 
 
@@ -51,7 +56,9 @@ class SurfaceColors:
 
 
 def paint(body: Body, look: Look) -> SurfaceColors:
-    """Return the colours and texture of a look on a body, before or after :func:`dress`."""
+    """Return the colours and texture of a look on a body, before or after :func:`dress` and
+    :func:`~simharness.world.humans.wearing.wear`.
+    """
     colors, texture = face_colors(body, look), cloth_texture.texture_image(look)
     if texture is None:
         return SurfaceColors(colors)
@@ -70,6 +77,8 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
     colors[body.part == FacePart.LIPS] = look.lips
     colors[body.part == FacePart.SCLERA] = _SCLERA
     colors[body.part == FacePart.IRIS] = look.eyes
+    for part, color in accessory_colors(look).items():
+        colors[body.part == part] = color
     return colors
 
 
@@ -116,7 +125,15 @@ def dress(body: Body, look: Look) -> Body:
     normals[leg] = _horizontal(normals[leg])  # normals over the foot point up and would lift the hem
     vertices = _draped(rest[source], faces, garment, look.fit)
     vertices[leg, 2] -= look.fit * _BREAK * np.clip((level[leg] - 1.5) / 0.4, 0, 1)
-    vertices = vertices + _thickness(worn, level, along_arm, adjacent[1] / adjacent.sum(0), look)[:, None] * normals
+    thickness = _thickness(worn, level, along_arm, adjacent[1] / adjacent.sum(0), look)
+    hair = worn == Garment.HAIR
+    if look.hair_style == "curly":
+        thickness[hair] = curls(rest[source[hair]], level[hair], volume=look.volume)
+        hairline = np.isin(source, source[~hair])  # where hair meets skin it starts on the skin
+        thickness[hair & hairline] = np.minimum(thickness[hair & hairline], _HAIRLINE)
+    if look.hat != "none":
+        thickness[hair] = np.minimum(thickness[hair], _UNDER_HAT)
+    vertices = vertices + thickness[:, None] * normals
     dressed = replace(
         body,
         vertices=vertices.astype(np.float32),
@@ -125,27 +142,29 @@ def dress(body: Body, look: Look) -> Body:
         weights=body.weights[source],
         skinned_count=len(vertices),
     )
-    if look.hair_style != "short":
-        dressed = _add(dressed, (long_hair if look.hair_style == "long" else bun)(dressed, volume=look.volume))
+    if (hair := _hair(dressed, look)) is not None:
+        dressed = add_mesh(dressed, hair)
     if look.lower_garment != "trousers":
         hips, neck = (body.heads[body.index(bone), 2] for bone in ("LeftUpLeg", "Neck"))
         waist = hips + 0.75 * _WAIST * (neck - hips)
         mesh, hang = skirt(dressed, top=waist, length=look.length, kind=look.lower_garment, ease=0.015 * look.fit)
-        dressed = replace(_add(dressed, mesh), skirt=replace(hang, first=len(dressed.vertices)))
+        dressed = replace(add_mesh(dressed, mesh), skirt=replace(hang, first=len(dressed.vertices)))
     return dressed
 
 
-def _add(body: Body, mesh: AddedMesh) -> Body:
-    """Append a mesh to a body."""
-    return replace(
-        body,
-        vertices=np.concatenate([body.vertices, mesh.vertices.astype(np.float32)]),
-        faces=np.concatenate([body.faces, mesh.faces + np.int32(len(body.vertices))]),
-        part=np.append(body.part, np.full(len(mesh.faces), mesh.part, np.int8)),
-        level=np.append(body.level, mesh.level),
-        weight_bones=np.concatenate([body.weight_bones, mesh.weight_bones]),
-        weights=np.concatenate([body.weights, mesh.weights]),
-    )
+def _hair(body: Body, look: Look) -> AddedMesh | None:
+    """Return the mesh of hair that hangs or is tied; under a hat it is tied at the nape."""
+    low = look.hat != "none"
+    match look.hair_style:
+        case "long":
+            return long_hair(body, volume=look.volume)
+        case "bob":
+            return bob(body, volume=look.volume)
+        case "bun":
+            return bun(body, volume=look.volume, low=low)
+        case "ponytail":
+            return ponytail(body, volume=look.volume, low=low)
+    return None
 
 
 def _thickness(worn: NDArray[np.int64], level: Floats, along_arm: Floats, sleeve: Floats, look: Look) -> Floats:

@@ -7,12 +7,10 @@ So a ring is the hull of two round sections, like cloth around both legs, and no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from simharness.world.humans.added_mesh import AddedMesh, grid, hull
 from simharness.world.humans.body import Body, FacePart
 from simharness.world.humans.skinning import Skirt
 
@@ -25,18 +23,6 @@ _FLARE = {"skirt": 0.05, "dress": 0.06, "coat": 0.045}  # metres by which a hem 
 _TOP = {"skirt": 0.003, "dress": 0.0, "coat": 0.0}  # gap at the upper edge, metres
 _HELD = (-0.15, 0.25)  # range in which the weight of the pelvis falls from 1 to 0, thigh lengths below the hip joint
 _BEHIND = (98.0, 262.0)  # bearings from the face around the head's axis, degrees: from behind one ear to the other
-
-
-@dataclass(frozen=True)
-class AddedMesh:
-    """Mesh to add to a body; for its fields see :class:`simharness.world.humans.body.Body`."""
-
-    vertices: Floats
-    faces: NDArray[np.int32]
-    part: FacePart
-    level: Floats
-    weight_bones: NDArray[np.uint8]
-    weights: NDArray[np.float32]
 
 
 def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> tuple[AddedMesh, Skirt]:
@@ -68,7 +54,7 @@ def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> t
         height = hips[:, 2].mean() + t * axis[:, 2].mean()
         around = trunk[np.abs(trunk[:, 2] - height) < 0.025]
         if len(around) > 20:  # below the crotch there is no trunk: the outline of the last ring is kept
-            outline = _hull(around[:, :2] - pelvis, bearing)
+            outline = hull(around[:, :2] - pelvis, bearing)
         fitted = min((t - first) * thigh / _FITTED, 1.0)
         ring = directions[:, :2] * (outline + wide * fitted + _TOP[kind] * (1 - fitted))[:, None]
         anchors[k, :, 0] = np.column_stack([pelvis + ring, np.full(_COLUMNS, height)])
@@ -91,7 +77,7 @@ def skirt(body: Body, *, top: float, length: float, kind: str, ease: float) -> t
     )
     vertices = np.zeros((len(hang.directions), 3), np.float32)
     hang.hang(np.tile(np.eye(3, 4, dtype=np.float32), (len(body.bones), 1, 1)), vertices)
-    faces = _grid(*shape, closed=True)
+    faces = grid(*shape, closed=True)
     left = _smoothstep(0.5 + 4.0 * vertices[:, 1].astype(float))
     weights = np.zeros((len(vertices), 4), np.float32)
     on_legs = 1 - hang.pelvis_share
@@ -110,32 +96,16 @@ def _body_points(body: Body) -> tuple[Floats, tuple[Floats, Floats]]:
     return trunk, (both[both[:, 1] > 0], both[both[:, 1] < 0])
 
 
-def _hull(points: Floats, bearing: Floats) -> Floats:
-    """Return the distance from the origin to the convex hull of points (n, 2) at bearings (c,), metres."""
-    support = (points @ np.stack([np.cos(bearing), np.sin(bearing)])).max(0)
-    cosine = np.cos(bearing[:, None] - bearing[None, :])
-    return np.where(cosine > 0.2, support[None, :] / np.maximum(cosine, 0.2), np.inf).min(1)
-
-
 def _smoothstep(share: Floats) -> Floats:
     """Return the cubic smoothstep of values clipped to 0..1."""
     share = np.clip(share, 0, 1)
     return share * share * (3 - 2 * share)
 
 
-def _grid(rows: int, columns: int, *, closed: bool) -> NDArray[np.int32]:
-    """Return the faces of a grid of vertices: columns counter-clockwise seen from above, rows downwards."""
-    across = np.arange(columns if closed else columns - 1)
-    a = (np.arange(rows - 1)[:, None] * columns + across).ravel()
-    b = (np.arange(rows - 1)[:, None] * columns + (across + 1) % columns).ravel()
-    c, d = a + columns, b + columns
-    return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])]).astype(np.int32)
-
-
 def long_hair(body: Body, *, volume: float) -> AddedMesh:
     """Make the mesh of hair that falls from behind the ears to the shoulder blades."""
     head, neck = body.heads[body.index("Head")], body.heads[body.index("Neck")]
-    points, scalp = _head_points(body)
+    points, scalp = head_points(body)
     crown = points[:, 2].max()
     top, end = head[2] + 0.62 * (crown - head[2]), neck[2] - 0.55 * (crown - neck[2])
     nape = scalp[:, 2].min() + 0.03
@@ -148,7 +118,7 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
     for z in height:
         if z > nape:  # hair lies on the skull and falls from its widest part
             around = scalp[np.abs(scalp[:, 2] - z) < 0.015, :2] - center
-            fall = np.maximum(_hull(around, bearing), fall)
+            fall = np.maximum(hull(around, bearing), fall)
             reach = fall + thick * np.sin(np.linspace(0, np.pi, len(bearing))) ** 0.5 - (0.006 if z == top else 0.0)
         else:  # hair falls, and lies on neck and back where they stand out further
             around = points[np.abs(points[:, 2] - z) < 0.02, :2] - center
@@ -156,7 +126,7 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
             reach = np.clip(_reach(around, directions) + 0.012, 0.88 * fall, limit)
         rows.append(np.column_stack([center + directions * reach[:, None], np.full(len(bearing), z)]))
     vertices = np.concatenate(rows)
-    faces = _grid(len(height), len(bearing), closed=False)
+    faces = grid(len(height), len(bearing), closed=False)
     below = _smoothstep((head[2] - vertices[:, 2]) / (head[2] - end))
     weights = np.zeros((len(vertices), 4), np.float32)
     weights[:, :3] = np.column_stack([1 - 0.45 * below, 0.2 * below, 0.25 * below])
@@ -164,24 +134,24 @@ def long_hair(body: Body, *, volume: float) -> AddedMesh:
     return AddedMesh(vertices, faces, FacePart.SCALP, np.ones(len(faces)), np.tile(bones, (len(vertices), 1)), weights)
 
 
-def bun(body: Body, *, volume: float) -> AddedMesh:
-    """Make the mesh of a bun, a knot of hair on the back of the head."""
-    points, scalp = _head_points(body)
+def bun(body: Body, *, volume: float, low: bool = False) -> AddedMesh:
+    """Make the mesh of a bun, a knot of hair on the back of the head, or ``low`` at the nape."""
+    points, scalp = head_points(body)
     head = body.heads[body.index("Head")]
     radius = 0.028 + 0.008 * volume
-    height = head[2] + 0.62 * (points[:, 2].max() - head[2])
+    height = head[2] + (-0.12 if low else 0.62) * (points[:, 2].max() - head[2])
     behind = scalp[np.abs(scalp[:, 2] - height) < 0.02, 0].min()
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.linspace(np.pi / 2, -np.pi / 2, 9))
     ball = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), 0.9 * np.sin(up)], -1).reshape(-1, 3)
-    vertices = np.array([behind - 0.55 * radius, 0.0, height]) + radius * ball
-    faces = _grid(9, 16, closed=True)
+    vertices = np.array([behind - (0.2 if low else 0.55) * radius, 0.0, height]) + radius * ball
+    faces = grid(9, 16, closed=True)
     weights = np.tile(np.array([1, 0, 0, 0], np.float32), (len(vertices), 1))
     bones = np.full((len(vertices), 4), body.index("Head"), np.uint8)
     return AddedMesh(vertices, faces, FacePart.SCALP, np.ones(len(faces)), bones, weights)
 
 
-def _head_points(body: Body) -> tuple[Floats, Floats]:
-    """Return the vertices of head, neck and trunk, and those of the scalp."""
+def head_points(body: Body) -> tuple[Floats, Floats]:
+    """Return the vertices of head, neck and trunk, (n, 3), and those of the scalp, (s, 3)."""
     points = body.vertices.astype(float)
     scalp = np.unique(body.faces[body.part == FacePart.SCALP])
     upper_body = np.unique(body.faces[np.isin(body.part, [FacePart.SCALP, FacePart.SKIN, FacePart.TORSO])])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from simharness.types.random_streams import stream
+from simharness.world.humans.accessories import BAGS, GLASSES, HATS, MASKS, draw_accessories
 from simharness.world.humans.clothing_colors import SHOES, TOPS, TROUSERS, Color, draw_color
 from simharness.world.humans.population import draw_sex
 
@@ -17,7 +20,7 @@ LEGS = {"shorts": 0.7, "cropped": 1.55, "long": 1.93}
 HEMS = {"tucked": 0.32, "loose": 0.13}
 PATTERNS = ("plain", "stripes", "checks", "blocks")
 LOWER_GARMENTS = ("trousers", "skirt", "dress", "coat")
-HAIR_STYLES = ("short", "long", "bun")
+HAIR_STYLES = ("short", "long", "bun", "bob", "ponytail", "curly")
 REPEATS = (6, 24)
 """Least and greatest number of repeats of a pattern around the body; a multiple of six closes around limbs too."""
 
@@ -29,6 +32,10 @@ _CHOICES = {
     "bottom_pattern": PATTERNS,
     "lower_garment": LOWER_GARMENTS,
     "hair_style": HAIR_STYLES,
+    "glasses": GLASSES,
+    "hat": HATS,
+    "mask": MASKS,
+    "bag": BAGS,
 }
 _NUMBERS = {"volume": (0.0, 2.0), "fit": (0.0, 1.0), "length": (0.3, 1.0), "beard": (0.0, 1.0), "bald": (0.0, 1.0)}
 
@@ -53,6 +60,9 @@ class Look:
         volume: volume of the hair, 0 cropped to 2 full.
         beard: density of the beard, 0 none to 1 full; adults only.
         bald: extent of the bald skin, 0 none to 1 all but a rim; adults only.
+        glasses, hat, mask, bag: accessories, each "none" or one of ``GLASSES``, ``HATS``, ``MASKS``, ``BAGS`` of
+            :mod:`simharness.world.humans.accessories`.
+        frame_color, hat_color, mask_color, bag_color: their colours; ``frame_color`` is that of the glasses.
 
     Raises:
         ValueError: an unknown choice, or a number out of its range.
@@ -79,6 +89,14 @@ class Look:
     volume: float = 1.0
     beard: float = 0.0
     bald: float = 0.0
+    glasses: str = "none"
+    hat: str = "none"
+    mask: str = "none"
+    bag: str = "none"
+    frame_color: Color = (0.1, 0.1, 0.1)
+    hat_color: Color = (0.15, 0.15, 0.16)
+    mask_color: Color = (0.66, 0.78, 0.85)
+    bag_color: Color = (0.13, 0.13, 0.14)
 
     def __post_init__(self) -> None:
         for key, choices in _CHOICES.items():
@@ -95,9 +113,9 @@ class Look:
                 raise ValueError(f"look: {entry.name} must be three numbers from 0 to 1, got {value!r}")
 
 
-UNIFORM_COLORS = ("top", "trousers", "shoes", "accent")
+UNIFORM_COLORS = ("top", "trousers", "shoes", "accent", "hat_color", "bag_color")
 UNIFORM_NUMBERS = ("fit", "length")
-UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "lower_garment")
+UNIFORM_CHOICES = ("sleeves", "legs", "hem", "top_pattern", "bottom_pattern", "repeats", "lower_garment", "hat", "bag")
 
 # Albedos, chosen by eye. Hair and skins both run from fair to dark, so that one draw can correlate the two.
 _SKINS = ("efcdb8", "e2b798", "cf9d7b", "b67f5e", "925f46", "6b4331", "4a2e23")
@@ -107,6 +125,8 @@ _ACCENTS = ("e4e1da", "cdbb95", "9fb0c4", "25282f", "313f5e", "6e2a36")
 _TOP_PATTERNS = (*("plain",) * 8, "stripes", "stripes", "checks", "blocks")
 _GOLDEN = (5**0.5 - 1) / 2
 _DRAWS = 32
+_STYLES: Mapping[str, Mapping[str, float]] = MappingProxyType({"long": {"ponytail": 0.4}, "short": {"bob": 0.65}})
+_CURLY, _CURLY_OF_DARK, _DARK = 0.08, 0.5, 0.42  # shares of short hair; skin darker than _DARK on average is dark
 _BEARDS, _BALD, _CROPPED = 0.4, 0.25, 0.9  # shares of men, and of those with short hair below a volume of 0.9
 
 
@@ -156,7 +176,8 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     colour is as frequent as in the shares, few people of a scene have the same one, and an additional person does not
     change the looks of the others. At 1 all wear the same uniform; skin, hair and body remain individual. In between,
     colours and widths are mixed in proportion, and every cut or pattern switches to the uniform at a separate value,
-    drawn once for the scene. So the looks of any two people come closer as ``look_alike`` grows.
+    drawn once for the scene. Hats and bags, and their colours, belong to the uniform; glasses and masks are individual,
+    as hair is. So the looks of any two people come closer as ``look_alike`` grows.
 
     Args:
         seed: seed of the scene.
@@ -170,7 +191,9 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
     if not 0 <= look_alike <= 1:
         raise ValueError(f"look_alike must be from 0 to 1, got {look_alike}")
     start = stream(seed, "people", "hue").random()
-    uniform = draw_look(stream(seed, "people", "uniform"))
+    uniform = _with_accessories(
+        draw_look(stream(seed, "people", "uniform")), stream(seed, "people", "uniform", "accessories"), female=False
+    )
     changes = stream(seed, "people", "uniform", "changes").random(len(UNIFORM_CHOICES)) < look_alike
     looks = []
     for i in range(count):
@@ -178,6 +201,8 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
         look = draw_look(stream(seed, "people", i, "look"), female=female, place=float(start + i * _GOLDEN))
         if not female:
             look = _groomed(look, stream(seed, "people", i, "grooming"))
+        look = _styled(look, stream(seed, "people", i, "hair style"), female=female)
+        look = _with_accessories(look, stream(seed, "people", i, "accessories"), female=female)
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
@@ -191,6 +216,25 @@ def _groomed(look: Look, rng: np.random.Generator) -> Look:
         beard=0.25 + 0.75 * density if with_beard < _BEARDS else 0.0,
         bald=0.3 + 0.7 * extent if cropped and with_bald < _BALD else 0.0,
     )
+
+
+def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
+    """Return the look with a bob, a ponytail or curly hair in place of short or long hair; rates are assumptions."""
+    of_women, curls = rng.random(2).tolist()
+    if look.hair_style == "short" and not look.bald:
+        dark = sum(look.skin) / 3 < _DARK
+        if curls < (_CURLY_OF_DARK if dark else _CURLY):
+            return replace(look, hair_style="curly")
+    if female:
+        for style, share in _STYLES.get(look.hair_style, {}).items():
+            if of_women < share:
+                return replace(look, hair_style=style)
+    return look
+
+
+def _with_accessories(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
+    """Return the look with accessories drawn from a random stream."""
+    return replace(look, **asdict(draw_accessories(rng, female=female)))
 
 
 def _toward(look: Look, uniform: Look, share: float, changes: list[bool]) -> Look:

@@ -16,6 +16,7 @@ from simharness.world.humans.clothing import dress, paint
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look
+from simharness.world.humans.wearing import wear
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
@@ -26,9 +27,10 @@ class Person:
     """One person in the rest pose. Several scenes may share it, so its arrays are never changed.
 
     Attributes:
-        look: clothes and hair.
-        body: dressed body.
-        mover: kinematics of the body. Poses are computed in its MuJoCo data, so threads must not share it.
+        look: clothes, hair and accessories.
+        body: dressed body with accessories.
+        mover: kinematics of the body without accessories. Poses are computed in its MuJoCo data, so threads must not
+            share it.
     """
 
     look: Look
@@ -54,7 +56,7 @@ class Person:
 def make_person(shape: Shape, look: Look) -> Person:
     """Return the person of a shape and look, made once in a process."""
     body = dress(make_body(shape), look)
-    return Person(look, body, Kinematics(body))
+    return Person(look, wear(body, look), Kinematics(body))
 
 
 @lru_cache(maxsize=_KEPT)

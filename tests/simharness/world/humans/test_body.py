@@ -120,7 +120,7 @@ def test_volume_of_a_tetrahedron():
 
 def test_every_part_is_shown_on_both_sides(body):
     middle = body.vertices[body.faces].mean(1)
-    for part in set(FacePart) - {FacePart.SKIRT}:
+    for part in set(FacePart) - {FacePart.SKIRT} - {part for part in FacePart if part >= FacePart.GLASSES}:
         centers = middle[body.part == part]
         assert (centers[:, 1] > 0).sum() == pytest.approx((centers[:, 1] < 0).sum(), rel=0.1), part
         assert len(centers) > 10, part

@@ -7,7 +7,7 @@ from simharness.types.random_streams import stream
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import Garment, dress, face_colors, garments, paint
 from simharness.world.humans.shape import Shape
-from simharness.world.humans.wardrobe import HEMS, LEGS, SLEEVES, draw_look
+from simharness.world.humans.wardrobe import HAIR_STYLES, HEMS, LEGS, SLEEVES, draw_look
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_wide_trousers_lie_on_the_shoe(body, look):
 
 
 @pytest.mark.parametrize("lower_garment", ["trousers", "skirt", "dress", "coat"])
-@pytest.mark.parametrize("hair_style", ["short", "long", "bun"])
+@pytest.mark.parametrize("hair_style", HAIR_STYLES)
 def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, lower_garment, hair_style):
     dressed = dress(body, replace(look, lower_garment=lower_garment, hair_style=hair_style))
     pose = np.tile(np.eye(3, 4), (len(body.bones), 1, 1))
@@ -122,7 +122,7 @@ def test_dressing_moves_no_joint_and_keeps_all_faces(body, look, lower_garment, 
     np.testing.assert_array_equal(dressed.part[: len(body.part)], body.part)
     added = dressed.part[len(body.part) :]
     assert (FacePart.SKIRT in added) == (lower_garment != "trousers")
-    assert (FacePart.SCALP in added) == (hair_style != "short")
+    assert (FacePart.SCALP in added) == (hair_style not in ("short", "curly"))
     assert dressed.vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
     np.testing.assert_allclose(dressed.skin(pose), dressed.vertices, atol=1e-5)
 

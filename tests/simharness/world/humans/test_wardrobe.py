@@ -20,6 +20,7 @@ from simharness.world.humans.wardrobe import (
 )
 
 INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style", "beard", "bald")
+INDIVIDUAL += ("glasses", "frame_color", "mask", "mask_color")
 
 
 def distance(a, b):
@@ -129,6 +130,8 @@ def test_skirts_are_worn_by_women_only():
         ("repeats", 7),
         ("lower_garment", "kilt"),
         ("top_pattern", "dots"),
+        ("hat", "crown"),
+        ("bag", "trunk"),
     ],
 )
 def test_an_impossible_look_is_refused(key, value):

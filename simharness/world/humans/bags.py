@@ -1,0 +1,134 @@
+"""Meshes of a backpack and of a shoulder bag, with their straps.
+
+Straps are taut: they lie on the convex hull of the trunk in a plane, and move with the skin below them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mvpose.arrays import Floats
+from simharness.world.humans.added_mesh import AddedMesh, attached, grid, hull, rigid
+from simharness.world.humans.body import Body, FacePart
+
+_TORSO = 0.57  # height of an adult's neck over the hips, metres
+_PACK = np.array([0.15, 0.29, 0.42])  # depth, width, height of a backpack for an adult, metres
+_BAG = np.array([0.29, 0.09, 0.22])  # length, depth, height of a shoulder bag, metres
+_STRAP = 0.036  # width of a strap, metres
+_OVER, _SIDES = 0.005, 0.014  # height of straps over the clothes, and depth of their sides, metres
+_APART = 0.085  # distance of the straps of a backpack from the middle, metres
+
+
+def backpack(body: Body) -> list[AddedMesh]:
+    """Make a backpack with a pocket and two straps."""
+    trunk, rows, scale = _trunk(body)
+    neck = body.heads[body.index("Neck")]
+    depth, width, height = scale * _PACK
+    top = neck[2] - 0.02 * scale
+    behind = trunk[(np.abs(trunk[:, 1]) < 0.4 * width) & (trunk[:, 2] < top) & (trunk[:, 2] > top - 0.7 * height)]
+    back = float(behind[:, 0].min())
+    middle = np.array([back - 0.5 * depth + 0.012, 0.0, top - 0.5 * height])
+    pocket = middle + [-0.5 * depth, 0.0, -0.2 * height]
+    boxes = [
+        _rounded_box(middle, np.array([depth, width, height]) / 2),
+        _rounded_box(pocket, np.array([0.3 * depth, 0.72 * width, 0.42 * height]) / 2),
+    ]
+    straps = [_shoulder_strap(trunk, side, middle, height, neck, scale) for side in (1.0, -1.0)]
+    return [rigid(body, "Spine1", boxes, FacePart.BAG), attached(body, straps, FacePart.STRAP, to=rows)]
+
+
+def _shoulder_strap(
+    trunk: Floats, side: float, middle: Floats, height: float, neck: Floats, scale: float
+) -> tuple[Floats, NDArray[np.int32]]:
+    """Return one strap: from the top of the pack over the shoulder and under the arm to the bottom of the pack."""
+    over = np.radians(np.linspace(165, -28, 12))
+    low, edges = neck[2] - 0.13 * scale, []
+    core = np.array([float(np.median(trunk[:, 0])), low])
+    for shift in (0.5 * _STRAP, -0.5 * _STRAP):
+        y = side * scale * (_APART + shift)
+        slab = trunk[(np.abs(trunk[:, 1] - y) < 0.018) & (trunk[:, 2] > low - 0.12 * scale)]
+        reach = hull(slab[:, [0, 2]] - core, over) + _OVER
+        line = core + reach[:, None] * np.column_stack([np.cos(over), np.sin(over)])
+        edges.append(np.column_stack([line[:, 0], np.full(len(line), y), line[:, 1]]))
+    front = 0.5 * (edges[0][-1] + edges[1][-1])
+    start = np.arctan2(abs(front[1]), front[0] - core[0])
+    under = np.linspace(start, np.radians(150), 6)
+    heights = np.linspace(front[2], middle[2] - 0.28 * height, len(under))
+    for edge, shift in enumerate((0.4 * _STRAP, -0.4 * _STRAP)):
+        line = []
+        for bearing, z in zip(under, heights + shift, strict=True):
+            slab = trunk[np.abs(trunk[:, 2] - z) < 0.02]
+            fan = np.array([bearing - 0.35, bearing - 0.17, bearing, bearing + 0.17, bearing + 0.35])
+            away = float(hull((slab[:, :2] - [core[0], 0.0]) * [1, side], fan)[2]) + _OVER
+            line.append([core[0] + away * np.cos(bearing), side * away * np.sin(bearing), z])
+        edges[edge] = np.concatenate([edges[edge], line[1:]])
+    return _band(edges[0], edges[1], np.array([core[0], side * 0.6 * _APART * scale, low]), closed=False)
+
+
+def shoulder_bag(body: Body) -> list[AddedMesh]:
+    """Make a bag on the right hip whose strap crosses the trunk to the left shoulder."""
+    trunk, rows, scale = _trunk(body, lower=(FacePart.SKIRT, FacePart.LEG))
+    neck, hip = body.heads[body.index("Neck")], body.heads[body.index("RightUpLeg")]
+    low = hip[2] + 0.02 * scale
+    length, depth, height = scale * _BAG
+    around = trunk[np.abs(trunk[:, 2] - low) < 0.5 * height]
+    ahead = float(np.median(around[:, 0])) - 0.05 * scale
+    side = float(around[np.abs(around[:, 0] - ahead) < 0.3 * length, 1].min())
+    middle = np.array([ahead, side - 0.5 * depth + 0.02, low])
+    upper, lower = np.array([0.0, 0.06 * scale, neck[2]]), np.array([0.0, side, low + 0.3 * height])
+    up = (upper - lower) / np.linalg.norm(upper - lower)
+    across = np.array([0.0, up[2], -up[1]])
+    center = 0.5 * (upper + lower) + [middle[0] + 0.05 * scale, 0.0, 0.0]
+    local = trunk - center
+    plane = np.column_stack([local[:, 0], local @ up])
+    bearing = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    edges = []
+    for shift in (0.5 * _STRAP, -0.5 * _STRAP):
+        slab = plane[np.abs(local @ across - shift) < 0.018]
+        slab = slab[slab[:, 1] > (lower - center) @ up]
+        reach = hull(slab, bearing) + _OVER
+        line = reach[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+        edges.append(center + shift * across + line[:, :1] * [1.0, 0.0, 0.0] + line[:, 1:] * up)
+    strap = _band(edges[0], edges[1], center, closed=True)
+    box = _rounded_box(middle, np.array([length, depth, height]) / 2)
+    flap = _rounded_box(middle + [0, -0.08 * depth, 0.2 * height], np.array([1.03 * length, depth, 0.66 * height]) / 2)
+    return [
+        rigid(body, "Hips", [box, flap], FacePart.BAG),
+        attached(body, [strap], FacePart.STRAP, to=rows),
+    ]
+
+
+def _trunk(body: Body, lower: tuple[FacePart, ...] = ()) -> tuple[Floats, NDArray[np.int64], float]:
+    """Return the vertices of the trunk (n, 3), their rows in the body (n,), and the size relative to an adult."""
+    rows = np.unique(body.faces[np.isin(body.part, [FacePart.TORSO, *lower])]).astype(np.int64)
+    height = body.heads[body.index("Neck"), 2] - body.heads[body.index("LeftUpLeg"), 2]
+    return body.vertices[rows].astype(float), rows, float(height) / _TORSO
+
+
+def _band(first: Floats, second: Floats, core: Floats, *, closed: bool) -> tuple[Floats, NDArray[np.int32]]:
+    """Return a strap between two edges (c, 3), with sides that reach into the clothes towards a point ``core`` (3,)."""
+    inner = [edge + _SIDES * _unit(core - edge) for edge in (first, second)]
+    return np.concatenate([inner[0], first, second, inner[1]]), grid(4, len(first), closed=closed)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def _rounded_box(middle: Floats, half: Floats) -> tuple[Floats, NDArray[np.int32]]:
+    """Return a box with rounded edges, a superellipsoid, of half sizes (3,)."""
+    up = np.linspace(np.pi / 2, -np.pi / 2, 8)
+    around = np.linspace(0, 2 * np.pi, 12, endpoint=False) + np.pi / 4
+    wide, high = _power(np.cos(up)), _power(np.sin(up))
+    ball = np.stack(
+        np.broadcast_arrays(
+            wide[:, None] * _power(np.cos(around)), wide[:, None] * _power(np.sin(around)), high[:, None]
+        ),
+        axis=-1,
+    )
+    return middle + half * ball.reshape(-1, 3), grid(8, 12, closed=True)
+
+
+def _power(value: Floats) -> Floats:
+    return np.sign(value) * np.abs(value) ** 0.45

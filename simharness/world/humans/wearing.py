@@ -1,0 +1,67 @@
+"""Accessories on a dressed body: their meshes come after all others, so they can be taken off again.
+
+Kinematics, capsules and collisions are those of the body without accessories: people move as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from simharness.world.humans.added_mesh import add_mesh
+from simharness.world.humans.bags import backpack, shoulder_bag
+from simharness.world.humans.body import Body, FacePart
+from simharness.world.humans.clothing_colors import Color
+from simharness.world.humans.head_wear import glasses, hat, mask
+from simharness.world.humans.wardrobe import Look, mix
+
+_LENS: Color = (0.05, 0.05, 0.06)
+
+
+def wear(body: Body, look: Look) -> Body:
+    """Return a dressed body with the meshes of the accessories of its look; joints do not move."""
+    meshes = []
+    if look.glasses != "none":
+        meshes += glasses(body, kind=look.glasses)
+    if look.mask != "none":
+        meshes += mask(body)
+    if look.hat != "none":
+        meshes += hat(body, kind=look.hat)
+    if look.bag != "none":
+        meshes += (backpack if look.bag == "backpack" else shoulder_bag)(body)
+    for mesh in meshes:
+        body = add_mesh(body, mesh)
+    return body
+
+
+def take_off(body: Body) -> Body:
+    """Return the body without accessories: the inverse of :func:`wear`."""
+    worn = body.part >= FacePart.GLASSES
+    if not worn.any():
+        return body
+    k = int(np.argmax(worn))
+    n = int(body.faces[worn].min())
+    return replace(
+        body,
+        vertices=body.vertices[:n],
+        faces=body.faces[:k],
+        part=body.part[:k],
+        level=body.level[:k],
+        weight_bones=body.weight_bones[:n],
+        weights=body.weights[:n],
+    )
+
+
+def accessory_colors(look: Look) -> Mapping[FacePart, Color]:
+    """Return the colour of the faces of every kind of accessory."""
+    return {
+        FacePart.GLASSES: look.frame_color,
+        FacePart.LENS: _LENS,
+        FacePart.HAT: look.hat_color,
+        FacePart.HAT_BAND: mix(look.hat_color, (0.05, 0.05, 0.05), 0.6),
+        FacePart.MASK: look.mask_color,
+        FacePart.BAG: look.bag_color,
+        FacePart.STRAP: mix(look.bag_color, (0.05, 0.05, 0.05), 0.35),
+    }
