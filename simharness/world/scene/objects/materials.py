@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mvpose.arrays import Floats
+from mvpose.checks import seal
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.prints import PRINTS
 from simharness.world.scene.rooms.noise import smooth_noise
@@ -86,6 +87,7 @@ def _packed(pictures: Mapping[str, Floats]) -> Sheet:
         rows = slice(patch.top - _BORDER, patch.top + patch.height + _BORDER)
         columns = slice(patch.left - _BORDER, patch.left + patch.width + _BORDER)
         texture[rows, columns] = np.round(255 * np.clip(bordered, 0, 1))
+    seal(texture)  # all meshes share it: renderers pack it once
     return Sheet(texture, MappingProxyType(patches))
 
 

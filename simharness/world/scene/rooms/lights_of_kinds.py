@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mvpose.checks import seal
 from simharness.scenario.sections.room import Room
 from simharness.types.light_sources import AreaLight, Vector
 from simharness.types.random_streams import stream
@@ -176,7 +177,9 @@ def draw_view(seed: int) -> NDArray[np.uint8]:
         1 + 0.08 * smooth_noise(rng, shape, 64, across=8)[horizon:, :, None]
     )
     soft = cv2.GaussianBlur(np.concatenate([picture[:, -64:], picture, picture[:, :64]], axis=1), (0, 0), 3.0)
-    return np.asarray(np.round(255 * np.clip(soft[:, 64:-64], 0, 1)), np.uint8)
+    view = np.round(255 * np.clip(soft[:, 64:-64], 0, 1)).astype(np.uint8)
+    seal(view)  # all windows share it: renderers pack it once
+    return view
 
 
 def _vector(values: NDArray[np.float64]) -> Vector:
