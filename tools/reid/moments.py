@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mvpose.arrays import Floats
 from mvpose.camera import Camera
-from simharness.scenario.sections.room import Room
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.scene.objects.geoms import Box
@@ -18,8 +17,8 @@ from simharness.world.scene.placement.clutter import CLUTTER_KINDS
 from tools.reid.filming_sites import Site
 from tools.reid.identities import DressedPerson
 from tools.reid.poses import Poses, place_body
+from tools.reid.site_rooms import REACH
 
-_REACH = 1.5  # half the side of the square in which people stand, metres
 _APART = 0.7  # least distance between the centres of two people, metres: they often occlude each other
 _BESIDE = 0.35  # least distance from the centre of a person to an object, metres
 _LENS = 0.9  # radius around a camera without people and objects, metres
@@ -61,14 +60,14 @@ def make_moment(key: Sequence[str | int], people: Sequence[DressedPerson], *, po
         bones, skin = place_body(person.body, poses.turns[pose], position, angle)
         meshes.append(person.mesh.moved(skin))
         joints.append(person.body.joints(bones))
-    objects = _object_meshes(rng, site.room, positions, site.cameras)
+    objects = _object_meshes(rng, site, positions)
     return Moment(meshes=(*meshes, *site.meshes, *objects), joints=np.stack(joints), facing=facing)
 
 
 def _standing_positions(rng: np.random.Generator, count: int, cameras: Sequence[Camera]) -> Floats:
     """Draw the positions of people, (P, 2) metres, apart from each other and from the cameras."""
     lenses = np.stack([camera.center[:2] for camera in cameras])
-    candidates, positions = rng.uniform(-_REACH, _REACH, (_TRIES, count, 2)), np.zeros((0, 2))
+    candidates, positions = rng.uniform(-REACH, REACH, (_TRIES, count, 2)), np.zeros((0, 2))
     for person in range(count):
         away = np.linalg.norm(candidates[:, person, None] - positions, axis=2).min(axis=1, initial=np.inf)
         clear = np.linalg.norm(candidates[:, person, None] - lenses, axis=2).min(axis=1) > _LENS
@@ -77,19 +76,24 @@ def _standing_positions(rng: np.random.Generator, count: int, cameras: Sequence[
     return positions
 
 
-def _object_meshes(rng: np.random.Generator, room: Room, positions: Floats, cameras: Sequence[Camera]) -> list[Mesh]:
-    """Draw objects near people, more often between them and the cameras than elsewhere."""
-    lenses = np.stack([camera.center for camera in cameras])
+def _object_meshes(rng: np.random.Generator, site: Site, positions: Floats) -> list[Mesh]:
+    """Draw objects near people, more often between them and the cameras than elsewhere.
+
+    The meshes are not still, as those of other moments are not the same: the light of the room is computed without
+    them, and once.
+    """
+    lenses = np.stack([camera.center for camera in site.cameras])
     on_floor = np.column_stack([positions, np.zeros(len(positions))])
-    meshes, taken = [], list[Box]()
+    meshes, taken = [], list(site.furniture)
     for _ in range(rng.integers(*_OBJECTS)):
         kind = CLUTTER_KINDS[rng.integers(len(CLUTTER_KINDS))]
-        model = kind.draw(rng, room)
+        model = kind.draw(rng, site.room)
         placement = _free_placement(rng, model, on_floor, lenses, taken)
         if placement is not None:
             box, position, yaw = placement
             taken.append(box)
-            meshes.append(model.at(position, yaw, kind="clutter", name=kind.name).mesh)
+            solid = model.at(position, yaw, kind="clutter", name=kind.name)
+            meshes.append(replace(solid.mesh, still=False))
     return meshes
 
 

@@ -48,6 +48,7 @@ class Network(nn.Module):
             Block(one, one, 1),
             Block(one, two, 2),
             Block(two, three, 2),
+            Block(three, three, 1),
         )
         self.descriptor = nn.Sequential(
             nn.Linear((BANDS + 1) * three, DIMENSIONS, bias=False), nn.BatchNorm1d(DIMENSIONS)
@@ -55,7 +56,10 @@ class Network(nn.Module):
 
     def forward(self, crops: Tensor) -> Tensor:
         """Map normalised crops (n, 3, 128, 64) to unit descriptors (n, 192)."""
-        features = self.trunk(crops)
+        return self.describe(self.trunk(crops))
+
+    def describe(self, features: Tensor) -> Tensor:
+        """Map features of the trunk (n, 128, 8, 4) to unit descriptors (n, 192)."""
         bands = [band.mean(dim=(2, 3)) for band in features.chunk(BANDS, dim=2)]
         pooled = torch.cat([*bands, features.amax(dim=(2, 3))], dim=1)
         return functional.normalize(self.descriptor(pooled), dim=1)

@@ -16,6 +16,7 @@ _TRAINING_LOOK_ALIKE = (0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 _AT_A_SITE = 10  # training groups per site
+_AT_A_VALIDATION_SITE, _AT_A_SCENE_SITE = 5, 3  # groups per site of the affinity and of the look_alike curve
 _SAMPLE = 10  # groups in the sample
 
 # In training the sensors differ by more and by less than in the evaluation, and people are occluded a little more.
@@ -61,7 +62,14 @@ class Plan:
     @property
     def validation_job(self) -> RenderJob:
         """Crops for the fit of the affinity, of people dressed somewhat alike, as is usual in real scenes."""
-        people = groups("validation", self.seed, self.validation, size=4, look_alike=(0.0, 0.25, 0.5))
+        people = groups(
+            "validation",
+            self.seed,
+            self.validation,
+            size=4,
+            look_alike=(0.0, 0.25, 0.5),
+            at_a_site=_AT_A_VALIDATION_SITE,
+        )
         return RenderJob(people, Recipe())
 
     def held_out_job(self, site: int) -> RenderJob:
@@ -77,5 +85,12 @@ class Plan:
 
     def curve_job(self, look_alike: float) -> RenderJob:
         """Return the crops of scenes of held-out people with one value of ``look_alike``."""
-        people = groups("held-out", self.seed, self.curve, size=self.curve_size, look_alike=(look_alike,))
+        people = groups(
+            "held-out",
+            self.seed,
+            self.curve,
+            size=self.curve_size,
+            look_alike=(look_alike,),
+            at_a_site=_AT_A_SCENE_SITE,
+        )
         return RenderJob(people, _SCENES)

@@ -54,7 +54,8 @@ def train(
     The loss is the sum of a softmax over the training identities with an additive margin (Wang et al., "CosFace", CVPR
     2018) and the triplet loss with the hardest positive and negative of each crop in its batch (Hermans et al., "In
     defense of the triplet loss", 2017). A batch has several people of the same group, so that it contains people
-    dressed alike.
+    dressed alike. The convolutions run in bfloat16 where the processor has instructions for it; the descriptors and
+    losses stay in float32.
 
     Args:
         crops: training crops.
@@ -66,6 +67,7 @@ def train(
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    short = device.type == "cuda" or _multiplies_short_numbers()
     identity = torch.from_numpy(crops.identity)
     network = Network().to(device)
     for weights in network.parameters():
@@ -88,7 +90,9 @@ def train(
         for rows in batches.epoch(epoch):
             batch = augment(images[rows], augmentation).to(device, memory_format=torch.channels_last)
             labels = identity[rows].to(device)
-            descriptors = network(batch)
+            with torch.autocast(device.type, torch.bfloat16, enabled=short):
+                features = network.trunk(batch)
+            descriptors = network.describe(features.float())
             losses = margin_loss(descriptors, centers, labels), triplet_loss(descriptors, labels)
             optimizer.zero_grad(set_to_none=True)
             torch.stack(losses).sum().backward()
@@ -98,6 +102,11 @@ def train(
         identities, triplets = (sums / len(batches)).tolist()
         report(Progress(epoch + 1, epochs, identities, triplets, time.perf_counter() - start))
     return network.cpu().eval()
+
+
+def _multiplies_short_numbers() -> bool:
+    """Return whether the CPU multiplies matrices of bfloat16 (AMX), twice as fast for these convolutions."""
+    return bool(torch.cpu.get_capabilities().get("amx_bf16", False))
 
 
 class Batches:
@@ -179,8 +188,8 @@ def augment(images: Tensor, generator: torch.Generator) -> Tensor:
     light = functional.grid_sample(light - fill, grid, align_corners=False) + fill
 
     # Change tint, brightness and contrast.
-    gain = torch.exp(0.10 * normal[4])[:, None] * torch.exp(
-        torch.stack([0.06 * normal[5], torch.zeros(n), 0.06 * normal[6]], 1)
+    gain = torch.exp(0.12 * normal[4])[:, None] * torch.exp(
+        torch.stack([0.08 * normal[5], torch.zeros(n), 0.08 * normal[6]], 1)
     )
     light = light * gain[:, :, None, None]
     middle = light.mean(dim=(1, 2, 3), keepdim=True)
