@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mvpose.checks import as_array
+from simharness.types.finish import Finish
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,13 @@ class Mesh:
         emission: radiance that the surface sends out, linear RGB, multiplied by ``colors`` and ``texture``: what a
             picture shows of a lamp or a window. It lights nothing else (that is an
             :class:`~simharness.types.light_sources.AreaLight`), and only lighting with ``sources`` shows it.
+        finish: materials of the faces, and grain of hair and cloth. It changes colours alone, of moving meshes, in
+            lighting with ``sources``; None for a matte surface.
 
     Raises:
         ValueError: a wrong shape, a vertex or texture coordinate that is not finite, a face that refers to a missing
-            vertex, a colour outside 0..1, a texture without pixels, an emission below 0, or one of ``texture`` and
-            ``uv`` alone.
+            vertex, a colour outside 0..1, a texture without pixels, an emission below 0, one of ``texture`` and
+            ``uv`` alone, or a finish of another number of faces or vertices.
     """
 
     vertices: NDArray[np.float32]
@@ -48,6 +51,7 @@ class Mesh:
     parts: NDArray[np.int8] | None = None
     still: bool = False
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    finish: Finish | None = None
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, "n")
@@ -81,6 +85,13 @@ class Mesh:
             object.__setattr__(self, "parts", parts)
         if len(self.emission) != 3 or not all(0 <= value < np.inf for value in self.emission):
             raise ValueError(f"mesh emission must be three numbers of at least 0, got {self.emission}")
+        if self.finish is not None:
+            counts = len(self.finish.materials), len(self.finish.toward)
+            if counts != (len(faces), len(vertices)):
+                raise ValueError(
+                    f"the finish of a mesh of {len(faces)} faces and {len(vertices)} vertices must have as many, got "
+                    f"{counts[0]} and {counts[1]}: make it from the body that the mesh shows"
+                )
 
     def moved(self, vertices: ArrayLike) -> Self:
         """Return the mesh with other vertex positions, (n, 3); it is not ``still``.

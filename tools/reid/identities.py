@@ -14,7 +14,8 @@ from typing import Literal
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
-from simharness.world.humans.clothing import dress, paint
+from simharness.world.humans.clothing import dress
+from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.wardrobe import Look, draw_looks
 from simharness.world.humans.wearing import wear
@@ -107,6 +108,4 @@ def dressed_people(group: Group, people: Iterable[int]) -> tuple[DressedPerson, 
 def _dressed_person(seed: int, person: int, look: Look) -> DressedPerson:
     shape = draw_shape(stream(seed, "people", person, "shape"), child=is_child(seed, person, CHILDREN))
     body = wear(dress(make_body(shape), look), look)
-    surface = paint(body, look)
-    mesh = Mesh(body.vertices, body.faces, surface.colors, smooth=True, texture=surface.texture, uv=surface.uv)
-    return DressedPerson(seed, person, body, mesh)
+    return DressedPerson(seed, person, body, figure_mesh(body, look))

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
+from simharness.capture.rendering.finish_kernels import finish
 from simharness.capture.rendering.shading_kernels import STRIDE, gather
 
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
@@ -38,6 +39,14 @@ def shade_lit(
     corner_samples: np.ndarray,
     divisions: np.ndarray,
     first_face: int,
+    first_vertex: int,
+    material: np.ndarray,
+    figure: np.ndarray,
+    lights: np.ndarray,
+    pixel: np.ndarray,
+    grain: np.ndarray,
+    place: np.ndarray,
+    around: float,
     curve: np.ndarray,
     brightest: float,
     rgb: np.ndarray,
@@ -62,6 +71,14 @@ def shade_lit(
         corner_samples: samples of the faces from ``first_face`` on, (m, 3); see :class:`.light_samples.LightSamples`.
         divisions: divisions of these faces, (m,).
         first_face: first face to colour.
+        first_vertex: first vertex of the faces to colour.
+        material: see :func:`.finish_kernels.finish`, as all arguments up to ``around``; empty: all is matte.
+        figure: mesh of these faces.
+        lights: light around the meshes.
+        pixel: size of a pixel at each mesh.
+        grain: grain of the vertices.
+        place: place in the pattern of the grain.
+        around: period of the pattern of hair.
         curve: tone curve, see :func:`.tone.table`.
         brightest: light of its last entry.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
@@ -71,6 +88,7 @@ def shade_lit(
     received, weights = np.empty((3, width), np.float32), np.empty((2, width), np.float32)
     index, edge, across = np.empty((3, width), np.int32), np.zeros((3, 3)), np.zeros((3, 3))
     steps, mixed = np.empty((2, STRIDE), np.int32), np.empty(STRIDE, np.uint64)
+    gloss, work = np.zeros(width, np.float32), np.zeros((5, width), np.float32)
     top = np.float32(len(curve) - 1)
     scale = np.float32(top * top / brightest)
     for y in range(height):
@@ -90,11 +108,16 @@ def shade_lit(
                 pyramids, rays, edge, across, steps, mixed, albedo, normal, weights,
             )  # fmt: skip
             _received(line, first, last, weights, emission, light, corner_samples, divisions, first_face, received)
+            if len(material):
+                finish(
+                    line, y, first, last, first_face, faces, first_vertex, rays, normal, weights, material, figure,
+                    lights, pixel, grain, place, around, work, received, gloss,
+                )  # fmt: skip
             for k in range(3):
-                dyes, lights, indices = albedo[k], received[k], index[k]
+                dyes, brought, indices = albedo[k], received[k], index[k]
                 for x in range(first, last):
                     dye = dyes[x]
-                    value = lights[x] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN))
+                    value = brought[x] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN) + gloss[x])
                     indices[x] = np.int32(min(np.float32(math.sqrt(scale * max(value, _ZERO))), top) + np.float32(0.5))
             red, green, blue = index[0], index[1], index[2]
             for x in range(first, last):

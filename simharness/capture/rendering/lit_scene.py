@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
+from simharness.capture.rendering.finishes import MATTE, Finishes, PosedFinishes
 from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
 from simharness.capture.rendering.occlusion_kernels import capsules, cast, moving_light, touched_blocks
 from simharness.capture.rendering.room_light import LUMINANCE, RoomLight, last_light, room_light
@@ -184,6 +186,18 @@ class LitScene:
         )  # fmt: skip
 
     @cached_property
+    def _finishes(self) -> PosedFinishes | None:
+        """Finishes of the moving meshes; None if all are matte."""
+        topology = self.geometry.topology
+        if "_finishes" not in topology.__dict__:
+            topology.__dict__["_finishes"] = Finishes.of(topology.meshes[len(self.geometry.still.meshes) :])
+        finishes: Finishes | None = topology.__dict__["_finishes"]
+        if finishes is None:
+            return None
+        vertices = self.geometry.moving_vertices
+        return PosedFinishes.of(finishes, vertices, self._moving[0], self.lighting, self.room.probes)
+
+    @cached_property
     def shadows(self) -> ShadowLayers:
         """What the moving meshes keep from the still ones."""
         probes, sources, grid = self.room.probes, self.lighting.sources, Grid.of(self.room)
@@ -222,7 +236,7 @@ class LitScene:
             emission = still.topology.emission * self.room.exposure
             self._shade(
                 still.topology, (triangle, background.corners), still.normals, rays, emission, self.room.light,
-                samples.corner_samples, samples.divisions, 0, rgb,
+                samples.corner_samples, samples.divisions, (0, 0), MATTE, rgb,
             )  # fmt: skip
         block, (rows, columns) = _BLOCK * grid.cell, grid.blocks
         place = blocks_below(
@@ -251,10 +265,11 @@ class LitScene:
                 shadows.fine, shadows.coarse, _HEIGHTS, shadows.touched, tone.dimming(), rgb,
             )  # fmt: skip
         emission = topology.emission[first:] * self.room.exposure
-        divisions = np.ones(len(samples.corner_samples), np.int32)
+        divisions, finishes = np.ones(len(samples.corner_samples), np.int32), self._finishes
         self._shade(
             topology, (triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
-            samples.corner_samples, divisions, first, rgb,
+            samples.corner_samples, divisions, topology.still, MATTE if finishes is None else
+            finishes.arguments(camera, rays), rgb,
         )  # fmt: skip
         return rgb
 
@@ -268,13 +283,14 @@ class LitScene:
         light: Floats,
         corner_samples: NDArray[np.int32],
         divisions: NDArray[np.int32],
-        first: int,
+        first: tuple[int, int],
+        finish: tuple[Any, ...],
         rgb: NDArray[np.uint8],
     ) -> None:
         shade_lit(
             *seen, topology.faces, topology.colors, topology.smooth, *normals, topology.texture, topology.uv,
-            *topology.pyramids, rays, emission, light, corner_samples, divisions, first, tone.table(),
-            tone.BRIGHTEST, rgb,
+            *topology.pyramids, rays, emission, light, corner_samples, divisions, *first, *finish,
+            tone.table(), tone.BRIGHTEST, rgb,
         )  # fmt: skip
 
 

@@ -139,6 +139,7 @@ def _same_topology(one: Mesh, other: Mesh) -> bool:
         and one.smooth == other.smooth
         and one.still == other.still
         and one.emission == other.emission
+        and one.finish is other.finish
         and len(one.vertices) == len(other.vertices)
     )
 

@@ -31,7 +31,8 @@ class Garment(IntEnum):
     SOLE = 5
 
 
-_SCLERA: Color = (0.9, 0.9, 0.88)
+# In the shadow of lids and lashes, which the mesh does not cast: white paint here would glow in a dark face.
+_SCLERA: Color = (0.66, 0.62, 0.59)
 _SOLE: Color = (0.85, 0.85, 0.83)
 _DRAPE, _DRAPE_ROUNDS = 0.5, (6, 14)  # step of the smoothing, and its rounds for close-fitting and for wide clothes
 _WAIST = HEMS["tucked"]

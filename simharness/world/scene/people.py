@@ -12,7 +12,8 @@ from functools import cached_property, lru_cache
 from simharness.types.mesh import Mesh
 from simharness.types.random_streams import stream
 from simharness.world.humans.body import Body, make_body
-from simharness.world.humans.clothing import dress, paint
+from simharness.world.humans.clothing import dress
+from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look
@@ -40,16 +41,7 @@ class Person:
     @cached_property
     def figure(self) -> Mesh:
         """Visible mesh of body and clothing in the rest pose."""
-        coat = paint(self.body, self.look)
-        return Mesh(
-            vertices=self.body.vertices,
-            faces=self.body.faces,
-            colors=coat.colors,
-            smooth=True,
-            texture=coat.texture,
-            uv=coat.uv,
-            parts=self.body.segments,
-        )
+        return figure_mesh(self.body, self.look)
 
 
 @lru_cache(maxsize=_KEPT)

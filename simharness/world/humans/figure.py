@@ -1,0 +1,149 @@
+"""Visible mesh of a dressed body: its colours, what its surfaces are made of, and the grain of hair and cloth.
+
+Hair runs from the whorl at the crown over the head and down. Cloth folds across trunk and limbs; its pattern of folds
+lies at rest on the body, and is irregular in all directions, so that no fold is a ring.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mvpose.arrays import Floats
+from simharness.types.finish import Finish, Material
+from simharness.types.mesh import Mesh
+from simharness.world.humans.body import Body, FacePart, body_model
+from simharness.world.humans.clothing import Garment, garments, paint
+from simharness.world.humans.wardrobe import Look
+
+_OF_PART = {
+    FacePart.SKIN: Material.SKIN,
+    FacePart.HAND: Material.SKIN,
+    FacePart.LIPS: Material.SKIN,
+    FacePart.SCALP: Material.HAIR,
+    FacePart.BROW: Material.MATTE,
+    FacePart.SCLERA: Material.EYE,
+    FacePart.IRIS: Material.EYE,
+    FacePart.GLASSES: Material.PLASTIC,
+    FacePart.LENS: Material.PLASTIC,
+    FacePart.HAT: Material.MATTE,
+    FacePart.HAT_BAND: Material.MATTE,
+    FacePart.MASK: Material.MATTE,
+    FacePart.BAG: Material.LEATHER,
+    FacePart.STRAP: Material.MATTE,
+}
+_OF_GARMENT = {
+    Garment.TOP: Material.CLOTH,
+    Garment.TROUSERS: Material.CLOTH,
+    Garment.SHOE: Material.LEATHER,
+    Garment.SOLE: Material.MATTE,
+}
+_STRAND, _FOLD = 0.022, 0.055  # metres along hair and cloth over which their direction is measured
+_WHORL = (-0.045, 0.01, 0.0)  # metres from the crown: hair runs away from here
+_AROUND = 0.6  # metres around the head
+_WANDER = 0.011  # metres by which folds wander along the grain
+_SLANT = 0.35  # folds of limbs are not rings: they rise along the surface
+
+
+def figure_mesh(body: Body, look: Look) -> Mesh:
+    """Return the visible mesh of a body that wears a look, in the rest pose."""
+    surface = paint(body, look)
+    return Mesh(
+        vertices=body.vertices,
+        faces=body.faces,
+        colors=surface.colors,
+        smooth=True,
+        texture=surface.texture,
+        uv=surface.uv,
+        parts=body.segments,
+        finish=finish_of(body, look),
+    )
+
+
+def finish_of(body: Body, look: Look) -> Finish:
+    """Return the materials of a dressed body and the grain of its hair and cloth."""
+    materials = materials_of(body, look)
+    vertices = body.vertices.astype(float)
+    count = len(vertices)
+    toward, place = np.arange(count, dtype=np.int32), np.zeros(count, np.float32)
+    looseness = np.zeros(count, np.float32)
+    hair = np.unique(body.faces[materials == Material.HAIR])
+    if len(hair):
+        points = vertices[hair] - _crown(body)
+        toward[hair] = hair[_ahead(vertices[hair], _strands(points), _STRAND)]
+        place[hair] = _AROUND * (np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi) + 0.5)
+    cloth = np.unique(body.faces[materials == Material.CLOTH])
+    if len(cloth):
+        grain, place[cloth] = _cloth(body, cloth)
+        toward[cloth] = cloth[_ahead(vertices[cloth], grain, _FOLD)]
+        x, y, z = vertices[cloth].T
+        looseness[cloth] = (0.5 + 0.5 * look.fit) * (
+            0.75 + 0.35 * np.sin(29 * y + 14 * z) * np.sin(19 * x - 23 * z + 2)
+        )
+    rest = np.linalg.norm(vertices[toward] - vertices, axis=1)
+    return Finish(materials, toward, rest.astype(np.float32), place, looseness, _AROUND)
+
+
+def materials_of(body: Body, look: Look) -> NDArray[np.int8]:
+    """Return the :class:`~simharness.types.finish.Material` of every face of a body, (k,) int8.
+
+    What a person wears is made of cloth or leather; bare arms and legs, and all else of the body, of skin.
+    """
+    of_part = np.array([_OF_PART.get(part, Material.SKIN) for part in FacePart], np.int8)
+    of_garment = np.array([_OF_GARMENT.get(garment, Material.MATTE) for garment in Garment], np.int8)
+    worn = garments(body, look)
+    covered = np.isin(worn, list(_OF_GARMENT))
+    return np.where(covered, of_garment[worn], of_part[body.part]).astype(np.int8)
+
+
+def _crown(body: Body) -> Floats:
+    """Return the place of the whorl, (3,) metres."""
+    grown = len(body_model().faces)  # what follows are meshes of hair
+    scalp = body.vertices[np.unique(body.faces[:grown][body.part[:grown] == FacePart.SCALP])].astype(float)
+    return np.array([0.5 * (scalp[:, 0].min() + scalp[:, 0].max()), 0.0, scalp[:, 2].max()]) + _WHORL
+
+
+def _strands(points: Floats) -> Floats:
+    """Return the direction of hair at points relative to the whorl, (n, 3): away from it and, on the sides, down."""
+    away = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
+    away[:, 2] -= np.clip(-points[:, 2] / 0.1, 0, 2)
+    return _unit(away)
+
+
+def _cloth(body: Body, cloth: NDArray[np.int64]) -> tuple[Floats, NDArray[np.float32]]:
+    """Return the grain of cloth vertices, (n, 3) unit vectors down the trunk or along a limb, and their ``place``."""
+    points, part = body.vertices[cloth].astype(float), np.zeros(len(body.vertices), int)
+    part[body.faces] = body.part[:, None]
+    on_arm, left = part[cloth] == FacePart.ARM, points[:, 1] > 0
+    grain, place = np.tile([0.0, 0.0, -1.0], (len(points), 1)), -points[:, 2]
+    for side, on_side in (("Left", left), ("Right", ~left)):
+        shoulder, elbow, wrist = (body.heads[body.index(side + bone)] for bone in ("Arm", "ForeArm", "Hand"))
+        arm = on_arm & on_side
+        upper, lower = _unit(elbow - shoulder), _unit(wrist - elbow)
+        beyond = (points[arm] - elbow) @ (upper + lower) > 0
+        grain[arm] = np.where(beyond[:, None], lower, upper)
+        along = np.where(
+            beyond, np.linalg.norm(elbow - shoulder) + (points[arm] - elbow) @ lower, (points[arm] - shoulder) @ upper
+        )
+        place[arm] = along - shoulder[2]
+    x, y, z = points.T
+    place = place + _SLANT * (x + np.abs(y) * np.where(on_arm, 0.0, 1.0))
+    place += _WANDER * (2 * np.sin(23 * x + 17 * z + 1) * np.sin(27 * y - 11 * z) + np.sin(13 * x - 25 * y + 23 * z))
+    return grain, place.astype(np.float32)
+
+
+def _ahead(points: Floats, direction: Floats, distance: float) -> NDArray[np.int64]:
+    """Return the point that lies about a distance ahead of each in a direction, (n,): among its neighbours the best."""
+    _, near = cKDTree(points).query(points + distance * direction, k=min(4, len(points)))
+    near = near.reshape(len(points), -1)
+    way = points[near] - points[:, None]
+    length = np.linalg.norm(way, axis=2)
+    straight = (way * direction[:, None]).sum(axis=2) / np.maximum(length, 1e-9)
+    score = np.where(length > 0.3 * distance, straight - 2 * np.abs(length / distance - 1), -9.0)
+    best = near[np.arange(len(points)), score.argmax(axis=1)]
+    return np.where(score.max(axis=1) > -1.5, best, np.arange(len(points)))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
