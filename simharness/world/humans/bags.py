@@ -14,7 +14,9 @@ from simharness.world.humans.body import Body, FacePart
 
 _TORSO = 0.57  # height of an adult's neck over the hips, metres
 _PACK = np.array([0.15, 0.29, 0.42])  # depth, width, height of a backpack for an adult, metres
-_BAG = np.array([0.29, 0.09, 0.22])  # length, depth, height of a shoulder bag, metres
+_BAG = np.array([0.27, 0.085, 0.21])  # length, depth, height of a shoulder bag, metres
+_PUSHED = np.radians(30.0)  # angle by which a shoulder bag is pushed back from the side, so that the arm hangs free
+_PRESSED = 0.015  # depth by which a shoulder bag is pressed into the clothes, metres
 _STRAP = 0.036  # width of a strap, metres
 _OVER, _SIDES = 0.005, 0.014  # height of straps over the clothes, and depth of their sides, metres
 _APART = 0.085  # distance of the straps of a backpack from the middle, metres
@@ -67,36 +69,47 @@ def _shoulder_strap(
 
 
 def shoulder_bag(body: Body) -> list[AddedMesh]:
-    """Make a bag on the right hip whose strap crosses the trunk to the left shoulder."""
+    """Make a bag behind the right hip whose strap crosses the trunk to the left shoulder."""
     trunk, rows, scale = _trunk(body, lower=(FacePart.SKIRT, FacePart.LEG))
-    neck, hip = body.heads[body.index("Neck")], body.heads[body.index("RightUpLeg")]
-    low = hip[2] + 0.02 * scale
-    length, depth, height = scale * _BAG
-    around = trunk[np.abs(trunk[:, 2] - low) < 0.5 * height]
-    ahead = float(np.median(around[:, 0])) - 0.05 * scale
-    side = float(around[np.abs(around[:, 0] - ahead) < 0.3 * length, 1].min())
-    middle = np.array([ahead, side - 0.5 * depth + 0.02, low])
-    upper, lower = np.array([0.0, 0.06 * scale, neck[2]]), np.array([0.0, side, low + 0.3 * height])
-    up = (upper - lower) / np.linalg.norm(upper - lower)
+    size = scale * _BAG
+    low = body.heads[body.index("RightUpLeg"), 2] + 0.02 * scale
+    around = trunk[np.abs(trunk[:, 2] - low) < 0.5 * size[2]]
+    core = float(np.median(around[:, 0]))
+    shoulder = np.array([core, 0.06 * scale, body.heads[body.index("Neck"), 2]])
+    hip = np.array([core, around[:, 1].min(), low + 0.3 * size[2]])
+    return [
+        rigid(body, "Hips", _bag(around, np.array([core, 0.0, low]), size), FacePart.BAG),
+        attached(body, [_cross_strap(trunk, shoulder, hip)], FacePart.STRAP, to=rows),
+    ]
+
+
+def _bag(around: Floats, core: Floats, size: Floats) -> list[tuple[Floats, NDArray[np.int32]]]:
+    """Return the body and the flap of a bag of a size (3,) that lies on points around the hips (n, 3)."""
+    outward = np.array([-np.sin(_PUSHED), -np.cos(_PUSHED), 0.0])
+    along = np.array([-outward[1], outward[0], 0.0])
+    near = np.abs((around - core) @ along) < 0.35 * size[0]
+    middle = core + (((around[near] - core) @ outward).max() + 0.5 * size[1] - _PRESSED) * outward
+    axes = np.stack([along, -outward, [0.0, 0.0, 1.0]])
+    whole = _rounded_box(np.zeros(3), size / 2)
+    flap = _rounded_box(size * [0.0, -0.08, 0.2], size * [1.03, 1.0, 0.66] / 2)
+    return [(middle + points @ axes, faces) for points, faces in (whole, flap)]
+
+
+def _cross_strap(trunk: Floats, shoulder: Floats, hip: Floats) -> tuple[Floats, NDArray[np.int32]]:
+    """Return the strap around points on the trunk (n, 3) in the plane through shoulder and hip, both (3,)."""
+    up = (shoulder - hip) / np.linalg.norm(shoulder - hip)
     across = np.array([0.0, up[2], -up[1]])
-    center = 0.5 * (upper + lower) + [middle[0] + 0.05 * scale, 0.0, 0.0]
+    center = 0.5 * (shoulder + hip)
     local = trunk - center
     plane = np.column_stack([local[:, 0], local @ up])
     bearing = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     edges = []
     for shift in (0.5 * _STRAP, -0.5 * _STRAP):
-        slab = plane[np.abs(local @ across - shift) < 0.018]
-        slab = slab[slab[:, 1] > (lower - center) @ up]
+        slab = plane[(np.abs(local @ across - shift) < 0.018) & (plane[:, 1] > (hip - center) @ up)]
         reach = hull(slab, bearing) + _OVER
-        line = reach[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
-        edges.append(center + shift * across + line[:, :1] * [1.0, 0.0, 0.0] + line[:, 1:] * up)
-    strap = _band(edges[0], edges[1], center, closed=True)
-    box = _rounded_box(middle, np.array([length, depth, height]) / 2)
-    flap = _rounded_box(middle + [0, -0.08 * depth, 0.2 * height], np.array([1.03 * length, depth, 0.66 * height]) / 2)
-    return [
-        rigid(body, "Hips", [box, flap], FacePart.BAG),
-        attached(body, [strap], FacePart.STRAP, to=rows),
-    ]
+        forward, upward = reach * np.cos(bearing), reach * np.sin(bearing)
+        edges.append(center + shift * across + np.outer(forward, [1.0, 0.0, 0.0]) + np.outer(upward, up))
+    return _band(edges[0], edges[1], center, closed=True)
 
 
 def _trunk(body: Body, lower: tuple[FacePart, ...] = ()) -> tuple[Floats, NDArray[np.int64], float]:

@@ -18,6 +18,7 @@ from simharness.types.views import Visibility
 from simharness.world.humans.accessories import BAGS, GLASSES, HATS
 from simharness.world.humans.body import FacePart, make_body
 from simharness.world.humans.clothing import dress, face_colors
+from simharness.world.humans.mujoco_model import neutral_transforms
 from simharness.world.humans.population import draw_sex, draw_shape
 from simharness.world.humans.segments import Segment
 from simharness.world.humans.shape import Shape
@@ -189,3 +190,14 @@ def test_accessories_have_the_colours_of_the_look():
         (FacePart.MASK, look.mask_color),
     ):
         np.testing.assert_allclose(colors[body.part == part], np.tile(color, (np.sum(body.part == part), 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize("person", [1, 2, "child"])
+def test_an_arm_that_hangs_down_is_free_of_the_bag(person):
+    """Else the wrist of everybody with a shoulder bag would be hidden in the bag."""
+    body, look = worn(person, bag="shoulder")
+    pose = neutral_transforms(dressed(person, bag="shoulder")[0])
+    bag = body.skin(pose)[np.unique(body.faces[body.part == FacePart.BAG])]
+    wrist = body.joints(pose)[10]
+    assert np.linalg.norm(bag - wrist, axis=1).min() > body.joint_radii[10]
+    assert look.bag == "shoulder"
