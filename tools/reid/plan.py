@@ -38,13 +38,13 @@ class Plan:
     """
 
     seed: int = 0
-    training: int = 640
+    training: int = 800
     validation: int = 40
     held_out: int = 75
     sites: int = 4
     curve: int = 25
     curve_size: int = 12
-    epochs: int = 24
+    epochs: int = 26
 
     @classmethod
     def quick(cls, *, seed: int = 0) -> Plan:

@@ -24,7 +24,7 @@ MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 
 _SCALE, _MARGIN, _SMOOTHING = 24.0, 0.2, 0.05  # scale, margin and label smoothing of the softmax over identities
 _TRIPLET_MARGIN = 0.3
-_BATCH = (4, 3, 2, 4)  # sites, groups per site, people per group, crops per person
+_BATCH = (3, 4, 2, 4)  # sites, groups per site, people per group, crops per person
 _RATE, _DECAY = 2.5e-3, 0.02  # learning rate and weight decay
 
 
@@ -171,9 +171,10 @@ def augment(images: Tensor, generator: torch.Generator) -> Tensor:
     n, height, width = images.shape[:3]
     drawn = torch.rand((16, n), generator=generator)
     normal = torch.randn((7, n), generator=generator)
-    light = images.permute(0, 3, 1, 2).float() / 255
+    fill = torch.tensor(FILL).view(1, 3, 1, 1) / 255
+    light = torch.add(-fill, images.permute(0, 3, 1, 2), alpha=1 / 255)  # differences from the fill colour
 
-    # Mirror, shift and scale. Pixels outside the crop get the colour that normalisation maps to 0.
+    # Mirror, shift and scale. Pixels outside the crop get the fill colour, which normalisation maps to 0.
     turn = torch.where(drawn[0] < 0.5, -1.0, 1.0)
     zeros = torch.zeros(n)
     theta = torch.stack(
@@ -183,30 +184,32 @@ def augment(images: Tensor, generator: torch.Generator) -> Tensor:
         ],
         1,
     )
-    fill = torch.tensor(FILL).view(1, 3, 1, 1) / 255
     grid = functional.affine_grid(theta, [n, 3, height, width], align_corners=False)
-    light = functional.grid_sample(light - fill, grid, align_corners=False) + fill
+    light = functional.grid_sample(light, grid, align_corners=False)
 
-    # Change tint, brightness and contrast.
+    # Change tint, brightness and contrast about the mean: one factor and one summand for each crop and colour.
     gain = torch.exp(0.12 * normal[4])[:, None] * torch.exp(
         torch.stack([0.08 * normal[5], torch.zeros(n), 0.08 * normal[6]], 1)
     )
-    light = light * gain[:, :, None, None]
-    middle = light.mean(dim=(1, 2, 3), keepdim=True)
-    light = middle + (light - middle) * (0.8 + 0.4 * drawn[1])[:, None, None, None]
+    gain, contrast = gain[:, :, None, None], (0.8 + 0.4 * drawn[1])[:, None, None, None]
+    middle = (gain * (light.mean(dim=(2, 3), keepdim=True) + fill)).mean(dim=1, keepdim=True)
+    light = torch.addcmul(contrast * gain * fill + (1 - contrast) * middle, light, contrast * gain)
 
     # Cover a rectangle by a patch of another crop or by a uniform colour.
+    covered = torch.nonzero(drawn[6] < 0.4)[:, 0]
+    under, (tall, wide) = light[covered], (0.15 + 0.35 * drawn[2, covered], 0.25 + 0.5 * drawn[3, covered])
+    tall, wide = tall * height, wide * width
+    top, left = drawn[4, covered] * (height - tall), drawn[5, covered] * (width - wide)
     y, x = torch.arange(height)[None, :, None], torch.arange(width)[None, None, :]
-    tall, wide = (0.15 + 0.35 * drawn[2]) * height, (0.25 + 0.5 * drawn[3]) * width
-    top, left = drawn[4] * (height - tall), drawn[5] * (width - wide)
     patch = (y >= top[:, None, None]) & (y < (top + tall)[:, None, None])
-    patch = patch & (x >= left[:, None, None]) & (x < (left + wide)[:, None, None]) & (drawn[6] < 0.4)[:, None, None]
-    flat = drawn[8:11].T[:, :, None, None].expand_as(light)
-    cover = torch.where((drawn[7] < 0.6)[:, None, None, None], light.roll(n // 2 + 1, dims=0), flat)
-    light = torch.where(patch[:, None], cover, light).clamp(0, 1)
+    patch = patch & (x >= left[:, None, None]) & (x < (left + wide)[:, None, None])
+    flat = drawn[8:11, covered].T[:, :, None, None].expand_as(under)
+    other = light[(covered + n // 2) % n]
+    cover = torch.where((drawn[7, covered] < 0.6)[:, None, None, None], other, flat)
+    light[covered] = torch.where(patch[:, None], cover, under)
 
-    mean, std = (torch.tensor(values).view(3, 1, 1) for values in (MEAN, STD))
-    return (light - mean) / std
+    mean, std = (torch.tensor(values).view(1, 3, 1, 1) for values in (MEAN, STD))
+    return torch.addcmul(-mean / std, light.clamp_(0, 1), 1 / std)
 
 
 def export(network: Network, path: Path) -> None:
