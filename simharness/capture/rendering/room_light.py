@@ -25,6 +25,7 @@ _SURFACE_RAYS, _AIR_RAYS = 36, 64
 _BOUNCES = 4
 _CLOSE = 0.05  # metres: of samples in a cell of this size one is computed
 _TURN = 0.15  # metres that count as much as a turn of a radian
+_SAME_WAY, _SAME_PLANE = 1.5, 20.0  # the same, and what a metre out of the plane counts, for a place in a solid
 # Share of rays that meet the backs of surfaces: such a place is in a solid, and takes the light of its neighbours.
 _INSIDE = 0.25
 # Colours of scenes are those in full light, where white paint looks white: it reflects 85 %, worn and dusty less.
@@ -127,8 +128,11 @@ def _computed(
     sites = np.concatenate([places, _TURN * facing], axis=1)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     if inside.any() and not inside.all():
+        # A wall inside a window sill has the light of the wall, not of the sill or of the frame behind it.
+        height = (places * facing).sum(axis=1, keepdims=True)
+        alike = np.concatenate([places, _SAME_WAY * facing, _SAME_PLANE * height], axis=1)
         outside = np.flatnonzero(~inside)
-        nearest = outside[cKDTree(sites[outside]).query(sites[inside])[1]]
+        nearest = outside[cKDTree(alike[outside]).query(alike[inside])[1]]
         direct[inside], found[inside] = direct[nearest], found[nearest]
     light = direct
     for _ in range(_BOUNCES):
