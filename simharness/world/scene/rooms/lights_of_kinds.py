@@ -55,7 +55,7 @@ def lights_of(room: Room, seed: int, openings: Sequence[Opening]) -> tuple[AreaL
 def _window_light(opening: Opening, mood: Mood) -> AreaLight:
     (a, b), (low, high) = opening.span, opening.heights
     middle = opening.wall.at(((a + b) / 2, _IN_PLANE, (low + high) / 2))
-    along = -np.append(opening.wall.along, 0.0) * (b - a) / 2  # right x up looks into the room
+    along = np.append(opening.wall.along, 0.0) * (b - a) / 2  # right x up looks into the room
     return AreaLight(_vector(middle), _vector(along), (0.0, 0.0, (high - low) / 2), mood.window, kind="window")
 
 
