@@ -56,7 +56,8 @@ def _places(body: Body) -> Floats:
     """
     model = body_model()
     of_body = model.mean[model.faces].mean(axis=1) - model.mean_heads[model.bones.index("Head")]
-    added = body.vertices.astype(float)[body.faces[len(of_body) :]].mean(axis=1)
+    corners = body.vertices.astype(float)[body.faces[len(of_body) :]]
+    added = 0.5 * (corners.min(axis=1) + corners.max(axis=1))  # nearly the same for both triangles of a quadrangle
     return np.concatenate([of_body, added - body.heads[body.index("Head")]])
 
 

@@ -32,14 +32,17 @@ _TALLER = {"cap": 0.006, "beanie": 0.016, "brimmed": 0.022}  # height of a hat o
 
 
 def glasses(body: Body, *, kind: str) -> list[AddedMesh]:
-    """Make frame and temples of glasses, and the dark lenses of sunglasses."""
+    """Make frame and temples of glasses, over a mask if there is one, and the dark lenses of sunglasses."""
     face = FacePoints.of(body)
     scale = face.scale
     half_width, half_height, power = (value * k for value, k in zip(_LENS[kind], (scale, scale, 1.0), strict=True))
     middle = np.array([max(face.eye[1], half_width + 0.006 * scale), face.eye[2] - 0.002 * scale])
     around = np.linspace(0, 2 * np.pi, _LENS_CORNERS, endpoint=False)
     outline = np.column_stack([half_width * _power(np.cos(around), power), half_height * _power(np.sin(around), power)])
-    front = _lens_plane(face, middle, half_width, half_height)
+    below = body.vertices[np.unique(body.faces[body.part == FacePart.MASK])].astype(float)
+    front = _lens_plane(
+        np.concatenate([face.face[face.face[:, 0] > face.ear[0]], below]), middle, half_width, half_height
+    )
     frames, lenses = [], []
     for side in (1.0, -1.0):
         inner, outer = (
@@ -62,11 +65,9 @@ def glasses(body: Body, *, kind: str) -> list[AddedMesh]:
     return meshes
 
 
-def _lens_plane(
-    face: FacePoints, middle: Floats, half_width: float, half_height: float
-) -> Callable[[ArrayLike], Floats]:
-    """Return the function from y to x of the front of glasses: a line over brow and cheek, without contact."""
-    near = face.face[(np.abs(face.face[:, 2] - middle[1]) < half_height) & (face.face[:, 0] > face.ear[0])]
+def _lens_plane(points: Floats, middle: Floats, half_width: float, half_height: float) -> Callable[[ArrayLike], Floats]:
+    """Return the function from y to x of the front of glasses: a line over points (n, 3) of brow and cheek."""
+    near = points[np.abs(points[:, 2] - middle[1]) < half_height]
     away = np.abs(near[:, 1])
     covered = (away > middle[0] - half_width) & (away < middle[0] + half_width)
     slope = 0.28
@@ -94,7 +95,7 @@ def mask(body: Body) -> list[AddedMesh]:
     face = FacePoints.of(body)
     scale = face.scale
     axis = np.array([face.ear[0] + 0.012 * scale, 0.0])
-    heights = face.nose[2] + scale * np.array([0.019, 0.008, -0.008, -0.025, -0.045, -0.066, -0.084])
+    heights = face.nose[2] + scale * np.array([0.014, 0.005, -0.008, -0.025, -0.045, -0.066, -0.084])
     widest = np.radians([48, 62, 68, 68, 65, 56, 44])
     rows = []
     for z, wide in zip(heights, widest, strict=True):
@@ -157,12 +158,11 @@ def hat(body: Body, *, kind: str) -> list[AddedMesh]:
 
 def _visor(edge: Floats, bearing: Floats, scale: float) -> Sheet:
     """Return the visor of a cap: a curved sheet in front of its edge (c, 3)."""
-    wide = np.radians(62)
+    wide = np.radians(60)
     turned = (bearing + np.pi) % (2 * np.pi) - np.pi
     order = np.argsort(turned)
-    across = np.linspace(-wide, wide, 9)
-    start = np.column_stack([np.interp(across, turned[order], edge[order, k]) for k in range(3)])
-    start[:, :2] -= 0.002 * _directions(across)
+    order = order[np.abs(turned[order]) < wide]
+    across, start = turned[order], edge[order]  # the vertices of the edge, so that no gap is left
     reach = _VISOR * scale * np.cos(across / wide * np.pi / 2) ** 0.6
     rows = []
     for share in (0.0, 0.5, 1.0):

@@ -23,10 +23,11 @@ _LENS: Color = (0.05, 0.05, 0.06)
 def wear(body: Body, look: Look) -> Body:
     """Return a dressed body with the meshes of the accessories of its look; joints do not move."""
     meshes = []
-    if look.glasses != "none":
-        meshes += glasses(body, kind=look.glasses)
     if look.mask != "none":
         meshes += mask(body)
+    if look.glasses != "none":
+        below = add_mesh(body, meshes[0]) if meshes else body
+        meshes += glasses(below, kind=look.glasses)
     if look.hat != "none":
         meshes += hat(body, kind=look.hat)
     if look.bag != "none":
