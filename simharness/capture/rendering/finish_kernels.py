@@ -281,7 +281,7 @@ def _lobe(
     alpha = rough * rough + light[6] * _HALF
     square, share_of_lobe = alpha * alpha, reflectance / (np.float32(4.0) * (rough + _HALF))
     # The surroundings: reflectance straight ahead and, on a rough surface less, at a glance.
-    plain, glance = reflectance, np.float32(0.55) * (_UNIT - rough) ** 2
+    plain, glance = reflectance, np.float32(0.4) * (_UNIT - rough) ** 2
     normal_x, normal_y, normal_z = normal[0], normal[1], normal[2]
     for n in range(len(gloss)):
         column, nx, ny, nz = np.float32(n), normal_x[n], normal_y[n], normal_z[n]

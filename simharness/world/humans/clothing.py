@@ -13,6 +13,7 @@ from mvpose.arrays import Floats
 from simharness.world.humans import cloth_texture
 from simharness.world.humans.added_mesh import AddedMesh, add_mesh
 from simharness.world.humans.body import Body, FacePart
+from simharness.world.humans.expressions import express
 from simharness.world.humans.grooming import groom
 from simharness.world.humans.hair_styles import bob, curls, ponytail
 from simharness.world.humans.skirts_and_hair import bun, long_hair, skirt
@@ -78,6 +79,7 @@ def face_colors(body: Body, look: Look) -> NDArray[np.float32]:
     colors[body.part == FacePart.LIPS] = look.lips
     colors[body.part == FacePart.SCLERA] = _SCLERA
     colors[body.part == FacePart.IRIS] = look.eyes
+    express(colors, body, expression=look.expression, brow=mix(look.hair, look.skin, 0.3))
     for part, color in accessory_colors(look).items():
         colors[body.part == part] = color
     return colors

@@ -15,6 +15,7 @@ from simharness.types.finish import Finish, Material
 from simharness.types.mesh import Mesh
 from simharness.world.humans.body import Body, FacePart, body_model
 from simharness.world.humans.clothing import Garment, garments, paint
+from simharness.world.humans.grooming import places_of_head
 from simharness.world.humans.wardrobe import Look
 
 _OF_PART = {
@@ -42,6 +43,7 @@ _OF_GARMENT = {
 _STRAND, _FOLD = 0.022, 0.055  # metres along hair and cloth over which their direction is measured
 _WHORL = (-0.045, 0.01, 0.0)  # metres from the crown: hair runs away from here
 _AROUND = 0.6  # metres around the head
+_INNER_LIPS = 0.003  # metres: half the height of what lies between the lips
 _WANDER = 0.011  # metres by which folds wander along the grain
 _SLANT = 0.35  # folds of limbs are not rings: they rise along the surface
 
@@ -94,7 +96,11 @@ def materials_of(body: Body, look: Look) -> NDArray[np.int8]:
     of_garment = np.array([_OF_GARMENT.get(garment, Material.MATTE) for garment in Garment], np.int8)
     worn = garments(body, look)
     covered = np.isin(worn, list(_OF_GARMENT))
-    return np.where(covered, of_garment[worn], of_part[body.part]).astype(np.int8)
+    materials = np.where(covered, of_garment[worn], of_part[body.part]).astype(np.int8)
+    lips = np.flatnonzero(body.part == FacePart.LIPS)
+    height = places_of_head(body)[lips, 2]
+    materials[lips[np.abs(height - height.mean()) < _INNER_LIPS]] = Material.MATTE  # between the lips nothing shines
+    return materials
 
 
 def _crown(body: Body) -> Floats:

@@ -32,7 +32,7 @@ def groom(colors: NDArray[np.float32], body: Body, *, skin: Color, hair: Color, 
         beard: density of the beard, 0 none to 1 full; children have none.
         bald: extent of the bald skin, 0 none to 1 all but a rim; children have none.
     """
-    centers = _places(body)
+    centers = places_of_head(body)
     scalp = body.part == FacePart.SCALP
     locks = colors[scalp] * (1 + _LOCKS * _waves(centers[scalp])[:, None])
     colors[scalp] = np.rint(255 * locks) / 255
@@ -49,7 +49,7 @@ def groom(colors: NDArray[np.float32], body: Body, *, skin: Color, hair: Color, 
         colors[grown & (height > (1 - _RIM * bald) * height[grown].max())] = skin
 
 
-def _places(body: Body) -> Floats:
+def places_of_head(body: Body) -> Floats:
     """Return the centres of all faces relative to the head joint, (k, 3) metres.
 
     Those of the body are at the mean body, so that the colours of two people do not depend on their shape or clothes.

@@ -12,6 +12,7 @@ import numpy as np
 from simharness.types.random_streams import stream
 from simharness.world.humans.accessories import BAGS, GLASSES, HATS, MASKS, draw_accessories
 from simharness.world.humans.clothing_colors import SHOES, TOPS, TROUSERS, Color, draw_color
+from simharness.world.humans.expressions import EXPRESSIONS
 from simharness.world.humans.population import draw_sex
 
 # Levels of a body's faces at which sleeves, trouser legs and shirts may end; the mesh has edges along each of them.
@@ -32,6 +33,7 @@ _CHOICES = {
     "bottom_pattern": PATTERNS,
     "lower_garment": LOWER_GARMENTS,
     "hair_style": HAIR_STYLES,
+    "expression": tuple(EXPRESSIONS),
     "glasses": GLASSES,
     "hat": HATS,
     "mask": MASKS,
@@ -60,6 +62,7 @@ class Look:
         volume: volume of the hair, 0 cropped to 2 full.
         beard: density of the beard, 0 none to 1 full; adults only.
         bald: extent of the bald skin, 0 none to 1 all but a rim; adults only.
+        expression: expression of the face, one of ``EXPRESSIONS`` of :mod:`simharness.world.humans.expressions`.
         glasses, hat, mask, bag: accessories, each "none" or one of ``GLASSES``, ``HATS``, ``MASKS``, ``BAGS`` of
             :mod:`simharness.world.humans.accessories`.
         frame_color, hat_color, mask_color, bag_color: their colours; ``frame_color`` is that of the glasses.
@@ -89,6 +92,7 @@ class Look:
     volume: float = 1.0
     beard: float = 0.0
     bald: float = 0.0
+    expression: str = "neutral"
     glasses: str = "none"
     hat: str = "none"
     mask: str = "none"
@@ -127,6 +131,7 @@ _GOLDEN = (5**0.5 - 1) / 2
 _DRAWS = 32
 _STYLES: Mapping[str, Mapping[str, float]] = MappingProxyType({"long": {"ponytail": 0.4}, "short": {"bob": 0.65}})
 _CURLY, _CURLY_OF_DARK, _DARK = 0.08, 0.5, 0.42  # shares of short hair; skin darker than _DARK on average is dark
+_EXPRESSIONS = ("neutral", "neutral", "neutral", "smile", "speaking", "frown")
 _BEARDS, _BALD, _CROPPED = 0.4, 0.25, 0.9  # shares of men, and of those with short hair below a volume of 0.9
 
 
@@ -203,6 +208,7 @@ def draw_looks(seed: int, count: int, *, look_alike: float = 0.0, alike: int = 0
             look = _groomed(look, stream(seed, "people", i, "grooming"))
         look = _styled(look, stream(seed, "people", i, "hair style"), female=female)
         look = _with_accessories(look, stream(seed, "people", i, "accessories"), female=female)
+        look = _expressive(look, stream(seed, "people", i, "expression"))
         looks.append(_toward(look, uniform, look_alike, changes.tolist()) if i < (alike or count) else look)
     return tuple(looks)
 
@@ -230,6 +236,11 @@ def _styled(look: Look, rng: np.random.Generator, *, female: bool) -> Look:
             if of_women < share:
                 return replace(look, hair_style=style)
     return look
+
+
+def _expressive(look: Look, rng: np.random.Generator) -> Look:
+    """Return the look with the expression of the face drawn: half of the faces are neutral, an assumption."""
+    return replace(look, expression=_pick(_EXPRESSIONS, float(rng.random())))
 
 
 def _with_accessories(look: Look, rng: np.random.Generator, *, female: bool) -> Look:

@@ -19,7 +19,7 @@ from simharness.world.humans.wardrobe import (
     draw_looks,
 )
 
-INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style", "beard", "bald")
+INDIVIDUAL = ("skin", "hair", "lips", "eyes", "volume", "hair_style", "beard", "bald", "expression")
 INDIVIDUAL += ("glasses", "frame_color", "mask", "mask_color")
 
 
