@@ -1,6 +1,7 @@
 """Accessories on a dressed body: their meshes come after all others, so they can be taken off again.
 
-Kinematics, capsules and collisions are those of the body without accessories: people move as before.
+Kinematics, capsules and collisions are those of :func:`plain` looks: how people move does not depend on what they wear
+on head and shoulders, nor on how their hair is cut or tied.
 """
 
 from __future__ import annotations
@@ -18,6 +19,13 @@ from simharness.world.humans.head_wear import glasses, hat, mask
 from simharness.world.humans.wardrobe import Look, mix
 
 _LENS: Color = (0.05, 0.05, 0.06)
+_GROWN = {"bob": "short", "curly": "short", "ponytail": "long"}  # hair styles are drawn for people with these
+
+
+def plain(look: Look) -> Look:
+    """Return the look without accessories, its hair short, long or in a bun."""
+    hair_style = _GROWN.get(look.hair_style, look.hair_style)
+    return replace(look, hair_style=hair_style, glasses="none", hat="none", mask="none", bag="none")
 
 
 def wear(body: Body, look: Look) -> Body:

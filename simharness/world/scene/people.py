@@ -17,7 +17,7 @@ from simharness.world.humans.figure import figure_mesh
 from simharness.world.humans.population import draw_shape, is_child
 from simharness.world.humans.shape import Shape
 from simharness.world.humans.wardrobe import Look
-from simharness.world.humans.wearing import wear
+from simharness.world.humans.wearing import plain, wear
 from simharness.world.motion.poses.kinematics import Kinematics
 
 _KEPT = 24  # people, about 5 MB each: those of a scene and of the next ones
@@ -30,8 +30,8 @@ class Person:
     Attributes:
         look: clothes, hair and accessories.
         body: dressed body with accessories.
-        mover: kinematics of the body without accessories. Poses are computed in its MuJoCo data, so threads must not
-            share it.
+        mover: kinematics of the body of the plain look (:func:`~simharness.world.humans.wearing.plain`). Poses are
+            computed in its MuJoCo data, so threads must not share it.
     """
 
     look: Look
@@ -47,8 +47,10 @@ class Person:
 @lru_cache(maxsize=_KEPT)
 def make_person(shape: Shape, look: Look) -> Person:
     """Return the person of a shape and look, made once in a process."""
-    body = dress(make_body(shape), look)
-    return Person(look, wear(body, look), Kinematics(body))
+    bare, simple = make_body(shape), plain(look)
+    moved = dress(bare, simple)
+    same = (look.hat, look.hair_style) == (simple.hat, simple.hair_style)
+    return Person(look, wear(moved if same else dress(bare, look), look), Kinematics(moved))
 
 
 @lru_cache(maxsize=_KEPT)

@@ -135,11 +135,16 @@ def test_what_is_worn_is_a_small_mesh_after_all_others_and_can_be_taken_off(chan
 
 
 def test_people_move_as_without_accessories():
+    """Also with another hair style: hair is tied, cut or curled after motion is decided."""
     shape, look = draw_shape(stream(2, "people", 0, "shape")), replace(draw_look(stream(2, "test")), **BARE)
-    plain, laden = (make_person(shape, each) for each in (look, replace(look, bag="backpack", glasses="round")))
-    np.testing.assert_array_equal(laden.mover.body.vertices, plain.mover.body.vertices)
-    assert len(laden.figure.faces) > len(plain.figure.faces)
-    assert (laden.figure.faces[: len(plain.figure.faces)] == plain.figure.faces).all()
+    before = make_person(shape, look)
+    laden = replace(look, bag="backpack", glasses="round")
+    for changed in (laden, replace(look, hair_style="curly"), replace(look, hair_style="bob", hat="cap")):
+        person = make_person(shape, changed)
+        np.testing.assert_array_equal(person.mover.body.vertices, before.mover.body.vertices)
+        np.testing.assert_array_equal(person.mover.body.faces, before.mover.body.faces)
+        assert len(person.figure.vertices) == len(person.body.vertices)
+        assert not np.array_equal(person.figure.vertices, before.figure.vertices)
 
 
 @pytest.mark.parametrize("person", [1, "child"])
