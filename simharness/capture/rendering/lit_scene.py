@@ -16,18 +16,21 @@ from numpy.typing import NDArray
 from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
+from simharness.capture.rendering.capsule_kernels import capsules
 from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
-from simharness.capture.rendering.occlusion_kernels import capsules, cast, moving_light, touched_blocks
-from simharness.capture.rendering.room_light import LUMINANCE, RoomLight, last_light, room_light
+from simharness.capture.rendering.moving_light_kernels import moving_light
+from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.shadow_layer_kernels import BLOCK, cast, touched_blocks
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
 
+_LUMINANCE = np.array(LUMINANCE)
 _CELL, _MOST_CELLS = 0.06, 384  # metres; cells of the map along each side: beyond, they are larger
-_BLOCK = 8  # cells
 _HEIGHTS = np.array([0.0, 0.5, 1.1, 1.9], np.float32)  # metres, of the maps above the floor
 
 
@@ -190,12 +193,12 @@ class LitScene:
         assert sources is not None
         lamps = np.zeros((len(sources.areas), 11))
         for row, area in zip(lamps, sources.areas, strict=True):
-            radiance = LUMINANCE @ (self.room.exposure * area.radiance)
+            radiance = _LUMINANCE @ (self.room.exposure * area.radiance)
             row[:] = *area.center, *area.right, *area.up, radiance, area.focus
         sun = np.zeros(4)
         if sources.sun is not None:
-            sun[:] = *sources.sun.direction, LUMINANCE @ (self.room.exposure * sources.sun.irradiance)
-        up = probes.every[..., 4, :] @ LUMINANCE.astype(np.float32)
+            sun[:] = *sources.sun.direction, _LUMINANCE @ (self.room.exposure * sources.sun.irradiance)
+        up = probes.every[..., 4, :] @ _LUMINANCE.astype(np.float32)
         fixed = (
             self._bodies, self._samples.ranges, lamps, sun, probes.origin, probes.step,
             np.ascontiguousarray(up[..., None]), probes.shares,
@@ -224,7 +227,7 @@ class LitScene:
                 still.topology, (triangle, background.corners), still.normals, rays, emission, self.room.light,
                 samples.corner_samples, samples.divisions, 0, rgb,
             )  # fmt: skip
-        block, (rows, columns) = _BLOCK * grid.cell, grid.blocks
+        block, (rows, columns) = BLOCK * grid.cell, grid.blocks
         place = blocks_below(
             triangle, inverse_depth, camera.center, rays, grid.corner, block, rows, columns, float(_HEIGHTS[-1])
         )
@@ -299,10 +302,10 @@ class Grid:
         counts = np.array(probes.every.shape[:2])
         extent = probes.step[:2] * (counts - 1) + 0.12
         cell = max(_CELL, float(extent.max()) / _MOST_CELLS)
-        columns, rows = (np.ceil(extent / (_BLOCK * cell)).astype(int) * _BLOCK).tolist()
+        columns, rows = (np.ceil(extent / (BLOCK * cell)).astype(int) * BLOCK).tolist()
         return cls(probes.origin[:2] - 0.06, cell, (rows, columns))
 
     @property
     def blocks(self) -> tuple[int, int]:
         """Rows and columns of blocks."""
-        return self.shape[0] // _BLOCK, self.shape[1] // _BLOCK
+        return self.shape[0] // BLOCK, self.shape[1] // BLOCK

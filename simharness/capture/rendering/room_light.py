@@ -7,17 +7,17 @@ scene and depends on nothing else, so it is the same in every process and for ev
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from simharness.capture.rendering.box_tree_kernels import build_tree
 from simharness.capture.rendering.light_kernels import DARK, direct_light, gathered, met, probe_light
 from simharness.capture.rendering.light_samples import Floats, LightSamples, light_samples
-from simharness.capture.rendering.ray_kernels import build_tree
-from simharness.capture.rendering.scene_topology import SceneTopology
+from simharness.capture.rendering.scene_topology import SceneTopology, same_meshes
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.light_sources import LightSources
 from simharness.types.mesh import Mesh
 
@@ -34,7 +34,7 @@ _APART = 0.5  # metres between probes
 _MOST_PROBES = 6000  # beyond, they are farther apart
 _REACH = 15.0  # metres from the middle of the scene that probes cover at most
 _HIGHEST = 3.5  # metres
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
+_LUMINANCE = np.array(LUMINANCE)
 _PEOPLE = (0.2, 1.9)  # metres: heights at which the exposure is measured
 _KEPT = 2
 
@@ -90,7 +90,7 @@ def room_light(
         normals: normals of faces, (k, 3), and vertices, (v, 3).
     """
     for place, (known, meshes, light) in enumerate(_kept):
-        if known == sources and _same(meshes, topology.meshes):
+        if known == sources and same_meshes(meshes, topology.meshes):
             _kept.insert(0, _kept.pop(place))
             return light
     light = _computed(sources, topology, vertices, normals)
@@ -102,10 +102,6 @@ def room_light(
 def last_light(sources: LightSources) -> RoomLight | None:
     """Return the light that these sources gave last, for a picture of the same scene in a mirror."""
     return next((light for known, _, light in _kept if known == sources), None)
-
-
-def _same(one: Sequence[Mesh], other: Sequence[Mesh]) -> bool:
-    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
 
 
 def _computed(
@@ -171,13 +167,13 @@ def _exposed(sources: LightSources, samples: LightSamples, light: Floats, probes
     height = probes.origin[2] + probes.step[2] * np.arange(probes.every.shape[2])
     among = (height >= _PEOPLE[0]) & (height <= _PEOPLE[1])
     mean = probes.every[:, :, among if among.any() else slice(None)].mean(axis=(0, 1, 2, 3), dtype=float)
-    level = max(float(mean @ LUMINANCE), 1e-9)
+    level = max(float(mean @ _LUMINANCE), 1e-9)
     exposure = (sources.brightness / level * (level / np.maximum(mean, 1e-9)) ** sources.balance).astype(np.float32)
     exposed = Probes(
         probes.origin,
         probes.step,
         probes.every * exposure,
-        probes.straight * np.float32(exposure @ LUMINANCE),
+        probes.straight * np.float32(exposure @ _LUMINANCE),
         probes.shares,
     )
     return RoomLight(samples, light * exposure, exposed, exposure)
@@ -236,7 +232,7 @@ def _probes(
     shape = tuple(counts)
     filled = [
         _filled(part.reshape(*shape, -1), inside.reshape(shape)).reshape(*shape, *part.shape[1:])
-        for part in (every, straight @ LUMINANCE.astype(np.float32), shares)
+        for part in (every, straight @ _LUMINANCE.astype(np.float32), shares)
     ]
     return Probes(low, step, *filled)
 

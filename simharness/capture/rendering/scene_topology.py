@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -153,3 +154,8 @@ def pyramid(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
             return
         size = (max(1, width // 2), max(1, height // 2))
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def same_meshes(meshes: Sequence[Mesh], others: Sequence[Mesh]) -> bool:
+    """Return whether two lists hold the same frozen objects."""
+    return len(meshes) == len(others) and all(map(operator.is_, meshes, others))
