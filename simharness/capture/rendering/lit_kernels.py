@@ -11,9 +11,10 @@ import math
 import numpy as np
 
 from mvpose.kernels import njit
-from simharness.capture.rendering.shading_kernels import STRIDE, gather
+from simharness.capture.rendering.surface_kernels import BLUE, GREEN, PIXELS, RED, SECOND, THIRD, gather, memory
 
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
+_TO_SECOND, _TO_THIRD, _SHARES, _RECEIVED = (PIXELS * row for row in (3, 6, 9, 11))  # rows of light on pixels
 _FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 # Linear value of sRGB s: s (s (s a + b) + c), within 0.2 % of white of IEC 61966-2-1.
 _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.float32(0.012522878)
@@ -67,48 +68,49 @@ def shade_lit(
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
     height, width = triangle.shape
-    albedo, normal = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
-    received, weights = np.empty((3, width), np.float32), np.empty((2, width), np.float32)
-    index, edge, across = np.empty((3, width), np.int32), np.zeros((3, 3)), np.zeros((3, 3))
-    steps, mixed = np.empty((2, STRIDE), np.int32), np.empty(STRIDE, np.uint64)
+    narrow, wide, whole, level = memory()
+    received, index = np.zeros(_RECEIVED, np.float32), np.zeros(3 * PIXELS, np.uint32)
+    most = PIXELS + width
+    labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     top = np.float32(len(curve) - 1)
-    scale = np.float32(top * top / brightest)
-    for y in range(height):
-        line = triangle[y]
-        last = 0
-        while last < width:
-            first = last
-            while first < width and line[first] < first_face:
-                first += 1
-            last = first
-            while last < width and line[last] >= first_face:
-                last += 1
-            if first == last:
-                continue
+    scale, count = np.float32(top * top / brightest), 0
+    for y in range(height + 1):
+        if y < height:
+            begin = count
+            for x in range(width):
+                columns[np.uint32(count)] = x
+                count += triangle[y, x] >= first_face
+            for n in range(begin, count):
+                labels[n], lines[n] = triangle[y, columns[n]], y
+        done = 0
+        while done + PIXELS <= count or (y == height and done < count):
+            size = min(count - done, PIXELS)
+            chunk = slice(done, done + size)
             gather(
-                line, y, first, last, q, faces, colors, smooth, face_normals, vertex_normals, texture, uv, texels,
-                pyramids, rays, edge, across, steps, mixed, albedo, normal, weights,
+                labels[chunk], columns[chunk], lines[chunk], q, faces, colors, smooth, face_normals, vertex_normals,
+                texture, uv, texels, pyramids, narrow, wide, whole, level,
             )  # fmt: skip
-            _received(line, first, last, weights, emission, light, corner_samples, divisions, first_face, received)
-            for k in range(3):
-                dyes, lights, indices = albedo[k], received[k], index[k]
-                for x in range(first, last):
-                    dye = dyes[x]
-                    value = lights[x] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN))
-                    indices[x] = np.int32(min(np.float32(math.sqrt(scale * max(value, _ZERO))), top) + np.float32(0.5))
-            red, green, blue = index[0], index[1], index[2]
-            for x in range(first, last):
-                rgb[y, x, 0] = curve[np.uint32(red[x])]
-                rgb[y, x, 1] = curve[np.uint32(green[x])]
-                rgb[y, x, 2] = curve[np.uint32(blue[x])]
+            _receive(labels[chunk], narrow, emission, light, corner_samples, divisions, first_face, received)
+            for n in range(3 * PIXELS):
+                dye = narrow[RED + n]
+                value = received[n] * (dye * (dye * (dye * _CUBE + _SQUARE) + _PLAIN))
+                step = min(np.float32(math.sqrt(scale * max(value, _ZERO))), top)
+                index[n] = np.uint32(np.int32(step + np.float32(0.5)))
+            for n in range(size):
+                row, column = lines[done + n], columns[done + n]
+                rgb[row, column, 0] = curve[index[RED + n]]
+                rgb[row, column, 1] = curve[index[GREEN + n]]
+                rgb[row, column, 2] = curve[index[BLUE + n]]
+            done += size
+        for n in range(count - done):
+            labels[n], columns[n], lines[n] = labels[done + n], columns[done + n], lines[done + n]
+        count -= done
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _received(
-    triangle: np.ndarray,
-    first: int,
-    last: int,
-    weights: np.ndarray,
+def _receive(
+    labels: np.ndarray,
+    narrow: np.ndarray,
     emission: np.ndarray,
     light: np.ndarray,
     corner_samples: np.ndarray,
@@ -116,49 +118,53 @@ def _received(
     first_face: int,
     received: np.ndarray,
 ) -> None:
-    """Write the light on the pixels ``first`` to before ``last`` of a row, (3, w); arguments as :func:`shade_lit`.
+    """Write the light on pixels to the first three rows of ``received``; arguments as :func:`shade_lit`.
 
-    ``weights`` are those of the second and third corner of the triangle, (2, w).
+    ``labels`` are the visible faces, (n,), and ``narrow`` has the weights of their corners, see
+    :func:`.surface_kernels.gather`. The light is interpolated between three samples: those of the corners, or of a
+    small triangle of the lattice of samples.
     """
-    red, green, blue, second, third = received[0], received[1], received[2], weights[0], weights[1]
-    end = first
-    while end < last:
-        start, label = end, triangle[end]
-        end += 1
-        f = np.uint32(label - first_face)
-        glow_red, glow_green, glow_blue = emission[f, 0], emission[f, 1], emission[f, 2]
-        n = divisions[f]
-        i, j, k = corner_samples[f, 0], corner_samples[f, 1], corner_samples[f, 2]
-        if n <= 1:
-            a, b, c = np.uint32(i), np.uint32(j), np.uint32(k)
-            red_a, green_a, blue_a = light[a, 0] + glow_red, light[a, 1] + glow_green, light[a, 2] + glow_blue
-            red_b, green_b, blue_b = light[b, 0] - light[a, 0], light[b, 1] - light[a, 1], light[b, 2] - light[a, 2]
-            red_c, green_c, blue_c = light[c, 0] - light[a, 0], light[c, 1] - light[a, 1], light[c, 2] - light[a, 2]
-            end = start
-            while end < last and triangle[end] == label:
-                vb, vc = second[end], third[end]
-                red[end] = red_a + vb * red_b + vc * red_c
-                green[end] = green_a + vb * green_b + vc * green_c
-                blue[end] = blue_a + vb * blue_b + vc * blue_c
-                end += 1
-            continue
-        while end < last and triangle[end] == label:
-            end += 1
-        size = np.float32(n)
-        for x in range(start, end):
-            u, v = min(max(size * second[x], _ZERO), size), min(max(size * third[x], _ZERO), size)
-            row = min(int(u), n - 1)
-            column = min(int(v), n - 1 - row)
-            u, v = u - np.float32(row), v - np.float32(column)
-            here = i + row * (n + 1) - row * (row - 1) // 2 + column
-            below = here + n + 1 - row  # the next row of the lattice
-            one, two, three = here, below, here + 1
-            va, vb, vc = _UNIT - u - v, u, v
-            if va < 0 and row + column < n - 1:
-                one, va, vb, vc = below + 1, -va, _UNIT - v, _UNIT - u
-            red[x] = va * light[one, 0] + vb * light[two, 0] + vc * light[three, 0] + glow_red
-            green[x] = va * light[one, 1] + vb * light[two, 1] + vc * light[three, 1] + glow_green
-            blue[x] = va * light[one, 2] + vb * light[two, 2] + vc * light[three, 2] + glow_blue
+    for n in range(len(labels)):
+        f = np.uint32(labels[n] - first_face)
+        i, j, k, divided = corner_samples[f, 0], corner_samples[f, 1], corner_samples[f, 2], divisions[f]
+        second, third = narrow[SECOND + n], narrow[THIRD + n]
+        if divided > 1:
+            i, j, k, second, third = _on_lattice(i, divided, second, third)
+        a, b, c = np.uint32(i), np.uint32(j), np.uint32(k)
+        received[_SHARES + n], received[_SHARES + PIXELS + n] = second, third
+        for color in range(3):
+            one, row = light[a, color], color * PIXELS + n
+            received[row] = one + emission[f, color]
+            received[_TO_SECOND + row], received[_TO_THIRD + row] = light[b, color] - one, light[c, color] - one
+    for row in range(0, 3 * PIXELS, PIXELS):
+        for n in range(PIXELS):
+            second, third = received[_SHARES + n], received[_SHARES + PIXELS + n]
+            to_second, to_third = received[_TO_SECOND + row + n], received[_TO_THIRD + row + n]
+            received[row + n] = received[row + n] + second * to_second + third * to_third
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
+def _on_lattice(
+    first: int, divisions: int, second: np.float32, third: np.float32
+) -> tuple[int, int, int, np.float32, np.float32]:
+    """Return the three samples around a place, and the weights of the second and the third.
+
+    Args:
+        first: first sample of the lattice of a face, see :class:`.light_samples.LightSamples`.
+        divisions: its divisions.
+        second: weight of the second corner of the face.
+        third: weight of the third corner.
+    """
+    size = np.float32(divisions)
+    u, v = min(max(size * second, _ZERO), size), min(max(size * third, _ZERO), size)
+    row = min(int(u), divisions - 1)
+    column = min(int(v), divisions - 1 - row)
+    u, v = u - np.float32(row), v - np.float32(column)
+    here = first + row * (divisions + 1) - row * (row - 1) // 2 + column
+    below = here + divisions + 1 - row  # the next row of the lattice
+    if _UNIT - u - v < 0 and row + column < divisions - 1:
+        return below + 1, below, here + 1, _UNIT - v, _UNIT - u
+    return here, below, here + 1, u, v
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from simharness.capture.rendering.shading_kernels import packed
+from simharness.capture.rendering.surface_kernels import packed
 from simharness.types.mesh import Mesh
 
 Floats = NDArray[np.float32]
