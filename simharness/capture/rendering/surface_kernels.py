@@ -189,11 +189,11 @@ def _level(n: int, narrow: np.ndarray, wide: np.ndarray, pyramid: np.ndarray) ->
         slope[0, 0], slope[1, 0], slope[2, 0] = slope[0, 0] + u * ex, slope[1, 0] + v * ex, slope[2, 0] + ex
         slope[0, 1], slope[1, 1], slope[2, 1] = slope[0, 1] + u * ey, slope[1, 1] + v * ey, slope[2, 1] + ey
     scale = 1.0 / three
-    u, v, rows, columns = one * scale, two * scale, pyramid[0, 1], pyramid[0, 2]
+    at_u, at_v, rows, columns = one * scale, two * scale, pyramid[0, 1], pyramid[0, 2]
     area = 0.0
     for k in range(2):
-        du = (slope[0, k] - u * slope[2, k]) * scale * columns
-        dv = (slope[1, k] - v * slope[2, k]) * scale * rows
+        du = (slope[0, k] - at_u * slope[2, k]) * scale * columns
+        dv = (slope[1, k] - at_v * slope[2, k]) * scale * rows
         area += 0.5 * (du * du + dv * dv)
     level = 0
     while area > 2.0 and level < len(pyramid) - 1:
