@@ -19,6 +19,7 @@ from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.capsule_kernels import capsules
 from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
 from simharness.capture.rendering.moving_light_kernels import moving_light
+from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
@@ -217,9 +218,9 @@ class LitScene:
         kept = background.lit
         if kept is not None and kept.lighting == self.lighting and kept.light is self.room:
             return kept
-        empty = np.round(255 * np.array(self.lighting.background)).astype(np.uint8)
         triangle, inverse_depth = background.triangle, background.inverse_depth
-        rgb = np.full((*triangle.shape, 3), empty, np.uint8)
+        rgb = np.empty((*triangle.shape, 3), np.uint8)
+        fill_empty(rgb, triangle < 0, self.lighting, rays, self.room.exposure)
         still, samples, grid = self.geometry.still, self.room.samples, Grid.of(self.room)
         if len(still.topology.faces):
             emission = still.topology.emission * self.room.exposure

@@ -19,6 +19,7 @@ from mvpose.camera import Camera
 from simharness.capture.rendering.backgrounds import Background, Backgrounds, LitBackground
 from simharness.capture.rendering.lens import through_lens
 from simharness.capture.rendering.lit_scene import LitScene
+from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.raster_kernels import LONGEST_SIDE, NOTHING_DRAWN, rasterise, resolve
 from simharness.capture.rendering.renderer import DAYLIGHT, NEAR, Image, check_count
 from simharness.capture.rendering.scene_geometry import SceneGeometry
@@ -136,8 +137,8 @@ def _lit(background: Background, geometry: SceneGeometry, camera: Camera, lighti
     """Return the background in a light; the last one is kept."""
     shadows, seen = geometry.shadows(lighting), (background.triangle, background.inverse_depth)
     if background.lit is None or background.lit.lighting != lighting or background.lit.light != shadows.light:
-        empty = np.round(255 * np.array(lighting.background)).astype(np.uint8)
-        rgb = np.full((*background.triangle.shape, 3), empty, np.uint8)
+        rgb = np.empty((*background.triangle.shape, 3), np.uint8)
+        fill_empty(rgb, background.triangle < 0, lighting, _rays(camera))
         place, depth = shadow_places(*seen, camera.center, _rays(camera), shadows.light.P, SHADOW_SIZE)
         _shade(geometry, camera, lighting, *seen, background.corners, NO_SHADOW, place, depth, 0, rgb)
         background.lit = LitBackground(lighting, shadows.light, rgb, place, depth)

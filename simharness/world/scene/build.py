@@ -40,6 +40,7 @@ from simharness.world.scene.rooms.lighting import room_lighting
 from simharness.world.scene.rooms.lights_of_kinds import lights_of, shown_lights_of
 from simharness.world.scene.rooms.openings import draw_openings
 from simharness.world.scene.rooms.room import make_room
+from simharness.world.scene.rooms.surroundings import make_surroundings
 
 CLOCK_MARGIN = 1.0  # seconds of motion before and after the sequence: clock errors of cameras are smaller
 
@@ -125,6 +126,7 @@ def build(scenario: Scenario, rig: Rig) -> Scene:
     clutter = place_clutter(seed, scenario.clutter, replace(space, taken=props + decoys + furniture))
     objects = (*furniture, *props, *decoys, *clutter)
     above = (make_ceiling(room), *shown_lights_of(room, seed, openings, areas)) if areas else ()
+    above = make_surroundings(room, seed, rig) if room.kind == "outdoors" else above
     solids = (*make_room(room, seed, openings), *above, *make_fittings(room, seed, openings, objects), *objects)
     check_rig(scenario, solids, rig)
     bodies = tuple(person.body for person in cast)

@@ -13,6 +13,8 @@ from simharness.types.light_sources import AreaLight, LightSources, Sun, Vector
 from simharness.types.lighting import Lighting
 from simharness.types.random_streams import stream
 from simharness.world.scene.rooms.lamps import MOODS, Mood, ceiling_lamps, wall_windows
+from simharness.world.scene.rooms.open_air import open_air
+from simharness.world.scene.rooms.surroundings import MEADOW
 
 LIGHTS: Mapping[str, Lighting] = MappingProxyType(
     {
@@ -48,6 +50,8 @@ def room_lighting(room: Room, seed: int, areas: Sequence[AreaLight] | None = Non
             lighting is in closed form.
     """
     name, light = _named(room, seed)
+    if room.kind == "outdoors":
+        return open_air(name, light, seed, MEADOW)
     if not areas:
         return light
     mood = MOODS[name]
