@@ -93,7 +93,7 @@ def _sky(rng: np.random.Generator, weather: Weather, shape: tuple[int, int]) -> 
 
 def _shown(radiance: ArrayLike) -> Floats:
     """Return sRGB, 0 to 255, of radiance."""
-    return from_linear(np.clip(np.asarray(radiance) / WHITE, 0, 1))
+    return np.asarray(from_linear(np.clip(np.asarray(radiance) / WHITE, 0, 1)), float)
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,10 @@ class _View:
         """Return the row at an elevation in radians."""
         return round((np.pi / 2 - elevation) * self.scale)
 
-    def color(self, albedo: ArrayLike, light: ArrayLike, far: float, column: float) -> list[int]:
+    def color(self, albedo: ArrayLike, light: float, far: float, column: float) -> list[int]:
         """Return the colour of a surface: sRGB albedo, light relative to that on the ground, distance in metres."""
         clear = np.exp(-far / _SIGHT)
-        radiance = to_linear(255 * np.asarray(albedo, float)) * light * self.weather.level
+        radiance = light * self.weather.level * to_linear(255 * np.asarray(albedo, float))
         mixed = clear * radiance + (1 - clear) * self.horizon[int(column) % _WIDTH]
         return [int(value) for value in np.round(_shown(mixed))]
 

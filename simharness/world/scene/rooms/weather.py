@@ -10,10 +10,11 @@ from types import MappingProxyType
 import numpy as np
 
 from mvpose.arrays import Floats
+from simharness.capture.srgb import LUMINANCE
 from simharness.types.light_sources import Sun, Vector
 from simharness.world.scene.rooms.sky import clear_sky, overcast_sky
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
+_LUMINANCE = np.array(LUMINANCE)
 _ROWS, _COLUMNS = 60, 120  # directions over which the light of the sky is summed
 _HIDDEN = 60.0  # degrees: elevation of a sun behind clouds, from which nothing but the closed form takes light
 
