@@ -15,13 +15,13 @@ from simharness.capture.rendering.surface_kernels import BLUE, GREEN, PIXELS, RE
 
 _ZERO, _UNIT = np.float32(0.0), np.float32(1.0)
 _TO_SECOND, _TO_THIRD, _SHARES, _RECEIVED = (PIXELS * row for row in (3, 6, 9, 11))  # rows of light on pixels
-_FLOOR = np.float32(0.02)  # metres: what is lower is the floor
 # Linear value of sRGB s: s (s (s a + b) + c), within 0.2 % of white of IEC 61966-2-1.
 _CUBE, _SQUARE, _PLAIN = np.float32(0.305306011), np.float32(0.682171111), np.float32(0.012522878)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
 def shade_lit(
+    spans: np.ndarray,
     triangle: np.ndarray,
     q: np.ndarray,
     faces: np.ndarray,
@@ -46,6 +46,7 @@ def shade_lit(
     """Colour the pixels that show faces from ``first_face`` on, in place.
 
     Args:
+        spans: spans of pixels that may show them, see :func:`.span_kernels.covering_spans`.
         triangle: see :func:`.shading_kernels.shade`, as all arguments up to ``rays``.
         q: homogeneous pixel coordinates of the vertices.
         faces: vertex indices.
@@ -67,28 +68,26 @@ def shade_lit(
         brightest: light of its last entry.
         rgb: picture to change, (h, w, 3) uint8, sRGB.
     """
-    height, width = triangle.shape
-    narrow, wide, whole, level = memory()
+    narrow, wide, exact, level = memory()
     received, index = np.zeros(_RECEIVED, np.float32), np.zeros(3 * PIXELS, np.uint32)
-    most = PIXELS + width
+    most = PIXELS + triangle.shape[1]
     labels, columns, lines = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     top = np.float32(len(curve) - 1)
     scale, count = np.float32(top * top / brightest), 0
-    for y in range(height + 1):
-        if y < height:
-            begin = count
-            for x in range(width):
-                columns[np.uint32(count)] = x
-                count += triangle[y, x] >= first_face
-            for n in range(begin, count):
-                labels[n], lines[n] = triangle[y, columns[n]], y
+    for span in range(len(spans)):
+        begin, y = count, spans[span, 0]
+        for x in range(spans[span, 1], spans[span, 2]):
+            columns[np.uint32(count)] = x
+            count += triangle[y, x] >= first_face
+        for n in range(begin, count):
+            labels[n], lines[n] = triangle[y, columns[n]], y
         done = 0
-        while done + PIXELS <= count or (y == height and done < count):
+        while done + PIXELS <= count or (span == len(spans) - 1 and done < count):
             size = min(count - done, PIXELS)
             chunk = slice(done, done + size)
             gather(
                 labels[chunk], columns[chunk], lines[chunk], q, faces, colors, smooth, face_normals, vertex_normals,
-                texture, uv, texels, pyramids, narrow, wide, whole, level,
+                texture, uv, texels, pyramids, narrow, wide, exact, level,
             )  # fmt: skip
             _receive(labels[chunk], narrow, emission, light, corner_samples, divisions, first_face, received)
             for n in range(3 * PIXELS):
@@ -165,142 +164,3 @@ def _on_lattice(
     if _UNIT - u - v < 0 and row + column < divisions - 1:
         return below + 1, below, here + 1, _UNIT - v, _UNIT - u
     return here, below, here + 1, u, v
-
-
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def dim(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    first_face: int,
-    place: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    origin: np.ndarray,
-    cell: float,
-    fine: np.ndarray,
-    coarse: np.ndarray,
-    heights: np.ndarray,
-    touched: np.ndarray,
-    dimming: np.ndarray,
-    rgb: np.ndarray,
-) -> None:
-    """Darken the pixels of still meshes that moving ones shade, in place.
-
-    Args:
-        triangle: visible face or -1, (h, w) int32.
-        inverse_depth: inverse depth, 1/m, (h, w) float32.
-        first_face: first face of the moving meshes.
-        place: block of the map that each pixel of a still mesh lies over, see :func:`blocks_below`.
-        center: camera centre in the world, (3,).
-        rays: see :func:`.shading_kernels.shade`.
-        origin: x and y of the corner of the map, (2,).
-        cell: size of a cell of ``fine``; a cell of ``coarse`` is twice as large.
-        fine: share of the light that is left on the floor, (rows, columns) float32.
-        coarse: the same at several heights, (heights, rows / 2, columns / 2) float32.
-        heights: these heights, (heights,) float32.
-        touched: blocks in which anything is dark, the last is always False, (blocks + 1,).
-        dimming: see :func:`.tone.dimming`.
-        rgb: picture to change, (h, w, 3) uint8.
-    """
-    height, width = triangle.shape
-    steps = np.float32(len(dimming) - 1)
-    per_cell, levels = np.float32(1.0 / cell), len(heights)
-    place_x, place_y, place_z = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    rise_x, rise_y, rise_z = np.float32(rays[0, 0]), np.float32(rays[1, 0]), np.float32(rays[2, 0])
-    from_x, from_y = np.float32(center[0] - origin[0]), np.float32(center[1] - origin[1])
-    from_z, half = np.float32(center[2]), np.float32(0.5)
-    for y in range(height):
-        places, faces, depths = place[y], triangle[y], inverse_depth[y]
-        ray_x, ray_y = np.float32(rays[0, 1] * y + rays[0, 2]), np.float32(rays[1, 1] * y + rays[1, 2])
-        ray_z = np.float32(rays[2, 1] * y + rays[2, 2])
-        end = 0
-        while end < width:
-            start = end
-            while start < width and not touched[places[start]]:
-                start += 1
-            end = start
-            while end < width and touched[places[end]]:
-                end += 1
-            for x in range(start, end):
-                far, column = _UNIT / depths[x], np.float32(x)
-                place_x[x] = (from_x + far * (rise_x * column + ray_x)) * per_cell
-                place_y[x] = (from_y + far * (rise_y * column + ray_y)) * per_cell
-                place_z[x] = from_z + far * (rise_z * column + ray_z)
-            for x in range(start, end):
-                if faces[x] >= first_face:
-                    continue
-                u, v, z = place_x[x], place_y[x], place_z[x]
-                if z < _FLOOR:
-                    left = _between(fine, u - half, v - half)
-                else:
-                    level = 0
-                    while level < levels - 2 and z > heights[level + 1]:
-                        level += 1
-                    share = (z - heights[level]) / (heights[level + 1] - heights[level])
-                    share = min(max(share, _ZERO), _UNIT)
-                    u, v = half * u - half, half * v - half
-                    left = _between(coarse[level], u, v)
-                    left += share * (_between(coarse[level + 1], u, v) - left)
-                row = np.int32(left * steps + half)
-                if row < len(dimming) - 1:
-                    for k in range(3):
-                        rgb[y, x, k] = dimming[row, rgb[y, x, k]]
-
-
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "ninf", "nsz"})
-def _between(grid: np.ndarray, u: np.float32, v: np.float32) -> np.float32:
-    """Return the value of a grid at column u and row v, by bilinear interpolation."""
-    u, v = min(max(u, _ZERO), np.float32(grid.shape[1] - 1.001)), min(max(v, _ZERO), np.float32(grid.shape[0] - 1.001))
-    i, j = np.uint32(u), np.uint32(v)
-    u, v = u - np.float32(i), v - np.float32(j)
-    below = j + np.uint32(1)
-    one, two = grid[j, i], grid[below, i]
-    one += u * (grid[j, i + np.uint32(1)] - one)
-    two += u * (grid[below, i + np.uint32(1)] - two)
-    return one + v * (two - one)
-
-
-@njit(cache=True, error_model="numpy")
-def blocks_below(
-    triangle: np.ndarray,
-    inverse_depth: np.ndarray,
-    center: np.ndarray,
-    rays: np.ndarray,
-    origin: np.ndarray,
-    block: float,
-    rows: int,
-    columns: int,
-    highest: float,
-) -> np.ndarray:
-    """Return the block of a map of the floor that each pixel lies over, (h, w) uint16; the last index for none.
-
-    Args:
-        triangle: visible face or -1, (h, w) int32.
-        inverse_depth: inverse depth, 1/m, (h, w) float32.
-        center: camera centre in the world, (3,).
-        rays: see :func:`.shading_kernels.shade`.
-        origin: x and y of the corner of the map, (2,).
-        block: side of a block, metres.
-        rows: number of blocks along y.
-        columns: number of blocks along x.
-        highest: height above which nothing is shaded, metres.
-    """
-    height, width = triangle.shape
-    place = np.full((height, width), rows * columns, np.uint16)
-    for y in range(height):
-        for x in range(width):
-            if triangle[y, x] < 0:
-                continue
-            far = 1.0 / inverse_depth[y, x]
-            u = (center[0] + far * (rays[0, 0] * x + rays[0, 1] * y + rays[0, 2]) - origin[0]) / block
-            v = (center[1] + far * (rays[1, 0] * x + rays[1, 1] * y + rays[1, 2]) - origin[1]) / block
-            if center[2] + far * (rays[2, 0] * x + rays[2, 1] * y + rays[2, 2]) > highest:
-                continue
-            # The walls lie on the border of the map.
-            i, j = (
-                math.floor(u - 1e-3 if u > 0.5 * columns else u + 1e-3),
-                math.floor(v - 1e-3 if v > 0.5 * rows else v + 1e-3),
-            )
-            if 0 <= i < columns and 0 <= j < rows:
-                place[y, x] = j * columns + i
-    return place

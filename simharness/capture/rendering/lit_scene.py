@@ -17,13 +17,15 @@ from mvpose.camera import Camera
 from simharness.capture.rendering import tone
 from simharness.capture.rendering.backgrounds import Background, LitBackground
 from simharness.capture.rendering.capsule_kernels import capsules
-from simharness.capture.rendering.lit_kernels import blocks_below, dim, shade_lit
+from simharness.capture.rendering.dimming_kernels import dim, runs_below
+from simharness.capture.rendering.lit_kernels import shade_lit
 from simharness.capture.rendering.moving_light_kernels import moving_light
 from simharness.capture.rendering.panoramas import fill_empty
 from simharness.capture.rendering.room_light import RoomLight, last_light, room_light
 from simharness.capture.rendering.scene_geometry import SceneGeometry
 from simharness.capture.rendering.scene_topology import SceneTopology
 from simharness.capture.rendering.shadow_layer_kernels import BLOCK, cast, touched_blocks
+from simharness.capture.rendering.span_kernels import whole
 from simharness.capture.srgb import LUMINANCE
 from simharness.types.lighting import Lighting
 from simharness.types.mesh import Mesh
@@ -224,40 +226,42 @@ class LitScene:
         still, samples, grid = self.geometry.still, self.room.samples, Grid.of(self.room)
         if len(still.topology.faces):
             emission = still.topology.emission * self.room.exposure
+            seen = whole(*triangle.shape), triangle, background.corners
             self._shade(
-                still.topology, (triangle, background.corners), still.normals, rays, emission, self.room.light,
+                still.topology, seen, still.normals, rays, emission, self.room.light,
                 samples.corner_samples, samples.divisions, 0, rgb,
             )  # fmt: skip
         block, (rows, columns) = BLOCK * grid.cell, grid.blocks
-        place = blocks_below(
+        runs = runs_below(
             triangle, inverse_depth, camera.center, rays, grid.corner, block, rows, columns, float(_HEIGHTS[-1])
         )
-        background.lit = LitBackground(self.lighting, self.room, rgb, place, np.zeros((0, 0), np.float32))
+        nothing = np.zeros((0, 0), np.uint16), np.zeros((0, 0), np.float32)
+        background.lit = LitBackground(self.lighting, self.room, rgb, *nothing, runs)
         return background.lit
 
     def draw(
         self,
         lit: LitBackground,
-        seen: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float64]],
+        seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32], NDArray[np.float64]],
         camera: Camera,
         rays: NDArray[np.float64],
     ) -> NDArray[np.uint8]:
         """Return the picture, (h, w, 3): the background with the moving meshes and what they keep from it."""
         rgb, topology, samples = lit.rgb.copy(), self.geometry.topology, self._samples
-        triangle, inverse_depth, corners = seen
+        spans, triangle, inverse_depth, corners = seen
         first = topology.still[0]
         if first == len(topology.faces):
             return rgb
         grid, shadows = Grid.of(self.room), self.shadows
         if first:
             dim(
-                triangle, inverse_depth, first, lit.shadow_place, camera.center, rays, grid.corner, grid.cell,
+                inverse_depth, lit.runs, camera.center, rays, grid.corner, grid.cell,
                 shadows.fine, shadows.coarse, _HEIGHTS, shadows.touched, tone.dimming(), rgb,
             )  # fmt: skip
         emission = topology.emission[first:] * self.room.exposure
         divisions = np.ones(len(samples.corner_samples), np.int32)
         self._shade(
-            topology, (triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
+            topology, (spans, triangle, corners), self.geometry.normals, rays, emission, self.moving_light,
             samples.corner_samples, divisions, first, rgb,
         )  # fmt: skip
         return rgb
@@ -265,7 +269,7 @@ class LitScene:
     @staticmethod
     def _shade(
         topology: SceneTopology,
-        seen: tuple[NDArray[np.int32], NDArray[np.float64]],
+        seen: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]],
         normals: tuple[Floats, Floats],
         rays: NDArray[np.float64],
         emission: Floats,

@@ -70,6 +70,22 @@ def rasterise(
     """
     height, width = triangle.shape
     q, seen, codes = project_vertices(vertices, P, near, drawn, width, height)
+    draw_projected(faces, q, seen, codes, near, inverse_depth, triangle, first)
+    return q
+
+
+@njit(cache=True, error_model="numpy")
+def draw_projected(
+    faces: np.ndarray,
+    q: np.ndarray,
+    seen: np.ndarray,
+    codes: np.ndarray,
+    near: float,
+    inverse_depth: np.ndarray,
+    triangle: np.ndarray,
+    first: int,
+) -> None:
+    """Do the same with vertices that are projected already, see :func:`.vertex_kernels.project_vertices`."""
     tiles = (_SMALL // _TILE) ** 2
     hits, planes = np.empty((_CHUNK * tiles + 1, 4), np.int32), np.empty((_CHUNK * tiles + 1, 5))
     kept, work = np.empty(_CHUNK + 1, np.uint32), np.empty(_ROWS_OF_WORK * _CHUNK)
@@ -89,7 +105,6 @@ def rasterise(
             _fill(hits, planes, count, inverse_depth, triangle)
         large = lists[3, : _drop_hidden(lists[3, : counts[3]], faces, codes, seen, inverse_depth, blocks)]
         _draw(large, faces, q, seen, near, inverse_depth, triangle)
-    return q
 
 
 @njit(cache=True, error_model="numpy")
@@ -391,17 +406,3 @@ def _draw(
                 w = low if w < low else (high if w > high else w)
                 depths[x] = w if w > before else before
                 triangles[x] = label if w > before else other
-
-
-@njit(cache=True, error_model="numpy")
-def resolve(inverse_depth: np.ndarray, triangle: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return depth (h, w) float32, +inf without a face, and the label of the visible face, ``labels[-1]`` for none."""
-    height, width = triangle.shape
-    depth, seen = np.empty((height, width), np.float32), np.empty((height, width), labels.dtype)
-    last = np.uint32(len(labels) - 1)
-    for y in range(height):
-        for x in range(width):
-            depth[y, x] = np.float32(1.0) / inverse_depth[y, x]
-        for x in range(width):
-            seen[y, x] = labels[min(np.uint32(triangle[y, x]), last)]  # as unsigned, -1 is the largest index
-    return depth, seen
