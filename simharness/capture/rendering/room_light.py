@@ -36,6 +36,7 @@ _REACH = 15.0  # metres from the middle of the scene that probes cover at most
 _HIGHEST = 3.5  # metres
 _LUMINANCE = np.array(LUMINANCE)
 _PEOPLE = (0.2, 1.9)  # metres: heights at which the exposure is measured
+_SPECK = 6.0  # times the mean radiance of all surfaces: what is brighter counts as much
 _KEPT = 2
 
 
@@ -128,7 +129,7 @@ def _computed(
         direct[inside], found[inside] = direct[nearest], found[nearest]
     light = direct
     for _ in range(_BOUNCES):
-        light = direct + gathered(found, _REFLECTED * samples.albedo * light[stands_for], sky)
+        light = direct + gathered(found, _reflected(samples, light[stands_for]), sky)
     everywhere = np.concatenate([samples.places, _TURN * samples.normals], axis=1)
     away, nearest = cKDTree(sites).query(everywhere, k=min(3, len(sites)))
     weight = (1 / (away.reshape(len(everywhere), -1) ** 2 + 1e-6)).astype(np.float32)[..., None]
@@ -137,6 +138,17 @@ def _computed(
     light, direct = ((weight * part[nearest]).sum(axis=1) / scale for part in (light, direct))
     light = direct + _smoothed(samples, light - direct)
     return _exposed(sources, samples, light, _probes(sources, samples, light, vertices, lights, sky, tree, surface))
+
+
+def _reflected(samples: LightSamples, light: Floats) -> Floats:
+    """Return the radiance (n, 3) of surfaces in a light (n, 3), without that of specks that are far brighter than most.
+
+    Few rays meet a speck, such as the sill of a window beside its light; it would show as streaks on the floor.
+    """
+    radiance = _REFLECTED * samples.albedo * light
+    bright = radiance @ np.array(_LUMINANCE, np.float32)
+    most = _SPECK * float(bright.mean()) / np.maximum(bright, 1e-9)
+    return np.asarray(radiance * np.minimum(most, 1.0)[:, None], np.float32)
 
 
 def _few(samples: LightSamples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -227,7 +239,7 @@ def _probes(
     places = (low + grid * step).reshape(-1, 3)
     ways = _sphere(_AIR_RAYS)
     found = met(places, np.zeros_like(places), ways, *tree, *surface)
-    every, straight, shares = probe_light(places, found, ways, _REFLECTED * samples.albedo * light, sky, *lights, *tree)
+    every, straight, shares = probe_light(places, found, ways, _reflected(samples, light), sky, *lights, *tree)
     inside = (found == DARK).mean(axis=1) > _INSIDE
     shape = tuple(counts)
     filled = [

@@ -24,7 +24,7 @@ from simharness.world.scene.rooms.weather import Weather
 
 WHITE = 2.5
 """Radiance that white in the picture stands for."""
-LOWEST = float(np.radians(-6.0))
+LOWEST = float(np.radians(-40.0))
 """Elevation of the lower edge, radians."""
 _WIDTH = 4096  # pixels around the horizon: 0.09 degrees each
 _COARSER = 2  # pixels of the picture along each side of one of the sky
@@ -63,7 +63,7 @@ def draw_panorama(seed: int, weather: Weather, ground: Vector) -> NDArray[np.uin
     things += [(float(far), "house") for far in rng.uniform(110, 300, 22)]
     for far, kind in sorted(things, reverse=True):
         (_tree if kind == "tree" else _house)(view, rng, far)
-    strip = view.picture[view.row(np.radians(24.0)) :]
+    strip = view.picture[view.row(np.radians(24.0)) : view.row(np.radians(-6.0))]
     strip[:] = cv2.GaussianBlur(strip, (0, 0), 0.6)
     return view.picture
 
@@ -198,12 +198,13 @@ def _woods(view: _View, rng: np.random.Generator) -> None:
 
 def _ground(view: _View, rng: np.random.Generator, albedo: Vector) -> None:
     """Draw level ground up to the horizon, with stripes of fields in the distance."""
-    first = view.row(0.0)
-    for row in range(first, len(view.picture)):
+    first, near = view.row(0.0), view.row(np.radians(-3.0))
+    for row in range(first, near):
         far = _EYE / np.tan(max((row - first + 0.5) / view.scale, 1e-3))
         view.picture[row] = np.repeat(
             [view.color(albedo, 1.0, min(far, 3000.0), column) for column in range(0, _WIDTH, 128)], 128, axis=0
         )
+    view.picture[near:] = view.picture[near - 1]
     land = view.picture[first:]
     patches = smooth_noise(rng, land.shape[:2], 256, across=8) + 0.6 * smooth_noise(rng, land.shape[:2], 48, across=3)
     land[:] = np.clip(land * (1 + 0.04 * patches)[..., None], 0, 255).astype(np.uint8)
